@@ -1,0 +1,87 @@
+# Every target sets up what it needs in $(VENV); nothing outside this folder is touched.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+
+# Empty files in $(VENV) that say what it holds: the package, what the derivation needs, what the tests need.
+PACKAGE := $(VENV)/package.stamp
+DERIVE := $(VENV)/derive.stamp
+TESTS := $(VENV)/tests.stamp
+SOURCES := $(wildcard csrc/*.c csrc/*.h csrc/build.py generated/*.h) pyproject.toml setup.py
+PREREQUISITES := @sh .ci/prerequisites $(PYTHON)
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+
+SANITIZE := -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+SANITIZED := build/sanitized
+
+.DEFAULT_GOAL := help
+.NOTPARALLEL:
+.PHONY: help demo test test-all check regenerate bench lint sanitize clean
+
+help:
+	@echo "make demo        calibrate a simulated machine from beginning to end"
+	@echo "make test        run the tests"
+	@echo "make test-all    run the tests, the slow ones too"
+	@echo "make regenerate  derive the formulas again and write generated/"
+	@echo "make check       fail if 'make regenerate' would change anything"
+	@echo "make bench       run the benchmarks"
+	@echo "make lint        run ruff and mypy"
+	@echo "make sanitize    run the tests on a core built with the address and UB sanitizers"
+	@echo "make clean       remove what was built, $(VENV) too"
+	@echo "PYTHON=$(PYTHON) and VENV=$(VENV) can be set on the command line."
+
+demo: $(PACKAGE)
+	$(BIN)/pkmcal demo
+
+test: $(TESTS)
+	$(BIN)/pytest -m "not slow"
+
+test-all: $(TESTS)
+	$(BIN)/pytest
+
+check: $(DERIVE)
+	$(BIN)/python -m derive --check
+
+# needs no compiled core: it can mend a generated file that does not compile
+regenerate: $(DERIVE)
+	$(BIN)/python -m derive
+
+bench: $(TESTS)
+	$(BIN)/pytest --benchmark-only benchmarks
+
+lint: $(TESTS)
+	$(BIN)/ruff check
+	$(BIN)/mypy
+
+# A copy of the package in a folder of its own, found before the one in $(VENV). Without the preloaded
+# runtime and Python's plain malloc the sanitizer misses overflows of arrays.
+sanitize: $(TESTS)
+	rm -rf $(SANITIZED) build/lib.* build/temp.*
+	CFLAGS="$(SANITIZE)" LDFLAGS="$(SANITIZE)" $(PIP) install --no-build-isolation --no-deps --target $(SANITIZED) .
+	rm -rf build/lib.* build/temp.*
+	PYTHONPATH=$(CURDIR)/$(SANITIZED) PYTHONMALLOC=malloc ASAN_OPTIONS=detect_leaks=0 \
+	LD_PRELOAD="$$($${CC:-gcc} -print-file-name=libasan.so)" $(BIN)/pytest -m "not slow" tests
+
+clean:
+	rm -rf $(VENV) build dist *.egg-info pkmcal/*.so .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +
+
+# An environment without pip is half-made (no python3-venv, or interrupted): it goes.
+$(BIN)/pip:
+	@rm -rf $(VENV)
+	$(PREREQUISITES)
+	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+$(PACKAGE): $(SOURCES) | $(BIN)/pip
+	$(PREREQUISITES)
+	$(PIP) install --editable .
+	@touch $@
+
+$(TESTS): $(SOURCES) | $(BIN)/pip
+	$(PREREQUISITES)
+	$(PIP) install --editable ".[test,lint]"
+	@touch $@ $(PACKAGE)
+
+$(DERIVE): | $(BIN)/pip
+	$(PIP) install sympy
+	@touch $@

@@ -1,0 +1,129 @@
+/* The flat interface: checks the call, picks the ISA, and hands over. */
+#include "pkmcal.h"
+#include "core_table.h"
+#include "names.h"
+
+const char *pkm_slot_names(void) { return SLOT_NAMES; }
+const char *pkm_driver_names(void) { return DRIVER_NAMES; }
+const char *pkm_row_names(void) { return ROW_NAMES; }
+const char *pkm_map_names(void) { return MAP_NAMES; }
+const char *pkm_map_free(void) { return MAP_FREE; }
+
+int pkm_best_isa(void)
+{
+#ifdef __x86_64__
+    __builtin_cpu_init();
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq")
+        && __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512cd")
+        && __builtin_cpu_supports("avx512vl"))
+        return 2;
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")
+        && __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2"))
+        return 1;
+#endif
+    return 0;
+}
+
+static const pkm_core *core(int isa)
+{
+    if (isa < 0 || isa > pkm_best_isa()) return NULL;
+#ifdef __x86_64__
+    if (isa == 2) return &pkm_v4;
+    if (isa == 1) return &pkm_v3;
+#endif
+    return &pkm_base;
+}
+
+/* The number of closure rows, or 0 for a machine the core cannot take. */
+static int closure_count(const pkm_machine *machine)
+{
+    int rows = 0, free = 0;
+#define CASE(NAME, name, M) if (machine->map == MAP_##NAME) free = M;
+    EACH_MAP(CASE)
+#undef CASE
+    if (!free || machine->limbs < 1 || machine->limbs > PKM_MAX_LIMBS || !(machine->length > 0)
+        || machine->actuators < 1 || machine->actuators > machine->limbs)
+        return 0;
+    for (int i = 0; i < machine->limbs; i++) {
+        if (machine->driver[i] < DRIVER_LENGTH || machine->driver[i] > DRIVER_CRANK
+            || machine->actuator[i] < 0 || machine->actuator[i] >= machine->actuators
+            || machine->rows[i] & ~(ROW_BASE_PLANE | ROW_PLATFORM_PLANE | ROW_COUPLE)
+            || (machine->rows[i] && machine->driver[i] != DRIVER_LENGTH))
+            return 0;
+        rows += 1 + __builtin_popcount((unsigned)machine->rows[i]);
+    }
+    return rows >= free && rows <= PKM_MAX_ROWS ? rows : 0;
+}
+
+#define CHECKED(isa)                                                                              \
+    const pkm_core *chosen = core(isa);                                                           \
+    if (!chosen) return PKM_BAD_ISA
+
+#define CHECKED_MACHINE(machine, isa)                                                             \
+    CHECKED(isa);                                                                                 \
+    if (!closure_count(machine)) return PKM_BAD_MACHINE
+
+int pkm_inverse(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                ptrdiff_t geometry_stride, const double *pose, double *q)
+{
+    CHECKED_MACHINE(machine, isa);
+    chosen->inverse(machine, n, geometry, geometry_stride, pose, q);
+    return 0;
+}
+
+int pkm_forward(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                ptrdiff_t geometry_stride, const double *q, const double *guess,
+                ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
+                double *residual)
+{
+    CHECKED_MACHINE(machine, isa);
+    chosen->forward(machine, n, geometry, geometry_stride, q, guess, guess_stride, pose, status,
+                    iterations, residual);
+    return 0;
+}
+
+int pkm_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                 ptrdiff_t geometry_stride, const double *pose, double *jacobian)
+{
+    CHECKED_MACHINE(machine, isa);
+    chosen->jacobian(machine, n, geometry, geometry_stride, pose, jacobian);
+    return 0;
+}
+
+int pkm_forward_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                         ptrdiff_t geometry_stride, const double *pose, const double *q,
+                         double *jacobian)
+{
+    CHECKED_MACHINE(machine, isa);
+    chosen->response(machine, n, geometry, geometry_stride, pose, q, NULL, machine->actuators,
+                     jacobian);
+    return 0;
+}
+
+int pkm_error_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                       ptrdiff_t geometry_stride, const double *pose, const double *q,
+                       const int32_t *column, int columns, double *jacobian)
+{
+    CHECKED_MACHINE(machine, isa);
+    for (int c = 0; c < columns; c++)
+        if (column[c] < 0 || column[c] >= SLOTS * machine->limbs || (c && column[c] <= column[c - 1]))
+            return PKM_BAD_COLUMN;
+    chosen->response(machine, n, geometry, geometry_stride, pose, q, column, columns, jacobian);
+    return 0;
+}
+
+int pkm_tpr2tps_lengths(int isa, ptrdiff_t n, const double *size, const double *free,
+                        double *lengths)
+{
+    CHECKED(isa);
+    chosen->tpr2tps(n, size, free, lengths, NULL);
+    return 0;
+}
+
+int pkm_tpr2tps_jacobian(int isa, ptrdiff_t n, const double *size, const double *free,
+                         double *jacobian)
+{
+    CHECKED(isa);
+    chosen->tpr2tps(n, size, free, NULL, jacobian);
+    return 0;
+}

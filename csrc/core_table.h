@@ -1,0 +1,24 @@
+/* What each ISA's core offers to the flat interface (the same arguments, already checked). */
+#ifndef CORE_TABLE_H
+#define CORE_TABLE_H
+
+#include "pkmcal.h"
+
+typedef struct {
+    void (*inverse)(const pkm_machine *, ptrdiff_t n, const double *geometry, ptrdiff_t stride,
+                    const double *pose, double *q);
+    void (*forward)(const pkm_machine *, ptrdiff_t n, const double *geometry, ptrdiff_t stride,
+                    const double *q, const double *guess, ptrdiff_t guess_stride, double *pose,
+                    int32_t *status, int32_t *iterations, double *residual);
+    void (*jacobian)(const pkm_machine *, ptrdiff_t n, const double *geometry, ptrdiff_t stride,
+                     const double *pose, double *jacobian);
+    void (*response)(const pkm_machine *, ptrdiff_t n, const double *geometry, ptrdiff_t stride,
+                     const double *pose, const double *q, const int32_t *column, int columns,
+                     double *jacobian);
+    void (*tpr2tps)(ptrdiff_t n, const double *size, const double *free, double *lengths,
+                    double *jacobian);
+} pkm_core;
+
+extern const pkm_core pkm_base, pkm_v3, pkm_v4;
+
+#endif

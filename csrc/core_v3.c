@@ -1,0 +1,14 @@
+/* The core for x86-64-v3 (AVX2): 256-bit lanes. Empty elsewhere. */
+#ifdef __x86_64__
+#ifdef __clang__
+#pragma clang attribute push(__attribute__((target("arch=x86-64-v3"))), apply_to = function)
+#else
+#pragma GCC target("arch=x86-64-v3")
+#endif
+#define LANES 4
+#define CORE pkm_v3
+#include "core.h"
+#ifdef __clang__
+#pragma clang attribute pop
+#endif
+#endif

@@ -1,0 +1,14 @@
+/* The core for x86-64-v4 (AVX-512): 512-bit lanes. Empty elsewhere. */
+#ifdef __x86_64__
+#ifdef __clang__
+#pragma clang attribute push(__attribute__((target("arch=x86-64-v4"))), apply_to = function)
+#else
+#pragma GCC target("arch=x86-64-v4")
+#endif
+#define LANES 8
+#define CORE pkm_v4
+#include "core.h"
+#ifdef __clang__
+#pragma clang attribute pop
+#endif
+#endif

@@ -1,0 +1,78 @@
+/* The flat C interface of the core: what `pkmcal._core` offers to Python.
+ *
+ * Every call takes n rows, contiguous, row by row. It returns 0, or a negative number for a bad
+ * call, in which case nothing was written. No memory is allocated and no state is kept.
+ * `geometry` holds limbs x SLOTS numbers; `geometry_stride` is 0 where all rows share it, else the
+ * distance from one row's geometry to the next. `isa` is 0 (baseline), 1 (AVX2) or 2 (AVX-512).
+ */
+#ifndef PKMCAL_H
+#define PKMCAL_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* cffi begin */
+enum { PKM_MAX_LIMBS = 12, PKM_MAX_ROWS = 24 };
+enum { PKM_OK, PKM_NOT_CONVERGED, PKM_SINGULAR, PKM_INFEASIBLE, PKM_INVALID };
+enum { PKM_BAD_ISA = -1, PKM_BAD_MACHINE = -2, PKM_BAD_COLUMN = -3 };
+
+/* A machine: its pose map and its limbs, without the numbers that calibration changes. */
+typedef struct {
+    int map;                        /* MAP_... */
+    int limbs;                      /* how many, at most PKM_MAX_LIMBS */
+    int actuators;
+    double length;                  /* characteristic length [mm]: rotations times it are mm */
+    int driver[12];                 /* DRIVER_... of each limb */
+    int rows[12];                   /* set of ROW_... beside the sphere */
+    int actuator[12];               /* which actuator drives the limb */
+    double branch[12];              /* +1 or -1 for slider and crank */
+    double frame[108];              /* base-side axis frame of each limb, 3 x 3 row by row */
+    double platform_frame[108];     /* platform-side axis frame of each limb */
+    double lever[12];               /* of the couple row [mm] */
+    double weight[24];              /* of each row, in row order; 1 where rows = free coordinates */
+} pkm_machine;
+
+const char *pkm_slot_names(void);
+const char *pkm_driver_names(void);
+const char *pkm_row_names(void);
+const char *pkm_map_names(void);
+const char *pkm_map_free(void);
+
+/* The best ISA of this processor. */
+int pkm_best_isa(void);
+
+/* pose (n, 6) -> q (n, actuators); a row a limb cannot reach is NaN. */
+int pkm_inverse(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                ptrdiff_t geometry_stride, const double *pose, double *q);
+
+/* q (n, actuators), guess (6 or n x 6 by guess_stride) -> pose (n, 6), status, iterations and the
+ * closure residual [mm] of each row. */
+int pkm_forward(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                ptrdiff_t geometry_stride, const double *q, const double *guess,
+                ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
+                double *residual);
+
+/* pose (n, 6) -> dq/dfree (n, actuators, m), limb by limb. */
+int pkm_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                 ptrdiff_t geometry_stride, const double *pose, double *jacobian);
+
+/* pose (n, 6), q (n, actuators) -> dpose/dq (n, 6, actuators). */
+int pkm_forward_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                         ptrdiff_t geometry_stride, const double *pose, const double *q,
+                         double *jacobian);
+
+/* pose (n, 6), q (n, actuators) -> dpose/d(numbers) (n, 6, columns) at held actuators;
+ * columns are indices into limbs x SLOTS. */
+int pkm_error_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                       ptrdiff_t geometry_stride, const double *pose, const double *q,
+                       const int32_t *column, int columns, double *jacobian);
+
+/* 2TPR&2TPS in closed form: size a b c d e f, free (n, 4) = y z alpha beta -> lengths (n, 4) of
+ * eq. 8, and their derivatives (n, 4, 4) of eq. 12. */
+int pkm_tpr2tps_lengths(int isa, ptrdiff_t n, const double *size, const double *free,
+                        double *lengths);
+int pkm_tpr2tps_jacobian(int isa, ptrdiff_t n, const double *size, const double *free,
+                         double *jacobian);
+/* cffi end */
+
+#endif

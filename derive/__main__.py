@@ -1,0 +1,108 @@
+"""``python -m derive`` writes ``generated/``; with ``--check`` it compares and changes nothing."""
+
+from __future__ import annotations
+
+import argparse
+import difflib
+import hashlib
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from . import elementary, limbs, posemaps, tpr2tps
+from .emit import Function
+
+HERE = Path(__file__).parent
+GENERATED = HERE.parent / "generated"
+PROGRAM = "python -m derive"
+
+
+def headers() -> dict[str, str]:
+    """Name and text of every generated header."""
+    return {
+        "names.h": _header("limbs", _names()),
+        "elementary.h": _header("elementary", elementary.emit()),
+        "limbs.h": _header("limbs", _functions(limbs.functions())),
+        "posemaps.h": _header("posemaps", _functions(posemaps.functions())),
+        "tpr2tps.h": _header("tpr2tps", _functions(tpr2tps.functions())),
+    }
+
+
+def _names() -> str:
+    """What C and Python call the numbers of a limb, its drivers and rows, and the pose maps."""
+    def enum(prefix: str, names: Iterable[str]) -> str:
+        return "enum { " + ", ".join(prefix + name.upper() for name in names) + " };"
+
+    maps = posemaps.MAPS
+    lines = [
+        "/* the numbers of one limb, in the order of the core */",
+        enum("", [*limbs.CONSTANTS, "SLOTS"]),
+        f'#define SLOT_NAMES "{" ".join(limbs.SLOTS)}"',
+        enum("DRIVER_", [driver.name for driver in limbs.DRIVERS]),
+        f'#define DRIVER_NAMES "{" ".join(driver.name for driver in limbs.DRIVERS)}"',
+        "/* constraint rows beside the sphere: bits of a set */",
+        *(f"#define ROW_{row.name.upper()} {1 << i}" for i, row in enumerate(limbs.CONSTRAINTS)),
+        f'#define ROW_NAMES "{" ".join(row.name for row in limbs.CONSTRAINTS)}"',
+        "/* pose maps: m free coordinates, iterated on a state */",
+        enum("MAP_", [pose_map.name for pose_map in maps]),
+        f'#define MAP_NAMES "{" ".join(pose_map.name for pose_map in maps)}"',
+        f'#define MAP_FREE "{";".join(" ".join(pose_map.free) for pose_map in maps)}"',
+        f"#define MAX_STATE {max(pose_map.state_size for pose_map in maps)}",
+        "#define EACH_MAP(X) " + " ".join(
+            f"X({pose_map.name.upper()}, {pose_map.name}, {pose_map.m})" for pose_map in maps),
+        "",
+    ]  # fmt: skip
+    return "\n".join(lines)
+
+
+def _functions(functions: list[Function]) -> str:
+    return "\n".join(function.emit() for function in functions)
+
+
+def _header(module: str, body: str) -> str:
+    """The file's first lines: where it comes from, and the hash of the derivation behind it."""
+    sources = sorted({HERE / "emit.py", HERE / "rotation.py", HERE / f"{module}.py"})
+    text = "".join(path.read_text(encoding="utf-8") for path in sources)
+    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
+    return (
+        f"/* Generated from derive/{module}.py by `{PROGRAM}`; never edited by hand.\n"
+        f" * derivation {digest}\n"
+        " * `real` is a number or a lane of numbers, FN(name) the function for that type. */\n\n"
+        f"{body}"
+    )
+
+
+def differences(folder: Path = GENERATED) -> str:
+    """Unified diff between what is checked in and what the derivation gives; empty when equal."""
+    lines: list[str] = []
+    fresh = headers()
+    for name in sorted(set(fresh) | {path.name for path in folder.glob("*.h")}):
+        path = folder / name
+        old = path.read_text(encoding="utf-8") if path.exists() else ""
+        lines += difflib.unified_diff(
+            old.splitlines(keepends=True),
+            fresh.get(name, "").splitlines(keepends=True),
+            f"generated/{name} (checked in)",
+            f"generated/{name} (derived)",
+        )
+    return "".join(lines)
+
+
+def main() -> int:
+    """Write, or compare with ``--check``: exit code 1 and the diff where they differ."""
+    parser = argparse.ArgumentParser(prog=PROGRAM, description=__doc__)
+    parser.add_argument("--check", action="store_true", help="compare only, change nothing")
+    if parser.parse_args().check:
+        diff = differences()
+        if diff:
+            print(f"{diff}\ngenerated/ is out of date: run `{PROGRAM}`", file=sys.stderr)
+        return 1 if diff else 0
+    GENERATED.mkdir(exist_ok=True)
+    for name, text in headers().items():
+        (GENERATED / name).write_text(text, encoding="utf-8")
+        print(f"generated/{name}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

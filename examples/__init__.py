@@ -1,0 +1,1 @@
+"""Runnable cases with their data."""

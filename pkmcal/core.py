@@ -1,0 +1,269 @@
+"""The compiled core as Python sees it: its names, its ISA, its machines, and rows in threads."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pkmcal._core import ffi, lib
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+
+def _text(pointer: Any) -> str:
+    return ffi.string(pointer).decode()
+
+
+# One source for these: the derivation, by way of the core.
+SLOTS: tuple[str, ...] = tuple(_text(lib.pkm_slot_names()).split())
+DRIVERS: tuple[str, ...] = tuple(_text(lib.pkm_driver_names()).split())
+ROWS: tuple[str, ...] = tuple(_text(lib.pkm_row_names()).split())
+MAPS: dict[str, tuple[str, ...]] = {
+    name: tuple(free.split())
+    for name, free in zip(
+        _text(lib.pkm_map_names()).split(), _text(lib.pkm_map_free()).split(";"), strict=True
+    )
+}
+POSE = ("x", "y", "z", "alpha", "beta", "gamma")
+MAX_LIMBS: int = lib.PKM_MAX_LIMBS
+ISAS = ("base", "avx2", "avx512")
+STATUS = {
+    lib.PKM_OK: "ok",
+    lib.PKM_NOT_CONVERGED: "not converged",
+    lib.PKM_SINGULAR: "singular",
+    lib.PKM_INFEASIBLE: "infeasible",
+    lib.PKM_INVALID: "invalid input",
+}
+ROWS_PER_THREAD = 10_000  # fewer do not pay for a thread
+
+
+def _default_isa() -> int:
+    wanted = os.environ.get("PKMCAL_ISA")
+    if not wanted:
+        return int(lib.pkm_best_isa())
+    if wanted not in ISAS:
+        raise ValueError(f"PKMCAL_ISA must be one of {', '.join(ISAS)}, found {wanted!r}")
+    if ISAS.index(wanted) > lib.pkm_best_isa():
+        raise ValueError(f"PKMCAL_ISA={wanted}: this processor has no {wanted}")
+    return ISAS.index(wanted)
+
+
+ISA = _default_isa()
+
+
+def as_rows(name: str, array: ArrayLike, width: int) -> tuple[FloatArray, tuple[int, ...]]:
+    """Numbers (..., width) as contiguous float64 rows (N, width), and the leading shape.
+
+    Raises
+    ------
+    TypeError
+        Not numbers.
+    ValueError
+        Another last axis.
+    """
+    given = np.asarray(array)
+    if given.dtype.kind not in "iuf":
+        raise TypeError(f"{name} must be an array of numbers, found dtype {given.dtype}")
+    if given.ndim == 0 or given.shape[-1] != width:
+        raise ValueError(f"{name} must have shape (..., {width}), found {given.shape}")
+    rows = np.ascontiguousarray(given, dtype=np.float64).reshape(-1, width)
+    return rows, given.shape[:-1]
+
+
+def pointer(array: FloatArray, start: int = 0) -> Any:
+    """C pointer to row `start` of a contiguous float64 array."""
+    return ffi.from_buffer("double *", array if start == 0 else array[start:])
+
+
+def int_pointer(array: IntArray, start: int = 0) -> Any:
+    """C pointer to entry `start` of a contiguous int32 array."""
+    return ffi.from_buffer("int32_t *", array if start == 0 else array[start:])
+
+
+def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) -> None:
+    """Run ``call(start, stop)`` over contiguous parts of the rows, one thread each.
+
+    Parameters
+    ----------
+    call : callable
+        Returns the core's code: 0, or negative for a bad call.
+    rows : int
+        Number of rows.
+    threads : int or None
+        None takes as many as pay.
+    """
+    if threads is None:
+        threads = min(len(os.sched_getaffinity(0)), rows // ROWS_PER_THREAD)
+    elif isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
+        raise ValueError(f"threads must be a whole number from 1 or None, found {threads!r}")
+    edges = [rows * k // max(threads, 1) for k in range(max(threads, 1) + 1)]
+    codes: list[int] = []
+    others = [
+        threading.Thread(target=lambda a=a, b=b: codes.append(call(a, b)))
+        for a, b in zip(edges[1:-1], edges[2:], strict=True)
+    ]
+    for thread in others:
+        thread.start()
+    codes.append(call(edges[0], edges[1]))
+    for thread in others:
+        thread.join()
+    if min(codes) < 0:
+        raise ValueError(f"the core refused the call (code {min(codes)})")
+
+
+def tpr2tps_lengths(size: FloatArray, free: FloatArray, out: FloatArray) -> int:
+    """Eq. 8 in closed form: `free` (N, 4) to lengths `out` (N, 4)."""
+    return lib.pkm_tpr2tps_lengths(ISA, len(free), pointer(size), pointer(free), pointer(out))
+
+
+def tpr2tps_jacobian(size: FloatArray, free: FloatArray, out: FloatArray) -> int:
+    """Eq. 12 in closed form: `free` (N, 4) to derivatives `out` (N, 4, 4)."""
+    return lib.pkm_tpr2tps_jacobian(ISA, len(free), pointer(size), pointer(free), pointer(out))
+
+
+class Machine:
+    """A machine in the core: what of a robot does not change with its geometry.
+
+    Parameters
+    ----------
+    map : str
+        A key of `MAPS`.
+    limbs : list of dict
+        Of each limb: driver, rows (names), actuator, branch, frame, platform_frame (3, 3), lever,
+        weights of the sphere row and the other rows.
+    length : float
+        Characteristic length, mm.
+    isa : int
+        Index into `ISAS`.
+    """
+
+    def __init__(self, map: str, limbs: list[dict[str, Any]], length: float, isa: int = ISA):
+        struct = ffi.new("pkm_machine *")
+        struct.map = list(MAPS).index(map)
+        struct.limbs = len(limbs)
+        struct.actuators = 1 + max(limb["actuator"] for limb in limbs)
+        struct.length = length
+        weights: list[float] = []
+        for i, limb in enumerate(limbs):
+            struct.driver[i] = DRIVERS.index(limb["driver"])
+            struct.rows[i] = sum(1 << ROWS.index(row) for row in limb["rows"])
+            struct.actuator[i] = limb["actuator"]
+            struct.branch[i] = limb["branch"]
+            struct.lever[i] = limb["lever"]
+            for k in range(9):
+                struct.frame[9 * i + k] = limb["frame"].flat[k]
+                struct.platform_frame[9 * i + k] = limb["platform_frame"].flat[k]
+            weights += limb["weights"]
+        for r, weight in enumerate(weights):
+            struct.weight[r] = weight
+        self.struct = struct
+        self.isa = isa
+        self.actuators: int = struct.actuators
+        self.m = len(MAPS[map])
+
+    def inverse(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """Poses (N, 6) to actuator coordinates (N, n)."""
+        q = np.empty((len(pose), self.actuators))
+        if len(pose):
+            self._ensure(
+                lib.pkm_inverse(
+                    self.struct, self.isa, len(pose), pointer(slots), 0, pointer(pose), pointer(q)
+                )
+            )
+        return q
+
+    def forward(
+        self, slots: FloatArray, q: FloatArray, guess: FloatArray, threads: int | None
+    ) -> tuple[FloatArray, IntArray, IntArray, FloatArray]:
+        """Actuator coordinates (N, n) to pose, status, iterations and residual.
+
+        `slots` is one geometry (limbs, SLOTS), or one per row (N, limbs, SLOTS); `guess` (6,) or
+        (N, 6).
+        """
+        n = len(q)
+        pose, residual = np.empty((n, 6)), np.empty(n)
+        status, iterations = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
+        slot_stride = slots[0].size if slots.ndim == 3 else 0
+        guess_stride = 6 if guess.ndim == 2 else 0
+
+        def call(start: int, stop: int) -> int:
+            return lib.pkm_forward(
+                self.struct,
+                self.isa,
+                stop - start,
+                pointer(slots, start if slot_stride else 0),
+                slot_stride,
+                pointer(q, start),
+                pointer(guess, start if guess_stride else 0),
+                guess_stride,
+                pointer(pose, start),
+                int_pointer(status, start),
+                int_pointer(iterations, start),
+                pointer(residual, start),
+            )
+
+        if n:
+            in_threads(call, n, threads)
+        return pose, status, iterations, residual
+
+    def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """∂q/∂free at poses (N, 6): (N, n, m)."""
+        out = np.empty((len(pose), self.actuators, self.m))
+        if len(pose):
+            self._ensure(
+                lib.pkm_jacobian(
+                    self.struct, self.isa, len(pose), pointer(slots), 0, pointer(pose), pointer(out)
+                )
+            )
+        return out
+
+    def forward_jacobian(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
+        """∂pose/∂q at poses (N, 6): (N, 6, n)."""
+        out = np.empty((len(pose), 6, self.actuators))
+        if len(pose):
+            self._ensure(
+                lib.pkm_forward_jacobian(
+                    self.struct,
+                    self.isa,
+                    len(pose),
+                    pointer(slots),
+                    0,
+                    pointer(pose),
+                    pointer(q),
+                    pointer(out),
+                )
+            )
+        return out
+
+    def error_jacobian(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, columns: IntArray
+    ) -> FloatArray:
+        """∂pose/∂(numbers at `columns` of the flattened slots): (N, 6, columns)."""
+        out = np.empty((len(pose), 6, len(columns)))
+        if out.size:
+            self._ensure(
+                lib.pkm_error_jacobian(
+                    self.struct,
+                    self.isa,
+                    len(pose),
+                    pointer(slots),
+                    0,
+                    pointer(pose),
+                    pointer(q),
+                    int_pointer(columns),
+                    len(columns),
+                    pointer(out),
+                )
+            )
+        return out
+
+    @staticmethod
+    def _ensure(code: int) -> None:
+        if code < 0:
+            raise ValueError(f"the core refused the call (code {code})")

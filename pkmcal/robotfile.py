@@ -1,0 +1,235 @@
+"""Robot files: TOML in, `Model` out, and back to the last bit."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal.geometry import Geometry
+from pkmcal.limb_kinds import KINDS, MAP_COORDINATES, Unit
+from pkmcal.model import COORDINATES, Limb, Model
+from pkmcal.robotfile_limbs import Parameters, read_limbs
+from pkmcal.robotfile_write import text_of
+from pkmcal.suggest import did_you_mean
+from pkmcal.toml_table import ANGLE_UNITS, LENGTH_UNITS, Table, Units, shown
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
+
+FloatArray = NDArray[np.float64]
+
+TOP = ("name", "units", "frames", "pose", "parameters", "calibration", "stated", "limb")
+
+
+def builtin_names() -> tuple[str, ...]:
+    """Names of the built-in machines."""
+    folder = resources.files("pkmcal") / "machines"
+    names = (entry.name for entry in folder.iterdir())
+    return tuple(sorted(name[: -len(".toml")] for name in names if name.endswith(".toml")))
+
+
+def read(robot: str | os.PathLike[str]) -> Model:
+    """Read a robot file or a built-in machine.
+
+    Parameters
+    ----------
+    robot : str or path
+        The name of a built-in machine, or a file.
+
+    Returns
+    -------
+    Model
+        What the file says, in mm and rad.
+
+    Raises
+    ------
+    ValueError
+        An unknown name, or a mistake in the file: one line with the file, the table, the key and
+        what was found.
+    FileNotFoundError
+        No such file.
+    TypeError
+        `robot` is neither text nor a path.
+
+    Examples
+    --------
+    >>> read("hexapod").map
+    'spatial'
+    """
+    if not isinstance(robot, str | os.PathLike):
+        raise TypeError(f"robot must be a name or a path, found {robot!r}")
+    if isinstance(robot, str) and robot in (known := builtin_names()):
+        resource = resources.files("pkmcal") / "machines" / f"{robot}.toml"
+        return parse(resource.read_bytes(), f"built-in machine {robot}", None)
+    path = Path(robot)
+    if path.is_file():
+        return parse(path.read_bytes(), str(path), str(path))
+    if path.is_dir():
+        raise ValueError(f"{path}: this is a folder, not a robot file")
+    if isinstance(robot, str) and path.name == robot and not path.suffix:
+        raise ValueError(f"unknown machine {robot!r}{did_you_mean(robot, known)}")
+    near = (each.name for each in path.parent.glob("*.toml"))
+    raise FileNotFoundError(f"{path}: no such file{did_you_mean(path.name, near, listed=0)}")
+
+
+def write(model: Model, path: str | os.PathLike[str]) -> None:
+    """Write a robot file in mm and rad, which `read` reads back to the last bit.
+
+    The file is complete or untouched: it is written beside its place and then moved there.
+
+    Parameters
+    ----------
+    model : Model
+        The robot.
+    path : str or path
+        Where to write; an existing file is replaced.
+
+    Raises
+    ------
+    OSError
+        The folder does not exist or cannot be written.
+    """
+    path = Path(path)
+    text = text_of(model)
+    if not path.parent.is_dir():
+        raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        os.replace(part, path)
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def parse(content: bytes, place: str, file: str | None) -> Model:
+    """Make a model of a robot file's content; `place` stands before every message."""
+    try:
+        data = tomllib.loads(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{place}: not a text file in UTF-8 (byte {error.start})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ValueError(f"{place}: not valid TOML: {error}") from None
+
+    top = Table(data, place, "", Units())
+    top.only(TOP)
+    units = _read_units(_section(top, "units"))
+    top = Table(data, place, "", units)
+    parameters = Parameters(_section(top, "parameters", optional=True))
+    limbs = read_limbs(list(_limb_tables(top)), parameters)
+    values = parameters.finish([number.name for number in limbs.numbers])
+    geometry = Geometry(limbs.numbers, parameters.ordered_units(), limbs.values | values)
+
+    pose = _section(top, "pose")
+    pose.only(("map", "home", "match"))
+    pose_map = pose.choice("map", MAP_COORDINATES, "pose map")
+    _check_rows(pose, pose_map, limbs.limbs)
+    frames = _section(top, "frames", optional=True)
+    frames.only(("base", "tool"))
+    return Model(
+        name=top.text("name"),
+        map=pose_map,
+        home=_read_pose(pose, "home", MAP_COORDINATES[pose_map], f"the map {pose_map}"),
+        match=_read_match(pose),
+        limbs=limbs.limbs,
+        geometry=geometry,
+        free=_read_free(_section(top, "calibration", optional=True), geometry),
+        stated=_read_stated(_section(top, "stated", optional=True), geometry, limbs.limbs),
+        base_frame=_read_pose(frames, "base", COORDINATES) if "base" in frames else None,
+        tool_frame=_read_pose(frames, "tool", COORDINATES) if "tool" in frames else None,
+        file=file,
+    )
+
+
+def _section(top: Table, key: str, optional: bool = False) -> Table:
+    value = top.data.get(key, {}) if optional else top[key]
+    if not isinstance(value, Mapping):
+        top.fail(key, f"must be a table, found {shown(value)}")
+    return Table(value, top.file, f"[{key}]", top.units)
+
+
+def _read_units(table: Table) -> Units:
+    table.only(("length", "angle"))
+    length = table.choice("length", LENGTH_UNITS, "unit of length")
+    angle = table.choice("angle", ANGLE_UNITS, "unit of angle")
+    return Units(LENGTH_UNITS[length], ANGLE_UNITS[angle])
+
+
+def _limb_tables(top: Table) -> Iterator[Table]:
+    found = top["limb"]
+    if not isinstance(found, list) or not all(isinstance(each, Mapping) for each in found):
+        top.fail("limb", "every limb is a table of its own, headed [[limb]] in double brackets")
+    if not found:
+        top.fail("limb", "a robot has at least one limb")
+    for i, data in enumerate(found, 1):
+        yield Table(data, top.file, f"[[limb]] {i}", top.units)
+
+
+def _check_rows(pose: Table, pose_map: str, limbs: tuple[Limb, ...]) -> None:
+    rows = sum(1 + len(KINDS[limb.kind].all_rows(limb.couple > 0.0)) for limb in limbs)
+    if rows < (free := len(MAP_COORDINATES[pose_map])):
+        pose.fail("map", f"{pose_map} has {free} free coordinates, but the limbs close only {rows}")
+
+
+def _read_pose(table: Table, key: str, known: tuple[str, ...], owner: str = "") -> FloatArray:
+    pose = table.table(key)
+    pose.only(known, owner)
+    units: dict[str, Unit] = {name: "mm" if name in "xyz" else "rad" for name in COORDINATES}
+    found = np.array([pose.number(name, units[name], 0.0) for name in COORDINATES])
+    found.flags.writeable = False
+    return found
+
+
+def _read_match(pose: Table) -> tuple[str, ...] | None:
+    if "match" not in pose:
+        return None
+    names = pose.texts("match")
+    for name in names:
+        if name not in COORDINATES:
+            pose.fail("match", f"{name!r} is no coordinate{did_you_mean(name, COORDINATES)}")
+    if not names or len(set(names)) < len(names):
+        pose.fail("match", f"must name some coordinates once each, found {shown(names)}")
+    return tuple(names)
+
+
+def _read_free(table: Table, geometry: Geometry) -> tuple[str, ...]:
+    table.only(("free",))
+    if "free" not in table:
+        return ()
+    patterns = table.texts("free")
+    try:
+        return tuple(geometry.match(patterns))
+    except ValueError as error:
+        table.fail("free", str(error))
+
+
+def _read_stated(table: Table, geometry: Geometry, limbs: tuple[Limb, ...]) -> Mapping[str, float]:
+    units: dict[str, Unit] = dict(zip(geometry.names, geometry.units, strict=True))
+    for limb in limbs:
+        for _, name, unit in KINDS[limb.kind].numbers("", limb.couple > 0.0):
+            if unit == "mm":
+                units.setdefault(name, unit)
+    stated = {}
+    for name, value in _flat(table.data):
+        if name not in units:
+            table.fail("", f"the robot has no number {name!r}{did_you_mean(name, units)}")
+        stated[name] = table.as_number(name, value, units[name])
+    return stated
+
+
+def _flat(data: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Pairs of dotted name and value: an unquoted ``base1.x`` is a table within a table."""
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value

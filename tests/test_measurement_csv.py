@@ -1,0 +1,293 @@
+"""Measurement files: units are converted once, nothing is lost, and errors say where they are."""
+
+from __future__ import annotations
+
+import doctest
+import math
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from pkmcal import csv_table, measurement_csv
+from pkmcal.measurement_csv import read_measurements
+from pkmcal.measurements import COMPONENTS, Measurements
+
+NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
+POSITIVE = st.floats(1e-300, 1e300)
+
+
+def read(tmp_path: Path, text: str, robot: Any = None) -> Measurements:
+    path = tmp_path / "m.csv"
+    path.write_bytes(text.encode("utf-8"))
+    return read_measurements(path, robot)
+
+
+# --- what is read ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("unit", "mm"),
+    [
+        ("mm", 1.0),
+        ("cm", 10.0),
+        ("m", 1000.0),
+        ("um", 1e-3),
+        ("µm", 1e-3),
+        ("μm", 1e-3),
+        ("in", 25.4),
+    ],
+)
+def test_lengths_become_mm(tmp_path: Path, unit: str, mm: float) -> None:
+    m = read(tmp_path, f"q1 [{unit}],z [{unit}],sigma [{unit}]\n3,-7,2\n")
+    assert (m.actuators[0, 0], m.values[0], m.sigma[0, 0]) == (3 * mm, -7 * mm, 2 * mm)
+    assert m.actuator_units == ("mm",)
+
+
+@pytest.mark.parametrize(
+    ("unit", "rad"), [("rad", 1.0), ("mrad", 1e-3), ("deg", math.pi / 180), ("°", math.pi / 180)]
+)
+def test_angles_become_rad(tmp_path: Path, unit: str, rad: float) -> None:
+    head = f"q1 [{unit}],x [mm],y [mm],z [mm],alpha [{unit}],beta [{unit}],gamma [{unit}]"
+    m = read(tmp_path, head + "\n90,1,2,3,4,5,6\n")
+    assert m.kind == "pose" and m.actuator_units == ("rad",)
+    expected = [90 * rad, 4 * rad, 5 * rad, 6 * rad]
+    np.testing.assert_allclose([m.actuators[0, 0], *m.values[0, 3:]], expected, rtol=3e-16)
+
+
+def test_columns_come_in_any_order_among_comments_and_empty_lines(tmp_path: Path) -> None:
+    head = "# a tracker\n\n z[mm] , q2 [mm],x [mm],group,q1 [mm],y [mm]\n"
+    m = read(tmp_path, head + "3,20,1,7,10,2\n # end\n,,,,,\n")
+    assert m.kind == "position"
+    np.testing.assert_array_equal(m.actuators, [[10, 20]])
+    np.testing.assert_array_equal(m.values, [[1, 2, 3]])
+    np.testing.assert_array_equal(m.group, [7])
+    assert m.sigma is None and m.target is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\ufeffq1 [mm],z [mm]\r\n1.5,-2.5\r\n",
+        "q1 [mm];z [mm]\n1,5;-2,5\n",
+        "q1 [mm]\tz [mm]\n1,5\t-2.5\n",
+        "q1 [mm];z [mm]\n1.5;-2,50\n",
+        '"q1 [mm]","z [mm]"\n"1.5","-2.5"\n',
+    ],
+)
+def test_what_spreadsheets_write_is_read(tmp_path: Path, text: str) -> None:
+    m = read(tmp_path, text)
+    assert (m.actuators[0, 0], m.values[0]) == (1.5, -2.5)
+
+
+def test_several_targets_share_their_actuators_row_by_row(tmp_path: Path) -> None:
+    head = "q1 [mm],A.x [m],A.y [m],A.z [m],B.x [mm],B.y [mm],B.z [mm],sigma [mm],group\n"
+    m = read(tmp_path, head + "10,1,2,3,4,5,6,0.1,1\n20,,,,7,8,9,0.2,1\n")
+    np.testing.assert_array_equal(m.actuators[:, 0], [10, 10, 20])
+    np.testing.assert_array_equal(m.values, [[1000, 2000, 3000], [4, 5, 6], [7, 8, 9]])
+    assert m.target_names == ("A", "B")
+    np.testing.assert_array_equal(m.target_index, [0, 1, 1])
+    np.testing.assert_array_equal(m.sigma[:, 0], [0.1, 0.1, 0.2])
+    np.testing.assert_array_equal(m.group, [1, 1, 1])
+    assert m.target is None
+
+
+def test_targets_of_one_row_are_held_out_together(tmp_path: Path) -> None:
+    head = "q1 [mm]," + ",".join(f"{t}.{c} [mm]" for t in "AB" for c in "xyz")
+    rows = "\n".join(f"{i},1,2,3,4,5,6" for i in range(10))
+    fit, held = read(tmp_path, f"{head}\n{rows}\n").split(3)
+    assert len(held) == 6 and not set(fit.actuators[:, 0]) & set(held.actuators[:, 0])
+
+
+def test_a_constant_place_of_the_target_is_one_target(tmp_path: Path) -> None:
+    head = "q1 [mm],distance [mm],target.x [mm],target.y [mm],target.z [mm]\n"
+    m = read(tmp_path, head + "1,10,0,0,5\n2,20,0,0,5\n")
+    assert m.kind == "distance"
+    np.testing.assert_array_equal(m.target, [0, 0, 5])
+    moving = read(tmp_path, head + "1,10,0,0,5\n2,20,0,1,5\n")
+    np.testing.assert_array_equal(moving.target, [[0, 0, 5], [0, 1, 5]])
+
+
+def test_the_robot_says_how_many_actuators_and_in_which_unit(tmp_path: Path) -> None:
+    text = "q1 [mm],q2 [mm],z [mm]\n1,2,3\n"
+    robot = SimpleNamespace(actuator_units=("mm", "mm"))
+    assert len(read(tmp_path, text, robot)) == 1
+    with pytest.raises(ValueError, match=r"line 1: 2 actuator columns, q1 to q2; the robot has 3"):
+        read(tmp_path, text, SimpleNamespace(actuator_units=("mm",) * 3))
+    with pytest.raises(ValueError, match=r"line 1: column 'q2' is a length; .* an angle"):
+        read(tmp_path, text, SimpleNamespace(actuator_units=("mm", "rad")))
+
+
+# --- round trips -------------------------------------------------------------------------------
+
+
+def same(one: Measurements, other: Measurements) -> None:
+    assert one.kind == other.kind
+    assert one.target_names == other.target_names
+    for name in ("actuators", "values", "sigma", "group", "target_index"):
+        a, b = getattr(one, name), getattr(other, name)
+        assert (a is None) == (b is None), name
+        if a is not None:
+            assert a.shape == b.shape and a.tobytes() == b.tobytes(), name
+    assert (one.target is None) == (other.target is None)
+    if one.target is not None:
+        assert one.targets.tobytes() == other.targets.tobytes()
+
+
+@st.composite
+def measurements(draw: st.DrawFn) -> Measurements:
+    kind = draw(st.sampled_from(list(COMPONENTS)))
+    rows, n, k = draw(st.integers(1, 4)), draw(st.integers(1, 3)), len(COMPONENTS[kind])
+    fields: dict[str, Any] = {}
+    if draw(st.booleans()):
+        shape = draw(st.sampled_from([(), (rows, 1), (rows, k)]))
+        fields["sigma"] = draw(arrays(float, shape, elements=POSITIVE))
+    if draw(st.booleans()):
+        fields["group"] = draw(st.lists(st.integers(-9, 9), min_size=rows, max_size=rows))
+    if kind == "distance" or (kind != "pose" and draw(st.booleans())):
+        shape = draw(st.sampled_from([(3,), (rows, 3)]))
+        fields["target"] = draw(arrays(float, shape, elements=NUMBERS))
+    units = draw(st.lists(st.sampled_from(["mm", "rad"]), min_size=n, max_size=n))
+    return Measurements(
+        draw(arrays(float, (rows, n), elements=NUMBERS)),
+        draw(arrays(float, (rows, k) if k > 1 else (rows,), elements=NUMBERS)),
+        kind,
+        actuator_units=units,
+        **fields,
+    )
+
+
+@settings(max_examples=150, deadline=None)
+@given(m=measurements())
+def test_what_is_written_is_read_back_to_the_last_bit(
+    m: Measurements, tmp_path_factory: Any
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "round trip.csv"
+    m.write(path)
+    again = read_measurements(path)
+    same(m, again)
+    assert again.actuator_units == m.actuator_units
+
+
+@pytest.mark.parametrize("kind", ["position", "pose"])
+def test_covariances_are_read_back_to_the_last_bit(tmp_path: Path, kind: str) -> None:
+    k = len(COMPONENTS[kind])
+    half = np.random.default_rng(0).normal(size=(3, k, k)) / 7
+    covariance = half @ half.transpose(0, 2, 1) + np.eye(k)
+    covariance = (covariance + covariance.transpose(0, 2, 1)) / 2
+    m = Measurements(np.ones((3, 2)), np.ones((3, k)), kind, sigma=covariance)
+    m.write(tmp_path / "m.csv")
+    same(m, read_measurements(tmp_path / "m.csv"))
+
+
+@pytest.mark.parametrize("target", [None, np.array([[1, 2, 3], [4, 5, 6.1]])])
+def test_several_targets_keep_their_names_and_places(tmp_path: Path, target: Any) -> None:
+    m = Measurements(
+        np.ones((3, 2)), np.ones((3, 3)), target=target, target_index=[0, 1, 0],
+        target_names=["SMR 1", 'a "high", far one'],
+    )  # fmt: skip
+    m.write(tmp_path / "m.csv")
+    same(m, read_measurements(tmp_path / "m.csv"))
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "m.csv"
+    path.write_text("old")
+
+    def full(*_: object) -> None:
+        raise OSError("no space left")
+
+    monkeypatch.setattr(measurement_csv.os, "replace", full)
+    with pytest.raises(OSError, match="no space left"):
+        Measurements([[1.0]], [[1.0, 2, 3]]).write(path)
+    assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
+
+
+# --- errors ------------------------------------------------------------------------------------
+
+POSITION = "q1 [mm],x [mm],y [mm],z [mm]"
+POSE = "q1 [mm],x [mm],y [mm],z [mm],alpha [deg],beta [deg],gamma [deg]"
+AB = "q1 [mm]," + ",".join(f"{t}.{c} [mm]" for t in "AB" for c in "xyz")
+PLACED = "q1 [mm],z [mm],target,target.x [mm],target.y [mm],target.z [mm]"
+
+ERRORS = [
+    ("", "the file is empty"),
+    ("# only a comment\n\n", "the file is empty"),
+    (POSITION + "\n", "no rows below the column names of line 1"),
+    (POSITION + "\n,,,\n", "no rows below"),
+    ("q1 [mm],x [mm],y [mm]\n1,2,3\n", "line 1: missing column 'z'"),
+    ("# c\nq2 [mm],z [mm]\n1,2\n", "line 2: missing column 'q1'"),
+    ("q1 [mm],q3 [mm],z [mm]\n1,2,3\n", "line 1: missing column 'q2'"),
+    ("x [mm],y [mm],z [mm]\n1,2,3\n", "line 1: missing column 'q1'"),
+    (POSE.replace(",beta [deg]", "") + "\n1,2,3,4,5,6\n", "line 1: missing column 'beta'"),
+    (AB.replace(",B.z [mm]", "") + "\n1,1,1,1,1,1\n", "line 1: missing column 'B.z'"),
+    ("q1 [mm]\n1\n", "line 1: nothing measured"),
+    ("q1,z [mm]\n1,2\n", "line 1: column 'q1' has no unit: expected 'q1 [mm]'"),
+    ("q1 [mm],z []\n1,2\n", "line 1: column 'z' has no unit"),
+    ("q1 [mm],z [deg]\n1,2\n", "line 1: column 'z' has unit [deg]: expected one of mm, um"),
+    ("q1 [steps],z [mm]\n1,2\n", "line 1: column 'q1' has unit [steps]"),
+    ("q1 [mm],z [mm],group [mm]\n1,2,3\n", "line 1: column 'group' takes no unit"),
+    ("q1 [mm],z [mm],q1 [mm]\n1,2,3\n", "line 1: column 'q1' appears twice (columns 1 and 3)"),
+    ("q1 [mm],z [mm],\n1,2,3\n", "line 1: column 3 is headed ''"),
+    ("q1 [mm],z mm]\n1,2\n", "line 1: column 2 is headed 'z mm]'"),
+    ("Q1 [mm],z [mm]\n1,2\n", "line 1: unknown column 'Q1'; did you mean 'q1'?"),
+    ("q1 [mm],z [mm],sigmas [mm]\n1,2,3\n", "unknown column 'sigmas'; did you mean 'sigma'?"),
+    ("q1 [mm],hight [mm]\n1,2\n", "line 1: unknown column 'hight'"),
+    ("q1 [mm],z [mm],distance [mm]\n1,2,3\n", "more than one thing measured"),
+    (AB + ",z [mm]\n1,1,1,1,1,1,1,1\n", "more than one thing measured"),
+    (AB + ",target\n1,1,1,1,1,1,1,1\n", "column 'target' does not go with 'A.x'"),
+    (AB + "\n1,1,1,1,1,,1\n", "line 2, column 'B.y': found an empty cell beside"),
+    (POSITION + "\n1,2,3,4\n1,2,3\n", "line 3: 3 cells under 4 column names"),
+    (POSITION + "\n1,5,2,3,4\n", "line 2: 5 cells under 4 column names (a decimal comma"),
+    (POSITION + "\n1,2,3,4\n#\n1,2,abc,4\n", "line 4, column 'y': expected a number, found 'abc'"),
+    (POSITION + "\n1,2,,4\n", "line 2, column 'y': expected a number, found an empty cell"),
+    (POSITION + "\n1,2,1_000,4\n", "line 2, column 'y': expected a number, found '1_000'"),
+    (POSITION + "\n1,2,nan,4\n", "line 2, column 'y': expected a finite number, found 'nan'"),
+    (POSITION + "\n1,2,3,1e999\n", "line 2, column 'z': expected a finite number"),
+    ("q1 [mm];z [mm]\n1;1.234,5\n", "line 2, column 'z': expected a number, found '1.234,5'"),
+    ("q1 [mm],z [mm],sigma [mm]\n1,2,0.1\n1,2,0\n", "line 3, column 'sigma': must be positive"),
+    ("q1 [mm],z [mm],group\n1,2,3.5\n", "line 2, column 'group': expected a whole number"),
+    (POSE + ",sigma [mm]\n1,2,3,4,5,6,7,1\n", "expected 'sigma.x' to 'sigma.gamma'"),
+    (POSITION + ",sigma.x [mm]\n1,2,3,4,5\n", "line 1: missing column 'sigma.y'"),
+    (POSITION + ",sigma [mm],sigma.x [mm]\n1,2,3,4,5,6\n", "'sigma.x' does not go with 'sigma'"),
+    ("q1 [mm],z [mm],cov.z.z [mm*mm]\n1,2,-1\n", "sigma: row 0 is not a covariance matrix"),
+    ("q1 [mm],distance [mm]\n1,2\n", "line 1: missing column 'target.x'"),
+    (POSE + ",target\n1,2,3,4,5,6,7,A\n", "columns of a target do not go with poses"),
+    (PLACED + "\n1,2,A,0,0,0\n1,2,A,0,0,1\n", "line 3, column 'target': 'A' has another place"),
+    (PLACED + "\n1,2,,0,0,0\n", "line 2, column 'target': found an empty cell"),
+    ('q1 [mm],z [mm]\n1,"2\n', "line 2: unexpected end of data"),
+]
+
+
+@pytest.mark.parametrize(("text", "message"), ERRORS)
+def test_errors_are_one_line_that_names_file_line_and_column(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    with pytest.raises(ValueError) as caught:
+        read(tmp_path, text)
+    assert message in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path / "m.csv")) and "\n" not in str(caught.value)
+
+
+def test_bytes_that_are_not_text_are_an_error(tmp_path: Path) -> None:
+    path = tmp_path / "m.csv"
+    path.write_bytes("q1 [mm],z [µm]\n1,2\n".encode("latin-1"))
+    with pytest.raises(ValueError, match="not a UTF-8 text file"):
+        read_measurements(path)
+
+
+def test_a_missing_file_is_an_error_of_the_system(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="absent"):
+        read_measurements(tmp_path / "absent.csv")
+
+
+def test_the_examples_run() -> None:
+    for module in (csv_table, measurement_csv):
+        assert doctest.testmod(module).failed == 0

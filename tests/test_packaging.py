@@ -1,0 +1,137 @@
+"""What is installed: a wheel that carries everything, an import that loads little."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+NOT_SOURCES = shutil.ignore_patterns(
+    *(".git", ".venv*", ".*_cache", ".benchmarks", ".hypothesis", "__pycache__"),
+    *("build", "dist", "*.egg-info", "*.so"),
+)
+
+
+def run(*arguments: str | Path, cwd: Path, **environment: str) -> str:
+    """Return what this Python prints when it runs `arguments` in `cwd`."""
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=cwd,
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def lacking(*, python: str | Path = sys.executable, **environment: str) -> str:
+    """Return the complaint of the prerequisites check, which must be one line."""
+    done = subprocess.run(
+        ["sh", ROOT / ".ci" / "prerequisites", python],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1
+    return done.stderr
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Build the wheel from the source archive of a copy of the checkout, and unpack it."""
+    folder = tmp_path_factory.mktemp("packaging")
+    checkout = shutil.copytree(ROOT, folder / "checkout", ignore=NOT_SOURCES)
+    build = "import setuptools.build_meta as backend; backend.build_sdist('..')"
+    run("-c", build, cwd=checkout)
+    (archive,) = folder.glob("*.tar.gz")
+    options = ("--quiet", "--no-deps", "--no-index", "--no-build-isolation")
+    run("-m", "pip", "wheel", *options, archive, cwd=folder)
+    (built,) = folder.glob("*.whl")
+    assert "-cp310-abi3-" in built.name
+    zipfile.ZipFile(built).extractall(folder / "site")
+    return folder / "site"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("source", "pattern", "installed"),
+    [
+        ("pkmcal", "**/*.py", "pkmcal"),
+        ("pkmcal", "machines/*.toml", "pkmcal"),
+        ("pkmcal", "py.typed", "pkmcal"),
+        ("derive", "**/*.py", "pkmcal/derive"),
+        ("generated", "*.h", "pkmcal/generated"),
+        ("examples", "**/*.toml", "pkmcal/examples"),
+        ("examples", "**/*.csv", "pkmcal/examples"),
+    ],
+)
+def test_wheel_carries_the_folder(wheel: Path, source: str, pattern: str, installed: str) -> None:
+    expected = {path.relative_to(ROOT / source) for path in (ROOT / source).glob(pattern)}
+    found = {path.relative_to(wheel / installed) for path in (wheel / installed).glob(pattern)}
+    assert expected
+    assert expected <= found
+
+
+@pytest.mark.slow
+def test_wheel_works_away_from_the_checkout(wheel: Path, tmp_path: Path) -> None:
+    code = (
+        "import pkmcal, pkmcal._core\n"
+        "assert [pkmcal.load(name) for name in pkmcal.machines()]\n"
+        "print(pkmcal.__file__, pkmcal._core.__file__)"
+    )
+    for file in run("-c", code, cwd=tmp_path, PYTHONPATH=str(wheel)).split():
+        assert Path(file).parent == wheel / "pkmcal"
+
+
+def test_import_loads_numpy_and_the_core_alone(tmp_path: Path) -> None:
+    heavy = {"matplotlib", "rich", "scipy", "sympy", "typer"}
+    loaded = run("-c", "import sys, pkmcal; print(*sys.modules)", cwd=tmp_path).split()
+    assert "pkmcal._core" in loaded
+    assert not heavy & set(loaded)
+
+
+def test_version_is_stated_once() -> None:
+    files = [ROOT / "pyproject.toml", ROOT / "setup.py"]
+    for folder in ("pkmcal", "derive", "csrc", "generated"):
+        files += [path for path in (ROOT / folder).rglob("*") if path.suffix in {".py", ".h", ".c"}]
+    quoted = f'"{metadata.version("pkmcal")}"'
+    stated = [path.name for path in files if quoted in path.read_text(encoding="utf-8")]
+    assert stated == ["pyproject.toml"]
+
+
+def test_missing_compiler_is_named_with_its_debian_package() -> None:
+    complaint = lacking(CC="no-such-compiler")
+    assert re.search(
+        r"C compiler as 'no-such-compiler'.*apt-get install gcc libc6-dev\)", complaint
+    )
+
+
+def test_missing_python_is_named_with_its_debian_package() -> None:
+    complaint = lacking(python="no-such-python")
+    assert re.search(r"3\.10.*'no-such-python'.*apt-get install python3 ", complaint)
+
+
+@pytest.mark.parametrize(
+    ("lost", "package"), [("ensurepip", "python3-venv"), ("Python.h", "python3-dev")]
+)
+def test_missing_part_of_python_is_named_with_its_debian_package(
+    tmp_path: Path, lost: str, package: str
+) -> None:
+    python = tmp_path / "python3"
+    without = f'case "$2" in *{lost}*) exit 1;; esac'
+    python.write_text(f'#!/bin/sh\n{without}\nexec {sys.executable} "$@"\n')
+    python.chmod(0o755)
+    assert f"apt-get install {package})" in lacking(python=python)
