@@ -1,4 +1,6 @@
 /* The flat interface: checks the call, picks the ISA, and hands over. */
+#include <math.h>
+
 #include "pkmcal.h"
 #include "core_table.h"
 #include "names.h"
@@ -34,13 +36,19 @@ static const pkm_core *core(int isa)
     return &pkm_base;
 }
 
+static int free_coordinates(const pkm_machine *machine)
+{
+#define CASE(NAME, name, M) if (machine->map == MAP_##NAME) return M;
+    EACH_MAP(CASE)
+#undef CASE
+    return 0;
+}
+
 /* The number of closure rows, or 0 for a machine the core cannot take. */
 static int closure_count(const pkm_machine *machine)
 {
-    int rows = 0, free = 0;
-#define CASE(NAME, name, M) if (machine->map == MAP_##NAME) free = M;
-    EACH_MAP(CASE)
-#undef CASE
+    const int free = free_coordinates(machine);
+    int rows = 0;
     if (!free || machine->limbs < 1 || machine->limbs > PKM_MAX_LIMBS || !(machine->length > 0)
         || machine->actuators < 1 || machine->actuators > machine->limbs)
         return 0;
@@ -62,6 +70,31 @@ static int closure_count(const pkm_machine *machine)
 #define CHECKED_MACHINE(machine, isa)                                                             \
     CHECKED(isa);                                                                                 \
     if (!closure_count(machine)) return PKM_BAD_MACHINE
+
+int pkm_order_rows(pkm_machine *machine, const double *geometry, const double *home)
+{
+    double A[PKM_MAX_ROWS * 6];
+    int row[PKM_MAX_ROWS];
+    const int m = free_coordinates(machine), rows = closure_count(machine);
+    if (!rows) return PKM_BAD_MACHINE;
+    for (int r = 0; r < rows; r++) machine->order[r] = row[r] = r;
+    if (rows > m) return 0; /* the normal equations need no order */
+    pkm_base.home(machine, geometry, home, A);
+    for (int c = 0; c < m; c++) {
+        int best = c;
+        for (int i = c + 1; i < m; i++)
+            if (fabs(A[row[i] * m + c]) > fabs(A[row[best] * m + c])) best = i;
+        const int swapped = row[c];
+        row[c] = row[best];
+        row[best] = swapped;
+        for (int i = c + 1; i < m; i++) {
+            const double factor = A[row[i] * m + c] / A[row[c] * m + c];
+            for (int j = c; j < m; j++) A[row[i] * m + j] -= factor * A[row[c] * m + j];
+        }
+    }
+    for (int c = 0; c < m; c++) machine->order[row[c]] = c;
+    return 0;
+}
 
 int pkm_inverse(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
                 ptrdiff_t geometry_stride, const double *pose, double *q)

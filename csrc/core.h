@@ -15,16 +15,14 @@ static void core_inverse(const pkm_machine *machine, ptrdiff_t n, const double *
 }
 
 static void core_forward(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                  ptrdiff_t geometry_stride, const double *q, const double *guess,
-                  ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
-                  double *residual)
+                         ptrdiff_t geometry_stride, const double *q, const double *guess,
+                         ptrdiff_t guess_stride, double *pose, int32_t *status,
+                         int32_t *iterations, double *residual)
 {
+    const forward_call call = {machine, n, geometry, geometry_stride, q, guess, guess_stride,
+                               pose, status, iterations, residual};
     switch (machine->map) {
-#define CASE(NAME, name, M)                                                                       \
-    case MAP_##NAME:                                                                              \
-        forward_map(MAP_##NAME, machine, n, geometry, geometry_stride, q, guess, guess_stride,    \
-                    pose, status, iterations, residual);                                          \
-        break;
+#define CASE(NAME, name, M) case MAP_##NAME: forward_map(MAP_##NAME, &call); break;
         EACH_MAP(CASE)
 #undef CASE
     }
@@ -59,22 +57,55 @@ static void core_response(const pkm_machine *machine, ptrdiff_t n, const double 
 }
 
 static void core_tpr2tps(ptrdiff_t n, const double *size, const double *free, double *lengths,
-                  double *jacobian)
+                         double *jacobian)
 {
     real lane_size[6];
-    for (int k = 0; k < 6; k++) lane_size[k] = FN(fill)(size[k]);
-    for (ptrdiff_t row = 0; row < n; row += LANES) {
-        const ptrdiff_t rows = n - row;
+    for (int k = 0; k < 6; k++) lane_size[k] = fill(size[k]);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
         real lane_free[4], out[16];
-        for (int k = 0; k < 4; k++) lane_free[k] = gather(free + 4 * row + k, 4, rows);
+        const int count = block_rows(first, n, row);
+        for (int k = 0; k < 4; k++) lane_free[k] = gather(free + k, 4, row);
         if (lengths) {
             FN(tpr2tps_lengths)(lane_size, lane_free, out);
-            for (int k = 0; k < 4; k++) scatter(out[k], lengths + 4 * row + k, 4, rows);
+            for (int k = 0; k < 4; k++) scatter(out[k], lengths + k, 4, row, count);
         } else {
             FN(tpr2tps_jacobian)(lane_size, lane_free, out);
-            for (int k = 0; k < 16; k++) scatter(out[k], jacobian + 16 * row + k, 16, rows);
+            for (int k = 0; k < 16; k++) scatter(out[k], jacobian + k, 16, row, count);
         }
     }
 }
 
-const pkm_core CORE = {core_inverse, core_forward, core_jacobian, core_response, core_tpr2tps};
+/* The closure rows' derivatives at home (rows x m, limb by limb): what pkm_order_rows eliminates. */
+static int core_home(const pkm_machine *machine, const double *geometry, const double *home,
+                     double *jacobian)
+{
+    limb_numbers limb[PKM_MAX_LIMBS];
+    FN(limb_sphere) sphere[PKM_MAX_LIMBS];
+    ptrdiff_t zero[LANES] = {0};
+    real pose[6], state[MAX_STATE], R[9], p[3], q[PKM_MAX_LIMBS], phi[PKM_MAX_ROWS];
+    real A[PKM_MAX_ROWS * 6];
+    mask reachable = fill_mask(-1);
+    int rows = 0;
+    prepare_limbs(machine, geometry, 0, zero, limb);
+    for (int k = 0; k < 6; k++) pose[k] = fill(home[k]);
+    switch (machine->map) {
+#define CASE(NAME, name, M)                                                                       \
+    case MAP_##NAME:                                                                              \
+        map_from_pose(MAP_##NAME, pose, state);                                                   \
+        FN(map_frame)(MAP_##NAME, state, R, p);                                                   \
+        inverse_at(machine, limb, R, p, q);                                                       \
+        for (int i = 0; i < machine->limbs; i++)                                                  \
+            sphere_of_limb(machine->driver[i], &limb[i], q[machine->actuator[i]], &sphere[i],     \
+                           &reachable);                                                           \
+        rows = FN(closure_rows)(MAP_##NAME, machine, sphere, state, phi, A);                      \
+        for (int k = 0; k < rows * M; k++) jacobian[k] = A[k][0];                                 \
+        break;
+        EACH_MAP(CASE)
+#undef CASE
+    }
+    return rows;
+}
+
+const pkm_core CORE = {core_inverse, core_forward, core_jacobian, core_response, core_tpr2tps,
+                       core_home};

@@ -17,6 +17,7 @@ typedef struct {
                      double *jacobian);
     void (*tpr2tps)(ptrdiff_t n, const double *size, const double *free, double *lengths,
                     double *jacobian);
+    int (*home)(const pkm_machine *, const double *geometry, const double *home, double *jacobian);
 } pkm_core;
 
 extern const pkm_core pkm_base, pkm_v3, pkm_v4;

@@ -10,24 +10,29 @@
 INLINE void sphere_derivatives(const pkm_machine *machine, int i, const limb_numbers *limb,
                                const real *R, const real *p, real q, real *by_q, real *by_g)
 {
+    real F[9];
+    fill_frame(machine->frame + 9 * i, F);
     if (machine->driver[i] == DRIVER_LENGTH)
         FN(length_derivatives)(R, p, q, limb->g, by_q, by_g);
     else if (machine->driver[i] == DRIVER_SLIDER)
-        FN(slider_derivatives)(R, p, q, limb->g, limb->frame, by_q, by_g);
+        FN(slider_derivatives)(R, p, q, limb->g, F, by_q, by_g);
     else
-        FN(crank_derivatives)(R, p, q, limb->g, limb->frame, by_q, by_g);
+        FN(crank_derivatives)(R, p, q, limb->g, F, by_q, by_g);
 }
 
 INLINE void constraint_derivatives(const pkm_machine *machine, int i, int kind,
                                    const limb_numbers *limb, const real *R, const real *p, real *by_g)
 {
+    real F[9], P[9];
+    fill_frame(machine->frame + 9 * i, F);
+    fill_frame(machine->platform_frame + 9 * i, P);
     if (kind == ROW_BASE_PLANE)
-        FN(base_plane_derivatives)(R, p, limb->g, limb->frame, by_g);
+        FN(base_plane_derivatives)(R, p, limb->g, F, by_g);
     else if (kind == ROW_PLATFORM_PLANE)
-        FN(platform_plane_derivatives)(R, p, limb->g, limb->platform_frame, by_g);
+        FN(platform_plane_derivatives)(R, p, limb->g, P, by_g);
     else
-        FN(couple_derivatives)(R, p, limb->g, limb->frame, limb->platform_frame,
-                               FN(fill)(machine->lever[i]), by_g);
+        FN(couple_derivatives)(R, p, limb->g, F, P,
+                               fill(machine->lever[i]), by_g);
 }
 
 /* ∂q/∂free of every actuator, -Φ_free / Φ_q limb by limb, averaged where limbs share one. */
@@ -35,22 +40,21 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
                            const real *pose, real *out)
 {
     const int m = map_m(map);
-    real state[MAX_STATE], R[9], p[3], q[PKM_MAX_LIMBS];
+    real state[MAX_STATE], R[9], p[3];
     double sharing[PKM_MAX_LIMBS] = {0};
-    inverse_block(machine, limb, pose, q);
     map_from_pose(map, pose, state);
-    map_frame(map, state, R, p);
+    FN(map_frame)(map, state, R, p);
     for (int i = 0; i < machine->limbs; i++) sharing[machine->actuator[i]] += 1.0;
-    for (int k = 0; k < machine->actuators * m; k++) out[k] = FN(fill)(0.0);
+    for (int k = 0; k < machine->actuators * m; k++) out[k] = fill(0.0);
     for (int i = 0; i < machine->limbs; i++) {
         real phi, omega[3], v[3], row[6], by_free[6], by_q, by_g[SLOTS];
-        limb_anchor anchor;
+        FN(limb_sphere) sphere;
         mask reachable = fill_mask(-1);
         const int a = machine->actuator[i];
         const real own = limb_inverse(machine, i, &limb[i], R, p);
-        anchor_limb(machine->driver[i], &limb[i], own, &anchor, &reachable);
-        FN(sphere_row)(R, p, limb[i].g + PLATFORM_X, anchor.c, anchor.rho2, &phi, omega, v);
-        map_pull(map, state, omega, v, row);
+        sphere_of_limb(machine->driver[i], &limb[i], own, &sphere, &reachable);
+        FN(sphere_row)(R, p, limb[i].g + PLATFORM_X, sphere.c, sphere.rho2, &phi, omega, v);
+        FN(map_pull)(map, state, omega, v, row);
         map_free(map, state, row, by_free);
         sphere_derivatives(machine, i, &limb[i], R, p, own, &by_q, by_g);
         for (int j = 0; j < m; j++) out[a * m + j] -= by_free[j] / (by_q * sharing[a]);
@@ -58,22 +62,22 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
 }
 
 /* How the pose answers a residual in each row: -M Φ⁻¹ (6 x rows), per unit of the scaled rows. */
-INLINE int pose_response(int map, const pkm_machine *machine, const limb_numbers *limb,
-                         const limb_anchor *anchor, const real *state, real *response)
+INLINE int pose_response(int map, const pkm_machine *machine, const FN(limb_sphere) *sphere,
+                         const real *state, real *response)
 {
     const int m = map_m(map);
     real residual[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6], A[36], X[6 * PKM_MAX_ROWS], pivot;
-    const int rows = closure_rows(map, machine, limb, anchor, state, residual, jacobian);
+    const int rows = FN(closure_rows)(map, machine, sphere, state, residual, jacobian);
     normal_system(m, rows, rows == m ? m : rows, jacobian, residual, A, X);
     solve(m, rows, A, X, &pivot);
-    const mask known = pivot > FN(fill)(1e-14);
+    const mask known = pivot > fill(1e-14);
     for (int r = 0; r < rows; r++) {
         real step[6], rates[6];
         for (int j = 0; j < m; j++)
             step[j] = X[j * rows + r] * (map_is_angle(map, j) ? -1.0 / machine->length : -1.0);
         map_rates(map, state, step, rates);
         for (int k = 0; k < 6; k++)
-            response[k * rows + r] = select(known, rates[k], FN(fill)(NAN));
+            response[k * rows + r] = select(known, rates[k], fill(NAN));
     }
     return rows;
 }
@@ -83,34 +87,35 @@ INLINE void response_block(int map, const pkm_machine *machine, const limb_numbe
                            const real *pose, const real *q, const int32_t *column, int columns,
                            real *out)
 {
-    limb_anchor anchor[PKM_MAX_LIMBS];
+    FN(limb_sphere) sphere[PKM_MAX_LIMBS];
     real state[MAX_STATE], R[9], p[3], response[6 * PKM_MAX_ROWS];
     mask reachable = fill_mask(-1);
     int r = 0, c = 0;
     map_from_pose(map, pose, state);
-    map_frame(map, state, R, p);
+    FN(map_frame)(map, state, R, p);
     for (int i = 0; i < machine->limbs; i++)
-        anchor_limb(machine->driver[i], &limb[i], q[machine->actuator[i]], &anchor[i], &reachable);
-    const int rows = pose_response(map, machine, limb, anchor, state, response);
-    for (int k = 0; k < 6 * columns; k++) out[k] = FN(fill)(0.0);
+        sphere_of_limb(machine->driver[i], &limb[i], q[machine->actuator[i]], &sphere[i], &reachable);
+    const int rows = pose_response(map, machine, sphere, state, response);
+    for (int k = 0; k < 6 * columns; k++) out[k] = fill(0.0);
     for (int i = 0; i < machine->limbs; i++) {
-        real by_q, by_g[SLOTS], scale = anchor[i].inverse_rho * machine->weight[r];
+        real by_q, by_g[SLOTS], scale = sphere[i].inverse_rho * machine->weight[r];
         sphere_derivatives(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
         int end = c;
         if (column)
             while (end < columns && column[end] / SLOTS == i) end++;
         else
             for (int k = 0; k < 6; k++)
-                out[k * columns + machine->actuator[i]] += response[k * rows + r] * scale * by_q;
+                out[k * columns + machine->actuator[i]] += response[k * rows + machine->order[r]] * scale * by_q;
         for (int kind = 0; kind <= ROW_COUPLE; kind = kind ? 2 * kind : 1) {
             if (kind && !(machine->rows[i] & kind)) continue;
             if (kind) {
                 constraint_derivatives(machine, i, kind, &limb[i], R, p, by_g);
-                scale = FN(fill)(machine->weight[r]);
+                scale = fill(machine->weight[r]);
             }
             for (int j = c; j < end; j++)
                 for (int k = 0; k < 6; k++)
-                    out[k * columns + j] += response[k * rows + r] * (scale * by_g[column[j] % SLOTS]);
+                    out[k * columns + j] += response[k * rows + machine->order[r]]
+                                          * (scale * by_g[column[j] % SLOTS]);
             r++;
         }
         c = end;
@@ -122,14 +127,15 @@ INLINE void jacobian_map(int map, const pkm_machine *machine, ptrdiff_t n, const
 {
     limb_numbers limb[PKM_MAX_LIMBS];
     const int width = machine->actuators * map_m(map);
-    for (ptrdiff_t row = 0; row < n; row += LANES) {
-        const ptrdiff_t rows = n - row;
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
         real lane_pose[6], out[PKM_MAX_LIMBS * 6];
-        if (row == 0 || geometry_stride)
-            prepare_limbs(machine, geometry + row * geometry_stride, geometry_stride, rows, limb);
-        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + 6 * row + k, 6, rows);
+        const int count = block_rows(first, n, row);
+        if (first == 0 || geometry_stride)
+            prepare_limbs(machine, geometry, geometry_stride, row, limb);
+        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
         jacobian_block(map, machine, limb, lane_pose, out);
-        for (int k = 0; k < width; k++) scatter(out[k], jacobian + row * width + k, width, rows);
+        for (int k = 0; k < width; k++) scatter(out[k], jacobian + k, width, row, count);
     }
 }
 
@@ -139,16 +145,16 @@ INLINE void response_map(int map, const pkm_machine *machine, ptrdiff_t n, const
 {
     limb_numbers limb[PKM_MAX_LIMBS];
     const int actuators = machine->actuators, width = 6 * columns;
-    for (ptrdiff_t row = 0; row < n; row += LANES) {
-        const ptrdiff_t rows = n - row;
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
         real lane_pose[6], lane_q[PKM_MAX_LIMBS], out[6 * PKM_MAX_LIMBS * SLOTS];
-        if (row == 0 || geometry_stride)
-            prepare_limbs(machine, geometry + row * geometry_stride, geometry_stride, rows, limb);
-        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + 6 * row + k, 6, rows);
-        for (int a = 0; a < actuators; a++)
-            lane_q[a] = gather(q + row * actuators + a, actuators, rows);
+        const int count = block_rows(first, n, row);
+        if (first == 0 || geometry_stride)
+            prepare_limbs(machine, geometry, geometry_stride, row, limb);
+        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
+        for (int a = 0; a < actuators; a++) lane_q[a] = gather(q + a, actuators, row);
         response_block(map, machine, limb, lane_pose, lane_q, column, columns, out);
-        for (int k = 0; k < width; k++) scatter(out[k], jacobian + row * width + k, width, rows);
+        for (int k = 0; k < width; k++) scatter(out[k], jacobian + k, width, row, count);
     }
 }
 

@@ -1,6 +1,8 @@
-/* Lanes: `real` is LANES doubles, one row of a batch each, at the processor's native width.
+/* Lanes: one row of a batch each, at the processor's native width.
  *
- * Masks are lanes of 64-bit integers, all ones or zero. Conditions are written so that NaN fails.
+ * `wide` is LANES doubles, `narrow` twice as many floats; `real`, `mask` and FN(name) stand for
+ * either where code is written once and included for both (kernel.h), and for `wide` elsewhere.
+ * Masks are lanes of integers, all ones or zero. Conditions are written so that NaN fails.
  */
 #ifndef LANES_H
 #define LANES_H
@@ -9,34 +11,113 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+
+#include "names.h"
+#include "pkmcal.h"
 #ifdef __x86_64__
 #include <immintrin.h>
 #endif
 
 #define INLINE static inline __attribute__((always_inline, unused))
-#define FN(name) name##_lanes
 
-typedef double real __attribute__((vector_size(8 * LANES)));
-typedef int64_t mask __attribute__((vector_size(8 * LANES)));
+typedef double wide __attribute__((vector_size(8 * LANES)));
+typedef int64_t wide_mask __attribute__((vector_size(8 * LANES)));
+typedef float narrow __attribute__((vector_size(8 * LANES)));
+typedef int32_t narrow_mask __attribute__((vector_size(8 * LANES)));
 
-INLINE real FN(fill)(double x)
+INLINE wide root_wide(wide x)
 {
-    real r;
-    for (int l = 0; l < LANES; l++) r[l] = x;
+#if LANES == 8 && defined(__AVX512F__)
+    return (wide)_mm512_sqrt_pd((__m512d)x);
+#elif LANES == 4 && defined(__AVX__)
+    return (wide)_mm256_sqrt_pd((__m256d)x);
+#elif LANES == 2 && defined(__SSE2__)
+    return (wide)_mm_sqrt_pd((__m128d)x);
+#else
+    for (int l = 0; l < LANES; l++) x[l] = sqrt(x[l]);
+    return x;
+#endif
+}
+
+INLINE narrow root_narrow(narrow x)
+{
+#if LANES == 8 && defined(__AVX512F__)
+    return (narrow)_mm512_sqrt_ps((__m512)x);
+#elif LANES == 4 && defined(__AVX__)
+    return (narrow)_mm256_sqrt_ps((__m256)x);
+#elif LANES == 2 && defined(__SSE2__)
+    return (narrow)_mm_sqrt_ps((__m128)x);
+#else
+    for (int l = 0; l < 2 * LANES; l++) x[l] = sqrtf(x[l]);
+    return x;
+#endif
+}
+
+/* Two wide blocks, rounded to one narrow block. */
+INLINE narrow join(wide low, wide high)
+{
+#if LANES == 8 && defined(__AVX512DQ__)
+    const __m512 first = _mm512_castps256_ps512(_mm512_cvtpd_ps((__m512d)low));
+    return (narrow)_mm512_insertf32x8(first, _mm512_cvtpd_ps((__m512d)high), 1);
+#elif LANES == 4 && defined(__AVX__)
+    const __m256 first = _mm256_castps128_ps256(_mm256_cvtpd_ps((__m256d)low));
+    return (narrow)_mm256_insertf128_ps(first, _mm256_cvtpd_ps((__m256d)high), 1);
+#elif LANES == 2 && defined(__SSE2__)
+    return (narrow)_mm_movelh_ps(_mm_cvtpd_ps((__m128d)low), _mm_cvtpd_ps((__m128d)high));
+#else
+    narrow r;
+    for (int l = 0; l < LANES; l++) r[l] = (float)low[l], r[LANES + l] = (float)high[l];
     return r;
+#endif
 }
 
-INLINE mask fill_mask(int64_t x)
+/* Half 0 or 1 of a narrow block, exactly. */
+INLINE wide half(narrow x, int which)
 {
-    mask r;
-    for (int l = 0; l < LANES; l++) r[l] = x;
+#if LANES == 8 && defined(__AVX512DQ__)
+    return (wide)_mm512_cvtps_pd(which ? _mm512_extractf32x8_ps((__m512)x, 1)
+                                       : _mm512_castps512_ps256((__m512)x));
+#elif LANES == 4 && defined(__AVX__)
+    return (wide)_mm256_cvtps_pd(which ? _mm256_extractf128_ps((__m256)x, 1)
+                                       : _mm256_castps256_ps128((__m256)x));
+#elif LANES == 2 && defined(__SSE2__)
+    return (wide)_mm_cvtps_pd(which ? _mm_movehl_ps((__m128)x, (__m128)x) : (__m128)x);
+#else
+    wide r;
+    for (int l = 0; l < LANES; l++) r[l] = (double)x[which * LANES + l];
     return r;
+#endif
 }
 
-INLINE real select(mask m, real yes, real no)
-{
-    return (real)((m & (mask)yes) | (~m & (mask)no));
-}
+/* The kernel, first for floats, then for doubles, which `real` means from here on. */
+#define NARROW
+#define real narrow
+#define mask narrow_mask
+#define NUMBER float
+#define COUNT (2 * LANES)
+#define FN(name) name##_narrow
+#include "kernel.h"
+#undef NARROW
+#undef real
+#undef mask
+#undef NUMBER
+#undef COUNT
+#undef FN
+#define real wide
+#define mask wide_mask
+#define NUMBER double
+#define COUNT LANES
+#define FN(name) name##_wide
+#include "kernel.h"
+
+#define EITHER(name, x) _Generic((x), narrow: name##_narrow, wide: name##_wide)
+#define select(m, yes, no) EITHER(select, yes)(m, yes, no)
+#define absolute(x) EITHER(absolute, x)(x)
+#define maximum(a, b) EITHER(maximum, a)(a, b)
+#define minimum(a, b) EITHER(minimum, a)(a, b)
+#define fill FN(fill)
+
+INLINE mask fill_mask(int64_t x) { return (mask){0} + x; }
 
 INLINE mask select_mask(mask m, mask yes, mask no) { return (m & yes) | (~m & no); }
 
@@ -46,6 +127,8 @@ INLINE int any(mask m)
     return _mm512_movepi64_mask((__m512i)m) != 0;
 #elif LANES == 4 && defined(__AVX2__)
     return _mm256_movemask_pd((__m256d)m) != 0;
+#elif LANES == 2 && defined(__SSE2__)
+    return _mm_movemask_pd((__m128d)m) != 0;
 #else
     int64_t r = 0;
     for (int l = 0; l < LANES; l++) r |= m[l];
@@ -53,44 +136,34 @@ INLINE int any(mask m)
 #endif
 }
 
-INLINE real FN(root)(real x)
+INLINE mask finite(real x) { return absolute(x) <= fill(1.7976931348623157e308); }
+
+/* Column k of the given rows of a row-major array. */
+INLINE real gather(const double *column, ptrdiff_t stride, const ptrdiff_t *row)
 {
-#if LANES == 8 && defined(__AVX512F__)
-    return (real)_mm512_sqrt_pd((__m512d)x);
-#elif LANES == 4 && defined(__AVX__)
-    return (real)_mm256_sqrt_pd((__m256d)x);
-#elif LANES == 2 && defined(__SSE2__)
-    return (real)_mm_sqrt_pd((__m128d)x);
-#else
+    double lane[LANES];
+    for (int l = 0; l < LANES; l++) lane[l] = column[stride * row[l]];
     real r;
-    for (int l = 0; l < LANES; l++) r[l] = sqrt(x[l]);
-    return r;
-#endif
-}
-
-INLINE real absolute(real x) { return (real)((mask)x & fill_mask(INT64_MAX)); }
-
-/* NaN in either wins: a maximum that dropped it would call a failed row good. */
-INLINE real maximum(real a, real b) { return select((a > b) | (a != a), a, b); }
-
-INLINE real minimum(real a, real b) { return select((a < b) | (a != a), a, b); }
-
-INLINE mask finite(real x) { return absolute(x) <= FN(fill)(1.7976931348623157e308); }
-
-/* Column k of LANES rows of a row-major array. Lanes past the last row repeat it. */
-INLINE real gather(const double *column, ptrdiff_t stride, ptrdiff_t rows)
-{
-    real r;
-    for (int l = 0; l < LANES; l++) r[l] = column[stride * (l < rows ? l : rows - 1)];
+    memcpy(&r, lane, sizeof r);
     return r;
 }
 
-/* The reverse, without the lanes past the last row. */
-INLINE void scatter(real x, double *column, ptrdiff_t stride, ptrdiff_t rows)
+/* The reverse, for the first `count` lanes. */
+INLINE void scatter(real x, double *column, ptrdiff_t stride, const ptrdiff_t *row, int count)
 {
     double lane[LANES];
     memcpy(lane, &x, sizeof lane);
-    for (int l = 0; l < LANES && l < rows; l++) column[stride * l] = lane[l];
+    if (count == LANES)
+        for (int l = 0; l < LANES; l++) column[stride * row[l]] = lane[l];
+    else
+        for (int l = 0; l < count; l++) column[stride * row[l]] = lane[l];
+}
+
+/* Rows start, start + 1, ... of n; lanes past the last repeat it. Returns how many are real. */
+INLINE int block_rows(ptrdiff_t start, ptrdiff_t n, ptrdiff_t row[LANES])
+{
+    for (int l = 0; l < LANES; l++) row[l] = start + l < n ? start + l : n - 1;
+    return n - start < LANES ? (int)(n - start) : LANES;
 }
 
 #endif

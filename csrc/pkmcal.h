@@ -29,7 +29,8 @@ typedef struct {
     double frame[108];              /* base-side axis frame of each limb, 3 x 3 row by row */
     double platform_frame[108];     /* platform-side axis frame of each limb */
     double lever[12];               /* of the couple row [mm] */
-    double weight[24];              /* of each row, in row order; 1 where rows = free coordinates */
+    double weight[24];              /* of each row, limb by limb, the sphere first */
+    int order[24];                  /* place of each row in the elimination: see pkm_order_rows */
 } pkm_machine;
 
 const char *pkm_slot_names(void);
@@ -40,6 +41,9 @@ const char *pkm_map_free(void);
 
 /* The best ISA of this processor. */
 int pkm_best_isa(void);
+
+/* Set `order` from an elimination with exchanges at the home pose: later ones run in that order. */
+int pkm_order_rows(pkm_machine *machine, const double *geometry, const double *home);
 
 /* pose (n, 6) -> q (n, actuators); a row a limb cannot reach is NaN. */
 int pkm_inverse(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,

@@ -9,7 +9,7 @@
  * near zero the matrix is singular and X means nothing. */
 INLINE void solve(int m, int k, real *A, real *B, real *pivot)
 {
-    real largest = FN(fill)(0.0), smallest = FN(fill)(INFINITY);
+    real largest = fill(0.0), smallest = fill(INFINITY);
     for (int i = 0; i < m * m; i++) largest = maximum(largest, absolute(A[i]));
     for (int c = 0; c < m; c++) {
         for (int i = c + 1; i < m; i++) {

@@ -149,7 +149,10 @@ class Function:
     def emit(self) -> str:
         """The C function, with its header comment."""
         statements = _Statements(self)
-        return "\n".join([*_comment(self, statements.counts), *statements.lines, "}", ""])
+        lines = [*_comment(self, statements.counts), *statements.lines, "}"]
+        if any(step.sincos is not None for step in self.steps):  # doubles only: see csrc/lanes.h
+            lines = ["#ifndef NARROW", *lines, "#endif"]
+        return "\n".join([*lines, ""])
 
 
 class _Statements:
@@ -226,9 +229,9 @@ class _Printer:
         return expr.name
 
     def _Rational(self, expr: sp.Rational) -> str:
-        if expr.q & (expr.q - 1):
-            raise NotImplementedError(f"{expr} is no exact binary fraction")
-        return repr(float(expr))
+        if expr.q & (expr.q - 1) or abs(expr.p) >= 2**24:
+            raise NotImplementedError(f"{expr} is no float: write it as a quotient of names")
+        return f"{float(expr)!r}f"  # exact, and C widens it to whatever `real` is
 
     def _Add(self, expr: sp.Add) -> str:
         terms = sorted(expr.args, key=self._order)
@@ -267,7 +270,7 @@ class _Printer:
         if exponent.is_negative:
             self.counts["/"] += 1
             under = self.print(1 / expr)
-            return f"1.0/({under})" if "*" in under or " " in under else f"1.0/{under}"
+            return f"1.0f/({under})" if "*" in under or " " in under else f"1.0f/{under}"
         raise NotImplementedError(f"the emitter does not expand the power {expr}")
 
     def _factor(self, expr: sp.Expr) -> str:

@@ -51,10 +51,10 @@ def rpy_angles(R: sp.Matrix, state: sp.Matrix) -> list[tuple[sp.Expr, sp.Expr]]:
 
 
 def turned(f: Function, c: sp.Expr, s: sp.Expr, step: sp.Expr, name: str) -> tuple:
-    """(cos, sin) turned by about `step`: the Cayley map, exact to second order and on the circle."""
-    t = f.let(f"t{name}", step / 2)
-    k = f.let(f"k{name}", 1 / (1 + t * t))
-    return ((1 - t * t) * c - 2 * t * s) * k, ((1 - t * t) * s + 2 * t * c) * k
+    """(cos, sin) turned by atan(step), and back on the unit circle whatever rounding did."""
+    x, y = f.let(f"x{name}", c - step * s), f.let(f"y{name}", s + step * c)
+    k = f.let(f"k{name}", 1 / sp.sqrt(x**2 + y**2))
+    return x * k, y * k
 
 
 def _spatial_from_pose(f: Function, pose: sp.Matrix) -> sp.Matrix:

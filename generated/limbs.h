@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation e78691c1c7f230b8
+ * derivation 1f26affcc724b0c5
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*
@@ -76,7 +76,7 @@ INLINE void FN(sphere_row)(const real R[9], const real p[3], const real b[3], co
     const real d1 = p[1] + r1 - c[1];
     const real d2 = p[2] + r2 - c[2];
     const real square = d0*d0 + d1*d1 + d2*d2 - rho2;
-    *phi = 0.5*square;
+    *phi = 0.5f*square;
     omega[0] = r1*d2 - r2*d1;
     omega[1] = r2*d0 - r0*d2;
     omega[2] = r0*d1 - r1*d0;
@@ -85,6 +85,7 @@ INLINE void FN(sphere_row)(const real R[9], const real p[3], const real b[3], co
     v[2] = d2;
 }
 
+#ifndef NARROW
 /*
  * base-side axis of a limb
  *     frame Rx(tilt1) Ry(tilt2) ez
@@ -103,7 +104,9 @@ INLINE void FN(base_axis)(const real g[14], const real F[9], real axis[3])
     axis[1] = F[3]*su2 + (F[5]*cu1 - F[4]*su1)*cu2;
     axis[2] = F[6]*su2 + (F[8]*cu1 - F[7]*su1)*cu2;
 }
+#endif
 
+#ifndef NARROW
 /*
  * platform-side axis of a limb
  *     frame Rx(tilt1) Ry(tilt2) ez
@@ -122,7 +125,9 @@ INLINE void FN(platform_axis)(const real g[14], const real P[9], real axis[3])
     axis[1] = P[3]*sw2 + (P[5]*cw1 - P[4]*sw1)*cw2;
     axis[2] = P[6]*sw2 + (P[8]*cw1 - P[7]*sw1)*cw2;
 }
+#endif
 
+#ifndef NARROW
 /*
  * slider: the directions the anchor moves in
  *     c = base + q̃ s, ρ = rod
@@ -141,11 +146,13 @@ INLINE void FN(slider_directions)(const real g[14], const real F[9], real first[
     first[0] = F[0]*su2 + (F[2]*cu1 - F[1]*su1)*cu2;
     first[1] = F[3]*su2 + (F[5]*cu1 - F[4]*su1)*cu2;
     first[2] = F[6]*su2 + (F[8]*cu1 - F[7]*su1)*cu2;
-    second[0] = FN(fill)(0.0);
-    second[1] = FN(fill)(0.0);
-    second[2] = FN(fill)(0.0);
+    second[0] = FN(fill)(0.0f);
+    second[1] = FN(fill)(0.0f);
+    second[2] = FN(fill)(0.0f);
 }
+#endif
 
+#ifndef NARROW
 /*
  * crank: the directions the anchor moves in
  *     c = base + crank Rot(axis, q̃) e, ρ = rod
@@ -168,6 +175,7 @@ INLINE void FN(crank_directions)(const real g[14], const real F[9], real first[3
     second[1] = g[CRANK]*(F[4]*cu1 + F[5]*su1);
     second[2] = g[CRANK]*(F[7]*cu1 + F[8]*su1);
 }
+#endif
 
 /*
  * slider: where the anchor stands
@@ -185,6 +193,7 @@ INLINE void FN(slider_anchor)(real qt, const real base[3], const real first[3], 
     c[2] = qt*first[2] + base[2];
 }
 
+#ifndef NARROW
 /*
  * crank: where the anchor stands
  *     c = base + crank Rot(axis, q̃) e, ρ = rod
@@ -204,6 +213,7 @@ INLINE void FN(crank_anchor)(real qt, const real base[3], const real first[3],
     c[1] = base[1] + first[1]*cq + second[1]*sq;
     c[2] = base[2] + first[2]*cq + second[2]*sq;
 }
+#endif
 
 /*
  * length: actuator coordinate at a joint position
@@ -257,7 +267,7 @@ INLINE void FN(crank_inverse)(const real g[14], const real h[3], const real firs
     const real x = h[0]*first[0] + h[1]*first[1] + h[2]*first[2];
     const real y = h[0]*second[0] + h[1]*second[1] + h[2]*second[2];
     const real twice = g[CRANK]*g[CRANK] + h[0]*h[0] + h[1]*h[1] + h[2]*h[2] - g[ROD]*g[ROD];
-    const real kappa = 0.5*twice;
+    const real kappa = 0.5f*twice;
     const real root = FN(root)(x*x + y*y - kappa*kappa);
     sine[0] = y;
     sine[1] = root;
@@ -299,14 +309,15 @@ INLINE void FN(length_derivatives)(const real R[9], const real p[3], real q, con
     by_g[PLATFORM_Z] = R[2]*d0 + R[5]*d1 + R[8]*d2;
     by_g[OFFSET] = -qt;
     by_g[GAIN] = -q*qt;
-    by_g[ROD] = FN(fill)(0.0);
-    by_g[CRANK] = FN(fill)(0.0);
-    by_g[TILT1] = FN(fill)(0.0);
-    by_g[TILT2] = FN(fill)(0.0);
-    by_g[PLATFORM_TILT1] = FN(fill)(0.0);
-    by_g[PLATFORM_TILT2] = FN(fill)(0.0);
+    by_g[ROD] = FN(fill)(0.0f);
+    by_g[CRANK] = FN(fill)(0.0f);
+    by_g[TILT1] = FN(fill)(0.0f);
+    by_g[TILT2] = FN(fill)(0.0f);
+    by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
+    by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
 }
 
+#ifndef NARROW
 /*
  * slider: the sphere row by q and numbers
  *     Φ = (d·d - ρ²)/2,  d = p + R b - c,  c = base + q̃ s, ρ = rod
@@ -357,7 +368,7 @@ INLINE void FN(slider_derivatives)(const real R[9], const real p[3], real q, con
     by_g[OFFSET] = -t3 - t4 - t5;
     by_g[GAIN] = -q*t3 - q*t4 - q*t5;
     by_g[ROD] = -g[ROD];
-    by_g[CRANK] = FN(fill)(0.0);
+    by_g[CRANK] = FN(fill)(0.0f);
     const real t6 = cu1*cu2;
     const real t7 = su1*cu2;
     const real t8 = qt*d0;
@@ -365,10 +376,12 @@ INLINE void FN(slider_derivatives)(const real R[9], const real p[3], real q, con
     const real t10 = qt*d2;
     by_g[TILT1] = -(-F[1]*t6 - F[2]*t7)*t8 - (-F[4]*t6 - F[5]*t7)*t9 - (-F[7]*t6 - F[8]*t7)*t10;
     by_g[TILT2] = -(F[0]*cu2 - su2*t0)*t8 - (F[3]*cu2 - su2*t1)*t9 - (F[6]*cu2 - su2*t2)*t10;
-    by_g[PLATFORM_TILT1] = FN(fill)(0.0);
-    by_g[PLATFORM_TILT2] = FN(fill)(0.0);
+    by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
+    by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
 }
+#endif
 
+#ifndef NARROW
 /*
  * crank: the sphere row by q and numbers
  *     Φ = (d·d - ρ²)/2,  d = p + R b - c,  c = base + crank Rot(axis, q̃) e, ρ = rod
@@ -447,9 +460,10 @@ INLINE void FN(crank_derivatives)(const real R[9], const real p[3], real q, cons
         (-(su2*t10 + su2*t11)*t15 - t5*t19)*d2;
     by_g[TILT2] = -(cu2*t0 - F[0]*su2)*d0*t15 - (cu2*t2 - F[3]*su2)*d1*t15 - (cu2*t4 -
         F[6]*su2)*d2*t15;
-    by_g[PLATFORM_TILT1] = FN(fill)(0.0);
-    by_g[PLATFORM_TILT2] = FN(fill)(0.0);
+    by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
+    by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
 }
+#endif
 
 /*
  * base_plane: the platform joint stays in a plane of the base
@@ -484,6 +498,7 @@ INLINE void FN(base_plane_row)(const real R[9], const real p[3], const real b[3]
     v[2] = n[2];
 }
 
+#ifndef NARROW
 /*
  * base_plane: the platform joint stays in a plane of the base
  *     Φ = n·d,  d = p + R b - base
@@ -522,17 +537,18 @@ INLINE void FN(base_plane_derivatives)(const real R[9], const real p[3], const r
     by_g[PLATFORM_X] = R[0]*n0 + R[3]*n1 + R[6]*n2;
     by_g[PLATFORM_Y] = R[1]*n0 + R[4]*n1 + R[7]*n2;
     by_g[PLATFORM_Z] = R[2]*n0 + R[5]*n1 + R[8]*n2;
-    by_g[OFFSET] = FN(fill)(0.0);
-    by_g[GAIN] = FN(fill)(0.0);
-    by_g[ROD] = FN(fill)(0.0);
-    by_g[CRANK] = FN(fill)(0.0);
+    by_g[OFFSET] = FN(fill)(0.0f);
+    by_g[GAIN] = FN(fill)(0.0f);
+    by_g[ROD] = FN(fill)(0.0f);
+    by_g[CRANK] = FN(fill)(0.0f);
     const real t3 = cu1*cu2;
     const real t4 = su1*cu2;
     by_g[TILT1] = (-F[1]*t3 - F[2]*t4)*d0 + (-F[4]*t3 - F[5]*t4)*d1 + (-F[7]*t3 - F[8]*t4)*d2;
     by_g[TILT2] = (F[0]*cu2 - su2*t0)*d0 + (F[3]*cu2 - su2*t1)*d1 + (F[6]*cu2 - su2*t2)*d2;
-    by_g[PLATFORM_TILT1] = FN(fill)(0.0);
-    by_g[PLATFORM_TILT2] = FN(fill)(0.0);
+    by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
+    by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
 }
+#endif
 
 /*
  * platform_plane: the leg stays square to the platform's revolute axis
@@ -570,6 +586,7 @@ INLINE void FN(platform_plane_row)(const real R[9], const real p[3], const real 
     v[2] = Ra2;
 }
 
+#ifndef NARROW
 /*
  * platform_plane: the leg stays square to the platform's revolute axis
  *     Φ = (R a)·d,  d = p + R b - base
@@ -611,12 +628,12 @@ INLINE void FN(platform_plane_derivatives)(const real R[9], const real p[3], con
     by_g[PLATFORM_X] = R[0]*Ra0 + R[3]*Ra1 + R[6]*Ra2;
     by_g[PLATFORM_Y] = R[1]*Ra0 + R[4]*Ra1 + R[7]*Ra2;
     by_g[PLATFORM_Z] = R[2]*Ra0 + R[5]*Ra1 + R[8]*Ra2;
-    by_g[OFFSET] = FN(fill)(0.0);
-    by_g[GAIN] = FN(fill)(0.0);
-    by_g[ROD] = FN(fill)(0.0);
-    by_g[CRANK] = FN(fill)(0.0);
-    by_g[TILT1] = FN(fill)(0.0);
-    by_g[TILT2] = FN(fill)(0.0);
+    by_g[OFFSET] = FN(fill)(0.0f);
+    by_g[GAIN] = FN(fill)(0.0f);
+    by_g[ROD] = FN(fill)(0.0f);
+    by_g[CRANK] = FN(fill)(0.0f);
+    by_g[TILT1] = FN(fill)(0.0f);
+    by_g[TILT2] = FN(fill)(0.0f);
     const real t3 = cw1*cw2;
     const real t4 = sw1*cw2;
     const real t5 = -P[1]*t3 - P[2]*t4;
@@ -630,6 +647,7 @@ INLINE void FN(platform_plane_derivatives)(const real R[9], const real p[3], con
     by_g[PLATFORM_TILT2] = (R[0]*t8 + R[1]*t9 + R[2]*t10)*d0 + (R[3]*t8 + R[4]*t9 + R[5]*t10)*d1 +
         (R[6]*t8 + R[7]*t9 + R[8]*t10)*d2;
 }
+#endif
 
 /*
  * couple: revolute and universal axis stay square, at the lever λ
@@ -657,11 +675,12 @@ INLINE void FN(couple_row)(const real R[9], const real p[3], const real b[3], co
     omega[0] = Ra1*t0 - n[1]*lever*Ra2;
     omega[1] = n[0]*lever*Ra2 - Ra0*t0;
     omega[2] = n[1]*lever*Ra0 - n[0]*lever*Ra1;
-    v[0] = FN(fill)(0.0);
-    v[1] = FN(fill)(0.0);
-    v[2] = FN(fill)(0.0);
+    v[0] = FN(fill)(0.0f);
+    v[1] = FN(fill)(0.0f);
+    v[2] = FN(fill)(0.0f);
 }
 
+#ifndef NARROW
 /*
  * couple: revolute and universal axis stay square, at the lever λ
  *     Φ = λ (R a)·n,  d = p + R b - base
@@ -702,16 +721,16 @@ INLINE void FN(couple_derivatives)(const real R[9], const real p[3], const real 
     const real Ra0 = R[0]*a0 + R[1]*a1 + R[2]*a2;
     const real Ra1 = R[3]*a0 + R[4]*a1 + R[5]*a2;
     const real Ra2 = R[6]*a0 + R[7]*a1 + R[8]*a2;
-    by_g[BASE_X] = FN(fill)(0.0);
-    by_g[BASE_Y] = FN(fill)(0.0);
-    by_g[BASE_Z] = FN(fill)(0.0);
-    by_g[PLATFORM_X] = FN(fill)(0.0);
-    by_g[PLATFORM_Y] = FN(fill)(0.0);
-    by_g[PLATFORM_Z] = FN(fill)(0.0);
-    by_g[OFFSET] = FN(fill)(0.0);
-    by_g[GAIN] = FN(fill)(0.0);
-    by_g[ROD] = FN(fill)(0.0);
-    by_g[CRANK] = FN(fill)(0.0);
+    by_g[BASE_X] = FN(fill)(0.0f);
+    by_g[BASE_Y] = FN(fill)(0.0f);
+    by_g[BASE_Z] = FN(fill)(0.0f);
+    by_g[PLATFORM_X] = FN(fill)(0.0f);
+    by_g[PLATFORM_Y] = FN(fill)(0.0f);
+    by_g[PLATFORM_Z] = FN(fill)(0.0f);
+    by_g[OFFSET] = FN(fill)(0.0f);
+    by_g[GAIN] = FN(fill)(0.0f);
+    by_g[ROD] = FN(fill)(0.0f);
+    by_g[CRANK] = FN(fill)(0.0f);
     const real t6 = cu1*cu2;
     const real t7 = su1*cu2;
     const real t8 = lever*Ra0;
@@ -735,3 +754,4 @@ INLINE void FN(couple_derivatives)(const real R[9], const real p[3], const real 
     by_g[PLATFORM_TILT2] = (R[0]*t19 + R[1]*t20 + R[2]*t21)*t16 + (R[3]*t19 + R[4]*t20 +
         R[5]*t21)*t17 + (R[6]*t19 + R[7]*t20 + R[8]*t21)*t18;
 }
+#endif

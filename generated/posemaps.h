@@ -1,7 +1,8 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation 5228678969b57c1f
+ * derivation c0eb55b0078f33dd
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
+#ifndef NARROW
 /*
  * the frame of a pose
  *     R = Rz(γ) Ry(β) Rx(α) (A eq. 1)
@@ -34,7 +35,9 @@ INLINE void FN(pose_frame)(const real pose[6], real R[9], real p[3])
     p[1] = pose[1];
     p[2] = pose[2];
 }
+#endif
 
+#ifndef NARROW
 /*
  * spatial: the state of a pose
  *     six free coordinates; state: p and the unit quaternion of R; step: (v, ω)
@@ -46,11 +49,11 @@ INLINE void FN(map_spatial_from_pose)(const real pose[6], real state[7])
 {
     /* half angles */
     real sa, ca;
-    FN(sincos)(0.5*pose[3], &sa, &ca);
+    FN(sincos)(0.5f*pose[3], &sa, &ca);
     real sb, cb;
-    FN(sincos)(0.5*pose[4], &sb, &cb);
+    FN(sincos)(0.5f*pose[4], &sb, &cb);
     real sg, cg;
-    FN(sincos)(0.5*pose[5], &sg, &cg);
+    FN(sincos)(0.5f*pose[5], &sg, &cg);
     state[0] = pose[0];
     state[1] = pose[1];
     state[2] = pose[2];
@@ -62,6 +65,7 @@ INLINE void FN(map_spatial_from_pose)(const real pose[6], real state[7])
     state[5] = sa*t2 + ca*t1;
     state[6] = ca*t2 - sa*t1;
 }
+#endif
 
 /*
  * spatial: the frame of a state
@@ -73,23 +77,23 @@ INLINE void FN(map_spatial_from_pose)(const real pose[6], real state[7])
  */
 INLINE void FN(map_spatial_frame)(const real state[7], real R[9], real p[3])
 {
-    const real t0 = 2.0*state[5]*state[5];
-    const real t1 = 2.0*state[6]*state[6] - 1.0;
+    const real t0 = 2.0f*state[5]*state[5];
+    const real t1 = 2.0f*state[6]*state[6] - 1.0f;
     R[0] = -t0 - t1;
-    const real t2 = 2.0*state[3];
+    const real t2 = 2.0f*state[3];
     const real t3 = state[6]*t2;
-    R[1] = 2.0*state[4]*state[5] - t3;
+    R[1] = 2.0f*state[4]*state[5] - t3;
     const real t4 = state[5]*t2;
-    const real t5 = 2.0*state[4];
+    const real t5 = 2.0f*state[4];
     R[2] = state[6]*t5 + t4;
     R[3] = state[5]*t5 + t3;
-    const real t6 = 2.0*state[4]*state[4];
+    const real t6 = 2.0f*state[4]*state[4];
     R[4] = -t1 - t6;
     const real t7 = state[4]*t2;
-    R[5] = 2.0*state[5]*state[6] - t7;
-    R[6] = 2.0*state[4]*state[6] - t4;
-    R[7] = 2.0*state[5]*state[6] + t7;
-    R[8] = 1.0 - t0 - t6;
+    R[5] = 2.0f*state[5]*state[6] - t7;
+    R[6] = 2.0f*state[4]*state[6] - t4;
+    R[7] = 2.0f*state[5]*state[6] + t7;
+    R[8] = 1.0f - t0 - t6;
     p[0] = state[0];
     p[1] = state[1];
     p[2] = state[2];
@@ -106,14 +110,14 @@ INLINE void FN(map_spatial_frame)(const real state[7], real R[9], real p[3])
 INLINE void FN(map_spatial_retract)(const real state[7], const real delta[6], real moved[7])
 {
     /* (1, ω/2) q, then to unit length */
-    const real t0 = 0.5*delta[3];
-    const real t1 = 0.5*delta[4];
-    const real t2 = 0.5*delta[5];
+    const real t0 = 0.5f*delta[3];
+    const real t1 = 0.5f*delta[4];
+    const real t2 = 0.5f*delta[5];
     const real q0 = state[3] - state[4]*t0 - state[5]*t1 - state[6]*t2;
     const real q1 = state[3]*t0 + state[4] + state[6]*t1 - state[5]*t2;
     const real q2 = state[3]*t1 + state[4]*t2 + state[5] - state[6]*t0;
     const real q3 = state[3]*t2 + state[5]*t0 + state[6] - state[4]*t1;
-    const real k = 1.0/(FN(root)(q0*q0 + q1*q1 + q2*q2 + q3*q3));
+    const real k = 1.0f/(FN(root)(q0*q0 + q1*q1 + q2*q2 + q3*q3));
     moved[0] = state[0] + delta[0];
     moved[1] = state[1] + delta[1];
     moved[2] = state[2] + delta[2];
@@ -133,13 +137,13 @@ INLINE void FN(map_spatial_retract)(const real state[7], const real delta[6], re
  */
 INLINE void FN(map_spatial_angles)(const real state[7], real sine[3], real cosine[3])
 {
-    const real t0 = 2.0*state[5]*state[5] - 1.0;
-    const real R0 = -2.0*state[6]*state[6] - t0;
-    const real t1 = 2.0*state[3];
-    const real R3 = 2.0*state[4]*state[5] + state[6]*t1;
-    const real R6 = 2.0*state[4]*state[6] - state[5]*t1;
-    const real R7 = state[4]*t1 + 2.0*state[5]*state[6];
-    const real R8 = -2.0*state[4]*state[4] - t0;
+    const real t0 = 2.0f*state[5]*state[5] - 1.0f;
+    const real R0 = -2.0f*state[6]*state[6] - t0;
+    const real t1 = 2.0f*state[3];
+    const real R3 = 2.0f*state[4]*state[5] + state[6]*t1;
+    const real R6 = 2.0f*state[4]*state[6] - state[5]*t1;
+    const real R7 = state[4]*t1 + 2.0f*state[5]*state[6];
+    const real R8 = -2.0f*state[4]*state[4] - t0;
     sine[0] = R7;
     sine[1] = -R6;
     sine[2] = R3;
@@ -179,13 +183,13 @@ INLINE void FN(map_spatial_pull)(const real state[7], const real omega[3], const
 INLINE void FN(map_spatial_rates)(const real state[7], const real delta[6], real pose[6])
 {
     /* sin β, cos β, and γ, from R */
-    const real t0 = 2.0*state[5];
-    const real t1 = 2.0*state[6];
+    const real t0 = 2.0f*state[5];
+    const real t1 = 2.0f*state[6];
     const real sb = state[3]*t0 - state[4]*t1;
-    const real r00 = 1.0 - 2.0*state[5]*state[5] - 2.0*state[6]*state[6];
+    const real r00 = 1.0f - 2.0f*state[5]*state[5] - 2.0f*state[6]*state[6];
     const real r10 = state[3]*t1 + state[4]*t0;
     const real cb = FN(root)(r00*r00 + r10*r10);
-    const real t2 = 1.0/cb;
+    const real t2 = 1.0f/cb;
     const real sg = r10*t2;
     const real cg = r00*t2;
     /* E⁻¹ ω, ω = E (α̇, β̇, γ̇) */
@@ -209,13 +213,13 @@ INLINE void FN(map_spatial_rates)(const real state[7], const real delta[6], real
 INLINE void FN(map_spatial_free)(const real state[7], const real row[6], real out[6])
 {
     /* sin β, cos β, and γ, from R */
-    const real t0 = 2.0*state[5];
-    const real t1 = 2.0*state[6];
+    const real t0 = 2.0f*state[5];
+    const real t1 = 2.0f*state[6];
     const real sb = state[3]*t0 - state[4]*t1;
-    const real r00 = 1.0 - 2.0*state[5]*state[5] - 2.0*state[6]*state[6];
+    const real r00 = 1.0f - 2.0f*state[5]*state[5] - 2.0f*state[6]*state[6];
     const real r10 = state[3]*t1 + state[4]*t0;
     const real cb = FN(root)(r00*r00 + r10*r10);
-    const real t2 = 1.0/cb;
+    const real t2 = 1.0f/cb;
     const real sg = r10*t2;
     const real cg = r00*t2;
     out[0] = row[0];
@@ -250,15 +254,15 @@ INLINE void FN(map_translation_from_pose)(const real pose[6], real state[3])
  */
 INLINE void FN(map_translation_frame)(const real state[3], real R[9], real p[3])
 {
-    R[0] = FN(fill)(1.0);
-    R[1] = FN(fill)(0.0);
-    R[2] = FN(fill)(0.0);
-    R[3] = FN(fill)(0.0);
-    R[4] = FN(fill)(1.0);
-    R[5] = FN(fill)(0.0);
-    R[6] = FN(fill)(0.0);
-    R[7] = FN(fill)(0.0);
-    R[8] = FN(fill)(1.0);
+    R[0] = FN(fill)(1.0f);
+    R[1] = FN(fill)(0.0f);
+    R[2] = FN(fill)(0.0f);
+    R[3] = FN(fill)(0.0f);
+    R[4] = FN(fill)(1.0f);
+    R[5] = FN(fill)(0.0f);
+    R[6] = FN(fill)(0.0f);
+    R[7] = FN(fill)(0.0f);
+    R[8] = FN(fill)(1.0f);
     p[0] = state[0];
     p[1] = state[1];
     p[2] = state[2];
@@ -289,12 +293,12 @@ INLINE void FN(map_translation_retract)(const real state[3], const real delta[3]
  */
 INLINE void FN(map_translation_angles)(const real state[3], real sine[3], real cosine[3])
 {
-    sine[0] = FN(fill)(0.0);
-    sine[1] = FN(fill)(0.0);
-    sine[2] = FN(fill)(0.0);
-    cosine[0] = FN(fill)(1.0);
-    cosine[1] = FN(fill)(1.0);
-    cosine[2] = FN(fill)(1.0);
+    sine[0] = FN(fill)(0.0f);
+    sine[1] = FN(fill)(0.0f);
+    sine[2] = FN(fill)(0.0f);
+    cosine[0] = FN(fill)(1.0f);
+    cosine[1] = FN(fill)(1.0f);
+    cosine[2] = FN(fill)(1.0f);
 }
 
 /*
@@ -327,9 +331,9 @@ INLINE void FN(map_translation_rates)(const real state[3], const real delta[3], 
     pose[0] = delta[0];
     pose[1] = delta[1];
     pose[2] = delta[2];
-    pose[3] = FN(fill)(0.0);
-    pose[4] = FN(fill)(0.0);
-    pose[5] = FN(fill)(0.0);
+    pose[3] = FN(fill)(0.0f);
+    pose[4] = FN(fill)(0.0f);
+    pose[5] = FN(fill)(0.0f);
 }
 
 /*
@@ -347,6 +351,7 @@ INLINE void FN(map_translation_free)(const real state[3], const real row[3], rea
     out[2] = row[2];
 }
 
+#ifndef NARROW
 /*
  * planar: the state of a pose
  *     x y γ in the plane z = 0; state: x, y, cos γ, sin γ; step: (vx, vy, ωz)
@@ -363,6 +368,7 @@ INLINE void FN(map_planar_from_pose)(const real pose[6], real state[4])
     state[2] = cg;
     state[3] = sg;
 }
+#endif
 
 /*
  * planar: the frame of a state
@@ -376,16 +382,16 @@ INLINE void FN(map_planar_frame)(const real state[4], real R[9], real p[3])
 {
     R[0] = state[2];
     R[1] = -state[3];
-    R[2] = FN(fill)(0.0);
+    R[2] = FN(fill)(0.0f);
     R[3] = state[3];
     R[4] = state[2];
-    R[5] = FN(fill)(0.0);
-    R[6] = FN(fill)(0.0);
-    R[7] = FN(fill)(0.0);
-    R[8] = FN(fill)(1.0);
+    R[5] = FN(fill)(0.0f);
+    R[6] = FN(fill)(0.0f);
+    R[7] = FN(fill)(0.0f);
+    R[8] = FN(fill)(1.0f);
     p[0] = state[0];
     p[1] = state[1];
-    p[2] = FN(fill)(0.0);
+    p[2] = FN(fill)(0.0f);
 }
 
 /*
@@ -394,19 +400,17 @@ INLINE void FN(map_planar_frame)(const real state[4], real R[9], real p[3])
  * in  state[4]       of the map
  * in  delta[3]       step [mm, rad]
  * out moved[4]       the new state
- * operations: 6 +, 9 *, 1 /, 0 sqrt
+ * operations: 5 +, 6 *, 1 /, 1 sqrt
  */
 INLINE void FN(map_planar_retract)(const real state[4], const real delta[3], real moved[4])
 {
-    const real tg = 0.5*delta[2];
-    const real t0 = tg*tg;
-    const real kg = 1.0/(1.0 + t0);
+    const real xg = state[2] - state[3]*delta[2];
+    const real yg = state[2]*delta[2] + state[3];
+    const real kg = 1.0f/(FN(root)(xg*xg + yg*yg));
     moved[0] = state[0] + delta[0];
     moved[1] = state[1] + delta[1];
-    const real t1 = 2.0*tg;
-    const real t2 = 1.0 - t0;
-    moved[2] = (state[2]*t2 - state[3]*t1)*kg;
-    moved[3] = (state[2]*t1 + state[3]*t2)*kg;
+    moved[2] = xg*kg;
+    moved[3] = yg*kg;
 }
 
 /*
@@ -419,11 +423,11 @@ INLINE void FN(map_planar_retract)(const real state[4], const real delta[3], rea
  */
 INLINE void FN(map_planar_angles)(const real state[4], real sine[3], real cosine[3])
 {
-    sine[0] = FN(fill)(0.0);
-    sine[1] = FN(fill)(0.0);
+    sine[0] = FN(fill)(0.0f);
+    sine[1] = FN(fill)(0.0f);
     sine[2] = state[3];
-    cosine[0] = FN(fill)(1.0);
-    cosine[1] = FN(fill)(1.0);
+    cosine[0] = FN(fill)(1.0f);
+    cosine[1] = FN(fill)(1.0f);
     cosine[2] = state[2];
 }
 
@@ -456,9 +460,9 @@ INLINE void FN(map_planar_rates)(const real state[4], const real delta[3], real 
 {
     pose[0] = delta[0];
     pose[1] = delta[1];
-    pose[2] = FN(fill)(0.0);
-    pose[3] = FN(fill)(0.0);
-    pose[4] = FN(fill)(0.0);
+    pose[2] = FN(fill)(0.0f);
+    pose[3] = FN(fill)(0.0f);
+    pose[4] = FN(fill)(0.0f);
     pose[5] = delta[2];
 }
 
@@ -477,6 +481,7 @@ INLINE void FN(map_planar_free)(const real state[4], const real row[3], real out
     out[2] = row[2];
 }
 
+#ifndef NARROW
 /*
  * 2tpr2tps: the state of a pose
  *     y z α β with x = z tan β, γ = 0 (A eq. 7); state: y, w = z / cos β, cos and sin of α, β
@@ -497,6 +502,7 @@ INLINE void FN(map_2tpr2tps_from_pose)(const real pose[6], real state[6])
     state[4] = cb;
     state[5] = sb;
 }
+#endif
 
 /*
  * 2tpr2tps: the frame of a state
@@ -511,7 +517,7 @@ INLINE void FN(map_2tpr2tps_frame)(const real state[6], real R[9], real p[3])
     R[0] = state[4];
     R[1] = state[3]*state[5];
     R[2] = state[2]*state[5];
-    R[3] = FN(fill)(0.0);
+    R[3] = FN(fill)(0.0f);
     R[4] = state[2];
     R[5] = -state[3];
     R[6] = -state[5];
@@ -528,26 +534,22 @@ INLINE void FN(map_2tpr2tps_frame)(const real state[6], real R[9], real p[3])
  * in  state[6]       of the map
  * in  delta[4]       step [mm, rad]
  * out moved[6]       the new state
- * operations: 10 +, 18 *, 2 /, 0 sqrt
+ * operations: 8 +, 12 *, 2 /, 2 sqrt
  */
 INLINE void FN(map_2tpr2tps_retract)(const real state[6], const real delta[4], real moved[6])
 {
-    const real ta = 0.5*delta[2];
-    const real t0 = ta*ta;
-    const real ka = 1.0/(1.0 + t0);
-    const real tb = 0.5*delta[3];
-    const real t1 = tb*tb;
-    const real kb = 1.0/(1.0 + t1);
+    const real xa = state[2] - state[3]*delta[2];
+    const real ya = state[2]*delta[2] + state[3];
+    const real ka = 1.0f/(FN(root)(xa*xa + ya*ya));
+    const real xb = state[4] - state[5]*delta[3];
+    const real yb = state[4]*delta[3] + state[5];
+    const real kb = 1.0f/(FN(root)(xb*xb + yb*yb));
     moved[0] = state[0] + delta[0];
     moved[1] = state[1] + delta[1];
-    const real t2 = 2.0*ta;
-    const real t3 = 1.0 - t0;
-    moved[2] = (state[2]*t3 - state[3]*t2)*ka;
-    moved[3] = (state[2]*t2 + state[3]*t3)*ka;
-    const real t4 = 2.0*tb;
-    const real t5 = 1.0 - t1;
-    moved[4] = (state[4]*t5 - state[5]*t4)*kb;
-    moved[5] = (state[4]*t4 + state[5]*t5)*kb;
+    moved[2] = xa*ka;
+    moved[3] = ya*ka;
+    moved[4] = xb*kb;
+    moved[5] = yb*kb;
 }
 
 /*
@@ -562,10 +564,10 @@ INLINE void FN(map_2tpr2tps_angles)(const real state[6], real sine[3], real cosi
 {
     sine[0] = state[3];
     sine[1] = state[5];
-    sine[2] = FN(fill)(0.0);
+    sine[2] = FN(fill)(0.0f);
     cosine[0] = state[2];
     cosine[1] = state[4];
-    cosine[2] = FN(fill)(1.0);
+    cosine[2] = FN(fill)(1.0f);
 }
 
 /*
@@ -602,7 +604,7 @@ INLINE void FN(map_2tpr2tps_rates)(const real state[6], const real delta[4], rea
     pose[2] = state[4]*delta[1] - state[5]*t0;
     pose[3] = delta[2];
     pose[4] = delta[3];
-    pose[5] = FN(fill)(0.0);
+    pose[5] = FN(fill)(0.0f);
 }
 
 /*
@@ -615,7 +617,7 @@ INLINE void FN(map_2tpr2tps_rates)(const real state[6], const real delta[4], rea
  */
 INLINE void FN(map_2tpr2tps_free)(const real state[6], const real row[4], real out[4])
 {
-    const real k = 1.0/state[4];
+    const real k = 1.0f/state[4];
     out[0] = row[0];
     const real t0 = row[1]*k;
     out[1] = t0;

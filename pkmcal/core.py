@@ -139,11 +139,21 @@ class Machine:
         weights of the sphere row and the other rows.
     length : float
         Characteristic length, mm.
+    slots, home : ndarray
+        Geometry (limbs, SLOTS) and pose (6,) at which the order of elimination is chosen.
     isa : int
         Index into `ISAS`.
     """
 
-    def __init__(self, map: str, limbs: list[dict[str, Any]], length: float, isa: int = ISA):
+    def __init__(
+        self,
+        map: str,
+        limbs: list[dict[str, Any]],
+        length: float,
+        slots: FloatArray,
+        home: FloatArray,
+        isa: int = ISA,
+    ) -> None:
         struct = ffi.new("pkm_machine *")
         struct.map = list(MAPS).index(map)
         struct.limbs = len(limbs)
@@ -162,6 +172,7 @@ class Machine:
             weights += limb["weights"]
         for r, weight in enumerate(weights):
             struct.weight[r] = weight
+        self._ensure(lib.pkm_order_rows(struct, pointer(slots), pointer(home)))
         self.struct = struct
         self.isa = isa
         self.actuators: int = struct.actuators

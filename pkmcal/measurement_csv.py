@@ -25,11 +25,9 @@ from __future__ import annotations
 import csv
 import io
 import itertools
-import os
 import re
 from collections.abc import Iterator, Sequence
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,6 +35,7 @@ from numpy.typing import NDArray
 
 from pkmcal.csv_table import Table
 from pkmcal.measurements import COMPONENTS, Measurements
+from pkmcal.whole_file import write_whole
 
 _AXES = ("x", "y", "z")
 _ANGLES = ("alpha", "beta", "gamma")
@@ -126,7 +125,7 @@ def write_measurements(measurements: Measurements, path: str | PathLike[str]) ->
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(headings)
     writer.writerows(zip(*columns, strict=True))
-    _replace(Path(path), text.getvalue())
+    write_whole(path, text.getvalue())
 
 
 # --- reading -----------------------------------------------------------------------------------
@@ -320,14 +319,3 @@ def _columns(m: Measurements) -> Iterator[tuple[str, Sequence[str]]]:
 def _exact(values: NDArray[np.float64]) -> list[str]:
     """The shortest decimals that are read back to the same bits."""
     return [repr(float(value)) for value in values]
-
-
-def _replace(path: Path, text: str) -> None:
-    """Write beside the file, then move over it."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        with open(beside, "x", encoding="utf-8", newline="") as file:
-            file.write(text)
-        os.replace(beside, path)
-    finally:
-        beside.unlink(missing_ok=True)

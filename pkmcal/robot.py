@@ -86,8 +86,9 @@ class Robot:
     def __init__(self, model: Model) -> None:
         self.model = model
         self._slots = np.ascontiguousarray(model.geometry.slots)
-        self._machine = Machine(model.map, [_limb(limb) for limb in model.limbs], self.length)
         self._home = np.ascontiguousarray(model.home, dtype=np.float64)
+        limbs = [_limb(limb) for limb in model.limbs]
+        self._machine = Machine(model.map, limbs, self.length, self._slots, self._home)
 
     # what it is ---------------------------------------------------------------------------------
 

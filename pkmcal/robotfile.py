@@ -19,6 +19,7 @@ from pkmcal.robotfile_limbs import Parameters, read_limbs
 from pkmcal.robotfile_write import text_of
 from pkmcal.suggest import did_you_mean
 from pkmcal.toml_table import ANGLE_UNITS, LENGTH_UNITS, Table, Units, shown
+from pkmcal.whole_file import write_whole
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -84,7 +85,7 @@ def read(robot: str | os.PathLike[str]) -> Model:
 def write(model: Model, path: str | os.PathLike[str]) -> None:
     """Write a robot file in mm and rad, which `read` reads back to the last bit.
 
-    The file is complete or untouched: it is written beside its place and then moved there.
+    The file is complete or untouched.
 
     Parameters
     ----------
@@ -98,17 +99,7 @@ def write(model: Model, path: str | os.PathLike[str]) -> None:
     OSError
         The folder does not exist or cannot be written.
     """
-    path = Path(path)
-    text = text_of(model)
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, path)
-    except BaseException:
-        part.unlink(missing_ok=True)
-        raise
+    write_whole(path, text_of(model))
 
 
 def parse(content: bytes, place: str, file: str | None) -> Model:
@@ -117,7 +108,7 @@ def parse(content: bytes, place: str, file: str | None) -> Model:
         data = tomllib.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise ValueError(f"{place}: not a text file in UTF-8 (byte {error.start})") from None
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # a syntax error, an endless number or nesting
         raise ValueError(f"{place}: not valid TOML: {error}") from None
 
     top = Table(data, place, "", Units())

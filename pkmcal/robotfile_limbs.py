@@ -160,8 +160,8 @@ def _read_numbers(
 
     entries: dict[str, Entry] = {}
     for point in ("base", "platform"):
-        for axis, found in zip("xyz", _point(table, point, parameters), strict=True):
-            entries[f"{point}.{axis}"] = found
+        for coordinate, found in zip("xyz", _point(table, point, parameters), strict=True):
+            entries[f"{point}.{coordinate}"] = found
     entries["offset"] = entry("offset", table.data.get("offset", 0.0), kind.actuator_unit)
     entries["gain"] = entry("gain", table.data.get("gain", 1.0), "1")
     if entries["gain"].value == 0.0:

@@ -10,17 +10,41 @@ from pkmcal.limb_kinds import KINDS, MAP_COORDINATES, PLATFORM_TILT_SLOTS, TILT_
 from pkmcal.model import COORDINATES, Cone, FloatArray, Limb, Model
 from pkmcal.ties import LimbNumber, Term
 
-HEADER = "# A robot for pkmcal: lengths in mm, angles in rad.\n\n"
+HEADER = "# A robot for pkmcal: lengths in mm, angles in rad.\n"
 
 
 def text_of(model: Model) -> str:
     """The TOML text of a model, in mm and rad."""
+    head = {"name": model.name, "units": {"length": "mm", "angle": "rad"}}
+    blocks = [HEADER, _lines(head)]
+    blocks += [f"[{key}]\n{_lines(table)}" for key, table in _sections(model).items() if table]
+    limbs = (_limb(limb, i, model.geometry) for i, limb in enumerate(model.limbs))
+    blocks += [f"[[limb]]\n{_lines(limb)}" for limb in limbs]
+    return "\n".join(blocks)
+
+
+def _lines(table: Mapping[str, Any]) -> str:
+    return "".join(f"{_key(key)} = {_value(value)}\n" for key, value in table.items())
+
+
+def _key(key: str) -> str:
     import tomli_w
 
-    return HEADER + tomli_w.dumps(_document(model))
+    return tomli_w.dumps({key: 0}).partition(" = ")[0]
 
 
-def _document(model: Model) -> dict[str, Any]:
+def _value(value: object) -> str:
+    """A value on one line: lists and tables within a table stay on theirs."""
+    import tomli_w
+
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(key)} = {_value(value[key])}" for key in value) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    return tomli_w.dumps({"_": value}).removeprefix("_ = ").removesuffix("\n")
+
+
+def _sections(model: Model) -> dict[str, Mapping[str, Any]]:
     geometry = model.geometry
     pose: dict[str, Any] = {
         "map": model.map,
@@ -29,16 +53,13 @@ def _document(model: Model) -> dict[str, Any]:
     if model.match is not None:
         pose["match"] = list(model.match)
     frames = {"base": model.base_frame, "tool": model.tool_frame}
-    sections: dict[str, Any] = {
-        "frames": {k: _pose(v, COORDINATES) for k, v in frames.items() if v is not None},
+    return {
         "pose": pose,
+        "frames": {k: _pose(v, COORDINATES) for k, v in frames.items() if v is not None},
         "parameters": {name: geometry[name] for name in geometry.parameters},
         "calibration": {"free": list(model.free)} if model.free else {},
-        "stated": dict(model.stated),
-        "limb": [_limb(limb, i, geometry) for i, limb in enumerate(model.limbs)],
+        "stated": model.stated,
     }
-    head = {"name": model.name, "units": {"length": "mm", "angle": "rad"}}
-    return head | {key: value for key, value in sections.items() if value}
 
 
 def _pose(pose: FloatArray, names: tuple[str, ...]) -> dict[str, float]:

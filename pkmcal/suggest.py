@@ -33,7 +33,7 @@ def did_you_mean(name: str, known: Iterable[str], listed: int = 12) -> str:
     names = list(dict.fromkeys(known))
     by_lower = {each.lower(): each for each in reversed(names)}
     near = difflib.get_close_matches(name.lower(), list(by_lower), n=1, cutoff=0.6)
-    if near:
+    if near and len(name) > 2:  # two letters are near to too much
         return f"; did you mean {by_lower[near[0]]!r}?"
     if 0 < len(names) <= listed:
         return f"; known: {', '.join(names)}"

@@ -7,6 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pkmcal.measurement_fields import numbers
 from pkmcal.measurements import COMPONENTS, Measurements
 
 _ARM = 200.0  # mm; an instrument good to 0.02 mm over it is good to 1e-4 rad
@@ -73,14 +74,16 @@ class VirtualMachine:
         Returns
         -------
         Measurements
-            With the instrument's noise as sigma; None where there is no noise.
+            With the instrument's noise as sigma; None where a component has no noise.
 
         Raises
         ------
         ValueError
             Rows that the machine cannot reach, by number; or an argument that does not fit.
         """
-        actuators = np.atleast_2d(np.asarray(q, dtype=np.float64))
+        actuators = np.atleast_2d(numbers("q", q))
+        if actuators.ndim != 2:
+            raise ValueError(f"q must have shape (N, n) or (n,); found {actuators.shape}")
         solved = self.true_robot.forward(actuators)
         failed = np.flatnonzero(~np.asarray(solved.ok))
         if len(failed):
@@ -119,7 +122,7 @@ def _readings(
         if kind == "distance":
             raise ValueError("target: a distance needs the fixed point (3,) it is measured to")
         return position[:, 2] if kind == "height" else position
-    point = np.asarray(target, dtype=np.float64)
+    point = numbers("target", target)
     if point.shape not in ((3,), position.shape):
         raise ValueError(f"target must have shape (3,) or {position.shape}; found {point.shape}")
     if kind == "distance":

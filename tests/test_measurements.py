@@ -273,3 +273,7 @@ def test_a_distance_needs_its_point_and_a_target_its_shape() -> None:
         machine.measure(Q, "position", target=[1, 2])
     with pytest.raises(ValueError, match="kind must be one of"):
         machine.measure(Q, "heigth")
+    with pytest.raises(ValueError, match="q must be finite"):
+        machine.measure([[np.nan, 0, 0]])
+    with pytest.raises(ValueError, match=r"q must have shape \(N, n\)"):
+        machine.measure(np.zeros((2, 2, 3)))

@@ -126,6 +126,12 @@ POSES = {
 }
 
 
+def test_the_twin_numbers_its_slots_as_the_package_does() -> None:
+    from pkmcal._slots import SLOTS
+
+    assert tuple(SLOTS) == twin.SLOTS
+
+
 @pytest.mark.parametrize(("model", "pose"), POSES.values(), ids=POSES)
 def test_the_closures_vanish_at_the_inverse(model: Any, pose: list[float]) -> None:
     residual = twin.closures(model, np.array(pose), twin.inverse(model, np.array(pose)))

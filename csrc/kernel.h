@@ -1,0 +1,156 @@
+/* What runs in either precision: lane arithmetic, the generated formulas, the closure rows of a
+ * machine, and elimination in a fixed order. Included by lanes.h for `narrow` and for `wide`. */
+
+INLINE real FN(fill)(NUMBER x) { return (real){0} + x; }
+
+INLINE real FN(select)(mask m, real yes, real no)
+{
+    return (real)((m & (mask)yes) | (~m & (mask)no));
+}
+
+INLINE real FN(absolute)(real x)
+{
+    const mask sign = (mask)(-FN(fill)(0));
+    return (real)((mask)x & ~sign);
+}
+
+/* NaN in either wins: a maximum that dropped it would call a failed row good. */
+INLINE real FN(maximum)(real a, real b) { return FN(select)((a > b) | (a != a), a, b); }
+
+INLINE real FN(minimum)(real a, real b) { return FN(select)((a < b) | (a != a), a, b); }
+
+#ifndef NARROW
+#include "trigonometry.h"
+#endif
+#include "limbs.h"
+#include "posemaps.h"
+
+/* A limb at a known actuator coordinate: a sphere around its anchor, and the axes of its
+ * constraint rows. */
+typedef struct {
+    real b[3], c[3], rho2, inverse_rho;
+    real base_axis[3], platform_axis[3];
+} FN(limb_sphere);
+
+#ifdef NARROW
+INLINE int map_m(int map)
+{
+    switch (map) {
+#define CASE(NAME, name, M) case MAP_##NAME: return M;
+    EACH_MAP(CASE)
+#undef CASE
+    }
+    return 0;
+}
+
+/* Is free coordinate i an angle? Its unit is then 1 rad = `length` mm in scaled systems. */
+INLINE int map_is_angle(int map, int i)
+{
+    return i >= (map == MAP_2TPR2TPS || map == MAP_PLANAR ? 2 : 3);
+}
+#endif
+
+/* Pose maps by number; `map` is a constant wherever these are inlined. */
+INLINE void FN(map_frame)(int map, const real *state, real *R, real *p)
+{
+    switch (map) {
+#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_frame)(state, R, p); break;
+    EACH_MAP(CASE)
+#undef CASE
+    }
+}
+
+INLINE void FN(map_retract)(int map, const real *state, const real *delta, real *moved)
+{
+    switch (map) {
+#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_retract)(state, delta, moved); break;
+    EACH_MAP(CASE)
+#undef CASE
+    }
+}
+
+INLINE void FN(map_pull)(int map, const real *state, const real *omega, const real *v, real *row)
+{
+    switch (map) {
+#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_pull)(state, omega, v, row); break;
+    EACH_MAP(CASE)
+#undef CASE
+    }
+}
+
+/* One row of the system: Φ times `scale` in mm, and its derivatives by the map's scaled step. */
+INLINE void FN(store_row)(int map, NUMBER inverse_length, const real *state, real phi,
+                          const real *omega, const real *v, real scale, real *residual, real *row)
+{
+    real covector[6];
+    const real angular = scale * inverse_length;
+    FN(map_pull)(map, state, omega, v, covector);
+    *residual = phi * scale;
+    for (int j = 0; j < map_m(map); j++)
+        row[j] = covector[j] * (map_is_angle(map, j) ? angular : scale);
+}
+
+/* All rows at a state, weighted, in the machine's order of elimination: the residual [mm], and its
+ * derivatives by the map's step, in which an angle counts as its arc at the characteristic length.
+ * Returns how many rows there are. */
+INLINE int FN(closure_rows)(int map, const pkm_machine *machine, const FN(limb_sphere) *limb,
+                            const real *state, real *residual, real *jacobian)
+{
+    const int m = map_m(map);
+    const NUMBER inverse_length = (NUMBER)(1.0 / machine->length);
+    real R[9], p[3], phi, omega[3], v[3];
+    int r = 0;
+    FN(map_frame)(map, state, R, p);
+    for (int i = 0; i < machine->limbs; i++) {
+        const FN(limb_sphere) *one = &limb[i];
+        FN(sphere_row)(R, p, one->b, one->c, one->rho2, &phi, omega, v);
+        FN(store_row)(map, inverse_length, state, phi, omega, v,
+                      one->inverse_rho * (NUMBER)machine->weight[r],
+                      &residual[machine->order[r]], &jacobian[machine->order[r] * m]);
+        r++;
+        for (int kind = ROW_BASE_PLANE; kind <= ROW_COUPLE; kind *= 2) {
+            if (!(machine->rows[i] & kind)) continue;
+            if (kind == ROW_BASE_PLANE)
+                FN(base_plane_row)(R, p, one->b, one->c, one->base_axis, &phi, omega, v);
+            else if (kind == ROW_PLATFORM_PLANE)
+                FN(platform_plane_row)(R, p, one->b, one->c, one->platform_axis, &phi, omega, v);
+            else
+                FN(couple_row)(R, p, one->b, one->c, one->base_axis, one->platform_axis,
+                               FN(fill)((NUMBER)machine->lever[i]), &phi, omega, v);
+            FN(store_row)(map, inverse_length, state, phi, omega, v,
+                          FN(fill)((NUMBER)machine->weight[r]),
+                          &residual[machine->order[r]], &jacobian[machine->order[r] * m]);
+            r++;
+        }
+    }
+    return r;
+}
+
+/* LU of A (m x m, row by row) in place and in the order given; the diagonal holds reciprocals.
+ * `pivot` is the smallest pivot over the largest entry, in magnitude. */
+INLINE void FN(factor)(int m, real *A, real *pivot)
+{
+    real largest = FN(fill)(0), smallest;
+    for (int i = 0; i < m * m; i++) largest = FN(maximum)(largest, FN(absolute)(A[i]));
+    for (int c = 0; c < m; c++) {
+        const real size = FN(absolute)(A[c * m + c]);
+        smallest = c ? FN(minimum)(smallest, size) : size;
+        A[c * m + c] = 1.0f / A[c * m + c];
+        for (int i = c + 1; i < m; i++) {
+            A[i * m + c] *= A[c * m + c];
+            for (int j = c + 1; j < m; j++) A[i * m + j] -= A[i * m + c] * A[c * m + j];
+        }
+    }
+    *pivot = smallest / largest;
+}
+
+/* Solve with those factors, in place. */
+INLINE void FN(substitute)(int m, const real *A, real *b)
+{
+    for (int i = 1; i < m; i++)
+        for (int j = 0; j < i; j++) b[i] -= A[i * m + j] * b[j];
+    for (int i = m - 1; i >= 0; i--) {
+        for (int j = i + 1; j < m; j++) b[i] -= A[i * m + j] * b[j];
+        b[i] *= A[i * m + i];
+    }
+}
