@@ -76,27 +76,48 @@ INLINE void prepare_limbs(const pkm_machine *machine, const double *geometry, pt
     }
 }
 
-/* The limb's sphere at actuator coordinate q; `reachable` falls where its length is not positive
- * or beyond all measure. */
-INLINE void sphere_of_limb(int driver, const limb_numbers *limb, real q, FN(limb_sphere) *sphere,
-                           mask *reachable)
+/* What of a limb's sphere its numbers alone say, whatever the actuator does. */
+INLINE void sphere_of_numbers(int driver, const limb_numbers *limb, FN(limb_sphere) *sphere)
 {
-    real qt, rho = limb->g[ROD];
-    FN(limb_drive)(q, limb->g, &qt);
     memcpy(sphere->b, limb->g + PLATFORM_X, sizeof sphere->b);
     memcpy(sphere->base_axis, limb->base_axis, sizeof sphere->base_axis);
     memcpy(sphere->platform_axis, limb->platform_axis, sizeof sphere->platform_axis);
     if (driver == DRIVER_LENGTH) {
-        rho = qt;
         memcpy(sphere->c, limb->g + BASE_X, sizeof sphere->c);
+    } else {
+        sphere->rho2 = limb->g[ROD] * limb->g[ROD];
+        sphere->scale = rough_reciprocal(limb->g[ROD]);
+    }
+}
+
+/* The rest of the sphere, at actuator coordinate q. `reachable` falls where a length is not
+ * positive, or so large or small that its square or its reciprocal leaves the floats. */
+INLINE void sphere_at(int driver, const limb_numbers *limb, real q, FN(limb_sphere) *sphere,
+                      mask *reachable)
+{
+    real qt;
+    FN(limb_drive)(q, limb->g, &qt);
+    if (driver == DRIVER_LENGTH) {
+        sphere->rho2 = qt * qt;
+        sphere->scale = rough_reciprocal(qt);
     } else if (driver == DRIVER_SLIDER) {
         FN(slider_anchor)(qt, limb->g + BASE_X, limb->first, sphere->c);
     } else {
         FN(crank_anchor)(qt, limb->g + BASE_X, limb->first, limb->second, sphere->c);
     }
-    sphere->rho2 = rho * rho;
-    sphere->inverse_rho = 1.0 / rho;
-    *reachable &= (rho > fill(0.0)) & finite(sphere->inverse_rho) & (absolute(qt) < fill(1e100));
+    *reachable &= (sphere->scale > fill(0.0)) & finite(sphere->scale) & (absolute(qt) < fill(1e30));
+}
+
+/* Both, for every limb. */
+INLINE mask spheres_at(const pkm_machine *machine, const limb_numbers *limb, const real *q,
+                       FN(limb_sphere) *sphere)
+{
+    mask reachable = fill_mask(-1);
+    for (int i = 0; i < machine->limbs; i++) {
+        sphere_of_numbers(machine->driver[i], &limb[i], &sphere[i]);
+        sphere_at(machine->driver[i], &limb[i], q[machine->actuator[i]], &sphere[i], &reachable);
+    }
+    return reachable;
 }
 
 /* Square systems as they are; more rows than m become the normal equations of least squares.

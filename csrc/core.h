@@ -85,7 +85,6 @@ static int core_home(const pkm_machine *machine, const double *geometry, const d
     ptrdiff_t zero[LANES] = {0};
     real pose[6], state[MAX_STATE], R[9], p[3], q[PKM_MAX_LIMBS], phi[PKM_MAX_ROWS];
     real A[PKM_MAX_ROWS * 6];
-    mask reachable = fill_mask(-1);
     int rows = 0;
     prepare_limbs(machine, geometry, 0, zero, limb);
     for (int k = 0; k < 6; k++) pose[k] = fill(home[k]);
@@ -95,9 +94,7 @@ static int core_home(const pkm_machine *machine, const double *geometry, const d
         map_from_pose(MAP_##NAME, pose, state);                                                   \
         FN(map_frame)(MAP_##NAME, state, R, p);                                                   \
         inverse_at(machine, limb, R, p, q);                                                       \
-        for (int i = 0; i < machine->limbs; i++)                                                  \
-            sphere_of_limb(machine->driver[i], &limb[i], q[machine->actuator[i]], &sphere[i],     \
-                           &reachable);                                                           \
+        spheres_at(machine, limb, q, sphere);                                                     \
         rows = FN(closure_rows)(MAP_##NAME, machine, sphere, state, phi, A);                      \
         for (int k = 0; k < rows * M; k++) jacobian[k] = A[k][0];                                 \
         break;

@@ -52,7 +52,8 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
         mask reachable = fill_mask(-1);
         const int a = machine->actuator[i];
         const real own = limb_inverse(machine, i, &limb[i], R, p);
-        sphere_of_limb(machine->driver[i], &limb[i], own, &sphere, &reachable);
+        sphere_of_numbers(machine->driver[i], &limb[i], &sphere);
+        sphere_at(machine->driver[i], &limb[i], own, &sphere, &reachable);
         FN(sphere_row)(R, p, limb[i].g + PLATFORM_X, sphere.c, sphere.rho2, &phi, omega, v);
         FN(map_pull)(map, state, omega, v, row);
         map_free(map, state, row, by_free);
@@ -89,16 +90,14 @@ INLINE void response_block(int map, const pkm_machine *machine, const limb_numbe
 {
     FN(limb_sphere) sphere[PKM_MAX_LIMBS];
     real state[MAX_STATE], R[9], p[3], response[6 * PKM_MAX_ROWS];
-    mask reachable = fill_mask(-1);
     int r = 0, c = 0;
     map_from_pose(map, pose, state);
     FN(map_frame)(map, state, R, p);
-    for (int i = 0; i < machine->limbs; i++)
-        sphere_of_limb(machine->driver[i], &limb[i], q[machine->actuator[i]], &sphere[i], &reachable);
+    spheres_at(machine, limb, q, sphere);
     const int rows = pose_response(map, machine, sphere, state, response);
     for (int k = 0; k < 6 * columns; k++) out[k] = fill(0.0);
     for (int i = 0; i < machine->limbs; i++) {
-        real by_q, by_g[SLOTS], scale = sphere[i].inverse_rho * machine->weight[r];
+        real by_q, by_g[SLOTS], scale = sphere[i].scale * machine->weight[r];
         sphere_derivatives(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
         int end = c;
         if (column)

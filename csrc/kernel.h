@@ -3,21 +3,11 @@
 
 INLINE real FN(fill)(NUMBER x) { return (real){0} + x; }
 
-INLINE real FN(select)(mask m, real yes, real no)
-{
-    return (real)((m & (mask)yes) | (~m & (mask)no));
-}
-
 INLINE real FN(absolute)(real x)
 {
     const mask sign = (mask)(-FN(fill)(0));
     return (real)((mask)x & ~sign);
 }
-
-/* NaN in either wins: a maximum that dropped it would call a failed row good. */
-INLINE real FN(maximum)(real a, real b) { return FN(select)((a > b) | (a != a), a, b); }
-
-INLINE real FN(minimum)(real a, real b) { return FN(select)((a < b) | (a != a), a, b); }
 
 #ifndef NARROW
 #include "trigonometry.h"
@@ -28,7 +18,7 @@ INLINE real FN(minimum)(real a, real b) { return FN(select)((a < b) | (a != a), 
 /* A limb at a known actuator coordinate: a sphere around its anchor, and the axes of its
  * constraint rows. */
 typedef struct {
-    real b[3], c[3], rho2, inverse_rho;
+    real b[3], c[3], rho2, scale; /* scale: 1/ρ, which makes Φ mm */
     real base_axis[3], platform_axis[3];
 } FN(limb_sphere);
 
@@ -84,15 +74,16 @@ INLINE void FN(store_row)(int map, NUMBER inverse_length, const real *state, rea
 {
     real covector[6];
     const real angular = scale * inverse_length;
-    FN(map_pull)(map, state, omega, v, covector);
     *residual = phi * scale;
+    if (!row) return;
+    FN(map_pull)(map, state, omega, v, covector);
     for (int j = 0; j < map_m(map); j++)
         row[j] = covector[j] * (map_is_angle(map, j) ? angular : scale);
 }
 
 /* All rows at a state, weighted, in the machine's order of elimination: the residual [mm], and its
  * derivatives by the map's step, in which an angle counts as its arc at the characteristic length.
- * Returns how many rows there are. */
+ * Without the derivatives where `jacobian` is NULL. Returns how many rows there are. */
 INLINE int FN(closure_rows)(int map, const pkm_machine *machine, const FN(limb_sphere) *limb,
                             const real *state, real *residual, real *jacobian)
 {
@@ -105,8 +96,8 @@ INLINE int FN(closure_rows)(int map, const pkm_machine *machine, const FN(limb_s
         const FN(limb_sphere) *one = &limb[i];
         FN(sphere_row)(R, p, one->b, one->c, one->rho2, &phi, omega, v);
         FN(store_row)(map, inverse_length, state, phi, omega, v,
-                      one->inverse_rho * (NUMBER)machine->weight[r],
-                      &residual[machine->order[r]], &jacobian[machine->order[r] * m]);
+                      one->scale * (NUMBER)machine->weight[r],
+                      &residual[machine->order[r]], jacobian ? &jacobian[machine->order[r] * m] : NULL);
         r++;
         for (int kind = ROW_BASE_PLANE; kind <= ROW_COUPLE; kind *= 2) {
             if (!(machine->rows[i] & kind)) continue;
@@ -119,7 +110,7 @@ INLINE int FN(closure_rows)(int map, const pkm_machine *machine, const FN(limb_s
                                FN(fill)((NUMBER)machine->lever[i]), &phi, omega, v);
             FN(store_row)(map, inverse_length, state, phi, omega, v,
                           FN(fill)((NUMBER)machine->weight[r]),
-                          &residual[machine->order[r]], &jacobian[machine->order[r] * m]);
+                          &residual[machine->order[r]], jacobian ? &jacobian[machine->order[r] * m] : NULL);
             r++;
         }
     }
@@ -127,21 +118,18 @@ INLINE int FN(closure_rows)(int map, const pkm_machine *machine, const FN(limb_s
 }
 
 /* LU of A (m x m, row by row) in place and in the order given; the diagonal holds reciprocals.
- * `pivot` is the smallest pivot over the largest entry, in magnitude. */
-INLINE void FN(factor)(int m, real *A, real *pivot)
+ * `large` is the largest reciprocal in magnitude: the rows are scaled, so it tells of a small
+ * pivot; NaN and infinity are larger than any bound. */
+INLINE void FN(factor)(int m, real *A, real *large)
 {
-    real largest = FN(fill)(0), smallest;
-    for (int i = 0; i < m * m; i++) largest = FN(maximum)(largest, FN(absolute)(A[i]));
     for (int c = 0; c < m; c++) {
-        const real size = FN(absolute)(A[c * m + c]);
-        smallest = c ? FN(minimum)(smallest, size) : size;
         A[c * m + c] = 1.0f / A[c * m + c];
+        *large = c ? FN(larger)(*large, FN(absolute)(A[c * m + c])) : FN(absolute)(A[0]);
         for (int i = c + 1; i < m; i++) {
             A[i * m + c] *= A[c * m + c];
             for (int j = c + 1; j < m; j++) A[i * m + j] -= A[i * m + c] * A[c * m + j];
         }
     }
-    *pivot = smallest / largest;
 }
 
 /* Solve with those factors, in place. */

@@ -53,6 +53,42 @@ INLINE narrow root_narrow(narrow x)
 #endif
 }
 
+INLINE wide select_wide(wide_mask m, wide yes, wide no)
+{
+#if LANES == 8 && defined(__AVX512DQ__)
+    return (wide)_mm512_mask_blend_pd(_mm512_movepi64_mask((__m512i)m), (__m512d)no, (__m512d)yes);
+#elif LANES == 4 && defined(__AVX__)
+    return (wide)_mm256_blendv_pd((__m256d)no, (__m256d)yes, (__m256d)m);
+#else
+    return (wide)((m & (wide_mask)yes) | (~m & (wide_mask)no));
+#endif
+}
+
+INLINE narrow select_narrow(narrow_mask m, narrow yes, narrow no)
+{
+    return (narrow)((m & (narrow_mask)yes) | (~m & (narrow_mask)no));
+}
+
+/* The larger of two numbers that are not negative. NaN wins, for its bits are larger than those of
+ * any number: a maximum that dropped it would call a failed row good. */
+INLINE wide larger_wide(wide a, wide b)
+{
+#if LANES == 8 && defined(__AVX512F__)
+    return (wide)_mm512_max_epi64((__m512i)a, (__m512i)b);
+#else
+    return select_wide((wide_mask)a > (wide_mask)b, a, b);
+#endif
+}
+
+INLINE narrow larger_narrow(narrow a, narrow b)
+{
+#if LANES == 8 && defined(__AVX512F__)
+    return (narrow)_mm512_max_epi32((__m512i)a, (__m512i)b);
+#else
+    return select_narrow((narrow_mask)a > (narrow_mask)b, a, b);
+#endif
+}
+
 /* Two wide blocks, rounded to one narrow block. */
 INLINE narrow join(wide low, wide high)
 {
@@ -89,6 +125,9 @@ INLINE wide half(narrow x, int which)
 #endif
 }
 
+/* 1/x to the precision of floats: enough for a scale, and cheaper. */
+INLINE wide rough_reciprocal(wide x) { return half(1.0f / join(x, x), 0); }
+
 /* The kernel, first for floats, then for doubles, which `real` means from here on. */
 #define NARROW
 #define real narrow
@@ -110,12 +149,10 @@ INLINE wide half(narrow x, int which)
 #define FN(name) name##_wide
 #include "kernel.h"
 
-#define EITHER(name, x) _Generic((x), narrow: name##_narrow, wide: name##_wide)
-#define select(m, yes, no) EITHER(select, yes)(m, yes, no)
-#define absolute(x) EITHER(absolute, x)(x)
-#define maximum(a, b) EITHER(maximum, a)(a, b)
-#define minimum(a, b) EITHER(minimum, a)(a, b)
-#define fill FN(fill)
+#define select(m, yes, no) select_wide(m, yes, no)
+#define absolute(x) absolute_wide(x)
+#define larger(a, b) larger_wide(a, b)
+#define fill(x) fill_wide(x)
 
 INLINE mask fill_mask(int64_t x) { return (mask){0} + x; }
 

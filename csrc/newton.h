@@ -18,18 +18,6 @@ enum { MAX_ITERATIONS = 60, MAX_HALVINGS = 20 };
 #define SETTLED 5e-12     /* step after which the pose is known, relative likewise */
 #define LEAST_PIVOT 2e-5  /* relative pivot under which 1e-11 of the size is not assured */
 
-/* How large a machine is at these actuator coordinates [mm]: what rounding is measured against. */
-INLINE real machine_size(const pkm_machine *machine, const FN(limb_sphere) *limb)
-{
-    real size = fill(0.0);
-    for (int i = 0; i < machine->limbs; i++) {
-        real limb_size = 1.0 / limb[i].inverse_rho;
-        for (int k = 0; k < 3; k++) limb_size += absolute(limb[i].c[k]) + absolute(limb[i].b[k]);
-        size = maximum(size, limb_size);
-    }
-    return size;
-}
-
 /* One block: status, iterations and residual of each lane; state holds the guess and the answer. */
 INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *limb, mask running,
                    real *state, mask *status, real *iterations, real *residual)
@@ -38,7 +26,7 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
     const real zero = fill(0.0), inverse_length = fill(1.0 / machine->length);
     real phi[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6], A[36], step[6] = {0}, trial[MAX_STATE];
     real merit = fill(INFINITY), worst = merit, share = fill(1.0), pivot = zero;
-    const real size = machine_size(machine, limb);
+    const real size = fill(machine->size);
     const real closed = CLOSED * size, settled = SETTLED * size;
     *status = fill_mask(PKM_NOT_CONVERGED);
     *iterations = zero;
@@ -48,7 +36,7 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
         real squares = zero, trial_worst = zero;
         for (int r = 0; r < rows; r++) {
             squares += phi[r] * phi[r];
-            trial_worst = maximum(trial_worst, absolute(phi[r]));
+            trial_worst = larger(trial_worst, absolute(phi[r]));
         }
         /* a step is taken if it does not make things worse, rounding apart */
         const mask better = (squares <= merit * (1.0 + 1e-9) + closed * closed) & running;
@@ -60,16 +48,15 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
         if (rows > m) trial_pivot = FN(root)(trial_pivot); /* the normal equations square it */
         real longest = zero, turn = zero;
         for (int j = 0; j < m; j++) {
-            longest = maximum(longest, absolute(fresh[j]));
-            if (map_is_angle(map, j)) turn = maximum(turn, absolute(fresh[j]) * inverse_length);
+            longest = larger(longest, absolute(fresh[j]));
+            if (map_is_angle(map, j)) turn = larger(turn, absolute(fresh[j]) * inverse_length);
         }
         const mask solvable = finite(longest);
         const mask known = trial_pivot > fill(LEAST_PIVOT);
         const mask holds = rows > m ? solvable : trial_worst <= closed;
         const mask done = better & holds & known & (longest <= settled);
-        const real bound = minimum(fill(1.0),
-                                   minimum(MAX_TURN / maximum(turn, fill(MAX_TURN)),
-                                           size / maximum(longest, size)));
+        const real excess = larger(larger(turn * (1.0 / MAX_TURN), longest / size), fill(1.0));
+        const real bound = 1.0 / excess;
         for (int s = 0; s < MAX_STATE; s++) state[s] = select(better, trial[s], state[s]);
         for (int j = 0; j < m; j++) {
             real bounded = -bound * fresh[j];

@@ -21,6 +21,7 @@ typedef struct {
     int map;                        /* MAP_... */
     int limbs;                      /* how many, at most PKM_MAX_LIMBS */
     int actuators;
+    double size;                    /* [mm] what rounding is measured against */
     double length;                  /* characteristic length [mm]: rotations times it are mm */
     int driver[12];                 /* DRIVER_... of each limb */
     int rows[12];                   /* set of ROW_... beside the sphere */

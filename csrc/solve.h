@@ -9,8 +9,8 @@
  * near zero the matrix is singular and X means nothing. */
 INLINE void solve(int m, int k, real *A, real *B, real *pivot)
 {
-    real largest = fill(0.0), smallest = fill(INFINITY);
-    for (int i = 0; i < m * m; i++) largest = maximum(largest, absolute(A[i]));
+    real largest = fill(0.0), reciprocal = fill(0.0);
+    for (int i = 0; i < m * m; i++) largest = larger(largest, absolute(A[i]));
     for (int c = 0; c < m; c++) {
         for (int i = c + 1; i < m; i++) {
             const mask swap = absolute(A[i * m + c]) > absolute(A[c * m + c]);
@@ -25,8 +25,8 @@ INLINE void solve(int m, int k, real *A, real *B, real *pivot)
                 B[i * k + j] = select(swap, a, b);
             }
         }
-        smallest = minimum(smallest, absolute(A[c * m + c]));
         const real inverse = 1.0 / A[c * m + c];
+        reciprocal = larger(reciprocal, absolute(inverse));
         for (int i = c + 1; i < m; i++) {
             const real factor = A[i * m + c] * inverse;
             for (int j = c + 1; j < m; j++) A[i * m + j] -= factor * A[c * m + j];
@@ -40,7 +40,7 @@ INLINE void solve(int m, int k, real *A, real *B, real *pivot)
             for (int i = c + 1; i < m; i++) x -= A[c * m + i] * B[i * k + j];
             B[c * k + j] = x * A[c * m + c];
         }
-    *pivot = smallest / largest;
+    *pivot = 1.0 / (reciprocal * largest);
 }
 
 #endif

@@ -1,5 +1,5 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation c0eb55b0078f33dd
+ * derivation 20f8e9a697c7e44a
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -105,7 +105,7 @@ INLINE void FN(map_spatial_frame)(const real state[7], real R[9], real p[3])
  * in  state[7]       of the map
  * in  delta[6]       step [mm, rad]
  * out moved[7]       the new state
- * operations: 18 +, 23 *, 1 /, 1 sqrt
+ * operations: 23 +, 27 *, 0 /, 0 sqrt
  */
 INLINE void FN(map_spatial_retract)(const real state[7], const real delta[6], real moved[7])
 {
@@ -117,7 +117,9 @@ INLINE void FN(map_spatial_retract)(const real state[7], const real delta[6], re
     const real q1 = state[3]*t0 + state[4] + state[6]*t1 - state[5]*t2;
     const real q2 = state[3]*t1 + state[4]*t2 + state[5] - state[6]*t0;
     const real q3 = state[3]*t2 + state[5]*t0 + state[6] - state[4]*t1;
-    const real k = 1.0f/(FN(root)(q0*q0 + q1*q1 + q2*q2 + q3*q3));
+    /* how far from unit length: 1/√(1 + e) by its series */
+    const real e = q0*q0 + q1*q1 + q2*q2 + q3*q3 - 1.0f;
+    const real k = 1.0f + e*(e*(0.375f + (0.2734375f*e - 0.3125f)*e) - 0.5f);
     moved[0] = state[0] + delta[0];
     moved[1] = state[1] + delta[1];
     moved[2] = state[2] + delta[2];
@@ -400,13 +402,15 @@ INLINE void FN(map_planar_frame)(const real state[4], real R[9], real p[3])
  * in  state[4]       of the map
  * in  delta[3]       step [mm, rad]
  * out moved[4]       the new state
- * operations: 5 +, 6 *, 1 /, 1 sqrt
+ * operations: 10 +, 10 *, 0 /, 0 sqrt
  */
 INLINE void FN(map_planar_retract)(const real state[4], const real delta[3], real moved[4])
 {
     const real xg = state[2] - state[3]*delta[2];
     const real yg = state[2]*delta[2] + state[3];
-    const real kg = 1.0f/(FN(root)(xg*xg + yg*yg));
+    /* how far from unit length: 1/√(1 + e) by its series */
+    const real eg = xg*xg + yg*yg - 1.0f;
+    const real kg = 1.0f + eg*(eg*(0.375f + (0.2734375f*eg - 0.3125f)*eg) - 0.5f);
     moved[0] = state[0] + delta[0];
     moved[1] = state[1] + delta[1];
     moved[2] = xg*kg;
@@ -534,16 +538,20 @@ INLINE void FN(map_2tpr2tps_frame)(const real state[6], real R[9], real p[3])
  * in  state[6]       of the map
  * in  delta[4]       step [mm, rad]
  * out moved[6]       the new state
- * operations: 8 +, 12 *, 2 /, 2 sqrt
+ * operations: 18 +, 20 *, 0 /, 0 sqrt
  */
 INLINE void FN(map_2tpr2tps_retract)(const real state[6], const real delta[4], real moved[6])
 {
     const real xa = state[2] - state[3]*delta[2];
     const real ya = state[2]*delta[2] + state[3];
-    const real ka = 1.0f/(FN(root)(xa*xa + ya*ya));
+    /* how far from unit length: 1/√(1 + e) by its series */
+    const real ea = xa*xa + ya*ya - 1.0f;
+    const real ka = 1.0f + ea*(ea*(0.375f + (0.2734375f*ea - 0.3125f)*ea) - 0.5f);
     const real xb = state[4] - state[5]*delta[3];
     const real yb = state[4]*delta[3] + state[5];
-    const real kb = 1.0f/(FN(root)(xb*xb + yb*yb));
+    /* how far from unit length: 1/√(1 + e) by its series */
+    const real eb = xb*xb + yb*yb - 1.0f;
+    const real kb = 1.0f + eb*(eb*(0.375f + (0.2734375f*eb - 0.3125f)*eb) - 0.5f);
     moved[0] = state[0] + delta[0];
     moved[1] = state[1] + delta[1];
     moved[2] = xa*ka;

@@ -159,6 +159,7 @@ class Machine:
         struct.limbs = len(limbs)
         struct.actuators = 1 + max(limb["actuator"] for limb in limbs)
         struct.length = length
+        struct.size = float(np.abs(slots).sum(axis=1).max() + np.abs(home[:3]).sum())
         weights: list[float] = []
         for i, limb in enumerate(limbs):
             struct.driver[i] = DRIVERS.index(limb["driver"])

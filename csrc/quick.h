@@ -1,0 +1,186 @@
+/* The quick way of forward kinematics: the same steps for every row, so no lane waits for another.
+ *
+ * From the guess a linear prediction, Newton steps and one factorisation in floats, then two steps
+ * in doubles with those factors. The last residual and the contraction of the two steps decide
+ * whether a row is solved; so do small pivots, and a determinant of another sign than at the guess.
+ * Every stage runs over all blocks of a batch before the next begins: the processor overlaps them.
+ */
+#ifndef QUICK_H
+#define QUICK_H
+
+#include "inverse.h"
+#include "jacobian.h"
+#include "newton.h"
+
+enum { BLOCKS = 2, HALVES = 2 * BLOCKS, BATCH = HALVES * LANES };
+enum { STEPS_PREDICTED = 2, STEPS_GUESSED = 3 }; /* Newton steps in floats */
+#define SAFE_RECIPROCAL 1e3f /* of a pivot: beyond it row exchanges may be needed */
+
+/* Where all rows start from: the step per actuator coordinate, and the sign of the determinant. */
+typedef struct {
+    int known;
+    real q[PKM_MAX_LIMBS], slope[6 * PKM_MAX_LIMBS], state[MAX_STATE];
+    float sign;
+} prediction;
+
+/* LANES rows as they come in, and what may stop them from being solved. */
+typedef struct {
+    real q[PKM_MAX_LIMBS], guess[6];
+    FN(limb_sphere) sphere[PKM_MAX_LIMBS];
+    mask usable;
+} rows_in;
+
+/* The rows of one batch between the stages. */
+typedef struct {
+    rows_in in[HALVES];
+    limb_sphere_narrow sphere[BLOCKS][PKM_MAX_LIMBS];
+    narrow state[BLOCKS][MAX_STATE], factors[BLOCKS][36];
+    real fine[HALVES][MAX_STATE], worst[HALVES];
+    mask solved[HALVES];
+} batch;
+
+/* From the scaled step of a linear system to the map's own: mm stay, arcs become angles. */
+INLINE double unscale(int map, const pkm_machine *machine, int j)
+{
+    return map_is_angle(map, j) ? 1.0 / machine->length : 1.0;
+}
+
+/* The step the closures ask for at the guess per actuator coordinate, and the determinant there. */
+INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *limb,
+                    const double *guess, prediction *start)
+{
+    const int m = map_m(map), actuators = machine->actuators;
+    real pose[6], R[9], p[3], phi[PKM_MAX_ROWS], A[PKM_MAX_ROWS * 6], X[36], by_g[SLOTS], large;
+    real sign = fill(1.0);
+    FN(limb_sphere) sphere[PKM_MAX_LIMBS];
+    mask reachable;
+    for (int k = 0; k < 6; k++) pose[k] = fill(guess[k]);
+    memset(start->state, 0, sizeof start->state);
+    map_from_pose(map, pose, start->state);
+    FN(map_frame)(map, start->state, R, p);
+    inverse_at(machine, limb, R, p, start->q);
+    reachable = spheres_at(machine, limb, start->q, sphere);
+    FN(closure_rows)(map, machine, sphere, start->state, phi, A);
+    FN(factor)(m, A, &large);
+    for (int c = 0; c < m; c++) sign *= A[c * m + c];
+    for (int a = 0; a < actuators * m; a++) start->slope[a] = fill(0.0);
+    for (int i = 0, r = 0; i < machine->limbs; i++) {
+        const int a = machine->actuator[i];
+        real by_q;
+        sphere_derivatives(machine, i, &limb[i], R, p, start->q[a], &by_q, by_g);
+        for (int j = 0; j < m; j++) X[j] = fill(0.0);
+        X[machine->order[r]] = by_q * sphere[i].scale * machine->weight[r];
+        FN(substitute)(m, A, X);
+        for (int j = 0; j < m; j++)
+            start->slope[j * actuators + a] -= X[j] * unscale(map, machine, j);
+        r += 1 + __builtin_popcount((unsigned)machine->rows[i]);
+    }
+    start->sign = sign[0] > 0.0 ? 1.0f : -1.0f;
+    start->known = (reachable & (large < fill((double)SAFE_RECIPROCAL)))[0] != 0;
+}
+
+INLINE void start_state(int map, const pkm_machine *machine, const rows_in *in,
+                        const prediction *start, real *state)
+{
+    const int m = map_m(map), actuators = machine->actuators;
+    real step[6], turn = fill(0.0);
+    if (!start->known) {
+        map_from_pose(map, in->guess, state);
+        return;
+    }
+    for (int j = 0; j < m; j++) {
+        step[j] = fill(0.0);
+        for (int a = 0; a < actuators; a++)
+            step[j] += start->slope[j * actuators + a] * (in->q[a] - start->q[a]);
+        if (map_is_angle(map, j)) turn = larger(turn, absolute(step[j]));
+    }
+    const real share = rough_reciprocal(larger(turn * (1.0 / MAX_TURN), fill(1.0)));
+    for (int j = 0; j < m; j++) step[j] *= share;
+    FN(map_retract)(map, start->state, step, state);
+}
+
+/* Two wide spheres as one narrow; the constants of shared numbers only `once`. */
+INLINE void join_spheres(const pkm_machine *machine, int i, int once, const FN(limb_sphere) *low,
+                         const FN(limb_sphere) *high, limb_sphere_narrow *both)
+{
+    if (once || machine->driver[i] != DRIVER_LENGTH)
+        for (int k = 0; k < 3; k++) both->c[k] = join(low->c[k], high->c[k]);
+    if (once || machine->driver[i] == DRIVER_LENGTH) {
+        both->rho2 = join(low->rho2, high->rho2);
+        both->scale = join(low->scale, high->scale);
+    }
+    if (!once) return;
+    for (int k = 0; k < 3; k++) both->b[k] = join(low->b[k], high->b[k]);
+    if (!machine->rows[i]) return;
+    for (int k = 0; k < 3; k++) {
+        both->base_axis[k] = join(low->base_axis[k], high->base_axis[k]);
+        both->platform_axis[k] = join(low->platform_axis[k], high->platform_axis[k]);
+    }
+}
+
+/* Newton in floats; the factors are those at the last state. */
+INLINE void steps_in_floats(int map, const pkm_machine *machine, int steps, float sign, batch *all)
+{
+    const int m = map_m(map);
+    narrow phi[BLOCKS][PKM_MAX_ROWS], large[BLOCKS], moved[MAX_STATE];
+    for (int k = 0;; k++) {
+        for (int t = 0; t < BLOCKS; t++)
+            closure_rows_narrow(map, machine, all->sphere[t], all->state[t], phi[t], all->factors[t]);
+        for (int t = 0; t < BLOCKS; t++) factor_narrow(m, all->factors[t], &large[t]);
+        if (k == steps) break;
+        for (int t = 0; t < BLOCKS; t++) substitute_narrow(m, all->factors[t], phi[t]);
+        for (int t = 0; t < BLOCKS; t++) {
+            for (int j = 0; j < m; j++) phi[t][j] *= (float)-unscale(map, machine, j);
+            map_retract_narrow(map, all->state[t], phi[t], moved);
+            memcpy(all->state[t], moved, sizeof moved);
+        }
+    }
+    for (int t = 0; t < BLOCKS; t++) {
+        narrow product = fill_narrow(sign);
+        for (int c = 0; c < m; c++) product *= all->factors[t][c * m + c];
+        const narrow sound = select_narrow(
+            (large[t] < fill_narrow(SAFE_RECIPROCAL)) & (product >= fill_narrow(0.0f)),
+            fill_narrow(1.0f), fill_narrow(0.0f));
+        for (int h = 0; h < 2; h++)
+            all->solved[2 * t + h] = all->in[2 * t + h].usable & (half(sound, h) > fill(0.0));
+    }
+}
+
+/* Two steps in doubles with the factors found in floats. */
+INLINE void steps_in_doubles(int map, const pkm_machine *machine, batch *all)
+{
+    const int m = map_m(map);
+    const double size = machine->size;
+    real phi[HALVES][PKM_MAX_ROWS], moved[MAX_STATE], longest[HALVES][2], A[HALVES][36];
+    for (int h = 0; h < HALVES; h++) {
+        for (int k = 0; k < m * m; k++) A[h][k] = half(all->factors[h / 2][k], h % 2);
+        for (int s = 0; s < MAX_STATE; s++) moved[s] = half(all->state[h / 2][s], h % 2);
+        for (int j = 0; j < m; j++) phi[h][j] = fill(0.0);
+        FN(map_retract)(map, moved, phi[h], all->fine[h]); /* unit length to double precision */
+    }
+    for (int round = 0; round < 2; round++) {
+        for (int h = 0; h < HALVES; h++)
+            FN(closure_rows)(map, machine, all->in[h].sphere, all->fine[h], phi[h], NULL);
+        for (int h = 0; h < HALVES; h++) FN(substitute)(m, A[h], phi[h]);
+        for (int h = 0; h < HALVES; h++) {
+            longest[h][round] = fill(0.0);
+            for (int j = 0; j < m; j++) {
+                longest[h][round] = larger(longest[h][round], absolute(phi[h][j]));
+                phi[h][j] *= -unscale(map, machine, j);
+            }
+            FN(map_retract)(map, all->fine[h], phi[h], moved);
+            memcpy(all->fine[h], moved, sizeof moved);
+        }
+    }
+    for (int h = 0; h < HALVES; h++) {
+        FN(closure_rows)(map, machine, all->in[h].sphere, all->fine[h], phi[h], NULL);
+        all->worst[h] = fill(0.0);
+        for (int r = 0; r < m; r++) all->worst[h] = larger(all->worst[h], absolute(phi[h][r]));
+        /* what is left after two steps a, b that contract is about b²/a */
+        const real first = larger(longest[h][0], longest[h][1]), second = longest[h][1];
+        all->solved[h] &= (all->worst[h] <= fill(CLOSED * size))
+                        & (second * second <= SETTLED * size * first);
+    }
+}
+
+#endif

@@ -1,0 +1,256 @@
+"""The equations of a calibration: measured less predicted, whitened, and their Jacobian."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal.core import STATUS
+from pkmcal.measurements import Measurements
+from pkmcal.parameters import Parameters
+from pkmcal.predict import Predicted, difference, distance_per_point, predict
+from pkmcal.robot import Robot
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """The equations at one parameter vector.
+
+    Attributes
+    ----------
+    theta : ndarray (n,)
+        The parameters, mm and rad.
+    robot : Robot
+        With their geometry.
+    pose : ndarray (K, 6)
+        Where the machine is at each distinct row of actuators; NaN where it cannot be.
+    status : ndarray of int (K,)
+        Of the forward kinematics.
+    predicted : tuple of Predicted
+        Of each set of measurements.
+    residuals : tuple of ndarray (N, k)
+        Measured less predicted of each set, mm and rad.
+    """
+
+    theta: FloatArray
+    robot: Robot
+    pose: FloatArray
+    status: NDArray[np.int32]
+    predicted: tuple[Predicted, ...]
+    residuals: tuple[FloatArray, ...]
+
+    @property
+    def reached(self) -> bool:
+        """Whether the machine reaches every row."""
+        return not self.status.any()
+
+
+@dataclass(frozen=True, eq=False)
+class Share:
+    """The rows of one set of measurements that are fitted or held out.
+
+    Attributes
+    ----------
+    measured : Measurements
+        These rows alone.
+    rows : ndarray of int (N,)
+        Their numbers in what the user gave, counted through all sets.
+    unknown_frame, unknown_target : bool
+        Whether its frame and its targets are among the parameters.
+    """
+
+    measured: Measurements
+    rows: IntArray
+    unknown_frame: bool
+    unknown_target: bool
+
+
+class Equations:
+    """What some measurements say about the parameters.
+
+    Parameters
+    ----------
+    shares : sequence of Share
+        Rows with the same actuators are solved once.
+    parameters : Parameters
+        What is estimated.
+    """
+
+    def __init__(self, shares: Sequence[Share], parameters: Parameters) -> None:
+        self.sets = tuple(share.measured for share in shares)
+        self.rows = np.concatenate([share.rows for share in shares])
+        self.parameters = parameters
+        self._framed = [s.unknown_frame and s.measured.kind != "distance" for s in shares]
+        self._columns = [
+            parameters.target_columns(s.measured)
+            if s.unknown_target and s.measured.kind != "pose"
+            else None
+            for s in shares
+        ]
+        # several targets or repeats at the same actuators are one pose
+        actuators = np.concatenate([m.actuators for m in self.sets])
+        self.actuators, inverse = np.unique(actuators, axis=0, return_inverse=True)
+        edges = np.cumsum([0, *map(len, self.sets)])
+        self.pose_of = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
+        self._guess = np.tile(parameters.robot.home, (len(self.actuators), 1))
+        for measured, framed, place in zip(self.sets, self._framed, self.pose_of, strict=True):
+            if measured.kind == "pose" and not framed:
+                self._guess[place] = measured.values
+        self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
+        self.components = np.concatenate([np.full(len(m), len(m.components)) for m in self.sets])
+        self.first = np.cumsum(self.components) - self.components  # equation of each row
+        self.set_of = np.repeat(np.arange(len(self.sets)), np.diff(edges))
+
+    def at(self, theta: FloatArray) -> Point:
+        """The equations at `theta` (n,)."""
+        robot = self.parameters.robot_at(theta)
+        solved = robot.forward(self.actuators, self._guess)
+        frame = self.parameters.frame_at(theta)
+        predicted, residuals = [], []
+        for i, measured in enumerate(self.sets):
+            seen = predict(
+                measured.kind,
+                solved.pose[self.pose_of[i]],
+                self._target(i, theta),
+                frame if self._framed[i] else None,
+            )
+            predicted.append(seen)
+            residuals.append(difference(measured.kind, measured.values, seen.values))
+        return Point(theta, robot, solved.pose, solved.status, tuple(predicted), tuple(residuals))
+
+    def start(self) -> Point:
+        """The equations at the present parameters, an unknown frame laid on what was measured.
+
+        Rows that are not reached from a measured pose are tried from home.
+        """
+        theta = self.parameters.start.copy()
+        point = self.at(theta)
+        if not point.reached:
+            self._guess[point.status != 0] = self.parameters.robot.home
+            point = self.at(theta)
+        first = self.parameters.frame
+        if first is None or not point.reached:
+            return point
+        pairs = [
+            (measured, seen.values)
+            for measured, seen, framed in zip(self.sets, point.predicted, self._framed, strict=True)
+            if framed
+        ]
+        theta[first : first + 6] = _laid_on(pairs)
+        return self.at(theta)
+
+    def _target(self, i: int, theta: FloatArray) -> FloatArray | None:
+        columns = self._columns[i]
+        if columns is not None:
+            place: FloatArray = theta[columns]
+            return place
+        measured = self.sets[i]
+        at_origin = measured.target is None and measured.target_index is None
+        return None if at_origin else measured.targets
+
+    def jacobian(self, point: Point) -> list[FloatArray]:
+        """Derivative of the predicted values of each set to the parameters, (N, k, n).
+
+        The poses of `point` are where later calls of `at` start.
+        """
+        self._guess = point.pose
+        p = self.parameters
+        by_geometry = point.robot.error_jacobian(point.pose, self.actuators)[:, :, p.places]
+        parts = []
+        for i, seen in enumerate(point.predicted):
+            rows, k = seen.values.shape
+            part = np.zeros((rows, k, len(p)))
+            part[:, :, : len(p.places)] = seen.by_pose @ by_geometry[self.pose_of[i]]
+            if seen.by_frame is not None and p.frame is not None:
+                part[:, :, p.frame : p.frame + 6] = seen.by_frame
+            columns = self._columns[i]
+            if columns is not None and seen.by_target is not None:
+                np.put_along_axis(
+                    part, np.repeat(columns[:, None, :], k, axis=1), seen.by_target, axis=2
+                )
+            parts.append(part)
+        return parts
+
+    def whitened(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
+        """Parts (N, k, ...) of all sets in units of their standard deviation, stacked: (M, ...).
+
+        `noise` (sets,) multiplies what `Measurements.sigma` says.
+        """
+        stacked = []
+        for part, white, factor in zip(parts, self._whiten, noise, strict=True):
+            if white.ndim == 3:
+                scaled = np.einsum("nij,nj...->ni...", white, part)
+            else:
+                scaled = white.reshape(*white.shape, *(1,) * (part.ndim - 2)) * part
+            stacked.append((scaled / factor).reshape(-1, *part.shape[2:]))
+        return np.concatenate(stacked)
+
+    def distances(self, point: Point) -> FloatArray:
+        """How far off each measured point is, mm, in the order of the sets."""
+        return np.concatenate([distance_per_point(r) for r in point.residuals])
+
+    def rms(self, point: Point) -> float:
+        """Root mean square of `distances` over the rows that were reached; NaN without any."""
+        off = self.distances(point)
+        off = off[np.isfinite(off)]
+        return float(np.sqrt(np.mean(off**2))) if off.size else float("nan")
+
+    def unreached(self, point: Point) -> str:
+        """Which rows the machine does not reach and why, in words; empty where it reaches all."""
+        status = np.concatenate([point.status[place] for place in self.pose_of])
+        parts = []
+        for code in sorted(set(status.tolist()) - {0}):
+            rows = self.rows[status == code].tolist()
+            shown = ", ".join(map(str, rows[:10])) + (", …" if len(rows) > 10 else "")
+            parts.append(f"{len(rows)} of {len(status)} rows {STATUS[code]} (rows {shown})")
+        return "; ".join(parts)
+
+
+def _whitening(measured: Measurements, length: float) -> FloatArray:
+    """Factors (N, k) or matrices (N, k, k) that make the noise one; 1 mm where it is not known."""
+    sigma = measured.sigma
+    if sigma is None:
+        per_unit = np.array([length if unit == "rad" else 1.0 for unit in measured.units])
+        return np.tile(per_unit, (len(measured), 1))
+    if sigma.ndim == 2:
+        return 1.0 / sigma
+    return np.linalg.inv(np.linalg.cholesky(sigma))
+
+
+def _laid_on(pairs: Sequence[tuple[Measurements, FloatArray]]) -> FloatArray:
+    """The frame (6,) in which predicted values come nearest to measured ones."""
+    from scipy.spatial.transform import Rotation
+
+    frame = np.zeros(6)
+    points = [(m.values, seen) for m, seen in pairs if m.kind == "position"]
+    if points:
+        measured, seen = (np.concatenate(side) for side in zip(*points, strict=True))
+        with warnings.catch_warnings():  # points in a line: any of the best rotations will do
+            warnings.simplefilter("ignore", UserWarning)
+            turn, _ = Rotation.align_vectors(
+                measured - measured.mean(axis=0), seen - seen.mean(axis=0)
+            )
+        frame[:3] = measured.mean(axis=0) - turn.apply(seen.mean(axis=0))
+        frame[3:] = turn.as_euler("xyz")
+        return frame
+    poses = [(m.values, seen) for m, seen in pairs if m.kind == "pose"]
+    if poses:
+        measured, seen = (np.concatenate(side) for side in zip(*poses, strict=True))
+        turn = (
+            Rotation.from_euler("xyz", measured[:, 3:])
+            * Rotation.from_euler("xyz", seen[:, 3:]).inv()
+        ).mean()
+        frame[:3] = (measured[:, :3] - turn.apply(seen[:, :3])).mean(axis=0)
+        frame[3:] = turn.as_euler("xyz")
+        return frame
+    heights = [m.values - seen[:, 0] for m, seen in pairs]
+    frame[2] = np.concatenate(heights).mean()
+    return frame

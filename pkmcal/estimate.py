@@ -1,0 +1,247 @@
+"""The estimator: least squares through scipy, with noise, rank and covariance at its solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal.equations import Equations, Point
+from pkmcal.identifiability import Directions, decompose, directions
+from pkmcal.loss import Loss
+
+FloatArray = NDArray[np.float64]
+
+_ROUNDS = 20  # of estimating noise and unidentifiable combinations anew
+_LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
+_LEAST_FREEDOM = 0.5  # equations that must be left over for residuals to tell the noise
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What the least squares take as given, and what is revised between them.
+
+    Attributes
+    ----------
+    noise : ndarray (sets,)
+        Factor on the stated deviations of each set; where none is stated, the deviation in mm.
+    loss : Loss
+        How rows count.
+    told : Directions
+        What the measurements tell.
+    determined : Directions
+        What measurements and prior tell; the rest is kept where it started.
+    """
+
+    noise: FloatArray
+    loss: Loss
+    told: Directions
+    determined: Directions
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The equations and their statistics at the solution.
+
+    Attributes
+    ----------
+    point : Point
+        The equations there.
+    setting : Setting
+        Noise, loss and what can be told.
+    residual : ndarray (M,)
+        Measured less predicted, whitened.
+    jacobian : ndarray (M, n)
+        Scaled and whitened.
+    weights : ndarray (N,)
+        Of each row; 1 unless the loss is robust.
+    covariance : ndarray (n, n)
+        Scaled; nothing along combinations that are not determined.
+    freedom : ndarray (sets,)
+        Equations of each set less the parameters they went into.
+    """
+
+    point: Point
+    setting: Setting
+    residual: FloatArray
+    jacobian: FloatArray
+    weights: FloatArray
+    covariance: FloatArray
+    freedom: FloatArray
+
+
+class Estimator:
+    """Weighted least squares in scaled parameters, u = (θ - θ0)/scale.
+
+    Parameters
+    ----------
+    equations : Equations
+        What is fitted.
+    start : Point
+        θ0: where the search starts and what the smallest change counts from.
+    loss : str
+        A name of `pkmcal.loss.LIMITS`.
+    """
+
+    def __init__(self, equations: Equations, start: Point, loss: str) -> None:
+        parameters = equations.parameters
+        self.equations, self.start, self.loss = equations, start, loss
+        self.scale = parameters.scale
+        sigma = parameters.prior / self.scale
+        stated = np.flatnonzero(np.isfinite(sigma))
+        self.prior = np.eye(len(sigma))[stated] / sigma[stated, None]  # one row for each
+        self._centre = (parameters.start - start.theta) / self.scale
+        bounds = [(end - start.theta) / self.scale for end in (parameters.lower, parameters.upper)]
+        self._bounds = bounds if np.isfinite(bounds).any() else None
+        self.unstated = np.array([m.sigma is None for m in equations.sets])
+        self._equation_set = np.repeat(equations.set_of, equations.components)
+        self._at_start = self._jacobian(start, np.ones(len(self.unstated)))
+        self._last: tuple[FloatArray, Point] = (np.zeros(len(sigma)), start)
+        self.evaluations = 0
+        self.converged = False
+
+    def solve(self) -> Estimate:
+        """The estimate; noise that is not stated is estimated along, set by set."""
+        ones = np.ones(len(self.unstated))
+        setting = self._setting(ones, self._loss("linear", ones), None)
+        if not setting.determined.rank:
+            names = ", ".join(self.equations.parameters.names)
+            raise ValueError(f"the measurements tell nothing about {names}")
+        u = np.zeros(len(self.scale))
+        for _ in range(_ROUNDS):
+            u = self._least_squares(u, setting)
+            estimate = self._estimate(u, setting)
+            revised = self._revised(estimate)
+            steady = self._steady(setting, revised)
+            setting = revised
+            if steady:
+                break
+        return self._estimate(u, setting)
+
+    # between the least squares ------------------------------------------------------------------
+
+    def _loss(self, name: str, width: FloatArray) -> Loss:
+        of_rows = width[self.equations.set_of]
+        return Loss(name, self.equations.components, of_rows)
+
+    def _setting(self, noise: FloatArray, loss: Loss, point: Point | None) -> Setting:
+        """What can be told with this noise, before (`point` None) or after a fit."""
+        unknown = point is None and self.unstated.any()
+        size = np.inf if unknown else self.start.robot.length
+        first = self._at_start / noise[self._equation_set, None]
+        now = None if point is None else self._jacobian(point, noise)
+        told = directions(decompose(first), None if now is None else decompose(now), size)
+        if not len(self.prior):
+            return Setting(noise, loss, told, told)
+        both = decompose(np.vstack([first, self.prior]))
+        later = None if now is None else decompose(np.vstack([now, self.prior]))
+        return Setting(noise, loss, told, directions(both, later, size))
+
+    def _revised(self, estimate: Estimate) -> Setting:
+        """Noise where it is not stated, limits of the loss, and what can be told with them."""
+        factor = self._spread(estimate)
+        noise = np.where(
+            self.unstated,
+            np.maximum(estimate.setting.noise * factor, _LEAST_NOISE),
+            estimate.setting.noise,
+        )
+        # while the model is still far off, rows are odd only if they are further off than most
+        width = np.where(self.unstated, 1.0, np.maximum(factor, 1.0))
+        return self._setting(noise, self._loss(self.loss, width), estimate.point)
+
+    def _spread(self, estimate: Estimate) -> FloatArray:
+        """Deviation of the whitened residuals of each set, (sets,); 1 where nothing tells it."""
+        from scipy.special import gammaincinv
+
+        rows, components = self.equations.set_of, self.equations.components
+        first = np.cumsum(components) - components
+        squares = np.add.reduceat(estimate.residual**2, first)
+        factor = np.ones(len(self.unstated))
+        for i in np.flatnonzero(estimate.freedom >= _LEAST_FREEDOM):
+            mine, k = squares[rows == i], components[rows == i]
+            if self.loss == "linear":
+                variance = mine.sum() / estimate.freedom[i]
+            else:  # the median of chi squared
+                variance = np.median(mine / (2 * gammaincinv(k / 2, 0.5)))
+                variance *= k.sum() / estimate.freedom[i]
+            factor[i] = np.sqrt(variance)
+        return factor
+
+    def _steady(self, old: Setting, new: Setting) -> bool:
+        if old.determined.rank != new.determined.rank or old.loss.name != new.loss.name:
+            return False
+        if self.loss == "linear" and not len(self.prior) and len(self.unstated) == 1:
+            return True  # the noise does not move the solution
+        return np.allclose(old.noise, new.noise, rtol=1e-3, atol=_LEAST_NOISE) and np.allclose(
+            old.loss.width, new.loss.width, rtol=1e-3
+        )
+
+    # the least squares --------------------------------------------------------------------------
+
+    def _at(self, u: FloatArray) -> Point:
+        if not np.array_equal(u, self._last[0]):
+            self._last = (u.copy(), self.equations.at(self.start.theta + self.scale * u))
+            self.evaluations += 1
+        return self._last[1]
+
+    def _jacobian(self, point: Point, noise: FloatArray) -> FloatArray:
+        equations = self.equations
+        return equations.whitened(equations.jacobian(point), noise) * self.scale
+
+    def _least_squares(self, u: FloatArray, setting: Setting) -> FloatArray:
+        from scipy.optimize import least_squares
+
+        equations, noise, loss = self.equations, setting.noise, setting.loss
+        # what is not told is held by rows that nothing contradicts
+        pins = setting.determined.singular[0] * setting.determined.untold.T
+        extra = np.vstack([self.prior, pins])
+        offset = np.concatenate([self.prior @ self._centre, np.zeros(len(pins))])
+        first = equations.whitened(self._at(u).residuals, noise)
+        refused = 10.0 * (1.0 + np.abs(first).max())
+
+        def residual(u: FloatArray) -> FloatArray:
+            point = self._at(u)
+            held = extra @ u - offset
+            if not point.reached:  # worse than any step that is taken
+                return np.full(len(first) + len(held), refused)
+            data = loss.residual(equations.whitened(point.residuals, noise))
+            return np.concatenate([-data, held])
+
+        def jacobian(u: FloatArray) -> FloatArray:
+            point = self._at(u)
+            data = equations.whitened(point.residuals, noise)
+            return np.vstack([loss.jacobian(data, self._jacobian(point, noise)), extra])
+
+        found = least_squares(
+            residual,
+            u,
+            jacobian,
+            bounds=self._bounds or (-np.inf, np.inf),
+            method="trf" if self._bounds else "lm",
+            x_scale=1.0,
+            ftol=1e-14,
+            xtol=1e-12,
+            gtol=1e-15,
+            max_nfev=200,
+        )
+        self.converged = bool(found.status > 0)
+        solution: FloatArray = found.x
+        return solution
+
+    def _estimate(self, u: FloatArray, setting: Setting) -> Estimate:
+        point = self._at(u)
+        jacobian = self._jacobian(point, setting.noise)
+        residual = self.equations.whitened(point.residuals, setting.noise)
+        weights = setting.loss.weights(residual)
+        root = np.sqrt(np.repeat(weights, self.equations.components))[:, None]
+        told = setting.determined.told
+        _, singular, rows = np.linalg.svd(
+            np.vstack([root * jacobian, self.prior]) @ told, full_matrices=False
+        )
+        half = told @ (rows.T / singular)
+        leverage = ((root * jacobian @ half) ** 2).sum(axis=1)
+        sets = self._equation_set
+        count = np.bincount(sets, weights=root[:, 0] ** 2, minlength=len(self.unstated))
+        freedom = count - np.bincount(sets, weights=leverage, minlength=len(self.unstated))
+        return Estimate(point, setting, residual, jacobian, weights, half @ half.T, freedom)

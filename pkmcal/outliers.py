@@ -1,0 +1,96 @@
+"""Rows that the others contradict."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+_FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
+_MOST = 4  # at most one row in so many can be odd
+
+
+def outliers(
+    residual: FloatArray, jacobian: FloatArray, components: IntArray, prior: FloatArray
+) -> IntArray:
+    """Rows further off than noise explains, judged by the fit without them.
+
+    The row that the rest contradicts most is set aside, the fit is corrected to first order, and
+    so on until what is left agrees; then rows that fit the corrected fit after all return.
+
+    Parameters
+    ----------
+    residual : ndarray (M,)
+        Measured less predicted at the solution, whitened.
+    jacobian : ndarray (M, n)
+        Derivative of the predicted values to what is determined, scaled and whitened.
+    components : ndarray of int (N,)
+        Equations of each row.
+    prior : ndarray (p, n)
+        Further rows, which stay.
+
+    Returns
+    -------
+    ndarray of int
+        In order. Where residuals exceed the stated noise on the whole, "further off" means
+        further than most.
+    """
+    rows = len(components)
+    equations = np.split(np.arange(len(residual)), np.cumsum(components)[:-1])
+    kept = np.ones(rows, dtype=bool)
+    limit = _FALSE_ALARM / rows
+    for _ in range(rows // _MOST + 1):
+        shift, covariance = _fit(residual, jacobian, prior, kept, components)
+        left = residual - jacobian @ shift
+        squares = np.array([
+            _square(left[e], jacobian[e], covariance, -1.0 if k else 1.0)
+            for e, k in zip(equations, kept, strict=True)
+        ])  # fmt: skip
+        spread = _median_ratio(squares[kept], components[kept])
+        chance = _chance(squares / max(spread, 1.0), components)
+        worst = int(np.argmin(np.where(kept, chance, np.inf)))
+        if chance[worst] >= limit:
+            break
+        kept[worst] = False
+    odd: IntArray = np.flatnonzero(~kept & (chance < limit))
+    return odd
+
+
+def _fit(
+    residual: FloatArray,
+    jacobian: FloatArray,
+    prior: FloatArray,
+    kept: NDArray[np.bool_],
+    components: IntArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Shift of the solution without the rows set aside, and its covariance."""
+    use = np.repeat(kept, components)
+    normal = jacobian[use].T @ jacobian[use] + prior.T @ prior
+    covariance: FloatArray = np.linalg.pinv(normal, hermitian=True)
+    if kept.all():  # the solution itself, also that of a robust loss
+        return np.zeros(jacobian.shape[1]), covariance
+    return covariance @ (jacobian[use].T @ residual[use]), covariance
+
+
+def _square(r: FloatArray, j: FloatArray, covariance: FloatArray, sign: float) -> float:
+    """Squared length of a row's residual in its own deviations: -1 was fitted, +1 was not."""
+    variance = np.eye(len(r)) + sign * (j @ covariance @ j.T)
+    values, vectors = np.linalg.eigh(variance)
+    along = vectors.T @ r
+    seen = values > 1e-6  # a row that the fit follows wherever it lies says nothing
+    return float(np.sum(along[seen] ** 2 / values[seen]))
+
+
+def _median_ratio(squares: FloatArray, components: IntArray) -> float:
+    from scipy.special import gammaincinv
+
+    return float(np.median(squares / (2 * gammaincinv(components / 2, 0.5))))
+
+
+def _chance(squares: FloatArray, components: IntArray) -> FloatArray:
+    from scipy.special import gammaincc
+
+    chance: FloatArray = gammaincc(components / 2, squares / 2)
+    return chance

@@ -1,0 +1,242 @@
+"""What a calibration estimates: numbers of the geometry, the instrument's frame, targets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal.measurements import Measurements
+from pkmcal.robot import Robot
+from pkmcal.suggest import did_you_mean
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+Prior = float | Mapping[str, float] | None
+Bounds = Mapping[str, tuple[float, float]] | None
+
+_POINT = (("x", "mm"), ("y", "mm"), ("z", "mm"))
+_FRAME = (*_POINT, ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """The vector that is estimated: numbers of the geometry first, then frame and targets.
+
+    Attributes
+    ----------
+    names, units : tuple of str, n
+        Units "mm", "rad" or "1".
+    start : ndarray (n,)
+        Present values.
+    scale : ndarray (n,)
+        What moves the machine by about 1 mm: 1 mm, 1 mm / length, 1 mm / travel.
+    prior : ndarray (n,)
+        Standard deviation around the present value; inf where there is none.
+    lower, upper : ndarray (n,)
+        Bounds; infinite where there are none.
+    places : ndarray of int
+        Places in the geometry's values of the first names.
+    frame : int or None
+        Column of frame.x; None where the frame is known.
+    targets : mapping
+        Column of the x of each unknown target, by "target" or "anchor" and its name.
+    robot : Robot
+        The machine they belong to.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    start: FloatArray
+    scale: FloatArray
+    prior: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    places: IntArray
+    frame: int | None
+    targets: Mapping[tuple[str, str], int]
+    robot: Robot
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def robot_at(self, theta: FloatArray) -> Robot:
+        """The machine with the geometry of `theta` (n,)."""
+        values = self.robot.geometry.values.copy()
+        values[self.places] = theta[: len(self.places)]
+        return self.robot.replace(values)
+
+    def frame_at(self, theta: FloatArray) -> FloatArray | None:
+        """Pose of the base in the instrument's frame (6,); None where it is known."""
+        return None if self.frame is None else theta[self.frame : self.frame + 6]
+
+    def target_columns(self, measured: Measurements) -> IntArray:
+        """Columns of the unknown target of each row, (N, 3)."""
+        kind, names, index = _targets_of(measured)
+        for name in names:
+            if (kind, name) not in self.targets:
+                known = did_you_mean(name, (other for _, other in self.targets))
+                raise ValueError(f"holdout: its target {name!r} was not fitted{known}")
+        first = np.array([self.targets[kind, name] for name in names])
+        columns: IntArray = first[index][:, None] + np.arange(3)
+        return columns
+
+
+def parameters(
+    robot: Robot,
+    sets: Sequence[Measurements],
+    free: str | Sequence[str] | None,
+    prior: Prior,
+    unknown_frame: Sequence[bool],
+    unknown_target: Sequence[bool],
+    bounds: Bounds,
+) -> Parameters:
+    """The parameters of a calibration; the arguments are those of `identify`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An unknown or tied name, nothing free, a prior or a bound that does not fit.
+    """
+    geometry = robot.geometry
+    if free is None:
+        free = robot.model.free
+        if not free:
+            raise ValueError(f"free: {robot.name} declares no free parameters, name some")
+    chosen = geometry.match(free)
+    if not chosen:
+        raise ValueError("free: name at least one parameter")
+    places = np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)
+    names, units = list(chosen), [str(geometry.units[i]) for i in places]
+    start = list(geometry.values[places])
+    frame = None
+    if any(unknown_frame):
+        frame = len(names)
+        names += [f"frame.{axis}" for axis, _ in _FRAME]
+        units += [unit for _, unit in _FRAME]
+        start += [0.0] * 6
+    targets: dict[tuple[str, str], int] = {}
+    known: dict[tuple[str, str], FloatArray] = {}
+    for measured, unknown in zip(sets, unknown_target, strict=True):
+        if not unknown or measured.kind == "pose":
+            continue
+        for key, place in _places_of(measured).items():
+            if key in targets:
+                if (known[key] != place).any():
+                    raise ValueError(
+                        f"target: {' '.join(key)} starts at different places in different"
+                        " measurements; give different targets different target_names"
+                    )
+                continue
+            targets[key], known[key] = len(names), place
+            names += [f"{''.join(key)}.{axis}" for axis, _ in _POINT]
+            units += [unit for _, unit in _POINT]
+            start += list(place)
+    travel = max(_travel(robot, measured) for measured in sets)
+    of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
+    scale = np.array([of_unit[unit] for unit in units])
+    values = np.array(start, dtype=np.float64)
+    lower, upper = _bounds(bounds, names, values)
+    return Parameters(
+        names=tuple(names),
+        units=tuple(units),
+        start=values,
+        scale=scale,
+        prior=_prior(prior, names, scale, len(chosen)),
+        lower=lower,
+        upper=upper,
+        places=places,
+        frame=frame,
+        targets=targets,
+        robot=robot,
+    )
+
+
+def _travel(robot: Robot, measured: Measurements) -> float:
+    """Largest actuator coordinate, mm; an angle counts as its arc."""
+    per_unit = [robot.length if unit == "rad" else 1.0 for unit in robot.actuator_units]
+    return max(1.0, float(np.abs(measured.actuators * per_unit).max()))
+
+
+def _targets_of(measured: Measurements) -> tuple[str, tuple[str, ...], IntArray]:
+    """Whether targets or anchors, their names, and which one each row measured."""
+    kind = "anchor" if measured.kind == "distance" else "target"
+    if measured.target_names is None or measured.target_index is None:
+        return kind, ("1",), np.zeros(len(measured), dtype=np.intp)
+    return kind, measured.target_names, measured.target_index
+
+
+def _places_of(measured: Measurements) -> dict[tuple[str, str], FloatArray]:
+    kind, names, _ = _targets_of(measured)
+    given = measured.target
+    if given is None:
+        given = np.zeros((len(names), 3))
+    elif given.ndim == 1:
+        given = given[None, :]
+    elif measured.target_index is None:
+        raise ValueError(
+            "target: one place per row cannot be estimated; say with target_index which of a few"
+            " targets each row measured"
+        )
+    return {(kind, name): place for name, place in zip(names, given, strict=True)}
+
+
+def _matching(argument: str, pattern: object, names: Sequence[str]) -> list[int]:
+    if not isinstance(pattern, str):
+        raise TypeError(f"{argument}: names must be str, found {pattern!r}")
+    hits = [i for i, name in enumerate(names) if fnmatchcase(name, pattern)]
+    if not hits:
+        raise ValueError(
+            f"{argument}: no free parameter matches {pattern!r}{did_you_mean(pattern, names)}"
+        )
+    return hits
+
+
+def _prior(prior: Prior, names: Sequence[str], scale: FloatArray, of_machine: int) -> FloatArray:
+    sigma = np.full(len(names), np.inf)
+    if prior is None:
+        return sigma
+    if isinstance(prior, Mapping):
+        for pattern, value in prior.items():
+            hits = _matching("prior", pattern, names)
+            sigma[hits] = _positive(f"prior of {pattern}", value)
+    else:
+        sigma[:of_machine] = _positive("prior", prior) * scale[:of_machine]
+    return sigma
+
+
+def _positive(what: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        raise TypeError(f"{what} must be a number, a standard deviation; found {value!r}")
+    if not value > 0:
+        raise ValueError(f"{what} must be positive; found {value}")
+    return float(value)
+
+
+def _bounds(
+    bounds: Bounds, names: Sequence[str], start: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
+    if bounds is None:
+        return lower, upper
+    if not isinstance(bounds, Mapping):
+        raise TypeError(f"bounds must map names to (lower, upper); found {type(bounds).__name__}")
+    for pattern, pair in bounds.items():
+        try:
+            low, high = (float(end) for end in pair)
+        except (TypeError, ValueError):
+            raise ValueError(
+                f"bounds of {pattern} must be (lower, upper); found {pair!r}"
+            ) from None
+        for i in _matching("bounds", pattern, names):
+            if not low <= start[i] <= high or not low < high:
+                raise ValueError(
+                    f"bounds of {names[i]} must enclose its present value {start[i]:.9g};"
+                    f" found {low:g} to {high:g}"
+                )
+            lower[i], upper[i] = low, high
+    return lower, upper
