@@ -2,7 +2,27 @@
 
 from __future__ import annotations
 
-from pkmcal.robot import Forward, Robot, load, machines
+from typing import Any
 
-__version__ = "0.1.0"
-__all__ = ["Forward", "Robot", "load", "machines"]
+from pkmcal.measurement_csv import read_measurements
+from pkmcal.measurements import Measurements
+from pkmcal.robot import Forward, Robot, load, machines
+from pkmcal.virtual import VirtualMachine
+
+__all__ = [
+    "Forward",
+    "Measurements",
+    "Robot",
+    "VirtualMachine",
+    "load",
+    "machines",
+    "read_measurements",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":  # stated once, in pyproject.toml
+        from importlib.metadata import version
+
+        return version("pkmcal")
+    raise AttributeError(f"module 'pkmcal' has no attribute {name!r}")

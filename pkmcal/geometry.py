@@ -15,7 +15,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pkmcal._slots import SLOTS
+from pkmcal.core import SLOTS
 from pkmcal.limb_kinds import Unit
 from pkmcal.suggest import did_you_mean
 from pkmcal.ties import LimbNumber, Term, Tie

@@ -9,18 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from pkmcal._slots import SLOTS
+from pkmcal.core import SLOTS
 
 Driver = Literal["length", "slider", "crank"]
 Unit = Literal["mm", "rad", "1"]
-
-# The free coordinates of each pose map.
-MAP_COORDINATES: dict[str, tuple[str, ...]] = {
-    "spatial": ("x", "y", "z", "alpha", "beta", "gamma"),
-    "translation": ("x", "y", "z"),
-    "planar": ("x", "y", "gamma"),
-    "2tpr2tps": ("y", "z", "alpha", "beta"),
-}
 
 POINT_SLOTS = SLOTS[:6]
 TILT_SLOTS = ("tilt1", "tilt2")

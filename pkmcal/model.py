@@ -13,8 +13,6 @@ from pkmcal.limb_kinds import KINDS, Unit
 
 FloatArray = NDArray[np.float64]
 
-COORDINATES = ("x", "y", "z", "alpha", "beta", "gamma")
-
 
 @dataclass(frozen=True, eq=False)
 class Cone:

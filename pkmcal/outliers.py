@@ -13,7 +13,11 @@ _MOST = 4  # at most one row in so many can be odd
 
 
 def outliers(
-    residual: FloatArray, jacobian: FloatArray, components: IntArray, prior: FloatArray
+    residual: FloatArray,
+    jacobian: FloatArray,
+    components: IntArray,
+    weights: FloatArray,
+    prior: FloatArray,
 ) -> IntArray:
     """Rows further off than noise explains, judged by the fit without them.
 
@@ -28,8 +32,10 @@ def outliers(
         Derivative of the predicted values to what is determined, scaled and whitened.
     components : ndarray of int (N,)
         Equations of each row.
+    weights : ndarray (N,)
+        Of each row in the fit.
     prior : ndarray (p, n)
-        Further rows, which stay.
+        Derivative of the prior's equations, which stay.
 
     Returns
     -------
@@ -39,44 +45,33 @@ def outliers(
     """
     rows = len(components)
     equations = np.split(np.arange(len(residual)), np.cumsum(components)[:-1])
+    weighted = np.repeat(weights, components)[:, None] * jacobian
+    pull = weighted.T @ residual  # of the prior: at the solution the two balance
     kept = np.ones(rows, dtype=bool)
-    limit = _FALSE_ALARM / rows
     for _ in range(rows // _MOST + 1):
-        shift, covariance = _fit(residual, jacobian, prior, kept, components)
+        use = np.repeat(kept, components)
+        normal = weighted[use].T @ jacobian[use] + prior.T @ prior
+        covariance = np.linalg.pinv(normal, hermitian=True)
+        shift = covariance @ (weighted[use].T @ residual[use] - pull)
         left = residual - jacobian @ shift
+        part = np.where(kept, -weights, 1.0)  # a fitted row has pulled the fit to itself
         squares = np.array([
-            _square(left[e], jacobian[e], covariance, -1.0 if k else 1.0)
-            for e, k in zip(equations, kept, strict=True)
+            _square(left[e], jacobian[e], covariance, share)
+            for e, share in zip(equations, part, strict=True)
         ])  # fmt: skip
         spread = _median_ratio(squares[kept], components[kept])
         chance = _chance(squares / max(spread, 1.0), components)
         worst = int(np.argmin(np.where(kept, chance, np.inf)))
-        if chance[worst] >= limit:
+        if chance[worst] >= _FALSE_ALARM / rows:
             break
         kept[worst] = False
-    odd: IntArray = np.flatnonzero(~kept & (chance < limit))
+    odd: IntArray = np.flatnonzero(~kept & (chance < _FALSE_ALARM / rows))
     return odd
 
 
-def _fit(
-    residual: FloatArray,
-    jacobian: FloatArray,
-    prior: FloatArray,
-    kept: NDArray[np.bool_],
-    components: IntArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Shift of the solution without the rows set aside, and its covariance."""
-    use = np.repeat(kept, components)
-    normal = jacobian[use].T @ jacobian[use] + prior.T @ prior
-    covariance: FloatArray = np.linalg.pinv(normal, hermitian=True)
-    if kept.all():  # the solution itself, also that of a robust loss
-        return np.zeros(jacobian.shape[1]), covariance
-    return covariance @ (jacobian[use].T @ residual[use]), covariance
-
-
-def _square(r: FloatArray, j: FloatArray, covariance: FloatArray, sign: float) -> float:
-    """Squared length of a row's residual in its own deviations: -1 was fitted, +1 was not."""
-    variance = np.eye(len(r)) + sign * (j @ covariance @ j.T)
+def _square(r: FloatArray, j: FloatArray, covariance: FloatArray, part: float) -> float:
+    """Squared length of a row's residual in units of its own deviation."""
+    variance = np.eye(len(r)) + part * (j @ covariance @ j.T)
     values, vectors = np.linalg.eigh(variance)
     along = vectors.T @ r
     seen = values > 1e-6  # a row that the fit follows wherever it lies says nothing

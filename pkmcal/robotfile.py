@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal.core import MAPS, POSE
 from pkmcal.geometry import Geometry
-from pkmcal.limb_kinds import KINDS, MAP_COORDINATES, Unit
-from pkmcal.model import COORDINATES, Limb, Model
+from pkmcal.limb_kinds import KINDS, Unit
+from pkmcal.model import Limb, Model
 from pkmcal.robotfile_limbs import Parameters, read_limbs
 from pkmcal.robotfile_write import text_of
 from pkmcal.suggest import did_you_mean
@@ -122,21 +123,21 @@ def parse(content: bytes, place: str, file: str | None) -> Model:
 
     pose = _section(top, "pose")
     pose.only(("map", "home", "match"))
-    pose_map = pose.choice("map", MAP_COORDINATES, "pose map")
+    pose_map = pose.choice("map", MAPS, "pose map")
     _check_rows(pose, pose_map, limbs.limbs)
     frames = _section(top, "frames", optional=True)
     frames.only(("base", "tool"))
     return Model(
         name=top.text("name"),
         map=pose_map,
-        home=_read_pose(pose, "home", MAP_COORDINATES[pose_map], f"the map {pose_map}"),
+        home=_read_pose(pose, "home", MAPS[pose_map], f"the map {pose_map}"),
         match=_read_match(pose),
         limbs=limbs.limbs,
         geometry=geometry,
         free=_read_free(_section(top, "calibration", optional=True), geometry),
         stated=_read_stated(_section(top, "stated", optional=True), geometry, limbs.limbs),
-        base_frame=_read_pose(frames, "base", COORDINATES) if "base" in frames else None,
-        tool_frame=_read_pose(frames, "tool", COORDINATES) if "tool" in frames else None,
+        base_frame=_read_pose(frames, "base", POSE) if "base" in frames else None,
+        tool_frame=_read_pose(frames, "tool", POSE) if "tool" in frames else None,
         file=file,
     )
 
@@ -167,15 +168,15 @@ def _limb_tables(top: Table) -> Iterator[Table]:
 
 def _check_rows(pose: Table, pose_map: str, limbs: tuple[Limb, ...]) -> None:
     rows = sum(1 + len(KINDS[limb.kind].all_rows(limb.couple > 0.0)) for limb in limbs)
-    if rows < (free := len(MAP_COORDINATES[pose_map])):
+    if rows < (free := len(MAPS[pose_map])):
         pose.fail("map", f"{pose_map} has {free} free coordinates, but the limbs close only {rows}")
 
 
 def _read_pose(table: Table, key: str, known: tuple[str, ...], owner: str = "") -> FloatArray:
     pose = table.table(key)
     pose.only(known, owner)
-    units: dict[str, Unit] = {name: "mm" if name in "xyz" else "rad" for name in COORDINATES}
-    found = np.array([pose.number(name, units[name], 0.0) for name in COORDINATES])
+    units: dict[str, Unit] = {name: "mm" if name in "xyz" else "rad" for name in POSE}
+    found = np.array([pose.number(name, units[name], 0.0) for name in POSE])
     found.flags.writeable = False
     return found
 
@@ -185,8 +186,8 @@ def _read_match(pose: Table) -> tuple[str, ...] | None:
         return None
     names = pose.texts("match")
     for name in names:
-        if name not in COORDINATES:
-            pose.fail("match", f"{name!r} is no coordinate{did_you_mean(name, COORDINATES)}")
+        if name not in POSE:
+            pose.fail("match", f"{name!r} is no coordinate{did_you_mean(name, POSE)}")
     if not names or len(set(names)) < len(names):
         pose.fail("match", f"must name some coordinates once each, found {shown(names)}")
     return tuple(names)

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from pkmcal.geometry import Geometry
-from pkmcal.limb_kinds import KINDS, MAP_COORDINATES, PLATFORM_TILT_SLOTS, TILT_SLOTS
-from pkmcal.model import COORDINATES, Cone, FloatArray, Limb, Model
+from pkmcal.core import MAPS, POSE
+from pkmcal.limb_kinds import KINDS, PLATFORM_TILT_SLOTS, TILT_SLOTS
+from pkmcal.model import Cone, FloatArray, Limb, Model
 from pkmcal.ties import LimbNumber, Term
 
 HEADER = "# A robot for pkmcal: lengths in mm, angles in rad.\n"
@@ -48,14 +49,14 @@ def _sections(model: Model) -> dict[str, Mapping[str, Any]]:
     geometry = model.geometry
     pose: dict[str, Any] = {
         "map": model.map,
-        "home": _pose(model.home, MAP_COORDINATES[model.map]),
+        "home": _pose(model.home, MAPS[model.map]),
     }
     if model.match is not None:
         pose["match"] = list(model.match)
     frames = {"base": model.base_frame, "tool": model.tool_frame}
     return {
         "pose": pose,
-        "frames": {k: _pose(v, COORDINATES) for k, v in frames.items() if v is not None},
+        "frames": {k: _pose(v, POSE) for k, v in frames.items() if v is not None},
         "parameters": {name: geometry[name] for name in geometry.parameters},
         "calibration": {"free": list(model.free)} if model.free else {},
         "stated": model.stated,
@@ -63,7 +64,7 @@ def _sections(model: Model) -> dict[str, Mapping[str, Any]]:
 
 
 def _pose(pose: FloatArray, names: tuple[str, ...]) -> dict[str, float]:
-    return {name: float(pose[COORDINATES.index(name)]) for name in names}
+    return {name: float(pose[POSE.index(name)]) for name in names}
 
 
 def _limb(limb: Limb, i: int, geometry: Geometry) -> dict[str, Any]:

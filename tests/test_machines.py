@@ -7,8 +7,9 @@ import pytest
 
 import pkmcal as pk
 from pkmcal import robotfile
-from pkmcal.limb_kinds import KINDS, MAP_COORDINATES
-from pkmcal.model import COORDINATES, Model
+from pkmcal.core import MAPS, POSE
+from pkmcal.limb_kinds import KINDS
+from pkmcal.model import Model
 
 MACHINES = robotfile.builtin_names()
 
@@ -30,7 +31,7 @@ def poses(model: Model, name: str, count: int = 40) -> np.ndarray:
     """Random poses of the machine around its home, (count, 6)."""
     length, angle = REACH.get(name, (30.0, 0.12))
     reach = np.array([length] * 3 + [angle] * 3)
-    free = [COORDINATES.index(each) for each in MAP_COORDINATES[model.map]]
+    free = [POSE.index(each) for each in MAPS[model.map]]
     found = np.tile(model.home, (count, 1))
     spread = np.random.default_rng(5).uniform(-1.0, 1.0, (count, 6)) * reach
     found[:, free] += spread[:, free]

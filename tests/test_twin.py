@@ -127,7 +127,7 @@ POSES = {
 
 
 def test_the_twin_numbers_its_slots_as_the_package_does() -> None:
-    from pkmcal._slots import SLOTS
+    from pkmcal.core import SLOTS
 
     assert tuple(SLOTS) == twin.SLOTS
 

@@ -1,0 +1,123 @@
+"""Whether measurements can be what they are said to be: units, columns, repeats, enough of them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pkmcal.equations import Equations, Point, Share
+from pkmcal.measurements import Measurements
+from pkmcal.parameters import Parameters
+
+_GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
+_TELLING = 0.2  # a reading that leaves so little of the misfit is what was meant
+_FACTORS = {
+    "mm": (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)),
+    "rad": (("degrees", np.pi / 180), ("milliradians", 1e-3)),
+}
+
+
+def misread(shares: Sequence[Share], parameters: Parameters, point: Point) -> list[str]:
+    """What measurements that the machine misses grossly were probably meant to be.
+
+    Each set is read in other units and with columns exchanged; a reading that fits far better is
+    named.
+    """
+    limit = _GROSS * parameters.robot.length
+    found = []
+    for i, share in enumerate(shares):
+        alone = Equations([share], parameters)
+        present = _misfit(alone)
+        if present <= limit:
+            continue
+        trials = {
+            words: _misfit(Equations([replace(share, measured=other)], parameters))
+            for words, other in _readings(share.measured, parameters.robot.actuator_units)
+        }
+        words = min(trials, key=lambda text: trials[text])
+        if trials[words] < _TELLING * present:
+            which = f"measurements {i + 1}: " if len(shares) > 1 else ""
+            off = f"off by {present:.3g} mm" if np.isfinite(present) else "out of the machine's reach"
+            found.append(f"{which}{off} as given, but by {trials[words]:.3g} mm if {words}")
+    return found
+
+
+def _misfit(equations: Equations) -> float:
+    """Root mean square residual at the start, mm; angles as their arc. inf if a row is not reached."""
+    point = equations.start()
+    if not point.reached:
+        return float("inf")
+    units = np.array([1.0, 1.0, 1.0] + [equations.parameters.robot.length] * 3)
+    (residual,) = point.residuals
+    return float(np.sqrt(((residual * units[: residual.shape[1]]) ** 2).sum(axis=1).mean()))
+
+
+def _readings(
+    measured: Measurements, actuator_units: Sequence[str]
+) -> Iterator[tuple[str, Measurements]]:
+    """Other things that measurements could have been meant to be."""
+    for unit in dict.fromkeys(actuator_units):
+        mine = np.array([unit == other for other in actuator_units])
+        for name, factor in _FACTORS[unit]:
+            q = np.where(mine, measured.actuators * factor, measured.actuators)
+            yield f"the actuators are in {name}", replace(measured, actuators=q)
+    yield "the actuators count the other way", replace(measured, actuators=-measured.actuators)
+    columns = np.arange(measured.actuators.shape[1])
+    for a, b in itertools.combinations(columns, 2):
+        order = columns.copy()
+        order[[a, b]] = b, a
+        swapped = replace(measured, actuators=measured.actuators[:, order])
+        yield f"q{a + 1} and q{b + 1} are exchanged", swapped
+    for unit in dict.fromkeys(measured.units):
+        mine = np.array([unit == other for other in measured.units])
+        what = "angles" if unit == "rad" else "measured lengths"
+        for name, factor in _FACTORS[unit]:
+            values = measured.values * (factor if mine.all() else np.where(mine, factor, 1.0))
+            yield f"the {what} are in {name}", replace(measured, values=values)
+    for a, b in itertools.combinations(range(min(3, len(measured.units))), 2):
+        values = measured.values.copy()
+        values[:, [a, b]] = values[:, [b, a]]
+        names = measured.components
+        yield f"{names[a]} and {names[b]} are exchanged", replace(measured, values=values)
+
+
+def meagre(equations: Equations, jacobian_rank: int, with_prior: bool) -> list[str]:
+    """Too few measurements, one pose only, rows that were entered twice."""
+    found = []
+    n, count = len(equations.parameters), int(equations.components.sum())
+    if len(equations.actuators) == 1 and len(equations.rows) > 1:
+        found.append("all rows have the same actuators: measure different poses")
+    elif count < n and not with_prior:
+        found.append(
+            f"{count} equations for {n} parameters: measure more poses, free fewer parameters or"
+            " state a prior"
+        )
+    elif count <= jacobian_rank and not with_prior:
+        found.append(
+            f"{count} equations for {jacobian_rank} combinations of parameters: nothing is left"
+            " over to show how good the fit is; measure more poses"
+        )
+    start = 0
+    for measured in equations.sets:
+        rows = equations.rows[start : start + len(measured)]
+        start += len(measured)
+        targets = np.zeros(len(measured)) if measured.target_index is None else measured.target_index
+        table = np.column_stack([
+            measured.actuators,
+            measured.values.reshape(len(measured), -1),
+            targets,
+        ])  # fmt: skip
+        _, first, inverse = np.unique(table, axis=0, return_index=True, return_inverse=True)
+        twins = first[inverse.reshape(-1)]
+        copies = np.flatnonzero(twins != np.arange(len(measured)))
+        if len(copies):
+            pairs = [f"{rows[i]} of {rows[twins[i]]}" for i in copies[:5]]
+            more = ", …" if len(copies) > 5 else ""
+            found.append(
+                f"{len(copies)} rows repeat others to the last digit (row {', '.join(pairs)}{more}):"
+                " copied, not measured again?"
+            )
+    return found
