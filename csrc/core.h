@@ -95,7 +95,7 @@ static int core_home(const pkm_machine *machine, const double *geometry, const d
         FN(map_frame)(MAP_##NAME, state, R, p);                                                   \
         inverse_at(machine, limb, R, p, q);                                                       \
         spheres_at(machine, limb, q, sphere);                                                     \
-        rows = FN(closure_rows)(MAP_##NAME, machine, sphere, state, phi, A);                      \
+        rows = FN(closure_rows)(MAP_##NAME, SCALED, machine, sphere, state, phi, A);              \
         for (int k = 0; k < rows * M; k++) jacobian[k] = A[k][0];                                 \
         break;
         EACH_MAP(CASE)

@@ -102,7 +102,7 @@ INLINE int quick_rows(int map, const forward_call *call, const limb_numbers *sha
         for (int s = 0; s < MAX_STATE; s++)
             all->state[t][s] = join(all->fine[2 * t][s], all->fine[2 * t + 1][s]);
     }
-    steps_in_floats(map, machine, steps, start->sign, all);
+    steps_in_floats(map, machine, steps, start, all);
     steps_in_doubles(map, machine, all);
     for (int h = 0; h < HALVES && count[h] > 0; h++) {
         const mask status = select_mask(all->solved[h], fill_mask(PKM_OK), fill_mask(-1));

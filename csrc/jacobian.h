@@ -68,7 +68,7 @@ INLINE int pose_response(int map, const pkm_machine *machine, const FN(limb_sphe
 {
     const int m = map_m(map);
     real residual[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6], A[36], X[6 * PKM_MAX_ROWS], pivot;
-    const int rows = FN(closure_rows)(map, machine, sphere, state, residual, jacobian);
+    const int rows = FN(closure_rows)(map, SCALED, machine, sphere, state, residual, jacobian);
     normal_system(m, rows, rows == m ? m : rows, jacobian, residual, A, X);
     solve(m, rows, A, X, &pivot);
     const mask known = pivot > fill(1e-14);

@@ -68,24 +68,27 @@ INLINE void FN(map_pull)(int map, const real *state, const real *omega, const re
     }
 }
 
-/* One row of the system: Φ times `scale` in mm, and its derivatives by the map's scaled step. */
-INLINE void FN(store_row)(int map, NUMBER inverse_length, const real *state, real phi,
+/* One row of the system: Φ times `scale`, and its derivatives by the map's step. In a SCALED
+ * system Φ is in mm and an angle counts as its arc at the characteristic length; in a PLAIN one
+ * the sphere row stays as derived, which saves the multiplications. */
+
+INLINE void FN(store_row)(int map, int scaling, NUMBER inverse_length, const real *state, real phi,
                           const real *omega, const real *v, real scale, real *residual, real *row)
 {
     real covector[6];
     const real angular = scale * inverse_length;
-    *residual = phi * scale;
+    *residual = scaling ? phi * scale : phi;
     if (!row) return;
     FN(map_pull)(map, state, omega, v, covector);
     for (int j = 0; j < map_m(map); j++)
-        row[j] = covector[j] * (map_is_angle(map, j) ? angular : scale);
+        row[j] = scaling ? covector[j] * (map_is_angle(map, j) ? angular : scale) : covector[j];
 }
 
-/* All rows at a state, weighted, in the machine's order of elimination: the residual [mm], and its
- * derivatives by the map's step, in which an angle counts as its arc at the characteristic length.
- * Without the derivatives where `jacobian` is NULL. Returns how many rows there are. */
-INLINE int FN(closure_rows)(int map, const pkm_machine *machine, const FN(limb_sphere) *limb,
-                            const real *state, real *residual, real *jacobian)
+/* All rows at a state in the machine's order of elimination, weighted if SCALED. Without the
+ * derivatives where `jacobian` is NULL. Returns how many rows there are. */
+INLINE int FN(closure_rows)(int map, int scaling, const pkm_machine *machine,
+                            const FN(limb_sphere) *limb, const real *state, real *residual,
+                            real *jacobian)
 {
     const int m = map_m(map);
     const NUMBER inverse_length = (NUMBER)(1.0 / machine->length);
@@ -95,9 +98,9 @@ INLINE int FN(closure_rows)(int map, const pkm_machine *machine, const FN(limb_s
     for (int i = 0; i < machine->limbs; i++) {
         const FN(limb_sphere) *one = &limb[i];
         FN(sphere_row)(R, p, one->b, one->c, one->rho2, &phi, omega, v);
-        FN(store_row)(map, inverse_length, state, phi, omega, v,
-                      one->scale * (NUMBER)machine->weight[r],
-                      &residual[machine->order[r]], jacobian ? &jacobian[machine->order[r] * m] : NULL);
+        FN(store_row)(map, scaling, inverse_length, state, phi, omega, v,
+                      one->scale * (NUMBER)machine->weight[r], &residual[machine->order[r]],
+                      jacobian ? &jacobian[machine->order[r] * m] : NULL);
         r++;
         for (int kind = ROW_BASE_PLANE; kind <= ROW_COUPLE; kind *= 2) {
             if (!(machine->rows[i] & kind)) continue;
@@ -108,23 +111,20 @@ INLINE int FN(closure_rows)(int map, const pkm_machine *machine, const FN(limb_s
             else
                 FN(couple_row)(R, p, one->b, one->c, one->base_axis, one->platform_axis,
                                FN(fill)((NUMBER)machine->lever[i]), &phi, omega, v);
-            FN(store_row)(map, inverse_length, state, phi, omega, v,
-                          FN(fill)((NUMBER)machine->weight[r]),
-                          &residual[machine->order[r]], jacobian ? &jacobian[machine->order[r] * m] : NULL);
+            FN(store_row)(map, scaling, inverse_length, state, phi, omega, v,
+                          FN(fill)((NUMBER)machine->weight[r]), &residual[machine->order[r]],
+                          jacobian ? &jacobian[machine->order[r] * m] : NULL);
             r++;
         }
     }
     return r;
 }
 
-/* LU of A (m x m, row by row) in place and in the order given; the diagonal holds reciprocals.
- * `large` is the largest reciprocal in magnitude: the rows are scaled, so it tells of a small
- * pivot; NaN and infinity are larger than any bound. */
-INLINE void FN(factor)(int m, real *A, real *large)
+/* LU of A (m x m, row by row) in place and in the order given; the diagonal holds reciprocals. */
+INLINE void FN(factor)(int m, real *A)
 {
     for (int c = 0; c < m; c++) {
         A[c * m + c] = 1.0f / A[c * m + c];
-        *large = c ? FN(larger)(*large, FN(absolute)(A[c * m + c])) : FN(absolute)(A[0]);
         for (int i = c + 1; i < m; i++) {
             A[i * m + c] *= A[c * m + c];
             for (int j = c + 1; j < m; j++) A[i * m + j] -= A[i * m + c] * A[c * m + j];

@@ -128,6 +128,8 @@ INLINE wide half(narrow x, int which)
 /* 1/x to the precision of floats: enough for a scale, and cheaper. */
 INLINE wide rough_reciprocal(wide x) { return half(1.0f / join(x, x), 0); }
 
+enum { PLAIN, SCALED }; /* systems of closure rows: see kernel.h */
+
 /* The kernel, first for floats, then for doubles, which `real` means from here on. */
 #define NARROW
 #define real narrow

@@ -32,7 +32,7 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
     *iterations = zero;
     memcpy(trial, state, sizeof(real) * MAX_STATE);
     for (int k = 0; k <= MAX_ITERATIONS && any(running); k++) {
-        const int rows = FN(closure_rows)(map, machine, limb, trial, phi, jacobian);
+        const int rows = FN(closure_rows)(map, SCALED, machine, limb, trial, phi, jacobian);
         real squares = zero, trial_worst = zero;
         for (int r = 0; r < rows; r++) {
             squares += phi[r] * phi[r];

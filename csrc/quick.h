@@ -14,13 +14,13 @@
 
 enum { BLOCKS = 2, HALVES = 2 * BLOCKS, BATCH = HALVES * LANES };
 enum { STEPS_PREDICTED = 2, STEPS_GUESSED = 3 }; /* Newton steps in floats */
-#define SAFE_RECIPROCAL 1e3f /* of a pivot: beyond it row exchanges may be needed */
+#define SAFE_PIVOT 1e-3 /* of a scaled system: below it row exchanges may be needed */
 
 /* Where all rows start from: the step per actuator coordinate, and the sign of the determinant. */
 typedef struct {
     int known;
     real q[PKM_MAX_LIMBS], slope[6 * PKM_MAX_LIMBS], state[MAX_STATE];
-    float sign;
+    narrow_mask sign;
 } prediction;
 
 /* LANES rows as they come in, and what may stop them from being solved. */
@@ -39,10 +39,12 @@ typedef struct {
     mask solved[HALVES];
 } batch;
 
-/* From the scaled step of a linear system to the map's own: mm stay, arcs become angles. */
-INLINE double unscale(int map, const pkm_machine *machine, int j)
+/* Sign bits of the determinant, from the factors. */
+INLINE narrow_mask determinant_sign(int m, const narrow *factors)
 {
-    return map_is_angle(map, j) ? 1.0 / machine->length : 1.0;
+    narrow_mask sign = (narrow_mask)factors[0];
+    for (int c = 1; c < m; c++) sign ^= (narrow_mask)factors[c * m + c];
+    return sign & (narrow_mask)(-fill_narrow(0));
 }
 
 /* The step the closures ask for at the guess per actuator coordinate, and the determinant there. */
@@ -50,33 +52,32 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
                     const double *guess, prediction *start)
 {
     const int m = map_m(map), actuators = machine->actuators;
-    real pose[6], R[9], p[3], phi[PKM_MAX_ROWS], A[PKM_MAX_ROWS * 6], X[36], by_g[SLOTS], large;
-    real sign = fill(1.0);
+    real pose[6], R[9], p[3], phi[PKM_MAX_ROWS], A[PKM_MAX_ROWS * 6], X[6], by_g[SLOTS];
+    narrow factors[36];
     FN(limb_sphere) sphere[PKM_MAX_LIMBS];
-    mask reachable;
     for (int k = 0; k < 6; k++) pose[k] = fill(guess[k]);
-    memset(start->state, 0, sizeof start->state);
     map_from_pose(map, pose, start->state);
     FN(map_frame)(map, start->state, R, p);
     inverse_at(machine, limb, R, p, start->q);
-    reachable = spheres_at(machine, limb, start->q, sphere);
-    FN(closure_rows)(map, machine, sphere, start->state, phi, A);
-    FN(factor)(m, A, &large);
-    for (int c = 0; c < m; c++) sign *= A[c * m + c];
-    for (int a = 0; a < actuators * m; a++) start->slope[a] = fill(0.0);
+    mask usable = spheres_at(machine, limb, start->q, sphere);
+    FN(closure_rows)(map, PLAIN, machine, sphere, start->state, phi, A);
+    FN(factor)(m, A);
     for (int i = 0, r = 0; i < machine->limbs; i++) {
         const int a = machine->actuator[i];
         real by_q;
         sphere_derivatives(machine, i, &limb[i], R, p, start->q[a], &by_q, by_g);
         for (int j = 0; j < m; j++) X[j] = fill(0.0);
-        X[machine->order[r]] = by_q * sphere[i].scale * machine->weight[r];
+        X[machine->order[r]] = by_q;
         FN(substitute)(m, A, X);
-        for (int j = 0; j < m; j++)
-            start->slope[j * actuators + a] -= X[j] * unscale(map, machine, j);
+        for (int j = 0; j < m; j++) {
+            start->slope[j * actuators + a] -= X[j];
+            usable &= finite(X[j]);
+        }
         r += 1 + __builtin_popcount((unsigned)machine->rows[i]);
     }
-    start->sign = sign[0] > 0.0 ? 1.0f : -1.0f;
-    start->known = (reachable & (large < fill((double)SAFE_RECIPROCAL)))[0] != 0;
+    for (int k = 0; k < m * m; k++) factors[k] = join(A[k], A[k]);
+    start->sign = determinant_sign(m, factors);
+    start->known = usable[0] != 0;
 }
 
 INLINE void start_state(int map, const pkm_machine *machine, const rows_in *in,
@@ -119,30 +120,36 @@ INLINE void join_spheres(const pkm_machine *machine, int i, int once, const FN(l
 }
 
 /* Newton in floats; the factors are those at the last state. */
-INLINE void steps_in_floats(int map, const pkm_machine *machine, int steps, float sign, batch *all)
+INLINE void steps_in_floats(int map, const pkm_machine *machine, int steps,
+                            const prediction *start, batch *all)
 {
     const int m = map_m(map);
-    narrow phi[BLOCKS][PKM_MAX_ROWS], large[BLOCKS], moved[MAX_STATE];
+    const double pivot = SAFE_PIVOT * machine->size;
+    const float least[2] = {(float)pivot, (float)(pivot * machine->length)};
+    narrow phi[BLOCKS][PKM_MAX_ROWS], moved[MAX_STATE];
     for (int k = 0;; k++) {
         for (int t = 0; t < BLOCKS; t++)
-            closure_rows_narrow(map, machine, all->sphere[t], all->state[t], phi[t], all->factors[t]);
-        for (int t = 0; t < BLOCKS; t++) factor_narrow(m, all->factors[t], &large[t]);
+            closure_rows_narrow(map, PLAIN, machine, all->sphere[t], all->state[t], phi[t],
+                                all->factors[t]);
+        for (int t = 0; t < BLOCKS; t++) factor_narrow(m, all->factors[t]);
         if (k == steps) break;
         for (int t = 0; t < BLOCKS; t++) substitute_narrow(m, all->factors[t], phi[t]);
         for (int t = 0; t < BLOCKS; t++) {
-            for (int j = 0; j < m; j++) phi[t][j] *= (float)-unscale(map, machine, j);
+            for (int j = 0; j < m; j++) phi[t][j] = -phi[t][j];
             map_retract_narrow(map, all->state[t], phi[t], moved);
             memcpy(all->state[t], moved, sizeof moved);
         }
     }
     for (int t = 0; t < BLOCKS; t++) {
-        narrow product = fill_narrow(sign);
-        for (int c = 0; c < m; c++) product *= all->factors[t][c * m + c];
-        const narrow sound = select_narrow(
-            (large[t] < fill_narrow(SAFE_RECIPROCAL)) & (product >= fill_narrow(0.0f)),
-            fill_narrow(1.0f), fill_narrow(0.0f));
+        const narrow *factors = all->factors[t];
+        narrow large = fill_narrow(0);
+        for (int c = 0; c < m; c++)
+            large = larger_narrow(large, absolute_narrow(factors[c * m + c]) * least[map_is_angle(map, c)]);
+        narrow_mask sound = large < fill_narrow(1);
+        if (start->known) sound &= determinant_sign(m, factors) == start->sign;
+        const narrow one = select_narrow(sound, fill_narrow(1), fill_narrow(0));
         for (int h = 0; h < 2; h++)
-            all->solved[2 * t + h] = all->in[2 * t + h].usable & (half(sound, h) > fill(0.0));
+            all->solved[2 * t + h] = all->in[2 * t + h].usable & (half(one, h) > fill(0.0));
     }
 }
 
@@ -160,20 +167,21 @@ INLINE void steps_in_doubles(int map, const pkm_machine *machine, batch *all)
     }
     for (int round = 0; round < 2; round++) {
         for (int h = 0; h < HALVES; h++)
-            FN(closure_rows)(map, machine, all->in[h].sphere, all->fine[h], phi[h], NULL);
+            FN(closure_rows)(map, PLAIN, machine, all->in[h].sphere, all->fine[h], phi[h], NULL);
         for (int h = 0; h < HALVES; h++) FN(substitute)(m, A[h], phi[h]);
         for (int h = 0; h < HALVES; h++) {
             longest[h][round] = fill(0.0);
             for (int j = 0; j < m; j++) {
-                longest[h][round] = larger(longest[h][round], absolute(phi[h][j]));
-                phi[h][j] *= -unscale(map, machine, j);
+                const real length = absolute(phi[h][j]) * (map_is_angle(map, j) ? machine->length : 1.0);
+                longest[h][round] = larger(longest[h][round], length);
+                phi[h][j] = -phi[h][j];
             }
             FN(map_retract)(map, all->fine[h], phi[h], moved);
             memcpy(all->fine[h], moved, sizeof moved);
         }
     }
     for (int h = 0; h < HALVES; h++) {
-        FN(closure_rows)(map, machine, all->in[h].sphere, all->fine[h], phi[h], NULL);
+        FN(closure_rows)(map, SCALED, machine, all->in[h].sphere, all->fine[h], phi[h], NULL);
         all->worst[h] = fill(0.0);
         for (int r = 0; r < m; r++) all->worst[h] = larger(all->worst[h], absolute(phi[h][r]));
         /* what is left after two steps a, b that contract is about b²/a */

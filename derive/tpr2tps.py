@@ -125,7 +125,9 @@ class _ClosedForm(Function):
         self.sincos("a", free[2])
         sine, cosine = self.sincos("b", free[3])
         secant = self.let("k", 1 / cosine, "1/cos β and tan β")
-        self.let("tb", sine * secant)
+        tangent = self.let("tb", sine * secant)
+        ahead = self.let("ahead", free[1] * tangent - size[3], "x of o1 as seen from T1 and T2")
+        self.meant[z * tb - d] = ahead
 
     def limbs(self, front: sp.Matrix, back: sp.Matrix, even: str, odd: str, doc: str) -> sp.Matrix:
         """The rows of limbs 1 to 4, even + n_i odd, from the rows of the two pairs."""

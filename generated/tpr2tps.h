@@ -1,5 +1,5 @@
 /* Generated from derive/tpr2tps.py by `python -m derive`; never edited by hand.
- * derivation 68bdb17d0e35bf7e
+ * derivation dbba226f0cf6af45
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -20,12 +20,14 @@ INLINE void FN(tpr2tps_lengths)(const real size[6], const real free[4], real L[4
     /* 1/cos β and tan β */
     const real k = 1.0f/cb;
     const real tb = sb*k;
+    /* x of o1 as seen from T1 and T2 */
+    const real ahead = free[1]*tb - size[3];
     /* terms of L_i² without n_i, front and back */
     const real t0 = 0.5f*ca;
     const real t1 = free[1]*free[1];
     const real t2 = free[0]*free[0] + t1;
-    const real even0 = size[0]*size[0] + 0.25f*size[1]*size[1] + (free[1]*tb - size[3])*(free[1]*tb
-        - size[3]) + 0.25f*size[4]*size[4] + t2 - 2.0f*size[0]*size[3]*cb - size[1]*size[4]*t0;
+    const real even0 = size[0]*size[0] + 0.25f*size[1]*size[1] + 0.25f*size[4]*size[4] +
+        ahead*ahead + t2 - 2.0f*size[0]*size[3]*cb - size[1]*size[4]*t0;
     const real even1 = 0.25f*size[2]*size[2] + 0.25f*size[5]*size[5] + tb*tb*t1 + t2 -
         size[2]*size[5]*t0;
     /* terms of L_i² with n_i */
@@ -57,15 +59,17 @@ INLINE void FN(tpr2tps_jacobian)(const real size[6], const real free[4], real J[
     /* 1/cos β and tan β */
     const real k = 1.0f/cb;
     const real tb = sb*k;
-    /* terms of L_i² without n_i, front and back */
+    /* x of o1 as seen from T1 and T2 */
     const real t0 = free[1]*tb;
+    const real ahead = t0 - size[3];
+    /* terms of L_i² without n_i, front and back */
     const real t1 = 2.0f*size[3];
     const real t2 = size[1]*ca;
     const real t3 = 0.5f*size[4];
     const real t4 = free[1]*free[1];
     const real t5 = free[0]*free[0] + t4;
-    const real even0 = size[0]*size[0] + 0.25f*size[1]*size[1] + (t0 - size[3])*(t0 - size[3]) +
-        0.25f*size[4]*size[4] + t5 - size[0]*cb*t1 - t2*t3;
+    const real even0 = size[0]*size[0] + 0.25f*size[1]*size[1] + 0.25f*size[4]*size[4] +
+        ahead*ahead + t5 - size[0]*cb*t1 - t2*t3;
     const real t6 = size[2]*ca;
     const real t7 = 0.5f*size[5];
     const real even1 = 0.25f*size[2]*size[2] + 0.25f*size[5]*size[5] + tb*tb*t4 + t5 - t6*t7;

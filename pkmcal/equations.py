@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pkmcal.core import STATUS
 from pkmcal.measurements import Measurements
-from pkmcal.parameters import Parameters
+from pkmcal.parameters import Parameters, Share
 from pkmcal.predict import Predicted, difference, distance_per_point, predict
 from pkmcal.robot import Robot
 
@@ -53,26 +53,6 @@ class Point:
         return not self.status.any()
 
 
-@dataclass(frozen=True, eq=False)
-class Share:
-    """The rows of one set of measurements that are fitted or held out.
-
-    Attributes
-    ----------
-    measured : Measurements
-        These rows alone.
-    rows : ndarray of int (N,)
-        Their numbers in what the user gave, counted through all sets.
-    unknown_frame, unknown_target : bool
-        Whether its frame and its targets are among the parameters.
-    """
-
-    measured: Measurements
-    rows: IntArray
-    unknown_frame: bool
-    unknown_target: bool
-
-
 class Equations:
     """What some measurements say about the parameters.
 
@@ -88,12 +68,9 @@ class Equations:
         self.sets = tuple(share.measured for share in shares)
         self.rows = np.concatenate([share.rows for share in shares])
         self.parameters = parameters
-        self._framed = [s.unknown_frame and s.measured.kind != "distance" for s in shares]
+        self._framed = [share.framed for share in shares]
         self._columns = [
-            parameters.target_columns(s.measured)
-            if s.unknown_target and s.measured.kind != "pose"
-            else None
-            for s in shares
+            parameters.target_columns(share.measured) if share.aimed else None for share in shares
         ]
         # several targets or repeats at the same actuators are one pose
         actuators = np.concatenate([m.actuators for m in self.sets])
@@ -202,6 +179,24 @@ class Equations:
         off = self.distances(point)
         off = off[np.isfinite(off)]
         return float(np.sqrt(np.mean(off**2))) if off.size else float("nan")
+
+    def repeatability(self, point: Point) -> float:
+        """Scatter of repeats of one pose about their mean, mm per coordinate; NaN without any."""
+        squares, freedom = 0.0, 0
+        for measured, residual in zip(self.sets, point.residuals, strict=True):
+            lengths = residual[:, :3]
+            target = (
+                np.zeros(len(measured)) if measured.target_index is None else measured.target_index
+            )
+            _, group = np.unique(
+                np.column_stack([measured.pose_index, target]), axis=0, return_inverse=True
+            )
+            count = np.bincount(group.reshape(-1))
+            for column in lengths.T:
+                mean = np.bincount(group.reshape(-1), weights=column) / count
+                squares += float(((column - mean[group.reshape(-1)]) ** 2).sum())
+            freedom += (len(measured) - len(count)) * lengths.shape[1]
+        return float(np.sqrt(squares / freedom)) if freedom else float("nan")
 
     def unreached(self, point: Point) -> str:
         """Which rows the machine does not reach and why, in words; empty where it reaches all."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pkmcal.equations import Equations, Point
-from pkmcal.identifiability import Directions, decompose, directions
+from pkmcal.identifiability import Decomposed, Directions, decompose, directions
 from pkmcal.loss import Loss
 
 FloatArray = NDArray[np.float64]
@@ -92,11 +93,14 @@ class Estimator:
         stated = np.flatnonzero(np.isfinite(sigma))
         self.prior = np.eye(len(sigma))[stated] / sigma[stated, None]  # one row for each
         self._centre = (parameters.start - start.theta) / self.scale
-        bounds = [(end - start.theta) / self.scale for end in (parameters.lower, parameters.upper)]
-        self._bounds = bounds if np.isfinite(bounds).any() else None
+        lower, upper = ((end - start.theta) / self.scale for end in parameters.bounds)
+        bounded = bool(np.isfinite([lower, upper]).any())
+        self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
+        self._method: Literal["trf", "lm"] = "trf" if bounded else "lm"
         self.unstated = np.array([m.sigma is None for m in equations.sets])
         self._equation_set = np.repeat(equations.set_of, equations.components)
         self._at_start = self._jacobian(start, np.ones(len(self.unstated)))
+        self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
         self._last: tuple[FloatArray, Point] = (np.zeros(len(sigma)), start)
         self.evaluations = 0
         self.converged = False
@@ -129,14 +133,19 @@ class Estimator:
         """What can be told with this noise, before (`point` None) or after a fit."""
         unknown = point is None and self.unstated.any()
         size = np.inf if unknown else self.start.robot.length
-        first = self._at_start / noise[self._equation_set, None]
-        now = None if point is None else self._jacobian(point, noise)
-        told = directions(decompose(first), None if now is None else decompose(now), size)
-        if not len(self.prior):
-            return Setting(noise, loss, told, told)
-        both = decompose(np.vstack([first, self.prior]))
-        later = None if now is None else decompose(np.vstack([now, self.prior]))
-        return Setting(noise, loss, told, directions(both, later, size))
+        if self._first is None or (noise != self._first[0]).any():
+            at_start = self._at_start / noise[self._equation_set, None]
+            self._first = noise, self._decomposed(at_start)
+        _, first = self._first
+        now = (None, None) if point is None else self._decomposed(self._jacobian(point, noise))
+        told = directions(first[0], now[0], size)
+        with_prior = directions(first[1], now[1], size) if len(self.prior) else told
+        return Setting(noise, loss, told, with_prior)
+
+    def _decomposed(self, jacobian: FloatArray) -> tuple[Decomposed, Decomposed]:
+        """Without and with the prior."""
+        data = decompose(jacobian)
+        return data, decompose(np.vstack([jacobian, self.prior])) if len(self.prior) else data
 
     def _revised(self, estimate: Estimate) -> Setting:
         """Noise where it is not stated, limits of the loss, and what can be told with them."""
@@ -189,6 +198,15 @@ class Estimator:
         equations = self.equations
         return equations.whitened(equations.jacobian(point), noise) * self.scale
 
+    def plain(self, point: Point) -> FloatArray:
+        """Scaled Jacobian (M, n), not whitened: mm per mm, angles as their arc."""
+        parts = []
+        for part, measured in zip(self.equations.jacobian(point), self.equations.sets, strict=True):
+            arc = np.where(np.array(measured.units) == "rad", self.start.robot.length, 1.0)
+            parts.append((part * arc[:, None]).reshape(-1, part.shape[2]))
+        jacobian: FloatArray = np.concatenate(parts) * self.scale
+        return jacobian
+
     def _least_squares(self, u: FloatArray, setting: Setting) -> FloatArray:
         from scipy.optimize import least_squares
 
@@ -217,16 +235,17 @@ class Estimator:
             residual,
             u,
             jacobian,
-            bounds=self._bounds or (-np.inf, np.inf),
-            method="trf" if self._bounds else "lm",
+            bounds=self._bounds,
+            method=self._method,
             x_scale=1.0,
-            ftol=1e-14,
-            xtol=1e-12,
+            ftol=1e-12,  # 1e-5 of a standard deviation
+            xtol=1e-10,
             gtol=1e-15,
             max_nfev=200,
         )
         self.converged = bool(found.status > 0)
-        solution: FloatArray = found.x
+        untold = setting.determined.untold
+        solution: FloatArray = found.x - untold @ (untold.T @ found.x)
         return solution
 
     def _estimate(self, u: FloatArray, setting: Setting) -> Estimate:
@@ -242,6 +261,6 @@ class Estimator:
         half = told @ (rows.T / singular)
         leverage = ((root * jacobian @ half) ** 2).sum(axis=1)
         sets = self._equation_set
-        count = np.bincount(sets, weights=root[:, 0] ** 2, minlength=len(self.unstated))
-        freedom = count - np.bincount(sets, weights=leverage, minlength=len(self.unstated))
+        left = root[:, 0] ** 2 - leverage
+        freedom: FloatArray = np.bincount(sets, left, len(self.unstated)).astype(np.float64)
         return Estimate(point, setting, residual, jacobian, weights, half @ half.T, freedom)

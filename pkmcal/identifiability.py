@@ -48,18 +48,21 @@ class Directions:
         return float(last / next_one) if next_one > 0 else float("inf")
 
 
-def decompose(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+Decomposed = tuple[FloatArray, FloatArray]  # singular values (n,), directions (n, n)
+
+
+def decompose(jacobian: FloatArray) -> Decomposed:
     """Singular values (n,), zeros where there are fewer rows, and all directions (n, n)."""
     n = jacobian.shape[1]
     if len(jacobian) > 2 * n:  # the triangular factor has the same
-        jacobian = np.linalg.qr(jacobian, mode="r")
+        jacobian = np.asarray(np.linalg.qr(jacobian, mode="r"))
     _, singular, rows = np.linalg.svd(jacobian, full_matrices=len(jacobian) < n)
     return np.concatenate([singular, np.zeros(n - len(singular))]), rows.T
 
 
 def directions(
-    before: tuple[FloatArray, FloatArray],
-    after: tuple[FloatArray, FloatArray] | None,
+    before: Decomposed,
+    after: Decomposed | None,
     size: float,
 ) -> Directions:
     """Split the combinations by the Jacobians before and after the fit (from `decompose`).
@@ -125,7 +128,7 @@ def observability(jacobian: FloatArray, poses: int, rank: int) -> dict[str, floa
 def sparse_basis(untold: FloatArray) -> FloatArray:
     """The same combinations, each of few parameters: (n, d), the largest entry of each 1."""
     basis = untold.copy()
-    n, d = basis.shape
+    d = basis.shape[1]
     pivots: list[int] = []
     for k in range(d):
         rest = basis[:, k:]

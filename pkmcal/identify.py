@@ -8,14 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pkmcal.equations import Equations, Point, Share
+from pkmcal.equations import Equations
 from pkmcal.estimate import Estimate, Estimator
+from pkmcal.holdout import HeldOut, compare, drawn
 from pkmcal.identifiability import in_words, observability, sparse_basis
 from pkmcal.identification import Identification
 from pkmcal.loss import LIMITS
 from pkmcal.measurements import Measurements
 from pkmcal.outliers import outliers
-from pkmcal.parameters import Bounds, Parameters, Prior, parameters
+from pkmcal.parameters import Bounds, Prior, Share, parameters
 from pkmcal.plausibility import meagre, misread
 from pkmcal.robot import Robot
 from pkmcal.suggest import did_you_mean
@@ -101,72 +102,64 @@ def identify(
     >>> round(found.robot.geometry["offset1"], 6)
     0.3
     """
-    shares, held, parameter = _arguments(
-        robot, measurements, free, prior, loss, frame, target, holdout, bounds
-    )
-    equations = Equations(shares, parameter)
+    shares = _shares(robot, measurements, frame, target)
+    held: list[tuple[Share, int]] = []
+    if isinstance(holdout, Measurements):
+        held = [_like(robot, holdout, shares)]
+    elif holdout is not None:
+        pairs = [drawn(share, holdout) for share in shares]
+        shares, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
+    chosen = parameters(robot, shares, free, prior, bounds)
+    if loss not in LIMITS:
+        raise ValueError(f"loss must be one of {', '.join(LIMITS)}; found {loss!r}")
+    equations = Equations(shares, chosen)
     start = equations.start()
-    noted = misread(shares, parameter, start)
+    noted = misread(shares, chosen, start)
     if not start.reached:
         hint = f" ({'; '.join(noted)})" if noted else ""
         raise ValueError(f"measurements: {equations.unreached(start)}{hint}")
     estimator = Estimator(equations, start, loss)
     estimate = estimator.solve()
+    compared = compare(held, estimator, estimate)
     noted += meagre(equations, estimate.setting.told.rank, bool(len(estimator.prior)))
-    if not estimator.converged:
-        noted.append("the least squares did not converge; the result is not to be trusted")
-    compared = _Compared(Equations(held, parameter), start, estimate) if held else None
-    if compared is not None and compared.unreached:
+    if compared.unreached:
         noted.append(f"holdout: {compared.unreached}; left out")
+    if not estimator.converged:
+        noted.append("the least squares did not converge: the result is not to be trusted")
     for text in noted:
         warnings.warn(text, UserWarning, stacklevel=2)
     return _result(estimator, estimate, compared, tuple(noted))
 
 
-def _arguments(
+def _shares(
     robot: Robot,
     measurements: Measurements | Sequence[Measurements],
-    free: str | Sequence[str] | None,
-    prior: Prior,
-    loss: str,
     frame: str | Sequence[str],
     target: str | Sequence[str],
-    holdout: float | Measurements | None,
-    bounds: Bounds,
-) -> tuple[list[Share], list[Share], Parameters]:
-    """What is fitted, what is held out, and the parameters."""
-    if loss not in LIMITS:
-        raise ValueError(f"loss must be one of {', '.join(LIMITS)}; found {loss!r}")
+) -> list[Share]:
     sets = [measurements] if isinstance(measurements, Measurements) else list(measurements)
     if not sets:
         raise ValueError("measurements: none given")
-    for measured in sets:
+    shares, first = [], 0
+    for measured, unknown_frame, unknown_target in zip(
+        sets, _words("frame", frame, len(sets)), _words("target", target, len(sets)), strict=True
+    ):
         _check(robot, measured, "measurements")
-    frames, targets = _words("frame", frame, len(sets)), _words("target", target, len(sets))
-    if any(frames) and all(m.kind == "distance" or not f for m, f in zip(sets, frames)):
-        raise ValueError("frame: distances do not depend on a frame")
-    shares, held = [], []
-    first = 0
-    for measured, unknown_frame, unknown_target in zip(sets, frames, targets, strict=True):
         rows = np.arange(first, first + len(measured))
+        shares.append(Share(measured, rows, unknown_frame, unknown_target))
         first += len(measured)
-        whole = Share(measured, rows, unknown_frame, unknown_target)
-        if holdout is None or isinstance(holdout, Measurements):
-            shares.append(whole)
-            continue
-        kept, out = _split(measured, holdout)
-        for side, chosen in ((shares, kept), (held, out)):
-            part = Share(measured.select(chosen), rows[chosen], unknown_frame, unknown_target)
-            side.append(part)
-    if isinstance(holdout, Measurements):
-        _check(robot, holdout, "holdout")
-        alike = [i for i, m in enumerate(sets) if (m.kind == "distance") == (holdout.kind == "distance")]
-        nearest = next((i for i in alike if sets[i].kind == holdout.kind), alike[0] if alike else 0)
-        held.append(
-            Share(holdout, np.arange(len(holdout)), frames[nearest], targets[nearest])
-        )
-    fitted = [share.measured for share in shares]
-    return shares, held, parameters(robot, fitted, free, prior, frames, targets, bounds)
+    if any(share.unknown_frame for share in shares) and not any(share.framed for share in shares):
+        raise ValueError("frame: distances do not depend on it, it cannot be unknown")
+    return shares
+
+
+def _like(robot: Robot, holdout: Measurements, shares: Sequence[Share]) -> tuple[Share, int]:
+    """Other measurements to hold out, read like those fitted of their kind."""
+    _check(robot, holdout, "holdout")
+    alike = [i for i, share in enumerate(shares) if share.measured.kind == holdout.kind]
+    i = alike[0] if alike else 0
+    rows = np.arange(len(holdout))
+    return Share(holdout, rows, shares[i].unknown_frame, shares[i].unknown_target), i
 
 
 def _check(robot: Robot, measured: Measurements, argument: str) -> None:
@@ -195,36 +188,65 @@ def _words(argument: str, given: str | Sequence[str], count: int) -> list[bool]:
     return [word == "unknown" for word in words]
 
 
-def _split(measured: Measurements, holdout: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Row numbers to fit and to hold out, drawn as `Measurements.split` draws them."""
-    numbered = Measurements(
-        measured.actuators, np.arange(len(measured)), "height", group=measured.pose_index
+def _result(
+    estimator: Estimator, estimate: Estimate, compared: HeldOut, noted: tuple[str, ...]
+) -> Identification:
+    equations, chosen = estimator.equations, estimator.equations.parameters
+    setting, theta, scale = estimate.setting, estimate.point.theta, chosen.scale
+    untold, told = setting.determined.untold, setting.determined.told
+    covariance = estimate.covariance * np.outer(scale, scale)
+    if (estimator.unstated & (estimate.freedom < 0.5)).any():
+        covariance = np.full_like(covariance, np.inf)  # the noise is not known
+    unknown = np.linalg.norm(untold, axis=1) > _INVOLVED
+    shown = covariance.copy()
+    shown[unknown] = shown[:, unknown] = np.nan
+    shown[unknown, unknown] = np.inf
+    prior_off = estimator.prior @ ((theta - chosen.start) / scale)
+    dof = float(estimate.weights @ equations.components) + len(prior_off) - told.shape[1]
+    squares = np.repeat(estimate.weights, equations.components) @ estimate.residual**2
+    no_sigma = bool(estimator.unstated.all()) or dof <= 0
+    at_bound = np.isclose(theta, chosen.lower, rtol=1e-9, atol=1e-9) | np.isclose(
+        theta, chosen.upper, rtol=1e-9, atol=1e-9
     )
-    kept, out = numbered.split(holdout)
-    return kept.values.astype(np.intp), out.values.astype(np.intp)
-
-
-class _HeldOut:
-    """How far off points that were not fitted are, and should be."""
-
-    def __init__(
-        self, shares: Sequence[Share], like: Sequence[int], estimator: Estimator, estimate: Estimate
-    ) -> None:
-        equations = Equations(shares, estimator.equations.parameters)
-        before = equations.at(estimator.start.theta)
-        after = equations.at(estimate.point.theta)
-        self.unreached = equations.unreached(after)
-        self.rms_before, self.rms = equations.rms(before), equations.rms(after)
-        half = np.linalg.cholesky(_ridged(estimate.covariance)) * estimator.scale[:, None]
-        variance = []
-        for part, measured, i in zip(equations.jacobian(after), equations.sets, like, strict=True):
-            model = ((part[:, :3] @ half) ** 2).sum(axis=(1, 2))
-            lengths = min(part.shape[1], 3)
-            if measured.sigma is None:
-                noise = np.full(len(measured), lengths * estimate.setting.noise[i] ** 2)
-            elif measured.sigma.ndim == 2:
-                noise = (measured.sigma[:, :3] ** 2).sum(axis=1)
-            else:
-                noise = np.trace(measured.sigma[:, :3, :3], axis1=1, axis2=2)
-            variance.append(model + noise)
-        self.expected = float(np.sqrt(np.nanmean(np.concatenate(variance))))
+    odd = outliers(
+        estimate.residual,
+        estimate.jacobian @ told,
+        equations.components,
+        estimate.weights,
+        estimator.prior @ told,
+    )
+    words = [in_words(c, chosen.names) for c in sparse_basis(setting.told.untold).T]
+    return Identification(
+        robot=estimate.point.robot,
+        free=chosen.names,
+        units=chosen.units,
+        values=theta,
+        start=estimator.start.theta,
+        stderr=np.sqrt(np.diagonal(shown)),
+        covariance=shown,
+        rank=setting.told.rank,
+        gap=setting.told.gap,
+        unidentifiable=tuple(words),
+        rms=equations.rms(estimate.point),
+        rms_before=equations.rms(estimator.start),
+        holdout_rms=compared.rms,
+        holdout_rms_before=compared.rms_before,
+        holdout_expected=compared.expected,
+        chi2_per_dof=float("nan") if no_sigma else float((squares + prior_off @ prior_off) / dof),
+        dof=dof,
+        noise=tuple(np.where(estimator.unstated, setting.noise, np.nan).tolist()),
+        repeatability=equations.repeatability(estimate.point),
+        observability=observability(
+            estimator.plain(estimate.point), len(equations.actuators), setting.told.rank
+        ),
+        residuals=estimate.point.residuals,
+        rows=equations.rows,
+        outliers=tuple(equations.rows[odd].tolist()),
+        at_bounds=tuple(name for name, at in zip(chosen.names, at_bound, strict=True) if at),
+        converged=estimator.converged,
+        evaluations=estimator.evaluations,
+        warnings=noted,
+        _places=chosen.places,
+        _told=covariance,
+        _untold=untold * scale[:, None],
+    )

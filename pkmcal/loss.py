@@ -82,7 +82,7 @@ class Loss:
         return scaled + residual[:, None] * turned
 
     def _factors(self, residual: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """g = √ρ/s of each row, and (∂g/∂s)/s."""
+        """Factor g = √ρ/s of each row, and (∂g/∂s)/s."""
         limit = self._limit
         t = np.maximum(self._lengths(residual) / limit, 1e-3)  # below, g is its own series
         if self.name == "huber":

@@ -44,21 +44,23 @@ def outliers(
         further than most.
     """
     rows = len(components)
-    equations = np.split(np.arange(len(residual)), np.cumsum(components)[:-1])
+    alike = [np.flatnonzero(components == k) for k in np.unique(components)]
+    first = np.cumsum(components) - components
     weighted = np.repeat(weights, components)[:, None] * jacobian
     pull = weighted.T @ residual  # of the prior: at the solution the two balance
     kept = np.ones(rows, dtype=bool)
     for _ in range(rows // _MOST + 1):
         use = np.repeat(kept, components)
         normal = weighted[use].T @ jacobian[use] + prior.T @ prior
-        covariance = np.linalg.pinv(normal, hermitian=True)
+        # the ridge is for directions that only rows set aside told
+        covariance = np.linalg.inv(normal + 1e-14 * np.trace(normal) * np.eye(len(normal)))
         shift = covariance @ (weighted[use].T @ residual[use] - pull)
         left = residual - jacobian @ shift
         part = np.where(kept, -weights, 1.0)  # a fitted row has pulled the fit to itself
-        squares = np.array([
-            _square(left[e], jacobian[e], covariance, share)
-            for e, share in zip(equations, part, strict=True)
-        ])  # fmt: skip
+        squares = np.empty(rows)
+        for mine in alike:
+            e = first[mine, None] + np.arange(components[mine[0]])
+            squares[mine] = _squares(left[e], jacobian[e], covariance, part[mine])
         spread = _median_ratio(squares[kept], components[kept])
         chance = _chance(squares / max(spread, 1.0), components)
         worst = int(np.argmin(np.where(kept, chance, np.inf)))
@@ -69,13 +71,14 @@ def outliers(
     return odd
 
 
-def _square(r: FloatArray, j: FloatArray, covariance: FloatArray, part: float) -> float:
-    """Squared length of a row's residual in units of its own deviation."""
-    variance = np.eye(len(r)) + part * (j @ covariance @ j.T)
+def _squares(r: FloatArray, j: FloatArray, covariance: FloatArray, part: FloatArray) -> FloatArray:
+    """Squared length of residuals (N, k) in units of their own deviations, (N,)."""
+    variance = np.eye(r.shape[1]) + part[:, None, None] * (j @ covariance @ j.transpose(0, 2, 1))
     values, vectors = np.linalg.eigh(variance)
-    along = vectors.T @ r
+    along = (vectors.transpose(0, 2, 1) @ r[:, :, None])[:, :, 0]
     seen = values > 1e-6  # a row that the fit follows wherever it lies says nothing
-    return float(np.sum(along[seen] ** 2 / values[seen]))
+    squares: FloatArray = np.where(seen, along**2 / np.where(seen, values, 1.0), 0.0).sum(axis=1)
+    return squares
 
 
 def _median_ratio(squares: FloatArray, components: IntArray) -> float:

@@ -24,6 +24,36 @@ _FRAME = (*_POINT, ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
 
 
 @dataclass(frozen=True, eq=False)
+class Share:
+    """The rows of one set of measurements that are fitted or held out.
+
+    Attributes
+    ----------
+    measured : Measurements
+        These rows alone.
+    rows : ndarray of int (N,)
+        Their numbers in what the user gave, counted through all sets.
+    unknown_frame, unknown_target : bool
+        What the user says is not known of them.
+    """
+
+    measured: Measurements
+    rows: IntArray
+    unknown_frame: bool
+    unknown_target: bool
+
+    @property
+    def framed(self) -> bool:
+        """Whether the unknown frame is among what it depends on."""
+        return self.unknown_frame and self.measured.kind != "distance"
+
+    @property
+    def aimed(self) -> bool:
+        """Whether unknown targets are among what it depends on."""
+        return self.unknown_target and self.measured.kind != "pose"
+
+
+@dataclass(frozen=True, eq=False)
 class Parameters:
     """The vector that is estimated: numbers of the geometry first, then frame and targets.
 
@@ -64,6 +94,11 @@ class Parameters:
     def __len__(self) -> int:
         return len(self.names)
 
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds."""
+        return self.lower, self.upper
+
     def robot_at(self, theta: FloatArray) -> Robot:
         """The machine with the geometry of `theta` (n,)."""
         values = self.robot.geometry.values.copy()
@@ -88,11 +123,9 @@ class Parameters:
 
 def parameters(
     robot: Robot,
-    sets: Sequence[Measurements],
+    shares: Sequence[Share],
     free: str | Sequence[str] | None,
     prior: Prior,
-    unknown_frame: Sequence[bool],
-    unknown_target: Sequence[bool],
     bounds: Bounds,
 ) -> Parameters:
     """The parameters of a calibration; the arguments are those of `identify`.
@@ -114,17 +147,17 @@ def parameters(
     names, units = list(chosen), [str(geometry.units[i]) for i in places]
     start = list(geometry.values[places])
     frame = None
-    if any(unknown_frame):
+    if any(share.framed for share in shares):
         frame = len(names)
         names += [f"frame.{axis}" for axis, _ in _FRAME]
         units += [unit for _, unit in _FRAME]
         start += [0.0] * 6
     targets: dict[tuple[str, str], int] = {}
     known: dict[tuple[str, str], FloatArray] = {}
-    for measured, unknown in zip(sets, unknown_target, strict=True):
-        if not unknown or measured.kind == "pose":
+    for share in shares:
+        if not share.aimed:
             continue
-        for key, place in _places_of(measured).items():
+        for key, place in _places_of(share.measured).items():
             if key in targets:
                 if (known[key] != place).any():
                     raise ValueError(
@@ -136,7 +169,7 @@ def parameters(
             names += [f"{''.join(key)}.{axis}" for axis, _ in _POINT]
             units += [unit for _, unit in _POINT]
             start += list(place)
-    travel = max(_travel(robot, measured) for measured in sets)
+    travel = max(_travel(robot, share.measured) for share in shares)
     of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
     scale = np.array([of_unit[unit] for unit in units])
     values = np.array(start, dtype=np.float64)

@@ -7,10 +7,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pkmcal.equations import Equations, Point, Share
+from pkmcal.equations import Equations, Point
 from pkmcal.measurements import Measurements
-from pkmcal.parameters import Parameters
+from pkmcal.parameters import Parameters, Share
+
+FloatArray = NDArray[np.float64]
 
 _GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
 _TELLING = 0.2  # a reading that leaves so little of the misfit is what was meant
@@ -26,33 +29,36 @@ def misread(shares: Sequence[Share], parameters: Parameters, point: Point) -> li
     Each set is read in other units and with columns exchanged; a reading that fits far better is
     named.
     """
-    limit = _GROSS * parameters.robot.length
+    size = parameters.robot.length
     found = []
     for i, share in enumerate(shares):
-        alone = Equations([share], parameters)
-        present = _misfit(alone)
-        if present <= limit:
+        present = _misfit(point.residuals[i], size)
+        if present <= _GROSS * size:
             continue
         trials = {
-            words: _misfit(Equations([replace(share, measured=other)], parameters))
+            words: _misfit(_alone(replace(share, measured=other), parameters), size)
             for words, other in _readings(share.measured, parameters.robot.actuator_units)
         }
         words = min(trials, key=lambda text: trials[text])
         if trials[words] < _TELLING * present:
             which = f"measurements {i + 1}: " if len(shares) > 1 else ""
-            off = f"off by {present:.3g} mm" if np.isfinite(present) else "out of the machine's reach"
+            off = (
+                f"off by {present:.3g} mm" if np.isfinite(present) else "out of the machine's reach"
+            )
             found.append(f"{which}{off} as given, but by {trials[words]:.3g} mm if {words}")
     return found
 
 
-def _misfit(equations: Equations) -> float:
-    """Root mean square residual at the start, mm; angles as their arc. inf if a row is not reached."""
-    point = equations.start()
-    if not point.reached:
-        return float("inf")
-    units = np.array([1.0, 1.0, 1.0] + [equations.parameters.robot.length] * 3)
-    (residual,) = point.residuals
-    return float(np.sqrt(((residual * units[: residual.shape[1]]) ** 2).sum(axis=1).mean()))
+def _alone(share: Share, parameters: Parameters) -> FloatArray:
+    (residual,) = Equations([share], parameters).start().residuals
+    return residual
+
+
+def _misfit(residual: FloatArray, size: float) -> float:
+    """Root mean square residual, mm; angles as their arc. inf if a row is not reached."""
+    arcs = residual * np.array([1.0, 1.0, 1.0, size, size, size])[: residual.shape[1]]
+    squares = (arcs**2).sum(axis=1)
+    return float(np.sqrt(squares.mean())) if np.isfinite(squares).all() else float("inf")
 
 
 def _readings(
@@ -77,11 +83,11 @@ def _readings(
         for name, factor in _FACTORS[unit]:
             values = measured.values * (factor if mine.all() else np.where(mine, factor, 1.0))
             yield f"the {what} are in {name}", replace(measured, values=values)
-    for a, b in itertools.combinations(range(min(3, len(measured.units))), 2):
+    names = measured.components
+    for one, other in itertools.combinations(range(min(3, len(names))), 2):
         values = measured.values.copy()
-        values[:, [a, b]] = values[:, [b, a]]
-        names = measured.components
-        yield f"{names[a]} and {names[b]} are exchanged", replace(measured, values=values)
+        values[:, [one, other]] = values[:, [other, one]]
+        yield f"{names[one]} and {names[other]} are exchanged", replace(measured, values=values)
 
 
 def meagre(equations: Equations, jacobian_rank: int, with_prior: bool) -> list[str]:
@@ -104,7 +110,9 @@ def meagre(equations: Equations, jacobian_rank: int, with_prior: bool) -> list[s
     for measured in equations.sets:
         rows = equations.rows[start : start + len(measured)]
         start += len(measured)
-        targets = np.zeros(len(measured)) if measured.target_index is None else measured.target_index
+        targets = (
+            np.zeros(len(measured)) if measured.target_index is None else measured.target_index
+        )
         table = np.column_stack([
             measured.actuators,
             measured.values.reshape(len(measured), -1),
@@ -117,7 +125,7 @@ def meagre(equations: Equations, jacobian_rank: int, with_prior: bool) -> list[s
             pairs = [f"{rows[i]} of {rows[twins[i]]}" for i in copies[:5]]
             more = ", …" if len(copies) > 5 else ""
             found.append(
-                f"{len(copies)} rows repeat others to the last digit (row {', '.join(pairs)}{more}):"
+                f"{len(copies)} rows equal others to the last digit (row {', '.join(pairs)}{more}):"
                 " copied, not measured again?"
             )
     return found

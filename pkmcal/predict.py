@@ -141,7 +141,8 @@ def _applied(matrix: FloatArray, vector: FloatArray) -> FloatArray:
 
 def _carried(axes: FloatArray, arm: FloatArray) -> FloatArray:
     """Velocity of the end of `arm` (N, 3) for each of the axes (N or 1, 3, 3): (N, 3, 3)."""
-    return np.cross(axes, arm[:, None, :]).transpose(0, 2, 1)
+    velocity: FloatArray = np.cross(axes, arm[:, None, :]).transpose(0, 2, 1)
+    return velocity
 
 
 def difference(kind: str, values: FloatArray, predicted: FloatArray) -> FloatArray:

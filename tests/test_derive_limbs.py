@@ -1,0 +1,168 @@
+"""Proofs of the limb rows: emitted derivatives against plain differentiation of the closures.
+
+They are compared exactly, at random rational points: rational rotations, and sines and cosines from
+rational points of the circle.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable
+from functools import cache
+
+import pytest
+import sympy as sp
+from pkmcal.derive import limbs
+
+FUNCTIONS = {f.name: f for f in limbs.functions()}
+
+
+def symbols(name: str, size: int) -> sp.Matrix:
+    """The entries of an emitted function's vector."""
+    return sp.Matrix([sp.Symbol(f"{name}[{i}]", real=True) for i in range(size)])
+
+
+g = {s: sp.Symbol(f"g[{c}]", real=True) for s, c in zip(limbs.SLOTS, limbs.CONSTANTS, strict=True)}
+q, qt, lever, rho2 = sp.symbols("q qt lever rho2", real=True)
+R, F, P = (symbols(name, 9).reshape(3, 3) for name in "RFP")
+p, b, c, h = (symbols(name, 3) for name in "pbch")
+omega, v = sp.Matrix(sp.symbols("w0:3", real=True)), sp.Matrix(sp.symbols("v0:3", real=True))
+VARIABLES = {"omega": omega, "v": v, "by_q": [q], "by_g": list(g.values())}
+base, platform = sp.Matrix(list(g.values())[:3]), sp.Matrix(list(g.values())[3:6])
+small = sp.rot_ccw_axis3(omega[2]) * sp.rot_ccw_axis2(omega[1]) * sp.rot_ccw_axis1(omega[0])
+
+
+def tilted(frame: sp.Matrix, name: str) -> sp.Matrix:
+    return frame * sp.rot_ccw_axis1(g[f"{name}1"]) * sp.rot_ccw_axis2(g[f"{name}2"])
+
+
+def anchor(driver: str, drive: sp.Expr) -> tuple[sp.Matrix, sp.Expr]:
+    """Where the anchor stands at q̃ = drive, and the length from there."""
+    first, _, axis = (tilted(F, "tilt").col(i) for i in range(3))
+    if driver == "length":
+        return base, drive
+    if driver == "slider":
+        return base + drive * axis, g["rod"]
+    turned = sp.cos(drive) * first + sp.sin(drive) * axis.cross(first)
+    return base + g["crank"] * turned, g["rod"]
+
+
+@cache
+def closures() -> dict[str, sp.Expr]:
+    """Φ of each emitted row, at a platform moved by the twist (omega, v)."""
+
+    def sphere(joint: sp.Matrix, centre: sp.Matrix, square: sp.Expr) -> sp.Expr:
+        d = p + v + small * R * joint - centre
+        return (d.dot(d) - square) / 2
+
+    made = {"sphere_row": sphere(b, c, rho2)}
+    for driver in ("length", "slider", "crank"):
+        centre, rho = anchor(driver, g["gain"] * q + g["offset"])
+        made[f"{driver}_derivatives"] = sphere(platform, centre, rho**2)
+    known = (b, c, symbols("n", 3), symbols("a", 3))
+    tilts = (platform, base, tilted(F, "tilt").col(2), tilted(P, "platform_tilt").col(2))
+    for suffix, (joint, foot, n, a) in {"row": known, "derivatives": tilts}.items():
+        d, axis = p + v + small * R * joint - foot, small * R * a
+        made[f"base_plane_{suffix}"] = n.dot(d)
+        made[f"platform_plane_{suffix}"] = axis.dot(d)
+        made[f"couple_{suffix}"] = lever * axis.dot(n)
+    return made
+
+
+def rational_point(exprs: sp.Matrix, seed: int) -> dict[sp.Expr, sp.Expr]:
+    """Random rational values of all symbols, sines and cosines; R, F and P are rotations."""
+    rng = random.Random(seed)
+
+    def number() -> sp.Rational:
+        return sp.Rational(rng.randint(-99, 99), rng.randint(1, 20))
+
+    point: dict[sp.Expr, sp.Expr] = {}
+    for matrix in (R, F, P):
+        x, y, z = number(), number(), number()
+        skew = sp.Matrix([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        rotation = (sp.eye(3) - skew).inv() * (sp.eye(3) + skew)
+        point.update(zip(matrix, rotation, strict=True))
+    for angle in sorted({call.args[0] for call in exprs.atoms(sp.sin, sp.cos)}, key=str):
+        half = number()
+        point[sp.sin(angle)] = 2 * half / (1 + half**2)
+        point[sp.cos(angle)] = (1 - half**2) / (1 + half**2)
+    for symbol in sorted(exprs.free_symbols - set(point), key=str):
+        point[symbol] = number()
+    return point
+
+
+def assert_equal(found: sp.Matrix, expected: sp.Matrix) -> None:
+    for seed in range(3):
+        point = rational_point(found.col_join(expected), seed)
+        assert found.xreplace(point) == expected.xreplace(point)
+
+
+def column(entries: Iterable[sp.Expr]) -> sp.Matrix:
+    return sp.Matrix(list(entries))
+
+
+def test_every_limb_derivative_has_its_closure_here() -> None:
+    rows = {
+        name for name, f in FUNCTIONS.items() if {a.name for a, _ in f.outputs} & set(VARIABLES)
+    }
+    assert rows == set(closures())
+
+
+@pytest.mark.parametrize("name", closures())
+def test_limb_derivatives_are_those_of_the_closure(name: str) -> None:
+    still = dict.fromkeys([*omega, *v], 0)
+    phi = closures()[name]
+    for argument, _ in FUNCTIONS[name].outputs:
+        if argument.name == "phi":
+            expected = column([phi.subs(still)])
+        else:
+            expected = column(sp.diff(phi, u).subs(still) for u in VARIABLES[argument.name])
+        assert_equal(FUNCTIONS[name].result(argument.name), expected)
+
+
+@pytest.mark.parametrize("driver", ["slider", "crank"])
+def test_the_anchor_moves_in_the_prepared_directions(driver: str) -> None:
+    directions, made = FUNCTIONS[f"{driver}_directions"], FUNCTIONS[f"{driver}_anchor"]
+    prepared = dict(zip(symbols("base", 3), base, strict=True))
+    for name in ("first", "second"):
+        prepared.update(zip(symbols(name, 3), directions.result(name), strict=True))
+    assert_equal(made.result("c").xreplace(prepared), anchor(driver, qt)[0])
+
+
+def test_axes_are_the_third_columns_of_the_tilted_frames() -> None:
+    assert_equal(FUNCTIONS["base_axis"].result("axis"), tilted(F, "tilt").col(2))
+    assert_equal(FUNCTIONS["platform_axis"].result("axis"), tilted(P, "platform_tilt").col(2))
+
+
+def test_command_undoes_drive() -> None:
+    (drive,) = FUNCTIONS["limb_drive"].result("qt")
+    (command,) = FUNCTIONS["limb_command"].result("q")
+    assert sp.cancel(command.subs(qt, drive)) == q
+
+
+@pytest.mark.parametrize("branch", [1, -1])
+@pytest.mark.parametrize("driver", ["length", "slider", "crank"])
+def test_inverse_puts_the_limb_at_its_length_on_its_branch(driver: str, branch: int) -> None:
+    made = FUNCTIONS[f"{driver}_inverse"]
+    numbers = rational_point(column([*anchor(driver, qt)[0], g["rod"], *h]), seed=1)
+    values = {s: value.n(40) for s, value in numbers.items() if s.is_Symbol and s != qt}
+    values |= dict(zip(h, (180, -90, 150), strict=True)) | {g["rod"]: 260, g["crank"]: 120}
+    if driver != "length":
+        directions = FUNCTIONS[f"{driver}_directions"]
+        for name in ("first", "second"):
+            values.update(
+                zip(symbols(name, 3), directions.result(name).subs(values).n(40), strict=True)
+            )
+    values[sp.Symbol("branch", real=True)] = branch
+    if driver == "crank":
+        sine, cosine = (made.result(name).subs(values) for name in ("sine", "cosine"))
+        angles = [sp.atan2(s, c) for s, c in zip(sine, cosine, strict=True)]
+        solution = sp.N(angles[0] - branch * angles[1], 40)
+    else:
+        solution = sp.N(made.result("qt").subs(values)[0], 40)
+    centre, rho = anchor(driver, qt)
+    d = base + h - centre
+    at = {**values, qt: solution}
+    assert abs((d.dot(d) - rho**2).xreplace(at).n(30)) < 1e-20
+    if driver != "length":
+        assert sp.sign(d.dot(centre.diff(qt)).xreplace(at).n(30)) == branch
