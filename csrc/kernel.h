@@ -120,25 +120,29 @@ INLINE int FN(closure_rows)(int map, int scaling, const pkm_machine *machine,
     return r;
 }
 
-/* LU of A (m x m, row by row) in place and in the order given; the diagonal holds reciprocals. */
-INLINE void FN(factor)(int m, real *A)
+/* LU of `count` matrices A (m x m, row by row) in place and in the order given; the diagonals hold
+ * reciprocals. Side by side, for the steps of one depend on each other and those of two do not. */
+INLINE void FN(factor)(int m, int count, real (*A)[36])
 {
     for (int c = 0; c < m; c++) {
-        A[c * m + c] = 1.0f / A[c * m + c];
-        for (int i = c + 1; i < m; i++) {
-            A[i * m + c] *= A[c * m + c];
-            for (int j = c + 1; j < m; j++) A[i * m + j] -= A[i * m + c] * A[c * m + j];
-        }
+        for (int t = 0; t < count; t++) A[t][c * m + c] = 1.0f / A[t][c * m + c];
+        for (int i = c + 1; i < m; i++)
+            for (int t = 0; t < count; t++) {
+                A[t][i * m + c] *= A[t][c * m + c];
+                for (int j = c + 1; j < m; j++) A[t][i * m + j] -= A[t][i * m + c] * A[t][c * m + j];
+            }
     }
 }
 
 /* Solve with those factors, in place. */
-INLINE void FN(substitute)(int m, const real *A, real *b)
+INLINE void FN(substitute)(int m, int count, real (*A)[36], real (*b)[PKM_MAX_ROWS])
 {
     for (int i = 1; i < m; i++)
-        for (int j = 0; j < i; j++) b[i] -= A[i * m + j] * b[j];
+        for (int j = 0; j < i; j++)
+            for (int t = 0; t < count; t++) b[t][i] -= A[t][i * m + j] * b[t][j];
     for (int i = m - 1; i >= 0; i--) {
-        for (int j = i + 1; j < m; j++) b[i] -= A[i * m + j] * b[j];
-        b[i] *= A[i * m + i];
+        for (int j = i + 1; j < m; j++)
+            for (int t = 0; t < count; t++) b[t][i] -= A[t][i * m + j] * b[t][j];
+        for (int t = 0; t < count; t++) b[t][i] *= A[t][i * m + i];
     }
 }

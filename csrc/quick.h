@@ -52,7 +52,7 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
                     const double *guess, prediction *start)
 {
     const int m = map_m(map), actuators = machine->actuators;
-    real pose[6], R[9], p[3], phi[PKM_MAX_ROWS], A[PKM_MAX_ROWS * 6], X[6], by_g[SLOTS];
+    real pose[6], R[9], p[3], phi[PKM_MAX_ROWS], A[1][36], X[1][PKM_MAX_ROWS], by_g[SLOTS];
     narrow factors[36];
     FN(limb_sphere) sphere[PKM_MAX_LIMBS];
     for (int k = 0; k < 6; k++) pose[k] = fill(guess[k]);
@@ -60,22 +60,22 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
     FN(map_frame)(map, start->state, R, p);
     inverse_at(machine, limb, R, p, start->q);
     mask usable = spheres_at(machine, limb, start->q, sphere);
-    FN(closure_rows)(map, PLAIN, machine, sphere, start->state, phi, A);
-    FN(factor)(m, A);
+    FN(closure_rows)(map, PLAIN, machine, sphere, start->state, phi, A[0]);
+    FN(factor)(m, 1, A);
     for (int i = 0, r = 0; i < machine->limbs; i++) {
         const int a = machine->actuator[i];
         real by_q;
         sphere_derivatives(machine, i, &limb[i], R, p, start->q[a], &by_q, by_g);
-        for (int j = 0; j < m; j++) X[j] = fill(0.0);
-        X[machine->order[r]] = by_q;
-        FN(substitute)(m, A, X);
+        for (int j = 0; j < m; j++) X[0][j] = fill(0.0);
+        X[0][machine->order[r]] = by_q;
+        FN(substitute)(m, 1, A, X);
         for (int j = 0; j < m; j++) {
-            start->slope[j * actuators + a] -= X[j];
-            usable &= finite(X[j]);
+            start->slope[j * actuators + a] -= X[0][j];
+            usable &= finite(X[0][j]);
         }
         r += 1 + __builtin_popcount((unsigned)machine->rows[i]);
     }
-    for (int k = 0; k < m * m; k++) factors[k] = join(A[k], A[k]);
+    for (int k = 0; k < m * m; k++) factors[k] = join(A[0][k], A[0][k]);
     start->sign = determinant_sign(m, factors);
     start->known = usable[0] != 0;
 }
@@ -131,9 +131,9 @@ INLINE void steps_in_floats(int map, const pkm_machine *machine, int steps,
         for (int t = 0; t < BLOCKS; t++)
             closure_rows_narrow(map, PLAIN, machine, all->sphere[t], all->state[t], phi[t],
                                 all->factors[t]);
-        for (int t = 0; t < BLOCKS; t++) factor_narrow(m, all->factors[t]);
+        factor_narrow(m, BLOCKS, all->factors);
         if (k == steps) break;
-        for (int t = 0; t < BLOCKS; t++) substitute_narrow(m, all->factors[t], phi[t]);
+        substitute_narrow(m, BLOCKS, all->factors, phi);
         for (int t = 0; t < BLOCKS; t++) {
             for (int j = 0; j < m; j++) phi[t][j] = -phi[t][j];
             map_retract_narrow(map, all->state[t], phi[t], moved);
@@ -168,7 +168,7 @@ INLINE void steps_in_doubles(int map, const pkm_machine *machine, batch *all)
     for (int round = 0; round < 2; round++) {
         for (int h = 0; h < HALVES; h++)
             FN(closure_rows)(map, PLAIN, machine, all->in[h].sphere, all->fine[h], phi[h], NULL);
-        for (int h = 0; h < HALVES; h++) FN(substitute)(m, A[h], phi[h]);
+        FN(substitute)(m, HALVES, A, phi);
         for (int h = 0; h < HALVES; h++) {
             longest[h][round] = fill(0.0);
             for (int j = 0; j < m; j++) {

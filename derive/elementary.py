@@ -40,7 +40,7 @@ def polynomials() -> dict[str, tuple[list[float], str]]:
     fits = {}
     with mp.workdps(60):
         for name, low, high, count, meaning in _FITS:
-            end = eval(high, {"pi": mp.pi, "tan": mp.tan})  # noqa: S307 - literals above
+            end = eval(high, {"pi": mp.pi, "tan": mp.tan})
             fit = mp.chebyfit(lambda s, n=name: _fitted(n, s), [low, end], count)
             fits[name] = ([float(c) for c in reversed(fit)], meaning)
     return fits

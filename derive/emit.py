@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import sympy as sp
 
-Value = sp.Expr | sp.MatrixBase
+Value = Any  # a SymPy expression or matrix; SymPy is untyped
 LINE = 100
 
 
@@ -136,7 +137,7 @@ class Function:
         self.declared += symbols
         return symbols
 
-    def _total(self, expr: sp.Expr, x: sp.Symbol, memo: dict) -> sp.Expr:
+    def _total(self, expr: sp.Expr, x: sp.Symbol, memo: dict[sp.Symbol, sp.Expr]) -> sp.Expr:
         total = sp.diff(expr, x)
         for step in self.steps:
             for symbol, definition in zip(step.symbols, step.exprs, strict=True):
@@ -201,7 +202,8 @@ class _Statements:
         self.counts = self.printer.counts
 
     def _assign(self, target: str, expr: sp.Expr, constant: bool = False) -> None:
-        for symbol in sorted(expr.free_symbols & set(self.shared), key=self.printer.rank.get):
+        rank = self.printer.rank
+        for symbol in sorted(expr.free_symbols & set(self.shared), key=rank.__getitem__):
             if symbol in self.shared:
                 self._assign(f"const real {symbol}", self.shared.pop(symbol))
         text = self.printer.print(expr)
@@ -265,8 +267,10 @@ class _Printer:
             self.counts["sqrt"] += 1
             return f"FN(root)({self.print(base)})"
         if exponent.is_Integer and 2 <= exponent <= 4:
+            if not base.is_Symbol:
+                raise NotImplementedError(f"name {base} before raising it to a power")
             self.counts["*"] += int(exponent) - 1
-            return "*".join([self._factor(base)] * int(exponent))
+            return "*".join([base.name] * int(exponent))
         if exponent.is_negative:
             self.counts["/"] += 1
             under = self.print(1 / expr)
@@ -277,7 +281,7 @@ class _Printer:
         text = self.print(expr)
         return f"({text})" if expr.is_Add or text.startswith("-") else text
 
-    def _order(self, term: sp.Expr) -> tuple:
+    def _order(self, term: sp.Expr) -> tuple[bool, list[int], str]:
         """Positive terms first, then the order in which the derivation declared its symbols."""
         ranks = sorted(self.rank.get(s, -1) for s in term.free_symbols)
         return (bool(_leading(term) < 0), ranks, str(term))
@@ -292,7 +296,8 @@ def _is_inverse(expr: sp.Expr) -> bool:
 
 
 def _entries(value: Value | Iterable[sp.Expr]) -> list[sp.Expr]:
-    return [value] if isinstance(value, sp.Expr) else list(value)
+    scalar = isinstance(value, sp.Expr) and not isinstance(value, sp.MatrixBase)
+    return [value] if scalar else list(value)
 
 
 def _comment(function: Function, counts: dict[str, int]) -> list[str]:

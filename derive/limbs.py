@@ -35,7 +35,7 @@ class LimbFunction(Function):
         self.b = sp.Matrix(g[3:6])
 
     def tilted(self, frame: sp.Matrix, tilt1: sp.Expr, tilt2: sp.Expr, name: str) -> sp.Matrix:
-        """frame · Rx(tilt1) · Ry(tilt2): its third column is the axis."""
+        """The tilted frame, frame · Rx(tilt1) · Ry(tilt2): its third column is the axis."""
         s1, c1 = self.sincos(f"{name}1", tilt1)
         s2, c2 = self.sincos(f"{name}2", tilt2)
         return frame * rot_x(c1, s1) * rot_y(c2, s2)
@@ -60,7 +60,7 @@ class LimbFunction(Function):
         self.p = self.vector("p", 3, "platform origin [mm]")
 
     def platform_joint(self, b: sp.Matrix) -> sp.Matrix:
-        """p + R b, free to move by the twist (omega, v), which is zero in the emitted code."""
+        """The joint p + R b, free to move by the twist (omega, v): zero in the emitted code."""
         self.omega = self.perturbation("omega", 3)
         self.v = self.perturbation("v", 3)
         r = self.let("r", self.R * b, "R b")
@@ -121,13 +121,17 @@ def _sphere() -> Function:
 
 def _basics() -> list[Function]:
     """The affine pieces: joint position, drive and command."""
-    joint = LimbFunction("limb_joint", "from the base point to the platform joint", "h = p + R b - base")
+    joint = LimbFunction(
+        "limb_joint", "from the base point to the platform joint", "h = p + R b - base"
+    )
     joint.pose()
     b = joint.vector("b", 3, "platform joint, platform frame [mm]")
     base = joint.vector("base", 3, "base point [mm]")
     joint.output("h", joint.platform_joint(b) - base, "base frame [mm]")
 
-    drive = LimbFunction("limb_drive", "an actuator's command as the limb sees it", "q̃ = gain q + offset")
+    drive = LimbFunction(
+        "limb_drive", "an actuator's command as the limb sees it", "q̃ = gain q + offset"
+    )
     q = drive.scalar("q", "actuator coordinate [mm or rad]")
     drive.numbers()
     drive.output("qt", drive.drive(q), "q̃ [mm or rad]")
@@ -144,7 +148,9 @@ def _anchor(driver: Driver) -> Function | None:
     """Anchor of a slider or crank from its two prepared directions."""
     if driver is LENGTH:
         return None
-    f = LimbFunction(f"{driver.name}_anchor", f"{driver.name}: where the anchor stands", driver.formula)
+    f = LimbFunction(
+        f"{driver.name}_anchor", f"{driver.name}: where the anchor stands", driver.formula
+    )
     qt = f.scalar("qt", "q̃ [mm or rad]")
     base = f.vector("base", 3, "base point [mm]")
     first = f.vector("first", 3, "s, or crank e")
@@ -161,8 +167,11 @@ def _prepare(driver: Driver) -> Function | None:
     """The two directions an anchor moves in, of the numbers alone: once per geometry."""
     if driver is LENGTH:
         return None
-    f = LimbFunction(f"{driver.name}_directions", f"{driver.name}: the directions the anchor moves in",
-                     driver.formula)  # fmt: skip
+    f = LimbFunction(
+        f"{driver.name}_directions",
+        f"{driver.name}: the directions the anchor moves in",
+        driver.formula,
+    )
     f.numbers()
     axes = f.base_axes()
     first, second = (axes.col(2), sp.zeros(3, 1)) if driver is SLIDER else (
@@ -180,8 +189,11 @@ def _inverse(driver: Driver) -> Function:
         CRANK: "h·(cos q̃ e + sin q̃ n) = κ = (h·h + crank² - rod²)/(2 crank)\n"
         "q̃ = atan2(h·n, h·e) - branch atan2(√((h·e)² + (h·n)² - κ²), κ)",
     }
-    f = LimbFunction(f"{driver.name}_inverse", f"{driver.name}: actuator coordinate at a joint position",
-                     formulas[driver])  # fmt: skip
+    f = LimbFunction(
+        f"{driver.name}_inverse",
+        f"{driver.name}: actuator coordinate at a joint position",
+        formulas[driver],
+    )
     f.numbers()
     h = f.vector("h", 3, "p + R b - base [mm]")
     if driver is LENGTH:
@@ -208,8 +220,11 @@ def _inverse(driver: Driver) -> Function:
 
 def _derivatives(driver: Driver) -> Function:
     """The sphere row's derivatives by q and by the limb's numbers (by twist: `sphere_row`)."""
-    f = LimbFunction(f"{driver.name}_derivatives", f"{driver.name}: the sphere row by q and numbers",
-                     f"Φ = (d·d - ρ²)/2,  d = p + R b - c,  {driver.formula}\nq̃ = gain q + offset")  # fmt: skip
+    f = LimbFunction(
+        f"{driver.name}_derivatives",
+        f"{driver.name}: the sphere row by q and numbers",
+        f"Φ = (d·d - ρ²)/2,  d = p + R b - c,  {driver.formula}\nq̃ = gain q + offset",
+    )
     f.pose()
     q = f.scalar("q", "actuator coordinate [mm or rad]")
     f.numbers()

@@ -1,5 +1,5 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation 20f8e9a697c7e44a
+ * derivation d697dc7f3af1d141
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

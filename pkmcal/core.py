@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ IntArray = NDArray[np.int32]
 
 
 def _text(pointer: Any) -> str:
-    return ffi.string(pointer).decode()
+    return str(ffi.string(pointer).decode())
 
 
 # One source for these: the derivation, by way of the core.
@@ -106,7 +107,7 @@ def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) 
     codes: list[int] = []
     others = [
         threading.Thread(target=lambda a=a, b=b: codes.append(call(a, b)))
-        for a, b in zip(edges[1:-1], edges[2:], strict=True)
+        for a, b in pairwise(edges[1:])
     ]
     for thread in others:
         thread.start()
@@ -117,14 +118,14 @@ def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) 
         raise ValueError(f"the core refused the call (code {min(codes)})")
 
 
-def tpr2tps_lengths(size: FloatArray, free: FloatArray, out: FloatArray) -> int:
+def tpr2tps_lengths(size: FloatArray, free: FloatArray, out: FloatArray) -> None:
     """Eq. 8 in closed form: `free` (N, 4) to lengths `out` (N, 4)."""
-    return lib.pkm_tpr2tps_lengths(ISA, len(free), pointer(size), pointer(free), pointer(out))
+    lib.pkm_tpr2tps_lengths(ISA, len(free), pointer(size), pointer(free), pointer(out))
 
 
-def tpr2tps_jacobian(size: FloatArray, free: FloatArray, out: FloatArray) -> int:
+def tpr2tps_jacobian(size: FloatArray, free: FloatArray, out: FloatArray) -> None:
     """Eq. 12 in closed form: `free` (N, 4) to derivatives `out` (N, 4, 4)."""
-    return lib.pkm_tpr2tps_jacobian(ISA, len(free), pointer(size), pointer(free), pointer(out))
+    lib.pkm_tpr2tps_jacobian(ISA, len(free), pointer(size), pointer(free), pointer(out))
 
 
 class Machine:
@@ -205,7 +206,7 @@ class Machine:
         guess_stride = 6 if guess.ndim == 2 else 0
 
         def call(start: int, stop: int) -> int:
-            return lib.pkm_forward(
+            code: int = lib.pkm_forward(
                 self.struct,
                 self.isa,
                 stop - start,
@@ -219,6 +220,7 @@ class Machine:
                 int_pointer(iterations, start),
                 pointer(residual, start),
             )
+            return code
 
         if n:
             in_threads(call, n, threads)

@@ -32,13 +32,16 @@ class Setting:
     told : Directions
         What the measurements tell.
     determined : Directions
-        What measurements and prior tell; the rest is kept where it started.
+        What measurements and prior tell.
+    searched : Directions
+        What they tell to the machine's size or better; the rest is kept where it started.
     """
 
     noise: FloatArray
     loss: Loss
     told: Directions
     determined: Directions
+    searched: Directions
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,9 +112,9 @@ class Estimator:
         """The estimate; noise that is not stated is estimated along, set by set."""
         ones = np.ones(len(self.unstated))
         setting = self._setting(ones, self._loss("linear", ones), None)
-        if not setting.determined.rank:
+        if not setting.searched.rank:
             names = ", ".join(self.equations.parameters.names)
-            raise ValueError(f"the measurements tell nothing about {names}")
+            raise ValueError(f"they tell nothing about {names}")
         u = np.zeros(len(self.scale))
         for _ in range(_ROUNDS):
             u = self._least_squares(u, setting)
@@ -131,16 +134,17 @@ class Estimator:
 
     def _setting(self, noise: FloatArray, loss: Loss, point: Point | None) -> Setting:
         """What can be told with this noise, before (`point` None) or after a fit."""
-        unknown = point is None and self.unstated.any()
-        size = np.inf if unknown else self.start.robot.length
+        size = self.start.robot.length
+        noise_known = point is not None or not self.unstated.any()
+        faint = size if noise_known else np.inf
         if self._first is None or (noise != self._first[0]).any():
             at_start = self._at_start / noise[self._equation_set, None]
             self._first = noise, self._decomposed(at_start)
         _, first = self._first
         now = (None, None) if point is None else self._decomposed(self._jacobian(point, noise))
         told = directions(first[0], now[0], size)
-        with_prior = directions(first[1], now[1], size) if len(self.prior) else told
-        return Setting(noise, loss, told, with_prior)
+        determined = directions(first[1], now[1], size)
+        return Setting(noise, loss, told, determined, directions(first[1], now[1], size, faint))
 
     def _decomposed(self, jacobian: FloatArray) -> tuple[Decomposed, Decomposed]:
         """Without and with the prior."""
@@ -178,7 +182,7 @@ class Estimator:
         return factor
 
     def _steady(self, old: Setting, new: Setting) -> bool:
-        if old.determined.rank != new.determined.rank or old.loss.name != new.loss.name:
+        if old.searched.rank != new.searched.rank or old.loss.name != new.loss.name:
             return False
         if self.loss == "linear" and not len(self.prior) and len(self.unstated) == 1:
             return True  # the noise does not move the solution
@@ -196,7 +200,13 @@ class Estimator:
 
     def _jacobian(self, point: Point, noise: FloatArray) -> FloatArray:
         equations = self.equations
-        return equations.whitened(equations.jacobian(point), noise) * self.scale
+        jacobian = equations.whitened(equations.jacobian(point), noise) * self.scale
+        if not np.isfinite(jacobian).all():
+            raise ValueError(
+                "no geometry near the present one agrees: the fit runs into poses"
+                " where the actuators do not hold the machine (type-2 singular)"
+            )
+        return jacobian
 
     def plain(self, point: Point) -> FloatArray:
         """Scaled Jacobian (M, n), not whitened: mm per mm, angles as their arc."""
@@ -212,7 +222,7 @@ class Estimator:
 
         equations, noise, loss = self.equations, setting.noise, setting.loss
         # what is not told is held by rows that nothing contradicts
-        pins = setting.determined.singular[0] * setting.determined.untold.T
+        pins = setting.searched.singular[0] * setting.searched.untold.T
         extra = np.vstack([self.prior, pins])
         offset = np.concatenate([self.prior @ self._centre, np.zeros(len(pins))])
         first = equations.whitened(self._at(u).residuals, noise)
@@ -244,8 +254,8 @@ class Estimator:
             max_nfev=200,
         )
         self.converged = bool(found.status > 0)
-        untold = setting.determined.untold
-        solution: FloatArray = found.x - untold @ (untold.T @ found.x)
+        kept = setting.searched.untold
+        solution: FloatArray = found.x - kept @ (kept.T @ found.x)
         return solution
 
     def _estimate(self, u: FloatArray, setting: Setting) -> Estimate:
@@ -255,11 +265,11 @@ class Estimator:
         weights = setting.loss.weights(residual)
         root = np.sqrt(np.repeat(weights, self.equations.components))[:, None]
         told = setting.determined.told
-        _, singular, rows = np.linalg.svd(
+        hat, singular, rows = np.linalg.svd(
             np.vstack([root * jacobian, self.prior]) @ told, full_matrices=False
         )
         half = told @ (rows.T / singular)
-        leverage = ((root * jacobian @ half) ** 2).sum(axis=1)
+        leverage = (hat[: len(root), : setting.searched.rank] ** 2).sum(axis=1)
         sets = self._equation_set
         left = root[:, 0] ** 2 - leverage
         freedom: FloatArray = np.bincount(sets, left, len(self.unstated)).astype(np.float64)

@@ -5,6 +5,7 @@ Everything here is in scaled parameters: 1 means about 1 mm at the machine.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +15,9 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
+_KINDS = 4  # kinds of parameters whose combinations are looked for
+_ELSEWHERE = 1e-5  # share of a combination outside some parameters that does not count
+_SPELLED = 6  # parameters whose shares are spelled out
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 CLEAR = 0.01  # share of the machine's size to which a combination must be told to count after all
 
@@ -61,36 +65,36 @@ def decompose(jacobian: FloatArray) -> Decomposed:
 
 
 def directions(
-    before: Decomposed,
-    after: Decomposed | None,
-    size: float,
+    before: Decomposed, after: Decomposed | None, size: float, faint: float = np.inf
 ) -> Directions:
-    """Split the combinations by the Jacobians before and after the fit (from `decompose`).
+    """Split the combinations by the Jacobians before and after the fit.
 
-    A combination is told if its singular value is not zero and its standard deviation, one over
-    the singular value, is below `size`. The Jacobian before the fit, with the machine as drawn,
-    decides: there the gap is clean. Its errors blur the gap, so the one after the fit overrules
-    it only where it shows as many combinations to `CLEAR` of the size, or fewer to `size`.
+    A combination is told if its singular value is not zero. The Jacobian before the fit, with the
+    machine as drawn, decides: there the gap is clean. Its errors blur the gap, so the one after
+    the fit overrules it only where it shows more combinations to `CLEAR` of the machine's size.
 
     Parameters
     ----------
     before, after : tuple
         `decompose` of the scaled, whitened Jacobians.
     size : float
-        Of the machine, mm; inf where the noise is not known yet.
+        Of the machine, mm.
+    faint : float
+        Standard deviation in mm, one over the singular value, beyond which a combination does not
+        count either, before or after.
     """
-    rank, deciding = _able(before[0], size), before
+    rank, deciding = _able(before[0], faint), before
     if after is not None:
-        clear = min(_able(after[0], CLEAR * size), len(after[0]))
-        able = _able(after[0], size)
+        clear, able = _able(after[0], CLEAR * size), _able(after[0], faint)
         if clear > rank or able < rank:
             rank, deciding = (clear if clear > rank else able), after
     singular, basis = deciding
     return Directions(basis[:, :rank], basis[:, rank:], singular)
 
 
-def _able(singular: FloatArray, size: float) -> int:
-    floor = max(ROUNDING * float(singular[0]), 1.0 / size)
+def _able(singular: FloatArray, deviation: float) -> int:
+    """How many singular values are not zero and tell more than to this deviation."""
+    floor = max(ROUNDING * float(singular[0]), 1.0 / deviation)
     return int(np.count_nonzero(singular > floor))
 
 
@@ -125,29 +129,71 @@ def observability(jacobian: FloatArray, poses: int, rank: int) -> dict[str, floa
     }
 
 
-def sparse_basis(untold: FloatArray) -> FloatArray:
-    """The same combinations, each of few parameters: (n, d), the largest entry of each 1."""
-    basis = untold.copy()
+def plain_basis(untold: FloatArray, names: Sequence[str]) -> FloatArray:
+    """The same combinations, each of as few kinds of parameters as will do.
+
+    Parameters
+    ----------
+    untold : ndarray (n, d)
+        Orthonormal columns.
+    names : sequence of str, n
+        Of the parameters; ``base1.x`` and ``base2.x`` are of one kind.
+
+    Returns
+    -------
+    ndarray (n, d)
+        The largest entry of each column is 1.
+    """
+    d = untold.shape[1]
+    families = [_family(name) for name in names]
+    kinds = list(dict.fromkeys(families))
+    member = np.array([[family == kind for kind in kinds] for family in families])
+    found = np.zeros((d, 0))  # orthonormal combinations of the columns
+    parts: list[FloatArray] = []
+    few = (itertools.combinations(range(len(kinds)), k) for k in range(1, _KINDS + 1))
+    for support in [*itertools.chain.from_iterable(few), range(len(kinds))]:
+        if found.shape[1] == d:
+            break
+        outside = untold[~member[:, list(support)].any(axis=1)]
+        _, singular, rows = np.linalg.svd(np.vstack([outside, np.zeros((d, d))]))
+        inside = rows[np.count_nonzero(singular > _ELSEWHERE) :].T
+        _, size, turn = np.linalg.svd(inside - found @ (found.T @ inside), full_matrices=False)
+        new = inside @ turn[: np.count_nonzero(size > _ELSEWHERE)].T
+        if new.shape[1]:
+            parts.append(_reduced(untold @ new))
+            found = np.linalg.qr(np.hstack([found, new])).Q
+    return np.hstack([np.zeros((len(untold), 0)), *parts])
+
+
+def _reduced(basis: FloatArray) -> FloatArray:
+    """The same combinations by elimination: each has a parameter that the others are without."""
+    basis = basis.copy()
     d = basis.shape[1]
     pivots: list[int] = []
     for k in range(d):
-        rest = basis[:, k:]
-        sizes = np.abs(rest).max(axis=1)
+        sizes = np.abs(basis[:, k:]).max(axis=1)
         sizes[pivots] = 0.0
-        row = int(np.argmax(sizes > sizes.max() * (1 - 1e-9)))
-        column = k + int(np.argmax(np.abs(rest[row])))
+        row = int(np.argmax(sizes > 0.999 * sizes.max()))
+        column = k + int(np.argmax(np.abs(basis[row, k:])))
         basis[:, [k, column]] = basis[:, [column, k]]
         basis[:, k] /= basis[row, k]
         others = [j for j in range(d) if j != k]
         basis[:, others] -= np.outer(basis[:, k], basis[row, others])
         pivots.append(row)
-    largest = basis[np.abs(basis).argmax(axis=0), np.arange(d)]
-    scaled: FloatArray = basis / largest
+    scaled: FloatArray = basis / basis[np.abs(basis).argmax(axis=0), np.arange(d)]
     return scaled
 
 
+def _family(name: str) -> str:
+    """What a parameter is apart from its limb; the frame is one, and so are targets."""
+    first = name.split(".")[0]
+    if first == "frame" or first.startswith(("target", "anchor")):
+        return re.sub("(frame|target|anchor).*", r"\1", first)
+    return re.sub(r"\d+", "", name)
+
+
 def in_words(combination: FloatArray, names: Sequence[str]) -> str:
-    """One combination that cannot be told, such as "base1.z, base2.z together".
+    """One combination that cannot be told, such as "base1.z … base4.z together".
 
     Parameters
     ----------
@@ -160,13 +206,18 @@ def in_words(combination: FloatArray, names: Sequence[str]) -> str:
     for value, name in zip(combination, names, strict=True):
         if abs(value) > 0.01:
             groups.setdefault(float(f"{value:.2g}"), []).append(name)
+    members = [name for group in groups.values() for name in group]
+    if len(members) == 1:
+        return f"{members[0]} by itself"
     if len(groups) == 1:
-        (only,) = groups.values()
-        return f"{listed(only)} together" if len(only) > 1 else f"{only[0]} by itself"
-    ordered = sorted(groups.items(), key=lambda item: -abs(item[0]))
-    texts = [f"{value:+g} ({listed(members)})" for value, members in ordered[:6]]
-    left_out = sum(len(members) for _, members in ordered[6:])
-    return " ".join(texts) + (f" and {left_out} more" if left_out else "")
+        return f"{listed(members)} together"
+    if set(groups) == {1.0, -1.0}:
+        return f"{listed(groups[1.0])} together, {listed(groups[-1.0])} against them"
+    if len(members) <= _SPELLED:
+        return "together " + ", ".join(f"{v:+g} {listed(g)}" for v, g in groups.items())
+    kinds = list(dict.fromkeys(_family(name) for name in names))
+    ordered = sorted(members, key=lambda name: (kinds.index(_family(name)), names.index(name)))
+    return f"{listed(ordered)} together, in one proportion"
 
 
 def listed(names: Sequence[str]) -> str:

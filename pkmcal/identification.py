@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import textwrap
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
 from pkmcal.core import as_rows
+from pkmcal.identifiability import in_words, plain_basis
 from pkmcal.predict import predict
 from pkmcal.robot import Robot
 
@@ -44,9 +46,6 @@ class Identification:
     gap : float
         Singular value of the last combination told over that of the first not told; inf where all
         are told.
-    unidentifiable : tuple of str
-        The combinations that they do not tell, in words, with what each parameter moves per mm.
-        They keep what they had, or follow the prior.
     rms, rms_before : float
         √(Σ r²/N) over the N fitted points, unweighted, r the distance in mm; of poses that of
         their positions.
@@ -89,7 +88,6 @@ class Identification:
     covariance: FloatArray
     rank: int
     gap: float
-    unidentifiable: tuple[str, ...]
     rms: float
     rms_before: float
     holdout_rms: float
@@ -109,13 +107,24 @@ class Identification:
     warnings: tuple[str, ...]
     _places: NDArray[np.intp]  # of the free numbers in the geometry
     _told: FloatArray  # covariance of what is determined, (n, n)
-    _untold: FloatArray  # directions of what is not, in scaled parameters times the scale (n, d)
+    _undetermined: FloatArray  # directions of what is not, mm and rad (n, d)
+    _untold: FloatArray  # directions that the measurements do not tell, scaled (n, n - rank)
 
     @property
     def parameters(self) -> dict[str, dict[str, float]]:
         """Value and standard deviation by name; mm and rad."""
         pairs = zip(self.free, self.values.tolist(), self.stderr.tolist(), strict=True)
         return {name: {"value": value, "stderr": stderr} for name, value, stderr in pairs}
+
+    @cached_property
+    def unidentifiable(self) -> tuple[str, ...]:
+        """The combinations that the measurements do not tell, in words.
+
+        They keep what they had, as the start has it, or follow the prior. Shares are of mm that
+        the machine is moved: an angle counts as its arc.
+        """
+        basis = plain_basis(self._untold, self.free)
+        return tuple(in_words(combination, self.free) for combination in basis.T)
 
     @property
     def correlations(self) -> tuple[tuple[str, str, float], ...]:
@@ -155,7 +164,7 @@ class Identification:
         variance = np.einsum(
             "nij,jk,nik->n", by_geometry, self._told[:k, :k], by_geometry, optimize=True
         )
-        untold = np.linalg.norm(by_geometry @ self._untold[:k], axis=(1, 2))
+        untold = np.linalg.norm(by_geometry @ self._undetermined[:k], axis=(1, 2))
         known = np.where(untold < _UNTOLD, np.sqrt(variance), np.inf)
         return known.reshape(shape)
 
@@ -201,7 +210,7 @@ class Identification:
 
     def _limits(self) -> str:
         lines = []
-        if self.unidentifiable:
+        if self.rank < len(self.free):
             gap = f", gap {self.gap:.0e}" if np.isfinite(self.gap) else ""
             lines.append(f"rank {self.rank} of {len(self.free)}{gap}; not told by measurements:")
             lines += [_filled("  ", text) for text in self.unidentifiable[:4]]
@@ -236,7 +245,10 @@ def _parameter_table(result: Identification) -> str:
         change, _ = digits.displayed(float(value - start), unit)
         places = digits.decimals(deviation) if np.isfinite(deviation) else 4
         label = f"{name} [{shown_unit}]" if shown_unit != "mm" else name
-        row = [label, digits.with_uncertainty(shown, deviation), digits.fixed(change, places)]
+        told = digits.with_uncertainty(shown, deviation)
+        if not np.isfinite(deviation):
+            told = f"{digits.fixed(shown, places)} ± {deviation:g}"
+        row = [label, told, digits.fixed(change, places)]
         cells.append(row[: len(heads)])
     per_column = -(-len(cells) // columns)
     blocks = [

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pkmcal.equations import Equations
 from pkmcal.estimate import Estimate, Estimator
 from pkmcal.holdout import HeldOut, compare, drawn
-from pkmcal.identifiability import in_words, observability, sparse_basis
+from pkmcal.identifiability import observability
 from pkmcal.identification import Identification
 from pkmcal.loss import LIMITS
 from pkmcal.measurements import Measurements
@@ -23,6 +23,8 @@ from pkmcal.suggest import did_you_mean
 
 FloatArray = NDArray[np.float64]
 
+_POOR = 0.1  # share of the misfit that a fit worth its name does not leave
+_FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
 _INVOLVED = 1e-6  # share of a parameter in what cannot be told, above which it cannot be told
 
 
@@ -114,14 +116,25 @@ def identify(
         raise ValueError(f"loss must be one of {', '.join(LIMITS)}; found {loss!r}")
     equations = Equations(shares, chosen)
     start = equations.start()
-    noted = misread(shares, chosen, start)
-    if not start.reached:
-        hint = f" ({'; '.join(noted)})" if noted else ""
-        raise ValueError(f"measurements: {equations.unreached(start)}{hint}")
-    estimator = Estimator(equations, start, loss)
-    estimate = estimator.solve()
+    try:
+        if not start.reached:
+            raise ValueError(equations.unreached(start))
+        estimator = Estimator(equations, start, loss)
+        estimate = estimator.solve()
+    except ValueError as error:
+        hint = "".join(f"; {text}" for text in misread(shares, chosen, start))
+        raise ValueError(f"measurements: {error}{hint}") from None
     compared = compare(held, estimator, estimate)
+    moved = np.abs((estimate.point.theta - start.theta) / chosen.scale).max()
+    badly = equations.rms(estimate.point) > _POOR * equations.rms(start)
+    noted = misread(shares, chosen, start) if badly or moved > _FAR * robot.length else []
     noted += meagre(equations, estimate.setting.told.rank, bool(len(estimator.prior)))
+    faint = estimate.setting.determined.rank - estimate.setting.searched.rank
+    if faint > 0:
+        noted.append(
+            f"{faint} combinations of parameters are told to no better than {robot.length:.0f} mm,"
+            " the machine's size, and were kept as they were: state a prior or measure more poses"
+        )
     if compared.unreached:
         noted.append(f"holdout: {compared.unreached}; left out")
     if not estimator.converged:
@@ -193,7 +206,7 @@ def _result(
 ) -> Identification:
     equations, chosen = estimator.equations, estimator.equations.parameters
     setting, theta, scale = estimate.setting, estimate.point.theta, chosen.scale
-    untold, told = setting.determined.untold, setting.determined.told
+    untold, searched = setting.determined.untold, setting.searched.told
     covariance = estimate.covariance * np.outer(scale, scale)
     if (estimator.unstated & (estimate.freedom < 0.5)).any():
         covariance = np.full_like(covariance, np.inf)  # the noise is not known
@@ -202,7 +215,7 @@ def _result(
     shown[unknown] = shown[:, unknown] = np.nan
     shown[unknown, unknown] = np.inf
     prior_off = estimator.prior @ ((theta - chosen.start) / scale)
-    dof = float(estimate.weights @ equations.components) + len(prior_off) - told.shape[1]
+    dof = float(estimate.weights @ equations.components) + len(prior_off) - setting.searched.rank
     squares = np.repeat(estimate.weights, equations.components) @ estimate.residual**2
     no_sigma = bool(estimator.unstated.all()) or dof <= 0
     at_bound = np.isclose(theta, chosen.lower, rtol=1e-9, atol=1e-9) | np.isclose(
@@ -210,12 +223,11 @@ def _result(
     )
     odd = outliers(
         estimate.residual,
-        estimate.jacobian @ told,
+        estimate.jacobian @ searched,
         equations.components,
         estimate.weights,
-        estimator.prior @ told,
+        estimator.prior @ searched,
     )
-    words = [in_words(c, chosen.names) for c in sparse_basis(setting.told.untold).T]
     return Identification(
         robot=estimate.point.robot,
         free=chosen.names,
@@ -226,7 +238,6 @@ def _result(
         covariance=shown,
         rank=setting.told.rank,
         gap=setting.told.gap,
-        unidentifiable=tuple(words),
         rms=equations.rms(estimate.point),
         rms_before=equations.rms(estimator.start),
         holdout_rms=compared.rms,
@@ -248,5 +259,6 @@ def _result(
         warnings=noted,
         _places=chosen.places,
         _told=covariance,
-        _untold=untold * scale[:, None],
+        _undetermined=untold * scale[:, None],
+        _untold=setting.told.untold,
     )

@@ -70,7 +70,7 @@ def rotation_and_axes(angles: FloatArray) -> tuple[FloatArray, FloatArray]:
     matrix = Rotation.from_euler("xyz", angles).as_matrix()
     axes = np.empty_like(matrix)
     axes[:, 0] = matrix[:, :, 0]
-    axes[:, 1] = Rotation.from_euler("z", angles[:, 2]).apply(_UNIT[1])
+    axes[:, 1] = Rotation.from_euler("z", angles[:, 2:]).apply(_UNIT[1])
     axes[:, 2] = _UNIT[2]
     return matrix, axes
 

@@ -1,4 +1,4 @@
-"""`Robot`: a machine with its geometry, its inverse and forward kinematics and their derivatives."""
+"""`Robot`: a machine with its geometry, its inverse and forward kinematics, their derivatives."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import robotfile
 from pkmcal.core import MAPS, POSE, STATUS, FloatArray, IntArray, Machine, as_rows
-from pkmcal.geometry import Geometry
+from pkmcal.geometry import BoolArray, Geometry
 from pkmcal.limb_kinds import KINDS
-from pkmcal.model import Model
+from pkmcal.model import Limb, Model
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +40,9 @@ class Forward:
     residual: FloatArray
 
     @property
-    def ok(self) -> np.ndarray:
+    def ok(self) -> BoolArray:
         """Which rows were solved, (...)."""
-        return self.status == 0
+        return np.equal(self.status, 0)
 
     def failures(self) -> str:
         """What failed and where, in one line; empty where nothing did."""
@@ -105,7 +106,8 @@ class Robot:
     @property
     def home(self) -> FloatArray:
         """Home pose (6,), mm and rad: in the middle of the workspace."""
-        return self._home.copy()
+        home: FloatArray = self._home.copy()
+        return home
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -302,7 +304,7 @@ class Robot:
         robotfile.write(self.model, path)
 
 
-def _limb(limb: object) -> dict[str, object]:
+def _limb(limb: Limb) -> dict[str, Any]:
     kind = KINDS[limb.kind]
     rows = kind.all_rows(limb.couple > 0)
     return {

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from pkmcal.geometry import Geometry
 from pkmcal.core import MAPS, POSE
+from pkmcal.geometry import Geometry
 from pkmcal.limb_kinds import KINDS, PLATFORM_TILT_SLOTS, TILT_SLOTS
 from pkmcal.model import Cone, FloatArray, Limb, Model
 from pkmcal.ties import LimbNumber, Term

@@ -7,15 +7,15 @@ from os import PathLike
 from pathlib import Path
 
 
-def write_whole(path: str | PathLike[str], text: str) -> None:
-    """Write a text file in UTF-8: beside its place first, then moved there.
+def write_whole(path: str | PathLike[str], content: str | bytes) -> None:
+    """Write a file: beside its place first, then moved there.
 
     Parameters
     ----------
     path : str or path
         Where to write; an existing file is replaced.
-    text : str
-        What to write, line ends included.
+    content : str or bytes
+        What to write; text in UTF-8, line ends as they are.
 
     Raises
     ------
@@ -27,8 +27,7 @@ def write_whole(path: str | PathLike[str], text: str) -> None:
         raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
     beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with open(beside, "w", encoding="utf-8", newline="") as file:
-            file.write(text)
+        beside.write_bytes(content.encode() if isinstance(content, str) else content)
         os.replace(beside, path)
     finally:
         beside.unlink(missing_ok=True)

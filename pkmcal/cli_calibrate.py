@@ -1,0 +1,202 @@
+"""`pkmcal calibrate`."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pkmcal.cli_output import as_json, folder
+from pkmcal.core import POSE
+from pkmcal.csv_table import UNITS
+from pkmcal.measurement_csv import read_measurements
+from pkmcal.measurements import Measurements
+from pkmcal.robot import Robot, load
+
+_FRAME = dict(zip(POSE, ("mm", "mm", "mm", "rad", "rad", "rad"), strict=True))
+_PRIOR = re.compile(
+    r"(?:(?P<name>[^=]+)=)?\s*"
+    r"(?P<number>[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(?P<unit>\D*)"
+)
+
+
+def calibrate(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
+    ],
+    csv: Annotated[Path, typer.Argument(metavar="CSV", help="What was measured, with units.")],
+    free: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Find this number instead of the robot's default set. Repeat it, separate names"
+            " with commas, or use wildcards: 'rod*,radius'.",
+        ),
+    ] = None,
+    prior: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[NAME=]σ",
+            help="How far a number may be off before anything is measured, one standard"
+            " deviation: 'base*=0.5', 'angle1=0.1deg'. Without a name, in mm, for all.",
+        ),
+    ] = None,
+    holdout: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FRACTION|FILE",
+            help="Compare these measurements instead of fitting them: a fraction of the poses"
+            " drawn at random, or another file.",
+        ),
+    ] = None,
+    loss: Annotated[
+        str, typer.Option(metavar="LOSS", help="linear, huber or cauchy: what outliers count.")
+    ] = "linear",
+    frame: Annotated[
+        str,
+        typer.Option(metavar="WORD", help="unknown: the instrument is not in the base frame."),
+    ] = "known",
+    target: Annotated[
+        str,
+        typer.Option(metavar="WORD", help="unknown: find the measured points of the platform."),
+    ] = "known",
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write the calibrated robot to DIR/robot.toml."),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
+) -> int:
+    """Find the geometry of a machine from measurements of it.
+
+    Exit code 1: done, but not to be trusted; the summary says why.
+
+    Example: pkmcal calibrate examples/linear-delta/robot.toml examples/linear-delta/probe.csv
+    """
+    from pkmcal.identify import identify
+
+    machine = load(robot)
+    if out is not None:
+        _refuse_own_input(out, robot)
+    measured = read_measurements(csv, machine)
+    chosen = free_names(machine, free)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # the summary has them
+        found = identify(
+            machine,
+            measured,
+            free=chosen,
+            prior=read_prior(prior or [], machine, chosen),
+            loss=loss,
+            frame=frame,
+            target=target,
+            holdout=None if holdout is None else _read_holdout(holdout, machine),
+        )
+    if out is not None:
+        found.robot.save(folder(out) / "robot.toml")
+    if json:
+        typer.echo(as_json(found, "parameters", "correlations"))
+    else:
+        typer.echo(found.summary())
+        if out is not None:
+            typer.echo(f"\ncalibrated robot: {out / 'robot.toml'}")
+    return 0 if found.converged and not found.warnings else 1
+
+
+def free_names(robot: Robot, given: Sequence[str] | None) -> list[str]:
+    """Names that ``--free`` chooses, or the robot's default set.
+
+    Raises
+    ------
+    ValueError
+        A name that the robot does not have, or that a parameter drives.
+    """
+    if not given:
+        return list(robot.model.free)
+    patterns = [name.strip() for text in given for name in text.split(",") if name.strip()]
+    try:
+        return robot.geometry.match(patterns)
+    except ValueError as error:
+        raise ValueError(f"--free: {error}") from None
+
+
+def read_prior(
+    given: Sequence[str], robot: Robot, free: Sequence[str]
+) -> float | Mapping[str, float] | None:
+    """The `prior` of `identify` from ``--prior`` options.
+
+    Parameters
+    ----------
+    given : sequence of str
+        "σ" for all free numbers in mm, or "NAME=σ"; σ may have a unit, and for angles must.
+    robot : Robot
+        The machine.
+    free : sequence of str
+        The free numbers of its geometry.
+
+    Raises
+    ------
+    ValueError
+        No number, a unit that does not fit, a wildcard over lengths and angles.
+    """
+    sigmas: dict[str, float] = {}
+    for text in given:
+        match = _PRIOR.fullmatch(text.strip())
+        if match is None:
+            raise ValueError(f"--prior {text}: expected NAME=NUMBER, such as base1.x=0.5")
+        name = (match["name"] or "").strip()
+        if not name and len(given) > 1:
+            raise ValueError(f"--prior {text}: a number without a name stands alone, for all")
+        unit = _unit_of(name, robot, free) if name else "mm"
+        sigma = _in_unit(text, float(match["number"]), match["unit"].strip(), unit, name)
+        if not name:
+            return sigma
+        sigmas[name] = sigma
+    return sigmas or None
+
+
+def _unit_of(pattern: str, robot: Robot, free: Sequence[str]) -> str:
+    """Unit of the free numbers that a pattern covers; what is not known is a length."""
+    units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
+    known = {name: str(units[name]) for name in free}
+    known |= {f"frame.{name}": unit for name, unit in _FRAME.items()}
+    covered = {known[name] for name in known if fnmatchcase(name, pattern)}
+    if len(covered) > 1:
+        raise ValueError(
+            f"--prior {pattern}: covers lengths, angles or ratios together; name them apart, or"
+            " give one number without a name"
+        )
+    return covered.pop() if covered else "mm"
+
+
+def _in_unit(text: str, number: float, unit: str, quantity: str, name: str) -> float:
+    """A number in mm, rad or 1."""
+    factors = UNITS.get(quantity, {})
+    if not unit and quantity == "rad":
+        raise ValueError(f"--prior {text}: {name} is an angle; give it a unit, such as 0.1deg")
+    if not unit:
+        return number
+    if unit not in factors:
+        expected = f"one of {', '.join(u for u in factors if u.isascii())}" if factors else "none"
+        raise ValueError(f"--prior {text}: unit {unit!r}; expected {expected}")
+    times, over = factors[unit]
+    return number * times / over
+
+
+def _read_holdout(text: str, robot: Robot) -> float | Measurements:
+    """A fraction, a number of poses or a file."""
+    try:
+        number = float(text)
+    except ValueError:
+        return read_measurements(text, robot)
+    return int(number) if number.is_integer() else number
+
+
+def _refuse_own_input(out: Path, robot: str) -> None:
+    written = out / "robot.toml"
+    if written.exists() and Path(robot).exists() and written.samefile(robot):
+        raise ValueError(f"--out {out}: would replace {robot}, which is read; take another folder")

@@ -1,0 +1,43 @@
+"""`pkmcal machines`."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from pkmcal import digits, robot
+from pkmcal.cli_output import as_json
+
+
+def machines(
+    json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+) -> int:
+    """List the built-in machines.
+
+    Their names stand wherever a command takes a robot file.
+
+    Example: pkmcal machines
+    """
+    rows = {}
+    for name in robot.machines():
+        machine = robot.load(name)
+        rows[name] = {
+            "limbs": [limb.kind for limb in machine.model.limbs],
+            "coordinates": machine.coordinates,
+            "free": machine.model.free,
+        }
+    if json:
+        typer.echo(as_json(rows))
+        return 0
+    table = (
+        [
+            name,
+            ", ".join(f"{row['limbs'].count(k)} {k}" for k in dict.fromkeys(row["limbs"])),
+            " ".join(row["coordinates"]),
+            str(len(row["free"])),
+        ]
+        for name, row in rows.items()
+    )
+    typer.echo(digits.table(["machine", "limbs", "moves in", "free"], table, left=3))
+    return 0

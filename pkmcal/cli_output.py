@@ -1,0 +1,74 @@
+"""What verbs print and write: results as JSON, folders for files."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pkmcal.robot import Robot
+
+
+def as_json(result: Any, *attributes: str) -> str:
+    """A result as JSON, one attribute a line.
+
+    Numbers are those of the result, in mm and rad; what is not finite is null.
+
+    Parameters
+    ----------
+    result : dataclass or mapping
+        What to print; attributes that start with ``_`` are left out.
+    *attributes : str
+        Properties of `result` to print as well.
+
+    Examples
+    --------
+    >>> print(as_json({"rms": np.float64(0.5), "noise": (math.nan,)}))
+    {
+      "rms": 0.5,
+      "noise": [null]
+    }
+    """
+    plain = _plain(result) | {name: _plain(getattr(result, name)) for name in attributes}
+    lines = (
+        f"  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False, allow_nan=False)}"
+        for key, value in plain.items()
+    )
+    return "{\n" + ",\n".join(lines) + "\n}"
+
+
+def _plain(value: Any) -> Any:
+    """The same in lists, dicts, numbers and text."""
+    if isinstance(value, Robot):
+        return {"name": value.name, "geometry": dict(value.geometry.items())}
+    if dataclasses.is_dataclass(value):
+        fields = (field.name for field in dataclasses.fields(value))
+        return {name: _plain(getattr(value, name)) for name in fields if name[0] != "_"}
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def folder(path: Path) -> Path:
+    """`path`, made if it is not there.
+
+    Raises
+    ------
+    ValueError
+        Something else is in its place.
+    """
+    if path.exists() and not path.is_dir():
+        raise ValueError(f"--out {path}: this is not a folder")
+    path.mkdir(parents=True, exist_ok=True)
+    return path

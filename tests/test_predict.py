@@ -1,0 +1,94 @@
+"""Derivatives of what instruments read are those of its differences, through the whole machine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.equations import Equations
+from pkmcal.measurements import Measurements
+from pkmcal.parameters import Share, parameters
+from pkmcal.predict import difference, predict
+from pkmcal.robot import Robot
+
+from .simulated import hexapod_poses
+
+KINDS = ("pose", "position", "height", "distance")
+SHAPES = {"pose": (12, 6), "position": (12, 3), "height": (12,), "distance": (12,)}
+
+
+def measured(robot: Robot, kind: str, rng: np.random.Generator) -> Measurements:
+    """Readings that the machine does not explain, of two targets in turn."""
+    q = robot.inverse(hexapod_poses(robot, 12, rng))
+    values = rng.normal(0, 3, SHAPES[kind])
+    if kind == "pose":
+        return Measurements(q, values, kind)
+    two = np.array([[60.0, -20.0, 35.0], [300.0, 200.0, -50.0]])
+    return Measurements(q, values, kind, target=two, target_index=np.arange(12) % 2)
+
+
+def differences(equations: Equations, theta: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    columns = []
+    for j, s in enumerate(scale):
+        step = np.zeros(len(theta))
+        step[j] = 1e-3 * s
+        ahead, back = equations.at(theta + step), equations.at(theta - step)
+        columns.append((ahead.predicted[0].values - back.predicted[0].values) / (2e-3 * s))
+    return np.stack(columns, axis=-1)
+
+
+@pytest.mark.parametrize("unknown", [False, True], ids=["known", "unknown frame and target"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_analytic_jacobian_equals_differences(kind: str, unknown: bool) -> None:
+    rng = np.random.default_rng(7)
+    robot = pk.load("hexapod")
+    readings = measured(robot, kind, rng)
+    share = Share(readings, np.arange(12), unknown and kind != "distance", unknown)
+    chosen = parameters(robot, [share], ["base*", "offset*", "gain*"], None, None)
+    equations = Equations([share], chosen)
+    theta = chosen.start.copy()
+    if chosen.frame is not None:
+        theta[chosen.frame : chosen.frame + 6] = [400, -200, 90, 0.4, -0.7, 2.0]
+    (jacobian,) = equations.jacobian(equations.at(theta))
+    expected = differences(equations, theta, chosen.scale)
+    np.testing.assert_allclose(
+        jacobian * chosen.scale, expected * chosen.scale, rtol=0, atol=2e-7 * np.abs(expected).max()
+    )
+
+
+def test_jacobian_passes_through_ties() -> None:
+    robot = pk.load("examples/linear-delta/robot.toml")
+    poses = np.array([[10.0, 20, 100, 0, 0, 0], [-40.0, 5, 80, 0, 0, 0], [0, -50.0, 120, 0, 0, 0]])
+    readings = Measurements(robot.inverse(poses), poses[:, 2], "height")
+    share = Share(readings, np.arange(3), False, False)
+    chosen = parameters(robot, [share], None, None, None)
+    equations = Equations([share], chosen)
+    (jacobian,) = equations.jacobian(equations.at(chosen.start))
+    expected = differences(equations, chosen.start, chosen.scale)
+    np.testing.assert_allclose(jacobian, expected, rtol=1e-5, atol=1e-7)
+
+
+def test_a_frame_moves_points_as_the_pose_of_the_base_in_it() -> None:
+    rng = np.random.default_rng(1)
+    pose, frame = rng.normal(0, 0.5, (5, 6)), rng.normal(0, 0.5, 6)
+    target = rng.normal(0, 50, (5, 3))
+    seen = predict("position", pose, target, frame).values
+    inner = predict("position", pose, target).values
+    outer = predict("position", np.tile(frame, (5, 1)), inner).values
+    np.testing.assert_allclose(seen, outer, atol=1e-12)
+
+
+def test_poses_in_a_frame_carry_points_there() -> None:
+    rng = np.random.default_rng(2)
+    pose, frame = rng.normal(0, 0.5, (5, 6)), rng.normal(0, 0.5, 6)
+    target = rng.normal(0, 50, (5, 3))
+    composed = predict("pose", pose, None, frame).values
+    there = predict("position", composed, target).values
+    np.testing.assert_allclose(there, predict("position", pose, target, frame).values, atol=1e-12)
+
+
+def test_angles_differ_the_short_way_round() -> None:
+    one = np.array([[0, 0, 0, np.pi - 0.01, 0, 0]])
+    other = np.array([[0, 0, 0, -np.pi + 0.01, 0, 0]])
+    np.testing.assert_allclose(difference("pose", one, other)[0, 3], -0.02, atol=1e-12)
