@@ -145,6 +145,46 @@ int pkm_error_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const d
     return 0;
 }
 
+int pkm_closure(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                const double *pose, const double *q, double *residual, double *by_step,
+                double *by_free, double *by_q)
+{
+    CHECKED_MACHINE(machine, isa);
+    chosen->closure(machine, n, geometry, pose, q, residual, by_step, by_free, by_q);
+    return 0;
+}
+
+int pkm_limbs(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+              const double *pose, double *drive, double *on_base, double *on_platform)
+{
+    CHECKED_MACHINE(machine, isa);
+    chosen->limbs(machine, n, geometry, pose, drive, on_base, on_platform);
+    return 0;
+}
+
+int pkm_compose(int isa, ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
+                ptrdiff_t b_stride, double *out)
+{
+    CHECKED(isa);
+    chosen->compose(n, a, a_stride, b, b_stride, out);
+    return 0;
+}
+
+int pkm_invert(int isa, ptrdiff_t n, const double *a, double *out)
+{
+    CHECKED(isa);
+    chosen->invert(n, a, out);
+    return 0;
+}
+
+int pkm_compose_rates(int isa, ptrdiff_t n, const double *a, const double *pose, const double *c,
+                      const double *composed, double *rates)
+{
+    CHECKED(isa);
+    chosen->compose_rates(n, a, pose, c, composed, rates);
+    return 0;
+}
+
 int pkm_tpr2tps_lengths(int isa, ptrdiff_t n, const double *size, const double *free,
                         double *lengths)
 {

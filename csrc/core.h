@@ -5,7 +5,9 @@
 #include "core_table.h"
 #include "forward.h"
 #include "inverse.h"
+#include "inspect.h"
 #include "jacobian.h"
+#include "poses.h"
 #include "tpr2tps.h"
 
 static void core_inverse(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
@@ -104,5 +106,39 @@ static int core_home(const pkm_machine *machine, const double *geometry, const d
     return rows;
 }
 
+static void core_closure(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                         const double *pose, const double *q, double *residual, double *by_step,
+                         double *by_free, double *by_q)
+{
+    const closure_out out = {residual, by_step, by_free, by_q};
+    switch (machine->map) {
+#define CASE(NAME, name, M)                                                                       \
+    case MAP_##NAME: closure_map(MAP_##NAME, machine, n, geometry, pose, q, &out); break;
+        EACH_MAP(CASE)
+#undef CASE
+    }
+}
+
+static void core_limbs(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                       const double *pose, double *drive, double *on_base, double *on_platform)
+{
+    limb_rows(machine, n, geometry, pose, drive, on_base, on_platform);
+}
+
+static void core_compose(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
+                         ptrdiff_t b_stride, double *out)
+{
+    compose_rows(n, a, a_stride, b, b_stride, out);
+}
+
+static void core_invert(ptrdiff_t n, const double *a, double *out) { invert_rows(n, a, out); }
+
+static void core_compose_rates(ptrdiff_t n, const double *a, const double *pose, const double *c,
+                               const double *composed, double *rates)
+{
+    compose_rates_rows(n, a, pose, c, composed, rates);
+}
+
 const pkm_core CORE = {core_inverse, core_forward, core_jacobian, core_response, core_tpr2tps,
-                       core_home};
+                       core_home,    core_closure, core_limbs,    core_compose,  core_invert,
+                       core_compose_rates};

@@ -18,6 +18,16 @@ typedef struct {
     void (*tpr2tps)(ptrdiff_t n, const double *size, const double *free, double *lengths,
                     double *jacobian);
     int (*home)(const pkm_machine *, const double *geometry, const double *home, double *jacobian);
+    void (*closure)(const pkm_machine *, ptrdiff_t n, const double *geometry, const double *pose,
+                    const double *q, double *residual, double *by_step, double *by_free,
+                    double *by_q);
+    void (*limbs)(const pkm_machine *, ptrdiff_t n, const double *geometry, const double *pose,
+                  double *drive, double *on_base, double *on_platform);
+    void (*compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
+                    ptrdiff_t b_stride, double *out);
+    void (*invert)(ptrdiff_t n, const double *a, double *out);
+    void (*compose_rates)(ptrdiff_t n, const double *a, const double *pose, const double *c,
+                          const double *composed, double *rates);
 } pkm_core;
 
 extern const pkm_core pkm_base, pkm_v3, pkm_v4;

@@ -68,38 +68,38 @@ INLINE void FN(map_pull)(int map, const real *state, const real *omega, const re
     }
 }
 
-/* One row of the system: Φ times `scale`, and its derivatives by the map's step. In a SCALED
- * system Φ is in mm and an angle counts as its arc at the characteristic length; in a PLAIN one
- * the sphere row stays as derived, which saves the multiplications. */
-
-INLINE void FN(store_row)(int map, int scaling, NUMBER inverse_length, const real *state, real phi,
-                          const real *omega, const real *v, real scale, real *residual, real *row)
+/* One row of the system: Φ and its derivatives by the map's step, lengths times `scale` and angles
+ * times `angular`; as they are where `scaled` is 0. */
+INLINE void FN(store_row)(int map, int scaled, const real *state, real phi, const real *omega,
+                          const real *v, real scale, real angular, real *residual, real *row)
 {
     real covector[6];
-    const real angular = scale * inverse_length;
-    *residual = scaling ? phi * scale : phi;
+    *residual = scaled ? phi * scale : phi;
     if (!row) return;
     FN(map_pull)(map, state, omega, v, covector);
     for (int j = 0; j < map_m(map); j++)
-        row[j] = scaling ? covector[j] * (map_is_angle(map, j) ? angular : scale) : covector[j];
+        row[j] = scaled ? covector[j] * (map_is_angle(map, j) ? angular : scale) : covector[j];
 }
 
-/* All rows at a state in the machine's order of elimination, weighted if SCALED. Without the
- * derivatives where `jacobian` is NULL. Returns how many rows there are. */
+/* All rows at a state in the machine's order of elimination. In a SCALED system Φ is in mm, weighted,
+ * and an angle counts as its arc at the characteristic length. In a PLAIN one the sphere row stays
+ * as derived, in mm², which saves the multiplications, and a constraint is brought to that size.
+ * Without the derivatives where `jacobian` is NULL. Returns how many rows there are. */
 INLINE int FN(closure_rows)(int map, int scaling, const pkm_machine *machine,
                             const FN(limb_sphere) *limb, const real *state, real *residual,
                             real *jacobian)
 {
     const int m = map_m(map);
-    const NUMBER inverse_length = (NUMBER)(1.0 / machine->length);
+    const NUMBER inverse_length = (NUMBER)(scaling == SCALED ? 1.0 / machine->length : 1.0);
     real R[9], p[3], phi, omega[3], v[3];
     int r = 0;
     FN(map_frame)(map, state, R, p);
     for (int i = 0; i < machine->limbs; i++) {
         const FN(limb_sphere) *one = &limb[i];
         FN(sphere_row)(R, p, one->b, one->c, one->rho2, &phi, omega, v);
-        FN(store_row)(map, scaling, inverse_length, state, phi, omega, v,
-                      one->scale * (NUMBER)machine->weight[r], &residual[machine->order[r]],
+        const real scale = one->scale * (NUMBER)machine->weight[r];
+        FN(store_row)(map, scaling == SCALED, state, phi, omega, v, scale, scale * inverse_length,
+                      &residual[machine->order[r]],
                       jacobian ? &jacobian[machine->order[r] * m] : NULL);
         r++;
         for (int kind = ROW_BASE_PLANE; kind <= ROW_COUPLE; kind *= 2) {
@@ -111,8 +111,10 @@ INLINE int FN(closure_rows)(int map, int scaling, const pkm_machine *machine,
             else
                 FN(couple_row)(R, p, one->b, one->c, one->base_axis, one->platform_axis,
                                FN(fill)((NUMBER)machine->lever[i]), &phi, omega, v);
-            FN(store_row)(map, scaling, inverse_length, state, phi, omega, v,
-                          FN(fill)((NUMBER)machine->weight[r]), &residual[machine->order[r]],
+            const real factor =
+                FN(fill)((NUMBER)(scaling == SCALED ? machine->weight[r] : machine->size));
+            FN(store_row)(map, 1, state, phi, omega, v, factor, factor * inverse_length,
+                          &residual[machine->order[r]],
                           jacobian ? &jacobian[machine->order[r] * m] : NULL);
             r++;
         }

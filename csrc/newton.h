@@ -28,6 +28,9 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
     real merit = fill(INFINITY), worst = merit, share = fill(1.0), pivot = zero;
     const real size = fill(machine->size);
     const real closed = CLOSED * size, settled = SETTLED * size;
+    double heaviest = 1.0;
+    for (int r = 0; r < PKM_MAX_ROWS; r++) heaviest = fmax(heaviest, machine->weight[r]);
+    const real rounding = closed * closed * (heaviest * heaviest);
     *status = fill_mask(PKM_NOT_CONVERGED);
     *iterations = zero;
     memcpy(trial, state, sizeof(real) * MAX_STATE);
@@ -39,7 +42,7 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
             trial_worst = larger(trial_worst, absolute(phi[r]));
         }
         /* a step is taken if it does not make things worse, rounding apart */
-        const mask better = (squares <= merit * (1.0 + 1e-9) + closed * closed) & running;
+        const mask better = (squares <= merit * (1.0 + 1e-9) + rounding) & running;
         const mask halved = running & ~better;
         share = select(halved, 0.5 * share, fill(1.0));
         real fresh[6], trial_pivot;
@@ -79,7 +82,11 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
     const mask lost = *status == fill_mask(PKM_NOT_CONVERGED);
     const mask flat = ~(pivot > fill(LEAST_PIVOT));
     *status = select_mask(lost & ((worst <= closed) | flat), fill_mask(PKM_SINGULAR), *status);
-    *residual = worst;
+    /* of the pose itself, and without the weights */
+    const int rows = FN(closure_rows)(map, SCALED, machine, limb, state, phi, NULL);
+    *residual = zero;
+    for (int r = 0; r < rows; r++)
+        *residual = larger(*residual, absolute(phi[machine->order[r]]) * (1.0 / machine->weight[r]));
 }
 
 #endif

@@ -72,6 +72,25 @@ int pkm_error_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const d
                        ptrdiff_t geometry_stride, const double *pose, const double *q,
                        const int32_t *column, int columns, double *jacobian);
 
+/* pose (n, 6), q (n, actuators) -> the closure rows, limb by limb and the sphere first: residual
+ * (n, rows) [mm]; their derivatives by a scaled twist (n, rows, m), by the free coordinates
+ * (n, rows, m) and by q (n, rows, actuators). */
+int pkm_closure(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                const double *pose, const double *q, double *residual, double *by_step,
+                double *by_free, double *by_q);
+
+/* pose (n, 6) as given -> of each limb its drive coordinate (n, limbs), NaN out of reach, and the
+ * unit vector from its anchor to the platform joint in base and platform axes (n, limbs, 3). */
+int pkm_limbs(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+              const double *pose, double *drive, double *on_base, double *on_platform);
+
+/* Poses as frames: out = A B (strides 0 or 6), out = A^-1, and the rates (n, 6, 6) of A T C. */
+int pkm_compose(int isa, ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
+                ptrdiff_t b_stride, double *out);
+int pkm_invert(int isa, ptrdiff_t n, const double *a, double *out);
+int pkm_compose_rates(int isa, ptrdiff_t n, const double *a, const double *pose, const double *c,
+                      const double *composed, double *rates);
+
 /* 2TPR&2TPS in closed form: size a b c d e f, free (n, 4) = y z alpha beta -> lengths (n, 4) of
  * eq. 8, and their derivatives (n, 4, 4) of eq. 12. */
 int pkm_tpr2tps_lengths(int isa, ptrdiff_t n, const double *size, const double *free,

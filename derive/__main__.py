@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from . import elementary, limbs, posemaps, tpr2tps
+from . import elementary, frames, limbs, posemaps, tpr2tps
 from .emit import Function
 
 HERE = Path(__file__).parent
@@ -22,6 +22,7 @@ def headers() -> dict[str, str]:
     return {
         "names.h": _header("limbs", _names()),
         "elementary.h": _header("elementary", elementary.emit()),
+        "frames.h": _header("frames", _functions(frames.functions())),
         "limbs.h": _header("limbs", _functions(limbs.functions())),
         "posemaps.h": _header("posemaps", _functions(posemaps.functions())),
         "tpr2tps.h": _header("tpr2tps", _functions(tpr2tps.functions())),

@@ -6,10 +6,13 @@ from typing import Any
 
 from pkmcal.measurement_csv import read_measurements
 from pkmcal.measurements import Measurements
-from pkmcal.robot import Forward, Robot, load, machines
+from pkmcal.feasible import Feasibility
+from pkmcal.forward import Forward
+from pkmcal.robot import Robot, load, machines
 from pkmcal.virtual import VirtualMachine
 
 __all__ = [
+    "Feasibility",
     "Forward",
     "Measurements",
     "Robot",

@@ -50,8 +50,8 @@ def calibrate(
         str | None,
         typer.Option(
             metavar="FRACTION|FILE",
-            help="Compare these measurements instead of fitting them: a fraction of the poses"
-            " drawn at random, or another file.",
+            help="Compare these measurements instead of fitting them: a fraction (or number) of"
+            " the poses, drawn at random, or another file.",
         ),
     ] = None,
     loss: Annotated[
@@ -89,7 +89,7 @@ def calibrate(
         found = identify(
             machine,
             measured,
-            free=chosen,
+            free=chosen or None,
             prior=read_prior(prior or [], machine, chosen),
             loss=loss,
             frame=frame,
@@ -117,7 +117,7 @@ def free_names(robot: Robot, given: Sequence[str] | None) -> list[str]:
     """
     if not given:
         return list(robot.model.free)
-    patterns = [name.strip() for text in given for name in text.split(",") if name.strip()]
+    patterns = [name.strip() for text in given for name in text.split(",")]
     try:
         return robot.geometry.match(patterns)
     except ValueError as error:

@@ -6,7 +6,7 @@ import os
 import threading
 from collections.abc import Callable
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -128,6 +128,56 @@ def tpr2tps_jacobian(size: FloatArray, free: FloatArray, out: FloatArray) -> Non
     lib.pkm_tpr2tps_jacobian(ISA, len(free), pointer(size), pointer(free), pointer(out))
 
 
+def compose(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Pose A followed by pose B: (6,) and (N, 6), or (N, 6) and (6,), to (N, 6)."""
+    n = len(b) if b.ndim == 2 else len(a)
+    out = np.empty((n, 6))
+    if n:
+        strides = (6 if a.ndim == 2 else 0, 6 if b.ndim == 2 else 0)
+        lib.pkm_compose(ISA, n, pointer(a), strides[0], pointer(b), strides[1], pointer(out))
+    return out
+
+
+def invert(a: FloatArray) -> FloatArray:
+    """The inverse of a pose (6,)."""
+    out = np.empty(6)
+    lib.pkm_invert(ISA, 1, pointer(a), pointer(out))
+    return out
+
+
+def compose_rates(
+    a: FloatArray, pose: FloatArray, c: FloatArray, composed: FloatArray
+) -> FloatArray:
+    """Rates (N, 6, 6) of A T C by those of T, for T = `pose` and A T C = `composed`, (N, 6)."""
+    out = np.empty((len(pose), 6, 6))
+    if len(pose):
+        lib.pkm_compose_rates(
+            ISA, len(pose), pointer(a), pointer(pose), pointer(c), pointer(composed), pointer(out)
+        )
+    return out
+
+
+class Closure(NamedTuple):
+    """Closure rows of N poses, limb by limb and the sphere row first.
+
+    Attributes
+    ----------
+    residual : ndarray (N, rows)
+        mm.
+    by_step : ndarray (N, rows, m)
+        By the map's step, with an angle as its arc at the characteristic length.
+    by_free : ndarray (N, rows, m)
+        By the free coordinates, mm and rad.
+    by_q : ndarray (N, rows, n)
+        By the actuator coordinates.
+    """
+
+    residual: FloatArray
+    by_step: FloatArray
+    by_free: FloatArray
+    by_q: FloatArray
+
+
 class Machine:
     """A machine in the core: what of a robot does not change with its geometry.
 
@@ -179,6 +229,7 @@ class Machine:
         self.isa = isa
         self.actuators: int = struct.actuators
         self.m = len(MAPS[map])
+        self.rows = len(weights)
 
     def inverse(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """Poses (N, 6) to actuator coordinates (N, n)."""
@@ -276,6 +327,54 @@ class Machine:
                 )
             )
         return out
+
+    def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
+        """The closure rows and their derivatives at poses (N, 6) and coordinates (N, n)."""
+        n, m = len(pose), self.m
+        out = Closure(
+            np.empty((n, self.rows)),
+            np.empty((n, self.rows, m)),
+            np.empty((n, self.rows, m)),
+            np.empty((n, self.rows, self.actuators)),
+        )
+        if n:
+            self._ensure(
+                lib.pkm_closure(
+                    self.struct,
+                    self.isa,
+                    n,
+                    pointer(slots),
+                    pointer(pose),
+                    pointer(q),
+                    pointer(out.residual),
+                    pointer(out.by_step),
+                    pointer(out.by_free),
+                    pointer(out.by_q),
+                )
+            )
+        return out
+
+    def limbs(
+        self, slots: FloatArray, pose: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Of each limb at poses (N, 6): q̃ (N, limbs), and the unit vectors from its anchor to the
+        platform joint in base and in platform axes (N, limbs, 3)."""
+        n, limbs = len(pose), slots.shape[-2]
+        drive, base, platform = np.empty((n, limbs)), np.empty((n, limbs, 3)), np.empty((n, limbs, 3))
+        if n:
+            self._ensure(
+                lib.pkm_limbs(
+                    self.struct,
+                    self.isa,
+                    n,
+                    pointer(slots),
+                    pointer(pose),
+                    pointer(drive),
+                    pointer(base),
+                    pointer(platform),
+                )
+            )
+        return drive, base, platform
 
     @staticmethod
     def _ensure(code: int) -> None:

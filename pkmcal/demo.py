@@ -77,7 +77,7 @@ class Demonstration:
         return found.converged and not found.warnings and _rms(self.after) < 2 * self.expected
 
     def __str__(self) -> str:
-        found, points = self.identification, len(self.measured)
+        found = self.identification
         gone = 100 * (1 - self.after.mean() / self.before.mean())
         rows = [
             [name, *(f"{value:.3f}" for value in (error.mean(), _rms(error), error.max()))]
@@ -87,8 +87,8 @@ class Demonstration:
         return "\n".join([
             f"{self.true_robot.name} with {len(found.free)} unknown errors of its geometry,"
             f" sigma {SIGMA} mm (simulated, seed {self.seed})",
-            f"measured    {points} tilted poses within the strokes, by a tracker good to {NOISE} mm a"
-            " coordinate",
+            f"measured    {len(self.measured)} tilted poses within the strokes, by a tracker good"
+            f" to {NOISE} mm a coordinate",
             f"identified  misfit {found.rms_before:.3f} -> {found.rms:.3f} mm rms; positions tell"
             f" {found.rank} of {len(found.free)} combinations of errors",
             f"commanded   {len(self.poses)} other poses, by leg lengths of the identified geometry",
@@ -97,7 +97,7 @@ class Demonstration:
             digits.table(["[mm]", "mean", "rms", "largest"], rows, left=1),
             f"{gone:.1f} % of the error is gone. Expected: rms {self.expected:.3f} mm; the noise of"
             f" one measured point is {NOISE * np.sqrt(3):.3f} mm.",
-            f"Tilt error {' -> '.join(tilts)} deg rms: positions of one point do not tell all of it.",
+            f"Tilt error {' -> '.join(tilts)} deg rms: one point cannot tell it, two can.",
         ])  # fmt: skip
 
     def write(self, folder: Path) -> dict[Path, str]:
@@ -176,12 +176,13 @@ def demonstrate(seed: int = 1) -> Demonstration:
 def _poses(random: np.random.Generator, robot: Robot, count: int) -> FloatArray:
     """Poses that the machine reaches within its strokes: x = z tan beta, gamma = 0 (eq. 7)."""
     drawn = random.uniform(_LOWEST, _HIGHEST, (20 * count, 4)).round(1)
-    y, z, alpha, beta = *drawn[:, :2].T, *np.radians(drawn[:, 2:]).T
-    poses = np.stack([z * np.tan(beta), y, z, alpha, beta, np.zeros(len(drawn))], axis=1)
+    (y, z), (alpha, beta) = drawn[:, :2].T, np.radians(drawn[:, 2:]).T
+    poses: FloatArray = np.stack([z * np.tan(beta), y, z, alpha, beta, 0.0 * y], axis=1)
     shortest, longest = np.transpose([limb.stroke for limb in robot.model.limbs])
     q = robot.inverse(poses)
     reached = ((q > shortest + _MARGIN) & (q < longest - _MARGIN)).all(axis=1)
-    return poses[reached][:count]
+    kept: FloatArray = poses[reached][:count]
+    return kept
 
 
 def _rms(error: FloatArray) -> float:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pkmcal.equations import Equations, Point
-from pkmcal.identifiability import Decomposed, Directions, decompose, directions
+from pkmcal.identifiability import Decomposed, Directions, decompose, directions, triangle
 from pkmcal.loss import Loss
 
 FloatArray = NDArray[np.float64]
@@ -101,7 +101,8 @@ class Estimator:
         self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
         self._method: Literal["trf", "lm"] = "trf" if bounded else "lm"
         self.unstated = np.array([m.sigma is None for m in equations.sets])
-        self._equation_set = np.repeat(equations.set_of, equations.components)
+        set_of = np.repeat(equations.set_of, equations.components)
+        self._equations_of = [set_of == i for i in range(len(self.unstated))]
         self._at_start = self._jacobian(start, np.ones(len(self.unstated)))
         self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
         self._last: tuple[FloatArray, Point] = (np.zeros(len(sigma)), start)
@@ -124,6 +125,8 @@ class Estimator:
             setting = revised
             if steady:
                 break
+        if self.loss == "linear" and not self.unstated.any():
+            return replace(estimate, setting=setting)  # nothing that it was made with has changed
         return self._estimate(u, setting)
 
     # between the least squares ------------------------------------------------------------------
@@ -138,7 +141,7 @@ class Estimator:
         noise_known = point is not None or not self.unstated.any()
         faint = size if noise_known else np.inf
         if self._first is None or (noise != self._first[0]).any():
-            at_start = self._at_start / noise[self._equation_set, None]
+            at_start = self._at_start / (noise @ np.array(self._equations_of))[:, None]
             self._first = noise, self._decomposed(at_start)
         _, first = self._first
         now = (None, None) if point is None else self._decomposed(self._jacobian(point, noise))
@@ -263,14 +266,16 @@ class Estimator:
         jacobian = self._jacobian(point, setting.noise)
         residual = self.equations.whitened(point.residuals, setting.noise)
         weights = setting.loss.weights(residual)
-        root = np.sqrt(np.repeat(weights, self.equations.components))[:, None]
+        every = np.repeat(weights, self.equations.components)
+        parts = [np.sqrt(every[mine, None]) * jacobian[mine] for mine in self._equations_of]
+        factors = [triangle(part) for part in parts]
         told = setting.determined.told
-        hat, singular, rows = np.linalg.svd(
-            np.vstack([root * jacobian, self.prior]) @ told, full_matrices=False
+        _, singular, rows = np.linalg.svd(
+            triangle(np.vstack([*factors, self.prior])) @ told, full_matrices=False
         )
         half = told @ (rows.T / singular)
-        leverage = (hat[: len(root), : setting.searched.rank] ** 2).sum(axis=1)
-        sets = self._equation_set
-        left = root[:, 0] ** 2 - leverage
-        freedom: FloatArray = np.bincount(sets, left, len(self.unstated)).astype(np.float64)
+        fitted = half[:, : setting.searched.rank]
+        leverage = [float(((factor @ fitted) ** 2).sum()) for factor in factors]
+        count = [float(every[mine].sum()) for mine in self._equations_of]
+        freedom = np.array(count) - np.array(leverage)
         return Estimate(point, setting, residual, jacobian, weights, half @ half.T, freedom)

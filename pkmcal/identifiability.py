@@ -18,6 +18,7 @@ FloatArray = NDArray[np.float64]
 _KINDS = 4  # kinds of parameters whose combinations are looked for
 _ELSEWHERE = 1e-5  # share of a combination outside some parameters that does not count
 _SPELLED = 6  # parameters whose shares are spelled out
+_IN_ONE_THREAD = 8192  # numbers
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 CLEAR = 0.01  # share of the machine's size to which a combination must be told to count after all
 
@@ -58,10 +59,26 @@ Decomposed = tuple[FloatArray, FloatArray]  # singular values (n,), directions (
 def decompose(jacobian: FloatArray) -> Decomposed:
     """Singular values (n,), zeros where there are fewer rows, and all directions (n, n)."""
     n = jacobian.shape[1]
-    if len(jacobian) > 2 * n:  # the triangular factor has the same
-        jacobian = np.asarray(np.linalg.qr(jacobian, mode="r"))
-    _, singular, rows = np.linalg.svd(jacobian, full_matrices=len(jacobian) < n)
-    return np.concatenate([singular, np.zeros(n - len(singular))]), rows.T
+    square = np.zeros((n, n))
+    factor = triangle(jacobian)
+    square[: len(factor)] = factor
+    _, singular, rows = np.linalg.svd(square)
+    return singular, rows.T
+
+
+def triangle(matrix: FloatArray) -> FloatArray:
+    """Triangular factor R of a QR factorisation: RᵀR = AᵀA.
+
+    Rows enter in blocks so small that the linear algebra library does not spread them over
+    threads, which on a busy computer takes a hundred times as long as the work itself.
+    """
+    n = matrix.shape[1]
+    block = max(n, _IN_ONE_THREAD // max(n, 1) - n)
+    factor: FloatArray = np.zeros((0, n))
+    for start in range(0, len(matrix), block):
+        stacked = np.vstack([factor, matrix[start : start + block]])
+        factor = np.asarray(np.linalg.qr(stacked, mode="r"))
+    return factor
 
 
 def directions(
@@ -116,7 +133,7 @@ def observability(jacobian: FloatArray, poses: int, rank: int) -> dict[str, floa
     O4 = σr²/σ1, O5 = 1/Σ(1/σ) (Y. Sun and J. M. Hollerbach, Observability index selection for robot
     calibration, ICRA 2008).
     """
-    singular = np.linalg.svd(jacobian, compute_uv=False)[:rank]
+    singular = decompose(jacobian)[0][:rank]
     if rank == 0 or singular[-1] <= 0:
         return dict.fromkeys(("O1", "O2", "O3", "O4", "O5"), 0.0)
     largest, least = float(singular[0]), float(singular[-1])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal.identifiability import triangle
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.intp]
 
@@ -46,12 +48,14 @@ def outliers(
     rows = len(components)
     alike = [np.flatnonzero(components == k) for k in np.unique(components)]
     first = np.cumsum(components) - components
-    weighted = np.repeat(weights, components)[:, None] * jacobian
+    root = np.sqrt(np.repeat(weights, components))[:, None]
+    weighted = root**2 * jacobian
     pull = weighted.T @ residual  # of the prior: at the solution the two balance
     kept = np.ones(rows, dtype=bool)
     for _ in range(rows // _MOST + 1):
         use = np.repeat(kept, components)
-        normal = weighted[use].T @ jacobian[use] + prior.T @ prior
+        factor = triangle(np.vstack([root[use] * jacobian[use], prior]))
+        normal = factor.T @ factor
         # the ridge is for directions that only rows set aside told
         covariance = np.linalg.inv(normal + 1e-14 * np.trace(normal) * np.eye(len(normal)))
         shift = covariance @ (weighted[use].T @ residual[use] - pull)

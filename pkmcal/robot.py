@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from os import PathLike
 from typing import Any
@@ -12,68 +12,24 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import robotfile
-from pkmcal.core import MAPS, POSE, STATUS, FloatArray, IntArray, Machine, as_rows
-from pkmcal.geometry import BoolArray, Geometry
+from pkmcal.complete import complete, matched_coordinates
+from pkmcal.core import MAPS, POSE, FloatArray, Machine, as_rows
+from pkmcal.feasible import Feasibility, feasibility
+from pkmcal.forward import Forward
+from pkmcal.frames import Frames
+from pkmcal.geometry import Geometry
 from pkmcal.limb_kinds import KINDS
 from pkmcal.model import Limb, Model
 
-
-@dataclass(frozen=True, eq=False)
-class Forward:
-    """Forward kinematics of a batch; every array has the batch's leading shape.
-
-    Attributes
-    ----------
-    pose : ndarray (..., 6)
-        x y z in mm, α β γ in rad; NaN where `status` is not 0.
-    status : ndarray of int (...)
-        0 ok, 1 not converged, 2 singular, 3 infeasible, 4 invalid input.
-    iterations : ndarray of int (...)
-        Newton steps taken.
-    residual : ndarray (...)
-        Largest closure error, mm; NaN where `status` is not 0.
-    """
-
-    pose: FloatArray
-    status: IntArray
-    iterations: IntArray
-    residual: FloatArray
-
-    @property
-    def ok(self) -> BoolArray:
-        """Which rows were solved, (...)."""
-        return np.equal(self.status, 0)
-
-    def failures(self) -> str:
-        """What failed and where, in one line; empty where nothing did."""
-        status = np.atleast_1d(self.status).ravel()
-        parts = []
-        for code, words in STATUS.items():
-            rows = np.flatnonzero(status == code)
-            if code and rows.size:
-                shown = ", ".join(map(str, rows[:5])) + (", …" if rows.size > 5 else "")
-                parts.append(f"{rows.size} of {status.size} rows {words} (rows {shown})")
-        return "; ".join(parts)
-
-    def __str__(self) -> str:
-        pose = self.pose.reshape(-1, 6)
-        lines = ["       x mm        y mm        z mm     α deg     β deg     γ deg  status"]
-        shown = min(len(pose), 20)
-        for p, code in zip(pose[:shown], np.atleast_1d(self.status).ravel(), strict=False):
-            mm = "".join(f"{v:12.4f}" for v in p[:3])
-            deg = "".join(f"{v:10.4f}" for v in np.degrees(p[3:]))
-            lines.append(f"{mm}{deg}  {STATUS[int(code)]}")
-        if len(pose) > shown:
-            lines.append(f"... {len(pose) - shown} more rows")
-        return "\n".join(lines)
+Match = bool | str | Sequence[str] | None
 
 
 class Robot:
     """A parallel machine: immutable; `replace` gives a changed one.
 
     Made by `load`. Poses are x y z in mm and α β γ in rad with R = Rz(γ) Ry(β) Rx(α), platform to
-    base; actuator coordinates are mm or rad as the limbs say. All calls take any leading batch
-    shape.
+    base, in the robot's base and tool frames where its file has them; actuator coordinates are mm
+    or rad as the limbs say. All calls take any leading batch shape.
 
     Examples
     --------
@@ -87,9 +43,13 @@ class Robot:
     def __init__(self, model: Model) -> None:
         self.model = model
         self._slots = np.ascontiguousarray(model.geometry.slots)
-        self._home = np.ascontiguousarray(model.home, dtype=np.float64)
+        self._frames = Frames(model.base_frame, model.tool_frame)
+        self._own_home = np.ascontiguousarray(model.home, dtype=np.float64)
         limbs = [_limb(limb) for limb in model.limbs]
-        self._machine = Machine(model.map, limbs, self.length, self._slots, self._home)
+        if sum(len(limb["weights"]) for limb in limbs) == len(self.coordinates):
+            for limb in limbs:  # nothing to weigh: all closures hold
+                limb["weights"] = [1.0] * len(limb["weights"])
+        self._machine = Machine(model.map, limbs, self.length, self._slots, self._own_home)
 
     # what it is ---------------------------------------------------------------------------------
 
@@ -106,12 +66,12 @@ class Robot:
     @property
     def home(self) -> FloatArray:
         """Home pose (6,), mm and rad: in the middle of the workspace."""
-        home: FloatArray = self._home.copy()
+        home: FloatArray = self._frames.outward(self._own_home[None])[0].copy()
         return home
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """The m free coordinates of its pose."""
+        """The m free coordinates of its pose, in the machine's own frame."""
         return MAPS[self.model.map]
 
     @property
@@ -143,13 +103,17 @@ class Robot:
 
     # kinematics ---------------------------------------------------------------------------------
 
-    def inverse(self, pose: ArrayLike) -> FloatArray:
+    def inverse(self, pose: ArrayLike, match: Match = None) -> FloatArray:
         """Actuator coordinates of a pose, limb by limb in closed form.
 
         Parameters
         ----------
         pose : array_like (..., 6)
-            x y z in mm, α β γ in rad; the six numbers are taken as given.
+            x y z in mm, α β γ in rad.
+        match : bool or names of coordinates, optional
+            By default the six numbers are taken as given. Where limbs constrain the pose, `match`
+            names the coordinates to keep and the machine determines the others (`complete`);
+            True takes those the robot file declares.
 
         Returns
         -------
@@ -160,14 +124,18 @@ class Robot:
         Raises
         ------
         ValueError, TypeError
-            A wrong shape, or no numbers.
+            A wrong shape, no numbers, unknown coordinates to match.
 
         Notes
         -----
         Length limbs: eq. 3 of the 2TPR&2TPS paper, ‖p + R b - base‖.
         """
-        rows, shape = as_rows("pose", pose, 6)
-        return self._machine.inverse(self._slots, rows).reshape(*shape, self.n_actuators)
+        rows, shape = self._own_rows(pose)
+        if match is None:
+            q = self._machine.inverse(self._slots, rows)
+        else:
+            q = self._completed(rows, match)[1]
+        return q.reshape(*shape, self.n_actuators)
 
     def forward(
         self, q: ArrayLike, guess: ArrayLike | None = None, threads: int | None = None
@@ -186,8 +154,8 @@ class Robot:
         Returns
         -------
         Forward
-            Pose, status, iterations and residual of each row. A row that cannot be solved is NaN
-            and says why; it does not raise.
+            Pose, status, iterations and residual of each row; conditioning when asked for. A row
+            that cannot be solved is NaN and says why; it does not raise.
 
         Raises
         ------
@@ -196,21 +164,26 @@ class Robot:
         """
         rows, shape = as_rows("q", q, self.n_actuators)
         if guess is None:
-            start = self._home
+            start = self._own_home
         else:
-            start, guess_shape = as_rows("guess", guess, 6)
+            start, guess_shape = self._own_rows(guess, "guess")
             if guess_shape == ():
                 start = start[0]
             elif guess_shape != shape:
                 start = np.broadcast_to(start.reshape(*guess_shape, 6), (*shape, 6))
                 start = np.ascontiguousarray(start).reshape(-1, 6)
-        result = self._machine.forward(self._slots, rows, start, threads)
-        pose, status, iterations, residual = result
+        own, status, iterations, residual = self._machine.forward(
+            self._slots, rows, start, threads
+        )
         return Forward(
-            pose.reshape(*shape, 6),
+            self._frames.outward(own).reshape(*shape, 6),
             status.reshape(shape),
             iterations.reshape(shape),
             residual.reshape(shape),
+            lambda: self._steps(own, rows).reshape(*shape, -1, self._machine.m),
+            lambda: self._steps(np.broadcast_to(start, own.shape).copy(), rows).reshape(
+                *shape, -1, self._machine.m
+            ),
         )
 
     def jacobian(self, pose: ArrayLike) -> FloatArray:
@@ -227,7 +200,7 @@ class Robot:
             mm or rad of the actuator per mm or rad of the coordinate, in the order of
             `coordinates`.
         """
-        rows, shape = as_rows("pose", pose, 6)
+        rows, shape = self._own_rows(pose)
         return self._machine.jacobian(self._slots, rows).reshape(*shape, self.n_actuators, -1)
 
     def forward_jacobian(self, pose: ArrayLike) -> FloatArray:
@@ -243,7 +216,7 @@ class Robot:
         ndarray (..., m, n)
             NaN at a type-2 singularity.
         """
-        rows, shape = as_rows("pose", pose, 6)
+        rows, shape = self._own_rows(pose)
         q = self._machine.inverse(self._slots, rows)
         by_q = self._machine.forward_jacobian(self._slots, rows, q)
         free = [POSE.index(name) for name in self.coordinates]
@@ -266,7 +239,8 @@ class Robot:
             alone would do; the column of a parameter what it does through all its ties.
             NaN at a type-2 singularity.
         """
-        rows, shape = as_rows("pose", pose, 6)
+        given, shape = as_rows("pose", pose, 6)
+        rows = self._frames.inward(given)
         if actuators is None:
             q = self._machine.inverse(self._slots, rows)
         else:
@@ -275,12 +249,83 @@ class Robot:
                 raise ValueError(f"actuators are a batch {q_shape}, poses a batch {shape}")
         geometry = self.geometry
         columns = geometry.slot_index.astype(np.int32)
-        limb_part = self._machine.error_jacobian(self._slots, rows, q, columns)
+        errors = self._machine.error_jacobian(self._slots, rows, q, columns)
+        errors = self._frames.rates_outward(rows, given, errors)
         count = len(geometry) - len(columns)
         if count:
-            named = limb_part @ geometry.chain[:, -count:]
-            limb_part = np.concatenate([limb_part, named], axis=-1)
-        return limb_part.reshape(*shape, 6, len(geometry))
+            named = errors @ geometry.chain[:, -count:]
+            errors = np.concatenate([errors, named], axis=-1)
+        return errors.reshape(*shape, 6, len(geometry))
+
+    # poses the machine can take -----------------------------------------------------------------
+
+    def complete(self, pose: ArrayLike, match: Match = True) -> FloatArray:
+        """The pose the machine takes when some coordinates are to be kept.
+
+        Parameters
+        ----------
+        pose : array_like (..., 6)
+            x y z in mm, α β γ in rad; what is not matched is where the search starts.
+        match : True or names of coordinates
+            As many as the machine has degrees of freedom; True takes those its file declares, or
+            its free coordinates.
+
+        Returns
+        -------
+        ndarray (..., 6)
+            NaN where the machine has no such pose.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> pose = pk.load("2tpr2tps").complete([0, 10, 400, 0.1, 0.2, 0])
+        >>> bool(abs(pose[0] - 400 * np.tan(0.2)) < 1e-9)
+        True
+        """
+        rows, shape = self._own_rows(pose)
+        return self._frames.outward(self._completed(rows, match)[0]).reshape(*shape, 6)
+
+    def violation(self, pose: ArrayLike) -> FloatArray:
+        """How far a pose is from one the machine can take.
+
+        Parameters
+        ----------
+        pose : array_like (..., 6)
+            x y z in mm, α β γ in rad.
+
+        Returns
+        -------
+        ndarray (...)
+            The largest closure error that is left with the limbs at their inverse, mm. Near 0
+            where six numbers are free, or where they fit.
+        """
+        rows, shape = self._own_rows(pose)
+        q = self._machine.inverse(self._slots, rows)
+        residual = self._machine.closure(self._slots, rows, q).residual
+        return np.asarray(np.abs(residual).max(axis=1)).reshape(shape)
+
+    def feasible(self, pose: ArrayLike) -> Feasibility:
+        """Which limits of which limbs a pose keeps.
+
+        Parameters
+        ----------
+        pose : array_like (..., 6)
+            x y z in mm, α β γ in rad.
+
+        Returns
+        -------
+        Feasibility
+            ``.ok`` for each pose; reach, stroke and joint cones for each limb.
+        """
+        rows, shape = self._own_rows(pose)
+        drive, on_base, on_platform = self._machine.limbs(self._slots, rows)
+        found = feasibility(self.model.limbs, drive, on_base, on_platform)
+        return Feasibility(
+            *(
+                getattr(found, name).reshape(*shape, len(self.model.limbs))
+                for name in (*Feasibility.LIMITS, "drive")
+            )
+        )
 
     # changing and saving ------------------------------------------------------------------------
 
@@ -302,6 +347,23 @@ class Robot:
     def save(self, path: str | PathLike[str]) -> None:
         """Write the robot file; `load` reads it back to the last bit."""
         robotfile.write(self.model, path)
+
+    # --------------------------------------------------------------------------------------------
+
+    def _own_rows(self, pose: ArrayLike, name: str = "pose") -> tuple[FloatArray, tuple[int, ...]]:
+        """Poses of the user as rows of the machine's own, and the batch's shape."""
+        rows, shape = as_rows(name, pose, 6)
+        return self._frames.inward(rows), shape
+
+    def _completed(self, rows: FloatArray, match: Match) -> tuple[FloatArray, FloatArray]:
+        if match is None:
+            raise ValueError("match must be True or names of coordinates, found None")
+        places = matched_coordinates(match, self.model.match, self.coordinates)
+        return complete(self._machine, self.model.map, self._slots, rows, places)
+
+    def _steps(self, own: FloatArray, q: FloatArray) -> FloatArray:
+        """Closure rows by a scaled twist, (N, rows, m)."""
+        return self._machine.closure(self._slots, own, q).by_step
 
 
 def _limb(limb: Limb) -> dict[str, Any]:
@@ -330,7 +392,9 @@ def load(robot: str | PathLike[str]) -> Robot:
     Raises
     ------
     ValueError
-        No such machine or file, or a file with a mistake: the message says where.
+        No such machine, or a file with a mistake: the message says where.
+    FileNotFoundError
+        No such file.
 
     Examples
     --------

@@ -43,8 +43,8 @@ def test_unidentifiable_combinations_move_no_measured_point() -> None:
     found = identify(robot, VirtualMachine(robot).measure(q))
     assert "platform3.x by itself" in found.unidentifiable
     assert "platform4.x by itself" in found.unidentifiable
-    moved = robot.replace({"platform3.x": 0.5, "platform4.x": -0.7})
-    np.testing.assert_allclose(moved.forward(q).pose, robot.forward(q).pose, atol=1e-10)
+    moved = robot.replace({"platform3.x": 5e-4, "platform4.x": -7e-4})  # mm; to first order
+    np.testing.assert_allclose(moved.forward(q).pose, robot.forward(q).pose, atol=1e-8)
 
 
 def test_a_turned_delta_is_named_by_its_towers() -> None:
@@ -66,9 +66,7 @@ def test_a_base_moved_with_the_frame_is_named() -> None:
     measured = VirtualMachine(robot).measure(robot.inverse(poses), kind="pose")
     found = identify(robot, measured, free=["base*.x"], frame="unknown")
     assert found.rank == 11
-    assert found.unidentifiable == ("base1.x … base6.x, frame.x together, in one proportion",) or (
-        found.unidentifiable == ("base1.x … base6.x together, frame.x against them",)
-    )
+    assert found.unidentifiable == ("base1.x … base6.x together, frame.x against them",)
 
 
 def test_what_is_not_told_keeps_its_value() -> None:
@@ -111,7 +109,9 @@ def test_names_that_count_on_are_shortened() -> None:
 
 def test_plain_basis_spans_the_same_combinations() -> None:
     rng = np.random.default_rng(10)
-    names = [f"{point}{i}.{axis}" for point in ("base", "platform") for i in (1, 2) for axis in "xy"]
+    names = [
+        f"{point}{i}.{axis}" for point in ("base", "platform") for i in (1, 2) for axis in "xy"
+    ]
     untold, _ = np.linalg.qr(rng.normal(size=(8, 3)))
     basis = plain_basis(untold, names)
     assert basis.shape == (8, 3)

@@ -71,9 +71,9 @@ def response(robot: pk.Robot, pose: np.ndarray, q: np.ndarray) -> tuple[np.ndarr
 
 
 def close(found: np.ndarray, expected: np.ndarray, tolerance: float) -> None:
-    """Within `tolerance` of the largest entry of each row of the last two axes."""
-    scale = np.abs(expected).max(axis=-1, keepdims=True) + 1e-12
-    np.testing.assert_array_less(np.abs(found - expected) / scale, tolerance)
+    """Equal to `tolerance`, and where an entry is next to nothing, to that of the largest one."""
+    largest = np.abs(expected).max()
+    np.testing.assert_allclose(found, expected, rtol=tolerance, atol=1e-2 * tolerance * largest)
 
 
 both = pytest.mark.parametrize("errors", [False, True], ids=["nominal", "with errors"])
@@ -111,7 +111,7 @@ def test_inverse_undoes_forward(name: str, errors: bool) -> None:
 def test_jacobian_agrees_with_the_twin(name: str, errors: bool) -> None:
     robot, _, pose, _ = case(name, errors)
     for i in range(ROWS):
-        close(robot.jacobian(pose[i]), twin.pose_jacobian(robot.model, pose[i]), 1e-7)
+        close(robot.jacobian(pose[i]), twin.pose_jacobian(robot.model, pose[i]), 1e-6)
 
 
 @both
@@ -120,9 +120,9 @@ def test_forward_and_error_jacobian_agree_with_the_twin(name: str, errors: bool)
     robot, q, pose, _ = case(name, errors)
     for i in range(ROWS):
         by_q, by_geometry = response(robot, pose[i], q[i])
-        close(robot.forward_jacobian(pose[i]), by_q, 1e-7)
-        close(robot.error_jacobian(pose[i]), by_geometry, 1e-7)
-        close(robot.error_jacobian(pose[i], q[i]), by_geometry, 1e-7)
+        close(robot.forward_jacobian(pose[i]), by_q, 1e-8)
+        close(robot.error_jacobian(pose[i]), by_geometry, 1e-8)
+        close(robot.error_jacobian(pose[i], q[i]), by_geometry, 1e-8)
 
 
 @both
@@ -132,10 +132,8 @@ def test_error_jacobian_foresees_what_solving_again_gives(name: str, errors: boo
     geometry = robot.geometry
     step = np.random.default_rng(11).standard_normal(len(geometry))
     step *= [1e-2 * ERRORS[unit] for unit in geometry.units]
-    ends = [
-        twin.forward(robot.model, q[0], slots(robot.replace(geometry.values + sign * step)), pose[0])
-        for sign in (1, -1)
-    ]
+    changed = [slots(robot.replace(geometry.values + sign * step)) for sign in (1, -1)]
+    ends = [twin.forward(robot.model, q[0], each, pose[0]) for each in changed]
     expected = robot.error_jacobian(pose[0]) @ step
     np.testing.assert_allclose((ends[0] - ends[1]) / 2.0, expected, rtol=1e-3, atol=1e-7)
 
@@ -163,12 +161,12 @@ def test_eight_rows_without_errors_are_six_rows() -> None:
     assert len(twin.closures(eight.model, pose[0], q[0])) == 8
     assert len(twin.closures(six.model, pose[0], q[0])) == 6
     found = eight.forward(q)
-    assert found.ok.all() and found.residual.max() < 1e-9
+    assert found.ok.all() and found.residual.max() < 1e-8
     np.testing.assert_allclose(found.pose, pose, rtol=0, atol=1e-9)
     for i in range(ROWS):
         by_q, by_geometry = response(eight, pose[i], q[i])
-        close(eight.forward_jacobian(pose[i]), by_q, 1e-7)
-        close(eight.error_jacobian(pose[i]), by_geometry, 1e-7)
+        close(eight.forward_jacobian(pose[i]), by_q, 1e-8)
+        close(eight.error_jacobian(pose[i]), by_geometry, 1e-8)
 
 
 def test_eight_rows_with_errors_are_missed_least_at_the_pose() -> None:
@@ -179,13 +177,14 @@ def test_eight_rows_with_errors_are_missed_least_at_the_pose() -> None:
     eight = eight.replace(geometry.values + sigma * noise)
     found = eight.forward(q)
     assert found.ok.all() and found.residual.min() > 0.01
+    weights = np.concatenate([(1.0, *limb.weights) for limb in eight.model.limbs])
     for i in range(ROWS):
         # the core's sphere row is (d.d - rho^2) / (2 rho), the twin's |d| - rho: what is left of a
         # sphere squared over twice its radius, here 1e-9 mm, lies between their answers
         expected = twin.forward(eight.model, q[i])
         np.testing.assert_allclose(found.pose[i], expected, rtol=0, atol=1e-7)
         missed = twin.closures(eight.model, found.pose[i], q[i])
-        np.testing.assert_allclose(np.abs(missed).max(), found.residual[i], rtol=1e-5)
+        np.testing.assert_allclose(np.abs(missed / weights).max(), found.residual[i], rtol=1e-5)
         for step in 1e-3 * np.vstack([np.eye(6), -np.eye(6)]):
             worse = twin.closures(eight.model, found.pose[i] + step, q[i])
             assert worse @ worse > missed @ missed

@@ -15,15 +15,16 @@ from pkmcal.robot import Robot
 from .simulated import hexapod_poses
 
 KINDS = ("pose", "position", "height", "distance")
-SHAPES = {"pose": (12, 6), "position": (12, 3), "height": (12,), "distance": (12,)}
+SHAPES = {"position": (12, 3), "height": (12,), "distance": (12,)}
 
 
 def measured(robot: Robot, kind: str, rng: np.random.Generator) -> Measurements:
     """Readings that the machine does not explain, of two targets in turn."""
-    q = robot.inverse(hexapod_poses(robot, 12, rng))
-    values = rng.normal(0, 3, SHAPES[kind])
+    poses = hexapod_poses(robot, 12, rng)
+    q = robot.inverse(poses)
     if kind == "pose":
-        return Measurements(q, values, kind)
+        return Measurements(q, poses + rng.normal(0, 0.01, poses.shape), kind)
+    values = rng.normal(0, 3, SHAPES[kind])
     two = np.array([[60.0, -20.0, 35.0], [300.0, 200.0, -50.0]])
     return Measurements(q, values, kind, target=two, target_index=np.arange(12) % 2)
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from pkmcal import robotfile
 
-# Half widths of the box about the home pose: x y z in mm, alpha beta gamma in rad. A coordinate that
-# the machine does not move, or that follows from the others, has 0. rbt-6t03p-printed has no
+# Half widths of the box about the home pose: x y z in mm, alpha beta gamma in rad. A coordinate
+# that the machine does not move, or that follows from the others, has 0. rbt-6t03p-printed has no
 # workspace: it is singular in every pose.
 WORKSPACE: dict[str, tuple[float, float, float, float, float, float]] = {
     "2tpr2tps": (0.0, 20.0, 20.0, 0.12, 0.12, 0.0),
@@ -41,8 +41,8 @@ def poses(name: str, count: int, seed: int = 0) -> np.ndarray:
 def follow_3rps(poses: np.ndarray) -> None:
     """Set x, y and gamma of a 3-RPS's poses (N, 6) to what z, alpha and beta lead to.
 
-    The platform joints, at radius r and 0, 120 and 240 degrees, stay in their legs' planes. With the
-    platform's axes n and o (columns of R) that is n_y = o_x, x = r (n_x - o_y) / 2, y = -r n_y.
+    The platform joints, at radius r and 0, 120 and 240 degrees, stay in their legs' planes. With
+    the platform's axes n and o (columns of R): n_y = o_x, x = r (n_x - o_y) / 2, y = -r n_y.
     """
     alpha, beta = poses[:, 3], poses[:, 4]
     gamma = np.arctan2(np.sin(alpha) * np.sin(beta), np.cos(alpha) + np.cos(beta))

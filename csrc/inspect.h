@@ -1,0 +1,88 @@
+/* A machine looked at: its closure rows with all their derivatives, and its limbs, at given poses. */
+#ifndef INSPECT_H
+#define INSPECT_H
+
+#include "jacobian.h"
+
+typedef struct {
+    double *residual;  /* (n, rows) [mm] */
+    double *by_step;   /* (n, rows, m), angles as arcs at the characteristic length */
+    double *by_free;   /* (n, rows, m), by the free coordinates as reported */
+    double *by_q;      /* (n, rows, actuators) */
+} closure_out;
+
+/* The closure rows at poses and actuator coordinates, limb by limb. */
+INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                        const double *pose, const double *q, const closure_out *out)
+{
+    const int m = map_m(map), actuators = machine->actuators;
+    limb_numbers limb[PKM_MAX_LIMBS];
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], lane_q[PKM_MAX_LIMBS], state[MAX_STATE], R[9], p[3];
+        real residual[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6];
+        FN(limb_sphere) sphere[PKM_MAX_LIMBS];
+        const int count = block_rows(first, n, row);
+        if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
+        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
+        for (int a = 0; a < actuators; a++) lane_q[a] = gather(q + a, actuators, row);
+        map_from_pose(map, lane_pose, state);
+        FN(map_frame)(map, state, R, p);
+        spheres_at(machine, limb, lane_q, sphere);
+        const int rows = FN(closure_rows)(map, SCALED, machine, sphere, state, residual, jacobian);
+        for (int i = 0, r = 0; i < machine->limbs; i++) {
+            const int limb_rows = 1 + __builtin_popcount((unsigned)machine->rows[i]);
+            for (int k = 0; k < limb_rows; k++, r++) {
+                const real *covector = &jacobian[machine->order[r] * m];
+                real step[6], free[6], by_q = fill(0.0), by_g[SLOTS];
+                scatter(residual[machine->order[r]], out->residual + r, rows, row, count);
+                for (int j = 0; j < m; j++) {
+                    step[j] = covector[j] * (map_is_angle(map, j) ? machine->length : 1.0);
+                    scatter(covector[j], out->by_step + r * m + j, rows * m, row, count);
+                }
+                map_free(map, state, step, free);
+                for (int j = 0; j < m; j++)
+                    scatter(free[j], out->by_free + r * m + j, rows * m, row, count);
+                if (k == 0)
+                    sphere_derivatives(machine, i, &limb[i], R, p, lane_q[machine->actuator[i]],
+                                       &by_q, by_g);
+                by_q *= sphere[i].scale * machine->weight[r];
+                for (int a = 0; a < actuators; a++)
+                    scatter(a == machine->actuator[i] ? by_q : fill(0.0),
+                            out->by_q + r * actuators + a, rows * actuators, row, count);
+            }
+        }
+    }
+}
+
+/* Of each limb at a pose as given: q̃ (NaN out of reach), and the unit vector from its anchor to the
+ * platform joint in base and in platform axes. */
+INLINE void limb_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                      const double *pose, double *drive, double *on_base, double *on_platform)
+{
+    const int limbs = machine->limbs;
+    limb_numbers limb[PKM_MAX_LIMBS];
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], R[9], p[3];
+        const int count = block_rows(first, n, row);
+        if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
+        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
+        FN(pose_frame)(lane_pose, R, p);
+        for (int i = 0; i < limbs; i++) {
+            real qt, by_q, by_g[SLOTS], square = fill(0.0);
+            const real q = limb_inverse(machine, i, &limb[i], R, p);
+            FN(limb_drive)(q, limb[i].g, &qt);
+            sphere_derivatives(machine, i, &limb[i], R, p, q, &by_q, by_g);
+            for (int k = 0; k < 3; k++) square += by_g[BASE_X + k] * by_g[BASE_X + k];
+            const real scale = 1.0 / FN(root)(square); /* ∂Φ/∂base = -d, ∂Φ/∂platform = Rᵀ d */
+            scatter(qt, drive + i, limbs, row, count);
+            for (int k = 0; k < 3; k++) {
+                scatter(-by_g[BASE_X + k] * scale, on_base + 3 * i + k, 3 * limbs, row, count);
+                scatter(by_g[PLATFORM_X + k] * scale, on_platform + 3 * i + k, 3 * limbs, row, count);
+            }
+        }
+    }
+}
+
+#endif

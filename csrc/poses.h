@@ -1,0 +1,65 @@
+/* Poses composed and inverted, for the base and tool frames of a robot. */
+#ifndef POSES_H
+#define POSES_H
+
+#include "lanes.h"
+#include "frames.h"
+
+INLINE void scatter_pose(const real p[3], const real sine[3], const real cosine[3], double *out,
+                         const ptrdiff_t *row, int count)
+{
+    for (int k = 0; k < 3; k++) {
+        scatter(p[k], out + k, 6, row, count);
+        scatter(arctangent2(sine[k], cosine[k]), out + 3 + k, 6, row, count);
+    }
+}
+
+/* out = A B; a stride is 0 where all rows share a pose, else 6. */
+INLINE void compose_rows(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
+                         ptrdiff_t b_stride, double *out)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_a[6], lane_b[6], p[3], sine[3], cosine[3];
+        const int count = block_rows(first, n, row);
+        for (int k = 0; k < 6; k++) {
+            lane_a[k] = gather(a + k, a_stride, row);
+            lane_b[k] = gather(b + k, b_stride, row);
+        }
+        FN(pose_compose)(lane_a, lane_b, p, sine, cosine);
+        scatter_pose(p, sine, cosine, out, row, count);
+    }
+}
+
+INLINE void invert_rows(ptrdiff_t n, const double *a, double *out)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_a[6], p[3], sine[3], cosine[3];
+        const int count = block_rows(first, n, row);
+        for (int k = 0; k < 6; k++) lane_a[k] = gather(a + k, 6, row);
+        FN(pose_invert)(lane_a, p, sine, cosine);
+        scatter_pose(p, sine, cosine, out, row, count);
+    }
+}
+
+/* Rates (n, 6, 6) of A T C by those of T, for poses T and A T C. */
+INLINE void compose_rates_rows(ptrdiff_t n, const double *a, const double *pose, const double *c,
+                               const double *composed, double *rates)
+{
+    real lane_a[6], lane_c[6];
+    for (int k = 0; k < 6; k++) lane_a[k] = fill(a[k]), lane_c[k] = fill(c[k]);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], lane_composed[6], out[36];
+        const int count = block_rows(first, n, row);
+        for (int k = 0; k < 6; k++) {
+            lane_pose[k] = gather(pose + k, 6, row);
+            lane_composed[k] = gather(composed + k, 6, row);
+        }
+        FN(pose_compose_rates)(lane_a, lane_pose, lane_c, lane_composed, out);
+        for (int k = 0; k < 36; k++) scatter(out[k], rates + k, 36, row, count);
+    }
+}
+
+#endif

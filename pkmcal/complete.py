@@ -1,0 +1,105 @@
+"""Poses that a machine can take: completed from some coordinates, and how far a pose is from one.
+
+Where limbs constrain the pose (3-RPS, spatial 2TPR&2TPS) or share an actuator, six numbers are too
+many: the closures, with the matched coordinates held, determine the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pkmcal.core import MAPS, POSE, FloatArray, Machine
+from pkmcal.suggest import did_you_mean
+
+ITERATIONS = 30
+SETTLED = 1e-12  # of the machine's size
+
+
+def matched_coordinates(
+    match: bool | str | Sequence[str], declared: Sequence[str] | None, coordinates: Sequence[str]
+) -> list[int]:
+    """Places of the matched coordinates in x y z α β γ.
+
+    Raises
+    ------
+    ValueError
+        An unknown coordinate, or ``match=True`` where the robot declares none.
+    """
+    if match is True:
+        names = tuple(declared if declared is not None else coordinates)
+    elif match is False or match is None:
+        raise ValueError(f"match must be True or names of coordinates, found {match!r}")
+    else:
+        names = (match,) if isinstance(match, str) else tuple(match)
+    for name in names:
+        if name not in POSE:
+            raise ValueError(f"match: {name!r} is no coordinate{did_you_mean(str(name), POSE)}")
+    if len(set(names)) != len(names):
+        raise ValueError(f"match: a coordinate is named twice in {', '.join(names)}")
+    return [POSE.index(name) for name in names]
+
+
+def complete(
+    machine: Machine, map: str, slots: FloatArray, pose: FloatArray, matched: Sequence[int]
+) -> tuple[FloatArray, FloatArray]:
+    """Poses on the machine's manifold that keep the matched coordinates.
+
+    Newton's method on the closures and the matched coordinates, in the free coordinates and the
+    actuator coordinates together; least squares where there are more rows than needed.
+
+    Parameters
+    ----------
+    machine : Machine
+        The machine.
+    map : str
+        Its pose map.
+    slots : ndarray (limbs, SLOTS)
+        Geometry.
+    pose : ndarray (N, 6)
+        Where to start, and what to keep.
+    matched : sequence of int
+        Places in x y z α β γ.
+
+    Returns
+    -------
+    pose : ndarray (N, 6)
+        NaN where there is none.
+    q : ndarray (N, n)
+        The actuator coordinates there.
+    """
+    free = [POSE.index(name) for name in MAPS[map]]
+    unknown = [i for i in matched if i not in free]
+    if unknown:
+        raise ValueError(f"match: {POSE[unknown[0]]} is not free on this machine")
+    freedom = len(free) + machine.actuators - machine.rows
+    if len(matched) != freedom and machine.rows <= len(free):
+        raise ValueError(f"match must name {freedom} coordinates here, found {len(matched)}")
+    weight = 1.0 if machine.rows <= len(free) else 1e6  # hold them in least squares too
+    keep = np.zeros((len(matched), len(free) + machine.actuators))
+    keep[np.arange(len(matched)), [free.index(i) for i in matched]] = weight
+    own = pose.copy()
+    wanted = own[:, matched]
+    q = machine.inverse(slots, own)
+    size = machine.struct.size
+    live = np.isfinite(q).all(axis=1)
+    done = np.zeros(len(own), dtype=bool)
+    for _ in range(ITERATIONS):
+        rows = np.flatnonzero(live & ~done)
+        if not rows.size:
+            break
+        closure = machine.closure(slots, own[rows], q[rows])
+        left = np.concatenate([closure.by_free, closure.by_q], axis=-1)
+        left = np.concatenate([left, np.broadcast_to(keep, (len(rows), *keep.shape))], axis=1)
+        missing = own[rows][:, matched] - wanted[rows]
+        right = np.concatenate([closure.residual, weight * missing], axis=1)
+        good = np.isfinite(left).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
+        live[rows[~good]] = False
+        step = np.zeros((len(rows), left.shape[-1]))
+        step[good] = -(np.linalg.pinv(left[good]) @ right[good][..., None])[..., 0]
+        own[np.ix_(rows, free)] += step[:, : len(free)]
+        q[rows] += step[:, len(free) :]
+        done[rows] = good & (np.abs(step).max(axis=1) <= SETTLED * size)
+    own[~done], q[~done] = np.nan, np.nan
+    return machine.forward(slots, q, own, threads=None)[0], q
