@@ -63,7 +63,7 @@ sanitize: $(TESTS)
 	LD_PRELOAD="$$($${CC:-gcc} -print-file-name=libasan.so)" $(BIN)/pytest -m "not slow" tests
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info pkmcal/*.so .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	rm -rf $(VENV) build dist pkmcal-demo *.egg-info pkmcal/*.so .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 # An environment without pip is half-made (no python3-venv, or interrupted): it goes.

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 from typing import Any
 
-from pkmcal.measurement_csv import read_measurements
-from pkmcal.measurements import Measurements
+from pkmcal.compensate import Compensation, compensate
 from pkmcal.feasible import Feasibility
 from pkmcal.forward import Forward
+from pkmcal.identification import Identification
+from pkmcal.identify import identify
+from pkmcal.measurement_csv import read_measurements
+from pkmcal.measurements import Measurements
 from pkmcal.robot import Robot, load, machines
 from pkmcal.virtual import VirtualMachine
 
 __all__ = [
+    "Compensation",
     "Feasibility",
     "Forward",
+    "Identification",
     "Measurements",
     "Robot",
     "VirtualMachine",
+    "compensate",
+    "identify",
     "load",
     "machines",
     "read_measurements",

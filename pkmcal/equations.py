@@ -124,6 +124,10 @@ class Equations:
         theta[first : first + 6] = _laid_on(pairs)
         return self.at(theta)
 
+    def go_on_from(self, point: Point) -> None:
+        """Let later calls of `at` start from its poses."""
+        self._guess = np.where(point.status[:, None] == 0, point.pose, self._guess)
+
     def _target(self, i: int, theta: FloatArray) -> FloatArray | None:
         columns = self._columns[i]
         if columns is not None:
@@ -134,11 +138,7 @@ class Equations:
         return None if at_origin else measured.targets
 
     def jacobian(self, point: Point) -> list[FloatArray]:
-        """Derivative of the predicted values of each set to the parameters, (N, k, n).
-
-        The poses of `point` are where later calls of `at` start.
-        """
-        self._guess = point.pose
+        """Derivative of the predicted values of each set to the parameters, (N, k, n)."""
         p = self.parameters
         by_geometry = point.robot.error_jacobian(point.pose, self.actuators)[:, :, p.places]
         parts = []
@@ -198,9 +198,13 @@ class Equations:
             freedom += (len(measured) - len(count)) * lengths.shape[1]
         return float(np.sqrt(squares / freedom)) if freedom else float("nan")
 
+    def status(self, point: Point) -> NDArray[np.int32]:
+        """Of the forward kinematics, for each row."""
+        return np.concatenate([point.status[place] for place in self.pose_of])
+
     def unreached(self, point: Point) -> str:
         """Which rows the machine does not reach and why, in words; empty where it reaches all."""
-        status = np.concatenate([point.status[place] for place in self.pose_of])
+        status = self.status(point)
         parts = []
         for code in sorted(set(status.tolist()) - {0}):
             rows = self.rows[status == code].tolist()

@@ -1,9 +1,8 @@
-"""The estimator: least squares through scipy, with noise, rank and covariance at its solution."""
+"""The estimator: noise, rank and covariance around the least squares."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from pkmcal.equations import Equations, Point
 from pkmcal.identifiability import Decomposed, Directions, decompose, directions, triangle
 from pkmcal.loss import Loss
+from pkmcal.search import Search
 
 FloatArray = NDArray[np.float64]
 
@@ -76,38 +76,27 @@ class Estimate:
 
 
 class Estimator:
-    """Weighted least squares in scaled parameters, u = (θ - θ0)/scale.
+    """Weighted least squares, and what follows from them.
 
     Parameters
     ----------
     equations : Equations
         What is fitted.
     start : Point
-        θ0: where the search starts and what the smallest change counts from.
+        Where the search starts and what the smallest change counts from.
     loss : str
         A name of `pkmcal.loss.LIMITS`.
     """
 
     def __init__(self, equations: Equations, start: Point, loss: str) -> None:
-        parameters = equations.parameters
         self.equations, self.start, self.loss = equations, start, loss
-        self.scale = parameters.scale
-        sigma = parameters.prior / self.scale
-        stated = np.flatnonzero(np.isfinite(sigma))
-        self.prior = np.eye(len(sigma))[stated] / sigma[stated, None]  # one row for each
-        self._centre = (parameters.start - start.theta) / self.scale
-        lower, upper = ((end - start.theta) / self.scale for end in parameters.bounds)
-        bounded = bool(np.isfinite([lower, upper]).any())
-        self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
-        self._method: Literal["trf", "lm"] = "trf" if bounded else "lm"
+        self.search = Search(equations, start)
+        self.scale, self.prior = self.search.scale, self.search.prior
         self.unstated = np.array([m.sigma is None for m in equations.sets])
         set_of = np.repeat(equations.set_of, equations.components)
         self._equations_of = [set_of == i for i in range(len(self.unstated))]
-        self._at_start = self._jacobian(start, np.ones(len(self.unstated)))
+        self._at_start = self.search.jacobian(start, np.ones(len(self.unstated)))
         self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
-        self._last: tuple[FloatArray, Point] = (np.zeros(len(sigma)), start)
-        self.evaluations = 0
-        self.converged = False
 
     def solve(self) -> Estimate:
         """The estimate; noise that is not stated is estimated along, set by set."""
@@ -118,7 +107,11 @@ class Estimator:
             raise ValueError(f"they tell nothing about {names}")
         u = np.zeros(len(self.scale))
         for _ in range(_ROUNDS):
-            u = self._least_squares(u, setting)
+            # what is not told is held by rows that nothing contradicts
+            kept = setting.searched.untold
+            pins = setting.searched.singular[0] * kept.T
+            u = self.search.best(u, setting.noise, setting.loss, pins)
+            u = u - kept @ (kept.T @ u)
             estimate = self._estimate(u, setting)
             revised = self._revised(estimate)
             steady = self._steady(setting, revised)
@@ -144,7 +137,9 @@ class Estimator:
             at_start = self._at_start / (noise @ np.array(self._equations_of))[:, None]
             self._first = noise, self._decomposed(at_start)
         _, first = self._first
-        now = (None, None) if point is None else self._decomposed(self._jacobian(point, noise))
+        now = (
+            (None, None) if point is None else self._decomposed(self.search.jacobian(point, noise))
+        )
         told = directions(first[0], now[0], size)
         determined = directions(first[1], now[1], size)
         return Setting(noise, loss, told, determined, directions(first[1], now[1], size, faint))
@@ -193,24 +188,6 @@ class Estimator:
             old.loss.width, new.loss.width, rtol=1e-3
         )
 
-    # the least squares --------------------------------------------------------------------------
-
-    def _at(self, u: FloatArray) -> Point:
-        if not np.array_equal(u, self._last[0]):
-            self._last = (u.copy(), self.equations.at(self.start.theta + self.scale * u))
-            self.evaluations += 1
-        return self._last[1]
-
-    def _jacobian(self, point: Point, noise: FloatArray) -> FloatArray:
-        equations = self.equations
-        jacobian = equations.whitened(equations.jacobian(point), noise) * self.scale
-        if not np.isfinite(jacobian).all():
-            raise ValueError(
-                "no geometry near the present one agrees: the fit runs into poses"
-                " where the actuators do not hold the machine (type-2 singular)"
-            )
-        return jacobian
-
     def plain(self, point: Point) -> FloatArray:
         """Scaled Jacobian (M, n), not whitened: mm per mm, angles as their arc."""
         parts = []
@@ -220,50 +197,9 @@ class Estimator:
         jacobian: FloatArray = np.concatenate(parts) * self.scale
         return jacobian
 
-    def _least_squares(self, u: FloatArray, setting: Setting) -> FloatArray:
-        from scipy.optimize import least_squares
-
-        equations, noise, loss = self.equations, setting.noise, setting.loss
-        # what is not told is held by rows that nothing contradicts
-        pins = setting.searched.singular[0] * setting.searched.untold.T
-        extra = np.vstack([self.prior, pins])
-        offset = np.concatenate([self.prior @ self._centre, np.zeros(len(pins))])
-        first = equations.whitened(self._at(u).residuals, noise)
-        refused = 10.0 * (1.0 + np.abs(first).max())
-
-        def residual(u: FloatArray) -> FloatArray:
-            point = self._at(u)
-            held = extra @ u - offset
-            if not point.reached:  # worse than any step that is taken
-                return np.full(len(first) + len(held), refused)
-            data = loss.residual(equations.whitened(point.residuals, noise))
-            return np.concatenate([-data, held])
-
-        def jacobian(u: FloatArray) -> FloatArray:
-            point = self._at(u)
-            data = equations.whitened(point.residuals, noise)
-            return np.vstack([loss.jacobian(data, self._jacobian(point, noise)), extra])
-
-        found = least_squares(
-            residual,
-            u,
-            jacobian,
-            bounds=self._bounds,
-            method=self._method,
-            x_scale=1.0,
-            ftol=1e-12,  # 1e-5 of a standard deviation
-            xtol=1e-10,
-            gtol=1e-15,
-            max_nfev=200,
-        )
-        self.converged = bool(found.status > 0)
-        kept = setting.searched.untold
-        solution: FloatArray = found.x - kept @ (kept.T @ found.x)
-        return solution
-
     def _estimate(self, u: FloatArray, setting: Setting) -> Estimate:
-        point = self._at(u)
-        jacobian = self._jacobian(point, setting.noise)
+        point = self.search.at(u)
+        jacobian = self.search.jacobian(point, setting.noise)
         residual = self.equations.whitened(point.residuals, setting.noise)
         weights = setting.loss.weights(residual)
         every = np.repeat(weights, self.equations.components)

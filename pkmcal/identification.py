@@ -53,6 +53,8 @@ class Identification:
         The same of points that were held out; NaN where none were.
     holdout_expected : float
         What `holdout_rms` should be if noise and covariance are right.
+    holdout_unreached : str
+        Which held-out rows the machine does not reach, and were left out; empty where none.
     chi2_per_dof : float
         About 1 if the noise is as stated; NaN where no sigma was given.
     dof : float
@@ -93,6 +95,7 @@ class Identification:
     holdout_rms: float
     holdout_rms_before: float
     holdout_expected: float
+    holdout_unreached: str
     chi2_per_dof: float
     dof: float
     noise: tuple[float, ...]

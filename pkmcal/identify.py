@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ FloatArray = NDArray[np.float64]
 
 _POOR = 0.1  # share of the misfit that a fit worth its name does not leave
 _FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
+_NOISY = 9.0  # chi²/dof that a slip in sigma does not explain
 _INVOLVED = 1e-6  # share of a parameter in what cannot be told, above which it cannot be told
 
 
@@ -124,24 +126,41 @@ def identify(
     except ValueError as error:
         hint = "".join(f"; {text}" for text in misread(shares, chosen, start))
         raise ValueError(f"measurements: {error}{hint}") from None
-    compared = compare(held, estimator, estimate)
-    moved = np.abs((estimate.point.theta - start.theta) / chosen.scale).max()
-    badly = equations.rms(estimate.point) > _POOR * equations.rms(start)
-    noted = misread(shares, chosen, start) if badly or moved > _FAR * robot.length else []
-    noted += meagre(equations, estimate.setting.told.rank, bool(len(estimator.prior)))
-    faint = estimate.setting.determined.rank - estimate.setting.searched.rank
-    if faint > 0:
-        noted.append(
-            f"{faint} combinations of parameters are told to no better than {robot.length:.0f} mm,"
-            " the machine's size, and were kept as they were: state a prior or measure more poses"
-        )
-    if compared.unreached:
-        noted.append(f"holdout: {compared.unreached}; left out")
-    if not estimator.converged:
-        noted.append("the least squares did not converge: the result is not to be trusted")
-    for text in noted:
+    result = _result(estimator, estimate, compare(held, estimator, estimate))
+    notes = _doubts(result, estimator, estimate, shares)
+    for text in notes:
         warnings.warn(text, UserWarning, stacklevel=2)
-    return _result(estimator, estimate, compared, tuple(noted))
+    return replace(result, warnings=tuple(notes))
+
+
+def _doubts(
+    result: Identification, estimator: Estimator, estimate: Estimate, shares: Sequence[Share]
+) -> list[str]:
+    """What looks wrong with the measurements or the fit."""
+    equations, size = estimator.equations, estimator.start.robot.length
+    moved = np.abs((result.values - result.start) / estimator.scale).max()
+    notes: list[str] = []
+    if result.rms > _POOR * result.rms_before or moved > _FAR * size:
+        notes += misread(shares, equations.parameters, estimator.start)
+    notes += meagre(equations, result.rank, bool(len(estimator.prior)))
+    if result.chi2_per_dof > _NOISY:
+        cure = "free more parameters, or state the true sigma"
+        if result.outliers:
+            cure = "look at the outliers, fit with loss='huber', or " + cure
+        notes.append(
+            f"residuals are {np.sqrt(result.chi2_per_dof):.3g} times what sigma says: {cure}"
+        )
+    faint = estimate.setting.determined.rank - estimate.setting.searched.rank
+    if faint:
+        notes.append(
+            f"{faint} combinations of parameters are told to no better than {size:.0f} mm, the"
+            " machine's size, and were kept as they were: state a prior or measure more poses"
+        )
+    if not result.converged:
+        notes.append("the least squares did not converge: the result is not to be trusted")
+    if result.holdout_unreached:
+        notes.append(f"holdout: {result.holdout_unreached}; left out")
+    return notes
 
 
 def _shares(
@@ -201,9 +220,7 @@ def _words(argument: str, given: str | Sequence[str], count: int) -> list[bool]:
     return [word == "unknown" for word in words]
 
 
-def _result(
-    estimator: Estimator, estimate: Estimate, compared: HeldOut, noted: tuple[str, ...]
-) -> Identification:
+def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Identification:
     equations, chosen = estimator.equations, estimator.equations.parameters
     setting, theta, scale = estimate.setting, estimate.point.theta, chosen.scale
     untold, searched = setting.determined.untold, setting.searched.told
@@ -243,6 +260,7 @@ def _result(
         holdout_rms=compared.rms,
         holdout_rms_before=compared.rms_before,
         holdout_expected=compared.expected,
+        holdout_unreached=compared.unreached,
         chi2_per_dof=float("nan") if no_sigma else float((squares + prior_off @ prior_off) / dof),
         dof=dof,
         noise=tuple(np.where(estimator.unstated, setting.noise, np.nan).tolist()),
@@ -254,9 +272,9 @@ def _result(
         rows=equations.rows,
         outliers=tuple(equations.rows[odd].tolist()),
         at_bounds=tuple(name for name, at in zip(chosen.names, at_bound, strict=True) if at),
-        converged=estimator.converged,
-        evaluations=estimator.evaluations,
-        warnings=noted,
+        converged=estimator.search.converged,
+        evaluations=estimator.search.evaluations,
+        warnings=(),
         _places=chosen.places,
         _told=covariance,
         _undetermined=untold * scale[:, None],

@@ -9,11 +9,17 @@ from pkmcal.robot import Robot
 
 
 def with_errors(robot: Robot, sigma: float, rng: np.random.Generator) -> Robot:
-    """The robot with Gaussian errors (mm) on its default free numbers."""
-    names = robot.geometry.match(robot.model.free)
+    """The robot with Gaussian errors on its default free numbers, in mm; of angles the arc."""
+    geometry = robot.geometry
+    units = dict(zip(geometry.names, geometry.units, strict=True))
+    per_mm = {"mm": 1.0, "rad": 1.0 / robot.length}
+    names = geometry.match(robot.model.free)
     errors = rng.normal(0.0, sigma, len(names))
     return robot.replace(
-        {name: robot.geometry[name] + error for name, error in zip(names, errors, strict=True)}
+        {
+            name: geometry[name] + error * per_mm[units[name]]
+            for name, error in zip(names, errors, strict=True)
+        }
     )
 
 

@@ -80,6 +80,15 @@ def test_angles_in_degrees_are_named() -> None:
     assert any("the angles are in degrees" in text for text in texts)
 
 
+def test_residuals_far_above_sigma_are_named(paper: Robot, points: Measurements) -> None:
+    (text,) = said(paper, points, free="offset*")
+    assert "times what sigma says: free more parameters" in text
+    wrong = points.values.copy()
+    wrong[5] += [0.0, 0.0, 2.0]
+    (text,) = said(paper, dataclasses.replace(points, values=wrong), prior=0.5)
+    assert "look at the outliers" in text
+
+
 def test_good_measurements_raise_no_suspicion(paper: Robot, points: Measurements) -> None:
     assert said(paper, points, prior=0.5) == []
     large = with_errors(paper, 5.0, np.random.default_rng(3))
