@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.core import MAPS, POSE, FloatArray, Machine
+from pkmcal.geometry import BoolArray
 from pkmcal.suggest import did_you_mean
 
 ITERATIONS = 30
@@ -83,7 +84,7 @@ def complete(
     wanted = own[:, matched]
     q = machine.inverse(slots, own)
     size = machine.struct.size
-    live = np.isfinite(q).all(axis=1)
+    live: BoolArray = np.asarray(np.isfinite(q).all(axis=1))
     done = np.zeros(len(own), dtype=bool)
     for _ in range(ITERATIONS):
         rows = np.flatnonzero(live & ~done)
@@ -98,7 +99,7 @@ def complete(
         live[rows[~good]] = False
         step = np.zeros((len(rows), left.shape[-1]))
         step[good] = -(np.linalg.pinv(left[good]) @ right[good][..., None])[..., 0]
-        own[np.ix_(rows, free)] += step[:, : len(free)]
+        own[rows[:, None], free] += step[:, : len(free)]
         q[rows] += step[:, len(free) :]
         done[rows] = good & (np.abs(step).max(axis=1) <= SETTLED * size)
     own[~done], q[~done] = np.nan, np.nan

@@ -357,10 +357,14 @@ class Machine:
     def limbs(
         self, slots: FloatArray, pose: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Of each limb at poses (N, 6): q̃ (N, limbs), and the unit vectors from its anchor to the
-        platform joint in base and in platform axes (N, limbs, 3)."""
+        """Look at each limb at poses (N, 6).
+
+        Its q̃ (N, limbs), and the unit vectors from its anchor to the
+        platform joint in base and in platform axes (N, limbs, 3).
+        """
         n, limbs = len(pose), slots.shape[-2]
-        drive, base, platform = np.empty((n, limbs)), np.empty((n, limbs, 3)), np.empty((n, limbs, 3))
+        drive = np.empty((n, limbs))
+        base, platform = np.empty((n, limbs, 3)), np.empty((n, limbs, 3))
         if n:
             self._ensure(
                 lib.pkm_limbs(

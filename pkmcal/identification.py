@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import textwrap
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
 from pkmcal.core import as_rows
-from pkmcal.identifiability import in_words, plain_basis
 from pkmcal.predict import predict
 from pkmcal.robot import Robot
 
@@ -46,6 +44,9 @@ class Identification:
     gap : float
         Singular value of the last combination told over that of the first not told; inf where all
         are told.
+    unidentifiable : tuple of str
+        The combinations that they do not tell, in words. They keep what they had, or follow the
+        prior. Shares are in mm at the machine: an angle counts as its arc.
     rms, rms_before : float
         √(Σ r²/N) over the N fitted points, unweighted, r the distance in mm; of poses that of
         their positions.
@@ -90,6 +91,7 @@ class Identification:
     covariance: FloatArray
     rank: int
     gap: float
+    unidentifiable: tuple[str, ...]
     rms: float
     rms_before: float
     holdout_rms: float
@@ -111,23 +113,12 @@ class Identification:
     _places: NDArray[np.intp]  # of the free numbers in the geometry
     _told: FloatArray  # covariance of what is determined, (n, n)
     _undetermined: FloatArray  # directions of what is not, mm and rad (n, d)
-    _untold: FloatArray  # directions that the measurements do not tell, scaled (n, n - rank)
 
     @property
     def parameters(self) -> dict[str, dict[str, float]]:
         """Value and standard deviation by name; mm and rad."""
         pairs = zip(self.free, self.values.tolist(), self.stderr.tolist(), strict=True)
         return {name: {"value": value, "stderr": stderr} for name, value, stderr in pairs}
-
-    @cached_property
-    def unidentifiable(self) -> tuple[str, ...]:
-        """The combinations that the measurements do not tell, in words.
-
-        They keep what they had, as the start has it, or follow the prior. Shares are of mm that
-        the machine is moved: an angle counts as its arc.
-        """
-        basis = plain_basis(self._untold, self.free)
-        return tuple(in_words(combination, self.free) for combination in basis.T)
 
     @property
     def correlations(self) -> tuple[tuple[str, str, float], ...]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pkmcal.equations import Equations
 from pkmcal.estimate import Estimate, Estimator
 from pkmcal.holdout import HeldOut, compare, drawn
-from pkmcal.identifiability import observability
+from pkmcal.identifiability import in_words, observability, plain_basis
 from pkmcal.identification import Identification
 from pkmcal.loss import LIMITS
 from pkmcal.measurements import Measurements
@@ -238,6 +238,7 @@ def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Iden
     at_bound = np.isclose(theta, chosen.lower, rtol=1e-9, atol=1e-9) | np.isclose(
         theta, chosen.upper, rtol=1e-9, atol=1e-9
     )
+    plain = plain_basis(setting.told.untold, chosen.names)
     odd = outliers(
         estimate.residual,
         estimate.jacobian @ searched,
@@ -255,6 +256,7 @@ def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Iden
         covariance=shown,
         rank=setting.told.rank,
         gap=setting.told.gap,
+        unidentifiable=tuple(in_words(c, chosen.names) for c in plain.T),
         rms=equations.rms(estimate.point),
         rms_before=equations.rms(estimator.start),
         holdout_rms=compared.rms,
@@ -278,5 +280,4 @@ def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Iden
         _places=chosen.places,
         _told=covariance,
         _undetermined=untold * scale[:, None],
-        _untold=setting.told.untold,
     )
