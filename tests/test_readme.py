@@ -98,7 +98,7 @@ def test_options_named_in_the_text_work(beside_the_examples: Path) -> None:
     for option in options:
         extra = shlex.split(option.replace("DIR", "calibrated"))
         if extra[0] == "--prior":
-            extra += ["--free", "rod*"]
+            extra += ["--free", "radius,angle[12],offset*,rod*"]
         assert run([*calibrate, *extra]).exit_code == 0, option
     assert pk.load("calibrated/robot.toml").name == pk.load(DELTA / "robot.toml").name
 
