@@ -93,14 +93,12 @@ INLINE int quick_rows(int map, const forward_call *call, const limb_numbers *sha
         if (!shared)
             prepare_limbs(machine, call->geometry, call->geometry_stride, row[h], own);
         load_rows(call, shared ? shared : own, row[h], once, &all->in[h]);
-        start_state(map, machine, &all->in[h], start, all->fine[h]);
     }
     for (int t = 0; t < BLOCKS; t++) {
         for (int i = 0; i < machine->limbs; i++)
             join_spheres(machine, i, once, &all->in[2 * t].sphere[i], &all->in[2 * t + 1].sphere[i],
                          &all->sphere[t][i]);
-        for (int s = 0; s < MAX_STATE; s++)
-            all->state[t][s] = join(all->fine[2 * t][s], all->fine[2 * t + 1][s]);
+        start_states(map, machine, &all->in[2 * t], &all->in[2 * t + 1], start, all->state[t]);
     }
     steps_in_floats(map, machine, steps, start, all);
     steps_in_doubles(map, machine, all);

@@ -19,7 +19,8 @@ enum { STEPS_PREDICTED = 2, STEPS_GUESSED = 3 }; /* Newton steps in floats */
 /* Where all rows start from: the step per actuator coordinate, and the sign of the determinant. */
 typedef struct {
     int known;
-    real q[PKM_MAX_LIMBS], slope[6 * PKM_MAX_LIMBS], state[MAX_STATE];
+    real q[PKM_MAX_LIMBS];
+    narrow slope[6 * PKM_MAX_LIMBS], state[MAX_STATE];
     narrow_mask sign;
 } prediction;
 
@@ -53,14 +54,15 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
 {
     const int m = map_m(map), actuators = machine->actuators;
     real pose[6], R[9], p[3], phi[PKM_MAX_ROWS], A[1][36], X[1][PKM_MAX_ROWS], by_g[SLOTS];
+    real state[MAX_STATE] = {0}, slope[6 * PKM_MAX_LIMBS] = {0};
     narrow factors[36];
     FN(limb_sphere) sphere[PKM_MAX_LIMBS];
     for (int k = 0; k < 6; k++) pose[k] = fill(guess[k]);
-    map_from_pose(map, pose, start->state);
-    FN(map_frame)(map, start->state, R, p);
+    map_from_pose(map, pose, state);
+    FN(map_frame)(map, state, R, p);
     inverse_at(machine, limb, R, p, start->q);
     mask usable = spheres_at(machine, limb, start->q, sphere);
-    FN(closure_rows)(map, PLAIN, machine, sphere, start->state, phi, A[0]);
+    FN(closure_rows)(map, PLAIN, machine, sphere, state, phi, A[0]);
     FN(factor)(m, 1, A);
     for (int i = 0, r = 0; i < machine->limbs; i++) {
         const int a = machine->actuator[i];
@@ -70,34 +72,42 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
         X[0][machine->order[r]] = by_q;
         FN(substitute)(m, 1, A, X);
         for (int j = 0; j < m; j++) {
-            start->slope[j * actuators + a] -= X[0][j];
+            slope[j * actuators + a] -= X[0][j];
             usable &= finite(X[0][j]);
         }
         r += 1 + __builtin_popcount((unsigned)machine->rows[i]);
     }
     for (int k = 0; k < m * m; k++) factors[k] = join(A[0][k], A[0][k]);
+    for (int k = 0; k < m * actuators; k++) start->slope[k] = join(slope[k], slope[k]);
+    for (int s = 0; s < MAX_STATE; s++) start->state[s] = join(state[s], state[s]);
     start->sign = determinant_sign(m, factors);
     start->known = usable[0] != 0;
 }
 
-INLINE void start_state(int map, const pkm_machine *machine, const rows_in *in,
-                        const prediction *start, real *state)
+/* Where two halves start, in floats: predicted, or at their own guesses. */
+INLINE void start_states(int map, const pkm_machine *machine, const rows_in *low,
+                         const rows_in *high, const prediction *start, narrow *state)
 {
     const int m = map_m(map), actuators = machine->actuators;
-    real step[6], turn = fill(0.0);
+    narrow step[6], change[PKM_MAX_LIMBS], turn = fill_narrow(0);
     if (!start->known) {
-        map_from_pose(map, in->guess, state);
+        real first[MAX_STATE] = {0}, second[MAX_STATE] = {0};
+        map_from_pose(map, low->guess, first);
+        map_from_pose(map, high->guess, second);
+        for (int s = 0; s < MAX_STATE; s++) state[s] = join(first[s], second[s]);
         return;
     }
+    for (int a = 0; a < actuators; a++)
+        change[a] = join(low->q[a] - start->q[a], high->q[a] - start->q[a]);
     for (int j = 0; j < m; j++) {
-        step[j] = fill(0.0);
-        for (int a = 0; a < actuators; a++)
-            step[j] += start->slope[j * actuators + a] * (in->q[a] - start->q[a]);
-        if (map_is_angle(map, j)) turn = larger(turn, absolute(step[j]));
+        step[j] = fill_narrow(0);
+        for (int a = 0; a < actuators; a++) step[j] += start->slope[j * actuators + a] * change[a];
+        if (map_is_angle(map, j)) turn = larger_narrow(turn, absolute_narrow(step[j]));
     }
-    const real share = rough_reciprocal(larger(turn * (1.0 / MAX_TURN), fill(1.0)));
+    const narrow limit = fill_narrow((float)MAX_TURN);
+    const narrow share = limit / larger_narrow(turn, limit);
     for (int j = 0; j < m; j++) step[j] *= share;
-    FN(map_retract)(map, start->state, step, state);
+    map_retract_narrow(map, start->state, step, state);
 }
 
 /* Two wide spheres as one narrow; the constants of shared numbers only `once`. */
