@@ -87,14 +87,17 @@ INLINE int quick_rows(int map, const forward_call *call, const limb_numbers *sha
     const int once = !shared || first == 0; /* is there anything but actuators to load? */
     ptrdiff_t row[HALVES][LANES];
     int count[HALVES], losses = 0;
-    for (int h = 0; h < HALVES; h++) {
+    const ptrdiff_t halves = (call->n - first + LANES - 1) / LANES;
+    all->halves = halves < HALVES ? (int)halves : HALVES;
+    all->blocks = (all->halves + 1) / 2;
+    for (int h = 0; h < 2 * all->blocks; h++) {
         limb_numbers own[PKM_MAX_LIMBS];
         count[h] = block_rows(first + h * LANES, call->n, row[h]);
         if (!shared)
             prepare_limbs(machine, call->geometry, call->geometry_stride, row[h], own);
         load_rows(call, shared ? shared : own, row[h], once, &all->in[h]);
     }
-    for (int t = 0; t < BLOCKS; t++) {
+    for (int t = 0; t < all->blocks; t++) {
         for (int i = 0; i < machine->limbs; i++)
             join_spheres(machine, i, once, &all->in[2 * t].sphere[i], &all->in[2 * t + 1].sphere[i],
                          &all->sphere[t][i]);
@@ -102,7 +105,7 @@ INLINE int quick_rows(int map, const forward_call *call, const limb_numbers *sha
     }
     steps_in_floats(map, machine, steps, start, all);
     steps_in_doubles(map, machine, all);
-    for (int h = 0; h < HALVES && count[h] > 0; h++) {
+    for (int h = 0; h < all->halves; h++) {
         const mask status = select_mask(all->solved[h], fill_mask(PKM_OK), fill_mask(-1));
         store_rows(map, call, all->fine[h], status, fill(steps + 2.0), all->worst[h], row[h], count[h]);
         if (any(status))
@@ -116,7 +119,7 @@ INLINE void forward_map(int map, const forward_call *call)
 {
     const pkm_machine *machine = call->machine;
     limb_numbers numbers[PKM_MAX_LIMBS];
-    prediction start = {0};
+    prediction start;
     batch all;
     ptrdiff_t lost[CHUNK + LANES], zero[LANES] = {0};
     int rows = 0, losses = 0;
@@ -124,9 +127,12 @@ INLINE void forward_map(int map, const forward_call *call)
     const int square = rows == map_m(map);
     const limb_numbers *shared = call->geometry_stride ? NULL : numbers;
     if (shared) prepare_limbs(machine, call->geometry, 0, zero, numbers);
+    start.known = 0;
     if (shared && square && !call->guess_stride)
         predict(map, machine, shared, call->guess, &start);
-    memset(&all, 0, sizeof all);
+    memset(all.state, 0, sizeof all.state);
+    memset(all.fine, 0, sizeof all.fine);
+    memset(all.factors, 0, sizeof all.factors);
     for (ptrdiff_t first = 0; first < call->n;) {
         const ptrdiff_t end = first + CHUNK < call->n ? first + CHUNK : call->n;
         if (square)

@@ -38,6 +38,7 @@ typedef struct {
     narrow state[BLOCKS][MAX_STATE], factors[BLOCKS][36];
     real fine[HALVES][MAX_STATE], worst[HALVES];
     mask solved[HALVES];
+    int halves, blocks; /* that hold rows: fewer at the end of the rows */
 } batch;
 
 /* Sign bits of the determinant, from the factors. */
@@ -138,19 +139,19 @@ INLINE void steps_in_floats(int map, const pkm_machine *machine, int steps,
     const float least[2] = {(float)pivot, (float)(pivot * machine->length)};
     narrow phi[BLOCKS][PKM_MAX_ROWS], moved[MAX_STATE];
     for (int k = 0;; k++) {
-        for (int t = 0; t < BLOCKS; t++)
+        for (int t = 0; t < all->blocks; t++)
             closure_rows_narrow(map, PLAIN, machine, all->sphere[t], all->state[t], phi[t],
                                 all->factors[t]);
         factor_narrow(m, BLOCKS, all->factors);
         if (k == steps) break;
         substitute_narrow(m, BLOCKS, all->factors, phi);
-        for (int t = 0; t < BLOCKS; t++) {
+        for (int t = 0; t < all->blocks; t++) {
             for (int j = 0; j < m; j++) phi[t][j] = -phi[t][j];
             map_retract_narrow(map, all->state[t], phi[t], moved);
             memcpy(all->state[t], moved, sizeof moved);
         }
     }
-    for (int t = 0; t < BLOCKS; t++) {
+    for (int t = 0; t < all->blocks; t++) {
         const narrow *factors = all->factors[t];
         narrow large = fill_narrow(0);
         for (int c = 0; c < m; c++)
@@ -169,17 +170,17 @@ INLINE void steps_in_doubles(int map, const pkm_machine *machine, batch *all)
     const int m = map_m(map);
     const double size = machine->size;
     real phi[HALVES][PKM_MAX_ROWS], moved[MAX_STATE], longest[HALVES][2], A[HALVES][36];
-    for (int h = 0; h < HALVES; h++) {
+    for (int h = 0; h < all->halves; h++) {
         for (int k = 0; k < m * m; k++) A[h][k] = half(all->factors[h / 2][k], h % 2);
         for (int s = 0; s < MAX_STATE; s++) moved[s] = half(all->state[h / 2][s], h % 2);
         for (int j = 0; j < m; j++) phi[h][j] = fill(0.0);
         FN(map_retract)(map, moved, phi[h], all->fine[h]); /* unit length to double precision */
     }
     for (int round = 0; round < 2; round++) {
-        for (int h = 0; h < HALVES; h++)
+        for (int h = 0; h < all->halves; h++)
             FN(closure_rows)(map, PLAIN, machine, all->in[h].sphere, all->fine[h], phi[h], NULL);
         FN(substitute)(m, HALVES, A, phi);
-        for (int h = 0; h < HALVES; h++) {
+        for (int h = 0; h < all->halves; h++) {
             longest[h][round] = fill(0.0);
             for (int j = 0; j < m; j++) {
                 const real length = absolute(phi[h][j]) * (map_is_angle(map, j) ? machine->length : 1.0);
@@ -190,7 +191,7 @@ INLINE void steps_in_doubles(int map, const pkm_machine *machine, batch *all)
             memcpy(all->fine[h], moved, sizeof moved);
         }
     }
-    for (int h = 0; h < HALVES; h++) {
+    for (int h = 0; h < all->halves; h++) {
         FN(closure_rows)(map, SCALED, machine, all->in[h].sphere, all->fine[h], phi[h], NULL);
         all->worst[h] = fill(0.0);
         for (int r = 0; r < m; r++) all->worst[h] = larger(all->worst[h], absolute(phi[h][r]));

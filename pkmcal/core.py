@@ -100,10 +100,11 @@ def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) 
         None takes as many as pay.
     """
     if threads is None:
-        threads = min(len(os.sched_getaffinity(0)), rows // ROWS_PER_THREAD)
+        threads = rows // ROWS_PER_THREAD
+        threads = min(threads, len(os.sched_getaffinity(0))) if threads > 1 else 1
     elif isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
         raise ValueError(f"threads must be a whole number from 1 or None, found {threads!r}")
-    edges = [rows * k // max(threads, 1) for k in range(max(threads, 1) + 1)]
+    edges = [rows * k // threads for k in range(threads + 1)]
     codes: list[int] = []
     others = [
         threading.Thread(target=lambda a=a, b=b: codes.append(call(a, b)))
