@@ -178,10 +178,29 @@ int pkm_invert(int isa, ptrdiff_t n, const double *a, double *out)
 }
 
 int pkm_compose_rates(int isa, ptrdiff_t n, const double *a, const double *pose, const double *c,
-                      const double *composed, double *rates)
+                      ptrdiff_t c_stride, const double *composed, double *rates)
 {
     CHECKED(isa);
-    chosen->compose_rates(n, a, pose, c, composed, rates);
+    chosen->compose_rates(n, a, pose, c, c_stride, composed, rates);
+    return 0;
+}
+
+int pkm_points(int isa, ptrdiff_t n, const double *pose, ptrdiff_t pose_stride,
+               const double *target, ptrdiff_t target_stride, double *point, double *by_pose,
+               double *by_target)
+{
+    CHECKED(isa);
+    chosen->points(n, pose, pose_stride, target, target_stride, point, by_pose, by_target);
+    return 0;
+}
+
+int pkm_distances(int isa, ptrdiff_t n, const double *pose, const double *target,
+                  ptrdiff_t target_stride, const double *anchor, ptrdiff_t anchor_stride,
+                  double *distance, double *by_pose, double *by_target, double *by_anchor)
+{
+    CHECKED(isa);
+    chosen->distances(n, pose, target, target_stride, anchor, anchor_stride, distance, by_pose,
+                      by_target, by_anchor);
     return 0;
 }
 

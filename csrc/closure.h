@@ -9,6 +9,7 @@ typedef struct {
     real g[SLOTS];
     real first[3], second[3]; /* directions a slider or crank moves the anchor in */
     real base_axis[3], platform_axis[3];
+    real per_gain;
 } limb_numbers;
 
 /* The rest of the pose maps, which only doubles need. */
@@ -63,6 +64,7 @@ INLINE void prepare_limbs(const pkm_machine *machine, const double *geometry, pt
         limb_numbers *one = &limb[i];
         real F[9], P[9];
         for (int s = 0; s < SLOTS; s++) one->g[s] = gather(geometry + i * SLOTS + s, stride, row);
+        one->per_gain = 1.0 / one->g[GAIN];
         fill_frame(machine->frame + 9 * i, F);
         fill_frame(machine->platform_frame + 9 * i, P);
         if (machine->driver[i] == DRIVER_SLIDER)

@@ -8,6 +8,7 @@
 #include "inspect.h"
 #include "jacobian.h"
 #include "poses.h"
+#include "readings.h"
 #include "tpr2tps.h"
 
 static void core_inverse(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
@@ -134,11 +135,26 @@ static void core_compose(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const
 static void core_invert(ptrdiff_t n, const double *a, double *out) { invert_rows(n, a, out); }
 
 static void core_compose_rates(ptrdiff_t n, const double *a, const double *pose, const double *c,
-                               const double *composed, double *rates)
+                               ptrdiff_t c_stride, const double *composed, double *rates)
 {
-    compose_rates_rows(n, a, pose, c, composed, rates);
+    compose_rates_rows(n, a, pose, c, c_stride, composed, rates);
+}
+
+static void core_points(ptrdiff_t n, const double *pose, ptrdiff_t pose_stride,
+                        const double *target, ptrdiff_t target_stride, double *point,
+                        double *by_pose, double *by_target)
+{
+    point_rows(n, pose, pose_stride, target, target_stride, point, by_pose, by_target);
+}
+
+static void core_distances(ptrdiff_t n, const double *pose, const double *target,
+                           ptrdiff_t target_stride, const double *anchor, ptrdiff_t anchor_stride,
+                           double *distance, double *by_pose, double *by_target, double *by_anchor)
+{
+    distance_rows(n, pose, target, target_stride, anchor, anchor_stride, distance, by_pose,
+                  by_target, by_anchor);
 }
 
 const pkm_core CORE = {core_inverse, core_forward, core_jacobian, core_response, core_tpr2tps,
                        core_home,    core_closure, core_limbs,    core_compose,  core_invert,
-                       core_compose_rates};
+                       core_compose_rates, core_points, core_distances};

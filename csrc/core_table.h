@@ -27,7 +27,12 @@ typedef struct {
                     ptrdiff_t b_stride, double *out);
     void (*invert)(ptrdiff_t n, const double *a, double *out);
     void (*compose_rates)(ptrdiff_t n, const double *a, const double *pose, const double *c,
-                          const double *composed, double *rates);
+                          ptrdiff_t c_stride, const double *composed, double *rates);
+    void (*points)(ptrdiff_t n, const double *pose, ptrdiff_t pose_stride, const double *target,
+                   ptrdiff_t target_stride, double *point, double *by_pose, double *by_target);
+    void (*distances)(ptrdiff_t n, const double *pose, const double *target,
+                      ptrdiff_t target_stride, const double *anchor, ptrdiff_t anchor_stride,
+                      double *distance, double *by_pose, double *by_target, double *by_anchor);
 } pkm_core;
 
 extern const pkm_core pkm_base, pkm_v3, pkm_v4;

@@ -20,7 +20,7 @@ INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *
         qt = select(qt > fill(PI), qt - 2.0 * PI, qt);
         qt = select(qt < fill(-PI), qt + 2.0 * PI, qt);
     }
-    FN(limb_command)(qt, limb->g, &q);
+    FN(limb_command)(qt, limb->per_gain, limb->g, &q);
     return q;
 }
 
@@ -38,8 +38,10 @@ INLINE void inverse_at(const pkm_machine *machine, const limb_numbers *limb, con
     }
     for (int a = 0; a < machine->actuators; a++) q[a] = fill(0.0);
     for (int i = 0; i < machine->limbs; i++) q[machine->actuator[i]] += lane[i];
-    for (int a = 0; a < machine->actuators; a++)
-        q[a] = select(reached, q[a] / sharing[a], fill(NAN));
+    for (int a = 0; a < machine->actuators; a++) {
+        if (sharing[a] > 1.0) q[a] /= sharing[a];
+        q[a] = select(reached, q[a], fill(NAN));
+    }
 }
 
 INLINE void inverse_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,

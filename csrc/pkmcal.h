@@ -84,12 +84,25 @@ int pkm_closure(const pkm_machine *machine, int isa, ptrdiff_t n, const double *
 int pkm_limbs(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
               const double *pose, double *drive, double *on_base, double *on_platform);
 
-/* Poses as frames: out = A B (strides 0 or 6), out = A^-1, and the rates (n, 6, 6) of A T C. */
+/* Poses as frames: out = A B (strides 0 or 6), out = A^-1, and the rates (n, 6, 6) of A T C by those
+ * of T. */
 int pkm_compose(int isa, ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
                 ptrdiff_t b_stride, double *out);
 int pkm_invert(int isa, ptrdiff_t n, const double *a, double *out);
 int pkm_compose_rates(int isa, ptrdiff_t n, const double *a, const double *pose, const double *c,
-                      const double *composed, double *rates);
+                      ptrdiff_t c_stride, const double *composed, double *rates);
+
+/* Targets (n, 3) of the platform as points (n, 3) of the base, and their derivatives by the pose
+ * (n, 3, 6) and by the target (n, 3, 3); strides 0 or 6, 0 or 3. */
+int pkm_points(int isa, ptrdiff_t n, const double *pose, ptrdiff_t pose_stride,
+               const double *target, ptrdiff_t target_stride, double *point, double *by_pose,
+               double *by_target);
+
+/* Distances (n,) from anchors of the base to targets of the platform, and their derivatives by the
+ * pose (n, 6), by the target (n, 3) and by the anchor (n, 3); strides 0 or 3. */
+int pkm_distances(int isa, ptrdiff_t n, const double *pose, const double *target,
+                  ptrdiff_t target_stride, const double *anchor, ptrdiff_t anchor_stride,
+                  double *distance, double *by_pose, double *by_target, double *by_anchor);
 
 /* 2TPR&2TPS in closed form: size a b c d e f, free (n, 4) = y z alpha beta -> lengths (n, 4) of
  * eq. 8, and their derivatives (n, 4, 4) of eq. 12. */

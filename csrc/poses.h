@@ -43,18 +43,19 @@ INLINE void invert_rows(ptrdiff_t n, const double *a, double *out)
     }
 }
 
-/* Rates (n, 6, 6) of A T C by those of T, for poses T and A T C. */
+/* Rates (n, 6, 6) of A T C by those of T, for poses T and A T C; a stride is as in compose_rows. */
 INLINE void compose_rates_rows(ptrdiff_t n, const double *a, const double *pose, const double *c,
-                               const double *composed, double *rates)
+                               ptrdiff_t c_stride, const double *composed, double *rates)
 {
-    real lane_a[6], lane_c[6];
-    for (int k = 0; k < 6; k++) lane_a[k] = fill(a[k]), lane_c[k] = fill(c[k]);
+    real lane_a[6];
+    for (int k = 0; k < 6; k++) lane_a[k] = fill(a[k]);
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
-        real lane_pose[6], lane_composed[6], out[36];
+        real lane_pose[6], lane_c[6], lane_composed[6], out[36];
         const int count = block_rows(first, n, row);
         for (int k = 0; k < 6; k++) {
             lane_pose[k] = gather(pose + k, 6, row);
+            lane_c[k] = gather(c + k, c_stride, row);
             lane_composed[k] = gather(composed + k, 6, row);
         }
         FN(pose_compose_rates)(lane_a, lane_pose, lane_c, lane_composed, out);

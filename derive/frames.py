@@ -13,13 +13,13 @@ from .posemaps import euler_rate_matrix, rpy_angles
 from .rotation import rpy, skew
 
 
-def _posed(f: Function, name: str, doc: str) -> tuple[sp.Matrix, sp.Matrix]:
-    """Declare a pose and name its R and p."""
+def posed(f: Function, name: str, doc: str) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
+    """Declare a pose and name its R and p; returns all three."""
     pose = f.vector(name, 6, f"{doc}: x y z [mm], α β γ [rad]")
     for i, angle in enumerate("abg"):
         f.sincos(f"{name}_{angle}", pose[3 + i])
     R = f.let(f"{name}_R", rpy(*pose[3:]).xreplace(f.known))
-    return R, sp.Matrix(pose[:3])
+    return pose, R, sp.Matrix(pose[:3])
 
 
 def _give(f: Function, R: sp.Matrix, p: sp.Matrix) -> None:
@@ -32,15 +32,15 @@ def _give(f: Function, R: sp.Matrix, p: sp.Matrix) -> None:
 
 def _compose() -> Function:
     f = Function("pose_compose", "one pose after another", "T = A B: R = Ra Rb, p = pa + Ra pb")
-    Ra, pa = _posed(f, "a", "first")
-    Rb, pb = _posed(f, "b", "second")
+    _, Ra, pa = posed(f, "a", "first")
+    _, Rb, pb = posed(f, "b", "second")
     _give(f, Ra * Rb, pa + Ra * pb)
     return f
 
 
 def _invert() -> Function:
     f = Function("pose_invert", "the inverse of a pose", "T⁻¹: Rᵀ, -Rᵀ p")
-    R, p = _posed(f, "a", "pose")
+    _, R, p = posed(f, "a", "pose")
     _give(f, R.T, -(R.T * p))
     return f
 
@@ -51,8 +51,8 @@ def _rates() -> Function:
         "rates of A T C by those of T, all as x y z α β γ",
         "ω' = A ω, v' = A (v + ω × R c);  ω = E (α̇, β̇, γ̇)",
     )
-    Ra, _ = _posed(f, "a", "A")
-    R, _ = _posed(f, "b", "T")
+    _, Ra, _ = posed(f, "a", "A")
+    _, R, _ = posed(f, "b", "T")
     pose = f.vector("c", 6, "C; only its origin matters")
     moved = f.vector("d", 6, "A T C")
     arm = f.let("arm", R * sp.Matrix(pose[:3]), "R c")

@@ -138,9 +138,11 @@ def _basics() -> list[Function]:
 
     command = LimbFunction("limb_command", "the command that gives q̃", "q = (q̃ - offset)/gain")
     qt = command.scalar("qt", "q̃ [mm or rad]")
+    per_gain = command.scalar("per_gain", "1/gain, once per geometry: divisions are slow")
     command.numbers()
     q = sp.Symbol("q")
-    command.output("q", sp.solve(command.drive(q) - qt, q)[0], "actuator coordinate [mm or rad]")
+    solved = sp.solve(command.drive(q) - qt, q)[0]
+    command.output("q", solved * command.g["gain"] * per_gain, "actuator coordinate [mm or rad]")
     return [joint, drive, command]
 
 

@@ -1,5 +1,5 @@
 /* Generated from derive/frames.py by `python -m derive`; never edited by hand.
- * derivation e4a5ad7fbdae6f6b
+ * derivation 649788cb7c4336de
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation ddad70a467fc92eb
+ * derivation 1d3e8cc01e7c0f6c
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*
@@ -41,13 +41,14 @@ INLINE void FN(limb_drive)(real q, const real g[14], real *qt)
  * the command that gives q̃
  *     q = (q̃ - offset)/gain
  * in  qt             q̃ [mm or rad]
+ * in  per_gain       1/gain, once per geometry: divisions are slow
  * in  g[14]          the limb's numbers
  * out q              actuator coordinate [mm or rad]
- * operations: 1 +, 0 *, 1 /, 0 sqrt
+ * operations: 1 +, 1 *, 0 /, 0 sqrt
  */
-INLINE void FN(limb_command)(real qt, const real g[14], real *q)
+INLINE void FN(limb_command)(real qt, real per_gain, const real g[14], real *q)
 {
-    *q = (qt - g[OFFSET])/g[GAIN];
+    *q = (qt - g[OFFSET])*per_gain;
 }
 
 /*

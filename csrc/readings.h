@@ -1,0 +1,57 @@
+/* What an instrument reads at given poses: points of the platform and their distances. */
+#ifndef READINGS_H
+#define READINGS_H
+
+#include "lanes.h"
+#include "measured.h"
+
+/* Row by row where `stride` is not 0, else one for all. */
+INLINE void gather_row(const double *array, ptrdiff_t stride, int width, const ptrdiff_t *row,
+                       real *out)
+{
+    for (int k = 0; k < width; k++) out[k] = gather(array + k, stride, row);
+}
+
+INLINE void scatter_row(const real *values, int width, double *array, const ptrdiff_t *row,
+                        int count)
+{
+    for (int k = 0; k < width; k++) scatter(values[k], array + k, width, row, count);
+}
+
+INLINE void point_rows(ptrdiff_t n, const double *pose, ptrdiff_t pose_stride,
+                       const double *target, ptrdiff_t target_stride, double *point,
+                       double *by_pose, double *by_target)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], lane_target[3], p[3], dp[18], dt[9];
+        const int count = block_rows(first, n, row);
+        gather_row(pose, pose_stride, 6, row, lane_pose);
+        gather_row(target, target_stride, 3, row, lane_target);
+        FN(measured_point)(lane_pose, lane_target, p, dp, dt);
+        scatter_row(p, 3, point, row, count);
+        scatter_row(dp, 18, by_pose, row, count);
+        scatter_row(dt, 9, by_target, row, count);
+    }
+}
+
+INLINE void distance_rows(ptrdiff_t n, const double *pose, const double *target,
+                          ptrdiff_t target_stride, const double *anchor, ptrdiff_t anchor_stride,
+                          double *distance, double *by_pose, double *by_target, double *by_anchor)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], lane_target[3], lane_anchor[3], rho, dp[6], dt[3], da[3];
+        const int count = block_rows(first, n, row);
+        gather_row(pose, 6, 6, row, lane_pose);
+        gather_row(target, target_stride, 3, row, lane_target);
+        gather_row(anchor, anchor_stride, 3, row, lane_anchor);
+        FN(measured_distance)(lane_pose, lane_target, lane_anchor, &rho, dp, dt, da);
+        scatter(rho, distance, 1, row, count);
+        scatter_row(dp, 6, by_pose, row, count);
+        scatter_row(dt, 3, by_target, row, count);
+        scatter_row(da, 3, by_anchor, row, count);
+    }
+}
+
+#endif
