@@ -57,13 +57,14 @@ lint: $(TESTS)
 	$(BIN)/mypy
 
 # A copy of the package in a folder of its own, found before the one in $(VENV). Without the preloaded
-# runtime and Python's plain malloc the sanitizer misses overflows of arrays.
+# runtime and Python's plain malloc the sanitizer misses overflows of arrays; without the C++ runtime
+# beside it matplotlib's exceptions end the run.
 sanitize: $(TESTS)
 	rm -rf $(SANITIZED) build/lib.* build/temp.*
 	CFLAGS="$(SANITIZE)" LDFLAGS="$(SANITIZE)" $(PIP) install --no-build-isolation --no-deps --target $(SANITIZED) .
 	rm -rf build/lib.* build/temp.*
 	PYTHONPATH=$(CURDIR)/$(SANITIZED) PYTHONMALLOC=malloc ASAN_OPTIONS=detect_leaks=0 \
-	LD_PRELOAD="$$($${CC:-gcc} -print-file-name=libasan.so)" $(BIN)/pytest -m "not slow" tests
+	LD_PRELOAD="$$($${CC:-gcc} -print-file-name=libasan.so) $$($${CC:-gcc} -print-file-name=libstdc++.so.6)" $(BIN)/pytest -m "not slow" tests
 
 clean:
 	rm -rf $(VENV) build dist pkmcal-demo *.egg-info pkmcal/*.so .benchmarks .hypothesis .mypy_cache .pytest_cache .ruff_cache
