@@ -46,12 +46,14 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
     FN(map_frame)(map, state, R, p);
     for (int i = 0; i < machine->limbs; i++) sharing[machine->actuator[i]] += 1.0;
     for (int k = 0; k < machine->actuators * m; k++) out[k] = fill(0.0);
+    mask reached = fill_mask(-1);
     for (int i = 0; i < machine->limbs; i++) {
         real phi, omega[3], v[3], row[6], by_free[6], by_q, by_g[SLOTS];
         FN(limb_sphere) sphere;
         mask reachable = fill_mask(-1);
         const int a = machine->actuator[i];
         const real own = limb_inverse(machine, i, &limb[i], R, p);
+        reached &= finite(own);
         sphere_of_numbers(machine->driver[i], &limb[i], &sphere);
         sphere_at(machine->driver[i], &limb[i], own, &sphere, &reachable);
         FN(sphere_row)(R, p, limb[i].g + PLATFORM_X, sphere.c, sphere.rho2, &phi, omega, v);
@@ -60,6 +62,7 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
         sphere_derivatives(machine, i, &limb[i], R, p, own, &by_q, by_g);
         for (int j = 0; j < m; j++) out[a * m + j] -= by_free[j] / (by_q * sharing[a]);
     }
+    for (int k = 0; k < machine->actuators * m; k++) out[k] = select(reached, out[k], fill(NAN));
 }
 
 /* How the pose answers a residual in each row: -M Φ⁻¹ (6 x rows), per unit of the scaled rows. */

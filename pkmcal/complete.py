@@ -77,9 +77,8 @@ def complete(
     freedom = len(free) + machine.actuators - machine.rows
     if len(matched) != freedom and machine.rows <= len(free):
         raise ValueError(f"match must name {freedom} coordinates here, found {len(matched)}")
-    weight = 1.0 if machine.rows <= len(free) else 1e6  # hold them in least squares too
     keep = np.zeros((len(matched), len(free) + machine.actuators))
-    keep[np.arange(len(matched)), [free.index(i) for i in matched]] = weight
+    keep[np.arange(len(matched)), [free.index(i) for i in matched]] = 1.0
     own = pose.copy()
     wanted = own[:, matched]
     q = machine.inverse(slots, own)
@@ -94,7 +93,7 @@ def complete(
         left = np.concatenate([closure.by_free, closure.by_q], axis=-1)
         left = np.concatenate([left, np.broadcast_to(keep, (len(rows), *keep.shape))], axis=1)
         missing = own[rows][:, matched] - wanted[rows]
-        right = np.concatenate([closure.residual, weight * missing], axis=1)
+        right = np.concatenate([closure.residual, missing], axis=1)
         good = np.isfinite(left).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
         live[rows[~good]] = False
         step = np.zeros((len(rows), left.shape[-1]))
@@ -103,4 +102,33 @@ def complete(
         q[rows] += step[:, len(free) :]
         done[rows] = good & (np.abs(step).max(axis=1) <= SETTLED * size)
     own[~done], q[~done] = np.nan, np.nan
-    return machine.forward(slots, q, own, threads=None)[0], q
+    own = machine.forward(slots, q, own, threads=None)[0]
+    if machine.rows > len(free):
+        own, q = _led_to(machine, slots, own, q, matched, wanted)
+    return own, q
+
+
+def _led_to(
+    machine: Machine,
+    slots: FloatArray,
+    own: FloatArray,
+    q: FloatArray,
+    matched: Sequence[int],
+    wanted: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Actuator coordinates whose pose, the one that misses the rows least, has what is wanted.
+
+    With more rows than free coordinates and inexact geometry no pose meets them all, and the one
+    above that met the matched coordinates is not quite where the machine goes.
+    """
+    for _ in range(ITERATIONS):
+        missing = own[:, matched] - wanted
+        live = np.flatnonzero(np.abs(missing).max(axis=1) > SETTLED * machine.struct.size)
+        if not live.size:
+            break
+        slope = machine.forward_jacobian(slots, own[live], q[live])[:, matched]
+        good = np.isfinite(slope).all(axis=(1, 2))
+        live, slope = live[good], slope[good]
+        q[live] -= (np.linalg.pinv(slope) @ missing[live][..., None])[..., 0]
+        own[live] = machine.forward(slots, q[live], own[live], threads=None)[0]
+    return own, q

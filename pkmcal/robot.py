@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from os import PathLike
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import robotfile
+from pkmcal import armfile, robotfile
 from pkmcal.complete import complete, matched_coordinates
 from pkmcal.core import MAPS, POSE, FloatArray, Machine, as_rows
 from pkmcal.feasible import Feasibility, feasibility
@@ -20,6 +21,7 @@ from pkmcal.frames import Frames
 from pkmcal.geometry import Geometry
 from pkmcal.limb_kinds import KINDS
 from pkmcal.model import Limb, Model
+from pkmcal.serial import SerialArm
 
 Match = bool | str | Sequence[str] | None
 
@@ -50,6 +52,9 @@ class Robot:
             for limb in limbs:  # nothing to weigh: all closures hold
                 limb["weights"] = [1.0] * len(limb["weights"])
         self._machine = Machine(model.map, limbs, self.length, self._slots, self._own_home)
+
+    def __reduce__(self) -> tuple[type[Robot], tuple[Model]]:
+        return Robot, (self.model,)
 
     # what it is ---------------------------------------------------------------------------------
 
@@ -170,20 +175,27 @@ class Robot:
             if guess_shape == ():
                 start = start[0]
             elif guess_shape != shape:
-                start = np.broadcast_to(start.reshape(*guess_shape, 6), (*shape, 6))
+                try:
+                    start = np.broadcast_to(start.reshape(*guess_shape, 6), (*shape, 6))
+                except ValueError:
+                    wanted, found = (*shape, 6), (*guess_shape, 6)
+                    raise ValueError(
+                        f"guess must be (6,) or broadcast to {wanted}, found {found}"
+                    ) from None
                 start = np.ascontiguousarray(start).reshape(-1, 6)
         own, status, iterations, residual = self._machine.forward(
             self._slots, rows, start, threads
         )
+        system = (*shape, self._machine.rows, self._machine.m)
         return Forward(
             self._frames.outward(own).reshape(*shape, 6),
             status.reshape(shape),
             iterations.reshape(shape),
             residual.reshape(shape),
-            lambda: self._steps(own, rows).reshape(*shape, -1, self._machine.m),
-            lambda: self._steps(np.broadcast_to(start, own.shape).copy(), rows).reshape(
-                *shape, -1, self._machine.m
-            ),
+            lambda: self._steps(own, rows).reshape(*system),
+            lambda: self._steps(
+                np.ascontiguousarray(np.broadcast_to(start, own.shape)), rows
+            ).reshape(*system),
         )
 
     def jacobian(self, pose: ArrayLike) -> FloatArray:
@@ -201,7 +213,8 @@ class Robot:
             `coordinates`.
         """
         rows, shape = self._own_rows(pose)
-        return self._machine.jacobian(self._slots, rows).reshape(*shape, self.n_actuators, -1)
+        n, m = self.n_actuators, len(self.coordinates)
+        return self._machine.jacobian(self._slots, rows).reshape(*shape, n, m)
 
     def forward_jacobian(self, pose: ArrayLike) -> FloatArray:
         """∂(free coordinates)/∂q.
@@ -344,6 +357,16 @@ class Robot:
         """
         return Robot(replace(self.model, geometry=self.geometry.replace(changes)))
 
+    def _nudged(self, values: FloatArray) -> Robot:
+        """`replace` for numbers (p,) near the present ones, without ordering the elimination anew.
+
+        Three times as fast, for machines that live as long as one step of a search.
+        """
+        nudged = copy(self)
+        nudged.model = replace(self.model, geometry=self.geometry.replace(values))
+        nudged._slots = np.ascontiguousarray(nudged.model.geometry.slots)
+        return nudged
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write the robot file; `load` reads it back to the last bit."""
         robotfile.write(self.model, path)
@@ -381,8 +404,16 @@ def _limb(limb: Limb) -> dict[str, Any]:
     }
 
 
-def load(robot: str | PathLike[str]) -> Robot:
-    """A built-in machine by name, or a robot file by path.
+@overload
+def load(robot: Literal["3r"]) -> SerialArm: ...  # type: ignore[overload-overlap]
+
+
+@overload
+def load(robot: str | PathLike[str]) -> Robot: ...
+
+
+def load(robot: str | PathLike[str]) -> Robot | SerialArm:
+    """A built-in machine by name, or a robot file by path; a serial arm where it has joints.
 
     Parameters
     ----------
@@ -402,9 +433,21 @@ def load(robot: str | PathLike[str]) -> Robot:
     >>> pk.load("hexapod").n_actuators
     6
     """
-    return Robot(robotfile.read(robot))
+    content, place, file = robotfile.located(robot)
+    data = robotfile.tables(content, place)
+    if armfile.is_arm(data):
+        return armfile.parse(data, place)
+    return Robot(robotfile.parse(content, place, file))
+
+
+def load_parallel(robot: str | PathLike[str]) -> Robot:
+    """Load a machine as `load` does, and refuse serial arms with a ValueError."""
+    machine: Robot | SerialArm = load(robot)
+    if isinstance(machine, SerialArm):
+        raise ValueError(f"{robot}: a serial arm, where a parallel machine is needed")
+    return machine
 
 
 def machines() -> tuple[str, ...]:
-    """Names of the built-in machines."""
-    return robotfile.builtin_names()
+    """Names of the built-in machines, serial arms last."""
+    return robotfile.builtin_names() + robotfile.builtin_names("arms")
