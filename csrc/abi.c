@@ -219,3 +219,136 @@ int pkm_tpr2tps_jacobian(int isa, ptrdiff_t n, const double *size, const double 
     chosen->tpr2tps(n, size, free, NULL, jacobian);
     return 0;
 }
+
+static int swarm_fits(const pkm_swarm *swarm) { return swarm->particles > 0 && swarm->dims > 0; }
+
+ptrdiff_t pkm_swarm_size(const pkm_swarm *swarm)
+{
+    const ptrdiff_t width = ((ptrdiff_t)swarm->particles + 7) / 8 * 8;
+    return swarm_fits(swarm) ? (3 * swarm->dims + 6) * width + swarm->dims + 1 : 0;
+}
+
+#define CHECKED_SWARM(swarm, isa)                                                                 \
+    CHECKED(isa);                                                                                 \
+    if (!swarm_fits(swarm)) return PKM_BAD_SWARM
+
+int pkm_swarm_start(const pkm_swarm *swarm, int isa, uint64_t seed, const double *lower,
+                    const double *upper, double *state)
+{
+    CHECKED_SWARM(swarm, isa);
+    chosen->swarm_start(swarm, seed, lower, upper, state);
+    return 0;
+}
+
+int pkm_swarm_judge(const pkm_swarm *swarm, int isa, double *state)
+{
+    CHECKED_SWARM(swarm, isa);
+    chosen->swarm_judge(swarm, state);
+    return 0;
+}
+
+int pkm_swarm_move(const pkm_swarm *swarm, int isa, const double *lower, const double *upper,
+                   double *state)
+{
+    CHECKED_SWARM(swarm, isa);
+    chosen->swarm_move(swarm, lower, upper, state);
+    return 0;
+}
+
+int pkm_swarm_eq18(const pkm_swarm *swarm, int isa, int iterations, uint64_t seed, ptrdiff_t start,
+                   ptrdiff_t n, ptrdiff_t rows, const double *off, const double *lower,
+                   const double *upper, double *state, double *correction, double *history)
+{
+    CHECKED_SWARM(swarm, isa);
+    if (iterations < 0 || rows < 1) return PKM_BAD_SWARM;
+    chosen->swarm_eq18(swarm, iterations, seed, start, n, rows, off, lower, upper, state, correction,
+                       history);
+    return 0;
+}
+
+int pkm_closure_cost(const pkm_machine *machine, int isa, ptrdiff_t particles,
+                     const double *geometry, ptrdiff_t n, const double *pose, const double *q,
+                     double *cost)
+{
+    CHECKED_MACHINE(machine, isa);
+    chosen->closure_cost(machine, particles, geometry, n, pose, q, cost);
+    return 0;
+}
+
+int pkm_exp(int isa, ptrdiff_t n, const double *twist, double *motion)
+{
+    CHECKED(isa);
+    chosen->exp(n, twist, motion);
+    return 0;
+}
+
+int pkm_log(int isa, ptrdiff_t n, const double *motion, double *twist)
+{
+    CHECKED(isa);
+    chosen->log(n, motion, twist);
+    return 0;
+}
+
+int pkm_adjoint(int isa, ptrdiff_t n, const double *motion, double *adjoint)
+{
+    CHECKED(isa);
+    chosen->adjoint(n, motion, adjoint);
+    return 0;
+}
+
+int pkm_motion_pose(int isa, ptrdiff_t n, const double *motion, double *pose)
+{
+    CHECKED(isa);
+    chosen->motion_pose(n, motion, pose);
+    return 0;
+}
+
+int pkm_exp_jacobian(int isa, int inverse, ptrdiff_t n, const double *twist, double *jacobian)
+{
+    CHECKED(isa);
+    chosen->exp_jacobian(inverse, n, twist, jacobian);
+    return 0;
+}
+
+int pkm_joint_motions(int isa, ptrdiff_t n, const double *error, const double *point,
+                      double *motion)
+{
+    CHECKED(isa);
+    chosen->joint_motions(n, error, point, motion);
+    return 0;
+}
+
+#define CHECKED_ARM(arm, isa)                                                                     \
+    CHECKED(isa);                                                                                 \
+    if (arm->joints < 1) return PKM_BAD_MACHINE
+
+int pkm_arm_links(const pkm_arm *arm, int isa, ptrdiff_t n, const double *error, double *link)
+{
+    CHECKED_ARM(arm, isa);
+    chosen->arm_links(arm, n, error, link);
+    return 0;
+}
+
+int pkm_arm_forward(const pkm_arm *arm, const pkm_links *links, int isa, ptrdiff_t n,
+                    const double *theta, double *motion)
+{
+    CHECKED_ARM(arm, isa);
+    chosen->arm_forward(arm, links, n, theta, motion);
+    return 0;
+}
+
+int pkm_arm_jacobian(const pkm_arm *arm, const pkm_links *links, int isa, int frame, ptrdiff_t n,
+                     const double *theta, double *jacobian)
+{
+    CHECKED_ARM(arm, isa);
+    chosen->arm_jacobian(arm, links, frame, n, theta, jacobian);
+    return 0;
+}
+
+int pkm_arm_error_jacobian(const pkm_arm *arm, const pkm_links *links, const double *error, int isa,
+                           int frame, ptrdiff_t n, const double *theta, double *jacobian)
+{
+    CHECKED_ARM(arm, isa);
+    chosen->arm_error_jacobian(arm, links, error, frame, n, theta, jacobian);
+    return 0;
+}

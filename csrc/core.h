@@ -8,7 +8,9 @@
 #include "inspect.h"
 #include "jacobian.h"
 #include "poses.h"
+#include "pso.h"
 #include "readings.h"
+#include "serial.h"
 #include "tpr2tps.h"
 
 static void core_inverse(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
@@ -155,6 +157,94 @@ static void core_distances(ptrdiff_t n, const double *pose, const double *target
                   by_target, by_anchor);
 }
 
+static void core_swarm_start(const pkm_swarm *swarm, uint64_t seed, const double *lower,
+                             const double *upper, double *state)
+{
+    swarm_start(swarm, seed, 0, lower, upper, state);
+}
+
+static void core_swarm_move(const pkm_swarm *swarm, const double *lower, const double *upper,
+                            double *state)
+{
+    swarm_move(swarm, lower, upper, state);
+}
+
+static void core_swarm_judge(const pkm_swarm *swarm, double *state) { swarm_judge(swarm, state); }
+
+static void core_swarm_eq18(const pkm_swarm *swarm, int iterations, uint64_t seed, ptrdiff_t start,
+                            ptrdiff_t n, ptrdiff_t rows, const double *off, const double *lower,
+                            const double *upper, double *state, double *correction,
+                            double *history)
+{
+    swarm_eq18(swarm, iterations, seed, start, n, rows, off, lower, upper, state, correction,
+               history);
+}
+
+static void core_closure_cost(const pkm_machine *machine, ptrdiff_t particles,
+                              const double *geometry, ptrdiff_t n, const double *pose,
+                              const double *q, double *cost)
+{
+    closure_cost_rows(machine, particles, geometry, n, pose, q, cost);
+}
+
+static void core_exp(ptrdiff_t n, const double *twist, double *motion)
+{
+    exp_rows(n, twist, motion);
+}
+
+static void core_log(ptrdiff_t n, const double *motion, double *twist)
+{
+    log_rows(n, motion, twist);
+}
+
+static void core_adjoint(ptrdiff_t n, const double *motion, double *adjoint)
+{
+    adjoint_rows(n, motion, adjoint);
+}
+
+static void core_motion_pose(ptrdiff_t n, const double *motion, double *pose)
+{
+    pose_rows(n, motion, pose);
+}
+
+static void core_exp_jacobian(int inverse, ptrdiff_t n, const double *twist, double *jacobian)
+{
+    exp_jacobian_rows(inverse, n, twist, jacobian);
+}
+
+static void core_joint_motions(ptrdiff_t n, const double *error, const double *point, double *motion)
+{
+    joint_error_rows(n, error, point, motion);
+}
+
+static void core_arm_links(const pkm_arm *arm, ptrdiff_t n, const double *error, double *link)
+{
+    arm_link_rows(arm, n, error, link);
+}
+
+static void core_arm_forward(const pkm_arm *arm, const pkm_links *links, ptrdiff_t n,
+                             const double *theta, double *motion)
+{
+    arm_forward_rows(arm, links, n, theta, motion);
+}
+
+static void core_arm_jacobian(const pkm_arm *arm, const pkm_links *links, int frame, ptrdiff_t n,
+                              const double *theta, double *jacobian)
+{
+    arm_jacobian_rows(arm, links, frame, n, theta, jacobian);
+}
+
+static void core_arm_error_jacobian(const pkm_arm *arm, const pkm_links *links, const double *error,
+                                    int frame, ptrdiff_t n, const double *theta, double *jacobian)
+{
+    arm_error_jacobian_rows(arm, links, error, frame, n, theta, jacobian);
+}
+
 const pkm_core CORE = {core_inverse, core_forward, core_jacobian, core_response, core_tpr2tps,
                        core_home,    core_closure, core_limbs,    core_compose,  core_invert,
-                       core_compose_rates, core_points, core_distances};
+                       core_compose_rates, core_points, core_distances,
+                       core_swarm_start, core_swarm_move, core_swarm_judge, core_swarm_eq18,
+                       core_closure_cost,
+                       core_exp, core_log, core_adjoint, core_motion_pose, core_exp_jacobian,
+                       core_joint_motions, core_arm_links, core_arm_forward, core_arm_jacobian,
+                       core_arm_error_jacobian};

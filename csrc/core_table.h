@@ -33,6 +33,28 @@ typedef struct {
     void (*distances)(ptrdiff_t n, const double *pose, const double *target,
                       ptrdiff_t target_stride, const double *anchor, ptrdiff_t anchor_stride,
                       double *distance, double *by_pose, double *by_target, double *by_anchor);
+    void (*swarm_start)(const pkm_swarm *, uint64_t seed, const double *lower, const double *upper,
+                        double *state);
+    void (*swarm_move)(const pkm_swarm *, const double *lower, const double *upper, double *state);
+    void (*swarm_judge)(const pkm_swarm *, double *state);
+    void (*swarm_eq18)(const pkm_swarm *, int iterations, uint64_t seed, ptrdiff_t start,
+                       ptrdiff_t n, ptrdiff_t rows, const double *off, const double *lower,
+                       const double *upper, double *state, double *correction, double *history);
+    void (*closure_cost)(const pkm_machine *, ptrdiff_t particles, const double *geometry,
+                         ptrdiff_t n, const double *pose, const double *q, double *cost);
+    void (*exp)(ptrdiff_t n, const double *twist, double *motion);
+    void (*log)(ptrdiff_t n, const double *motion, double *twist);
+    void (*adjoint)(ptrdiff_t n, const double *motion, double *adjoint);
+    void (*motion_pose)(ptrdiff_t n, const double *motion, double *pose);
+    void (*exp_jacobian)(int inverse, ptrdiff_t n, const double *twist, double *jacobian);
+    void (*joint_motions)(ptrdiff_t n, const double *error, const double *point, double *motion);
+    void (*arm_links)(const pkm_arm *, ptrdiff_t n, const double *error, double *link);
+    void (*arm_forward)(const pkm_arm *, const pkm_links *, ptrdiff_t n, const double *theta,
+                        double *motion);
+    void (*arm_jacobian)(const pkm_arm *, const pkm_links *, int frame, ptrdiff_t n,
+                         const double *theta, double *jacobian);
+    void (*arm_error_jacobian)(const pkm_arm *, const pkm_links *, const double *error, int frame,
+                               ptrdiff_t n, const double *theta, double *jacobian);
 } pkm_core;
 
 extern const pkm_core pkm_base, pkm_v3, pkm_v4;

@@ -14,7 +14,7 @@
 /* cffi begin */
 enum { PKM_MAX_LIMBS = 12, PKM_MAX_ROWS = 24 };
 enum { PKM_OK, PKM_NOT_CONVERGED, PKM_SINGULAR, PKM_INFEASIBLE, PKM_INVALID };
-enum { PKM_BAD_ISA = -1, PKM_BAD_MACHINE = -2, PKM_BAD_COLUMN = -3 };
+enum { PKM_BAD_ISA = -1, PKM_BAD_MACHINE = -2, PKM_BAD_COLUMN = -3, PKM_BAD_SWARM = -4 };
 
 /* A machine: its pose map and its limbs, without the numbers that calibration changes. */
 typedef struct {
@@ -33,6 +33,14 @@ typedef struct {
     double weight[24];              /* of each row, limb by limb, the sphere first */
     int order[24];                  /* place of each row in the elimination: see pkm_order_rows */
 } pkm_machine;
+
+/* A swarm in `dims` dimensions and the factors of eq. 19. Its state, pkm_swarm_size numbers, begins
+ * with x (dims, width), width = the particles rounded up to eights, and ends with the value of each
+ * particle (width), gBest (dims) and the value there. */
+typedef struct {
+    int particles, dims;
+    double inertia, cognitive, social;
+} pkm_swarm;
 
 const char *pkm_slot_names(void);
 const char *pkm_driver_names(void);
@@ -110,6 +118,70 @@ int pkm_tpr2tps_lengths(int isa, ptrdiff_t n, const double *size, const double *
                         double *lengths);
 int pkm_tpr2tps_jacobian(int isa, ptrdiff_t n, const double *size, const double *free,
                          double *jacobian);
+
+/* A swarm step by step: start within the bounds; set the particles' values in the state and judge
+ * (pBest, gBest); move (eq. 19); judge again. Of one seed the same bits with every isa. */
+ptrdiff_t pkm_swarm_size(const pkm_swarm *swarm);
+int pkm_swarm_start(const pkm_swarm *swarm, int isa, uint64_t seed, const double *lower,
+                    const double *upper, double *state);
+int pkm_swarm_judge(const pkm_swarm *swarm, int isa, double *state);
+int pkm_swarm_move(const pkm_swarm *swarm, int isa, const double *lower, const double *upper,
+                   double *state);
+
+/* Eq. 18 by swarms start, start + 1, ... start + n - 1 of a seed, one for each set of `rows` poses:
+ * off (n, rows, dims) = L* - L -> the correction of each set (n, dims) and its best E after each
+ * iteration (n, iterations + 1). */
+int pkm_swarm_eq18(const pkm_swarm *swarm, int isa, int iterations, uint64_t seed, ptrdiff_t start,
+                   ptrdiff_t n, ptrdiff_t rows, const double *off, const double *lower,
+                   const double *upper, double *state, double *correction, double *history);
+
+/* geometry (particles, limbs, SLOTS), pose (n, 6), q (n, actuators) -> of each geometry the sum over
+ * the poses of its squared closures (particles) [mm²]. */
+int pkm_closure_cost(const pkm_machine *machine, int isa, ptrdiff_t particles,
+                     const double *geometry, ptrdiff_t n, const double *pose, const double *q,
+                     double *cost);
+
+/* Twists (n, 6) are (omega, v); motions (n, 16) are 4 x 4 matrices, row by row. */
+int pkm_exp(int isa, ptrdiff_t n, const double *twist, double *motion);
+int pkm_log(int isa, ptrdiff_t n, const double *motion, double *twist);
+int pkm_adjoint(int isa, ptrdiff_t n, const double *motion, double *adjoint);
+int pkm_motion_pose(int isa, ptrdiff_t n, const double *motion, double *pose);
+
+/* At a twist (n, 6): dT T^-1 by dtwist (n, 6, 6), or with `inverse` dtwist by dT T^-1. */
+int pkm_exp_jacobian(int isa, int inverse, ptrdiff_t n, const double *twist, double *jacobian);
+
+/* The motion (n, 16) by joint errors dx dy dz dphi dtheta dpsi (n, 6) at points (n, 3), or by poses
+ * where the points are 0. */
+int pkm_joint_motions(int isa, ptrdiff_t n, const double *error, const double *point,
+                      double *motion);
+
+/* A serial arm at zero: of each joint its kind, its frame's axes (joints, 9) with the joint's own as
+ * the third column, and its point (joints, 3); and the tool. */
+typedef struct {
+    int joints;
+    const int32_t *prismatic;
+    const double *axes, *point, *home;
+} pkm_arm;
+
+/* What is between the joints: (joints + 1, 12), or (n, joints + 1, 12) by row. See pkm_arm_links. */
+typedef struct {
+    int by_row;
+    const double *link;
+} pkm_links;
+
+enum { PKM_SPACE, PKM_BODY, PKM_TIP }; /* tip: velocity of the tool's origin, in base axes */
+
+/* Joint errors (n, joints, 6) -> links (n, joints + 1, 12). */
+int pkm_arm_links(const pkm_arm *arm, int isa, ptrdiff_t n, const double *error, double *link);
+
+/* theta (n, joints) -> the tool (n, 16); its twist by theta (n, 6, joints); its twist by the joint
+ * errors (n, 6, 6 joints), which are those the links were made of. */
+int pkm_arm_forward(const pkm_arm *arm, const pkm_links *links, int isa, ptrdiff_t n,
+                    const double *theta, double *motion);
+int pkm_arm_jacobian(const pkm_arm *arm, const pkm_links *links, int isa, int frame, ptrdiff_t n,
+                     const double *theta, double *jacobian);
+int pkm_arm_error_jacobian(const pkm_arm *arm, const pkm_links *links, const double *error, int isa,
+                           int frame, ptrdiff_t n, const double *theta, double *jacobian);
 /* cffi end */
 
 #endif

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+from pkmcal import screw
+from pkmcal.allocation import Allocation, allocate_tolerance
+from pkmcal.bootstrap import Bootstrap, bootstrap
 from pkmcal.compensate import Compensation, compensate
 from pkmcal.feasible import Feasibility
 from pkmcal.forward import Forward
@@ -11,22 +14,49 @@ from pkmcal.identification import Identification
 from pkmcal.identify import identify
 from pkmcal.measurement_csv import read_measurements
 from pkmcal.measurements import Measurements
+from pkmcal.plan import Plan, plan_poses
+from pkmcal.pso import SwarmResult, pso
 from pkmcal.robot import Robot, load, machines
+from pkmcal.sensitivity import Sensitivity, sensitivity
+from pkmcal.serial import SerialArm
+from pkmcal.tolerance import Tolerance, tolerance
+from pkmcal.tracker import Tracker
 from pkmcal.virtual import VirtualMachine
+from pkmcal.workspace import Dexterity, Workspace, dexterity, sample_poses, workspace
 
 __all__ = [
+    "Allocation",
+    "Bootstrap",
     "Compensation",
+    "Dexterity",
     "Feasibility",
     "Forward",
     "Identification",
     "Measurements",
+    "Plan",
     "Robot",
+    "Sensitivity",
+    "SerialArm",
+    "SwarmResult",
+    "Tolerance",
+    "Tracker",
     "VirtualMachine",
+    "Workspace",
+    "allocate_tolerance",
+    "bootstrap",
     "compensate",
+    "dexterity",
     "identify",
     "load",
     "machines",
+    "plan_poses",
+    "pso",
     "read_measurements",
+    "sample_poses",
+    "screw",
+    "sensitivity",
+    "tolerance",
+    "workspace",
 ]
 
 

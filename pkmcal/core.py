@@ -68,7 +68,10 @@ def as_rows(name: str, array: ArrayLike, width: int) -> tuple[FloatArray, tuple[
     ValueError
         Another last axis.
     """
-    given = np.asarray(array)
+    try:
+        given = np.asarray(array)
+    except ValueError:
+        raise ValueError(f"{name} must have shape (..., {width}), found a ragged list") from None
     if given.dtype.kind not in "iuf":
         raise TypeError(f"{name} must be an array of numbers, found dtype {given.dtype}")
     if given.ndim == 0 or given.shape[-1] != width:
@@ -149,13 +152,74 @@ def invert(a: FloatArray) -> FloatArray:
 def compose_rates(
     a: FloatArray, pose: FloatArray, c: FloatArray, composed: FloatArray
 ) -> FloatArray:
-    """Rates (N, 6, 6) of A T C by those of T, for T = `pose` and A T C = `composed`, (N, 6)."""
-    out = np.empty((len(pose), 6, 6))
-    if len(pose):
+    """Rates (N, 6, 6) of A T C by those of T, for T = `pose` and A T C = `composed`, (N, 6).
+
+    A is (6,); C is (6,) or (N, 6).
+    """
+    n, out = len(pose), np.empty((len(pose), 6, 6))
+    if n:
         lib.pkm_compose_rates(
-            ISA, len(pose), pointer(a), pointer(pose), pointer(c), pointer(composed), pointer(out)
+            ISA,
+            n,
+            pointer(a),
+            pointer(pose),
+            pointer(c),
+            6 if c.ndim == 2 else 0,
+            pointer(composed),
+            pointer(out),
         )
     return out
+
+
+def points(pose: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Where poses carry a target: `pose` (6,) and `target` (3,), or (N, 6) and (N, 3).
+
+    Returns the points (N, 3) and their derivatives by the pose (N, 3, 6) and by the target
+    (N, 3, 3).
+    """
+    n = len(pose) if pose.ndim == 2 else len(target)
+    point, by_pose, by_target = np.empty((n, 3)), np.empty((n, 3, 6)), np.empty((n, 3, 3))
+    if n:
+        lib.pkm_points(
+            ISA,
+            n,
+            pointer(pose),
+            6 if pose.ndim == 2 else 0,
+            pointer(target),
+            3 if target.ndim == 2 else 0,
+            pointer(point),
+            pointer(by_pose),
+            pointer(by_target),
+        )
+    return point, by_pose, by_target
+
+
+def distances(
+    pose: FloatArray, target: FloatArray, anchor: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """How far targets of the platform are from anchors of the base, at poses (N, 6).
+
+    `target` and `anchor` are (3,) or (N, 3). Returns the distances (N,) and their derivatives by
+    the pose (N, 6), by the target (N, 3) and by the anchor (N, 3).
+    """
+    n = len(pose)
+    distance, by_pose = np.empty(n), np.empty((n, 6))
+    by_target, by_anchor = np.empty((n, 3)), np.empty((n, 3))
+    if n:
+        lib.pkm_distances(
+            ISA,
+            n,
+            pointer(pose),
+            pointer(target),
+            3 if target.ndim == 2 else 0,
+            pointer(anchor),
+            3 if anchor.ndim == 2 else 0,
+            pointer(distance),
+            pointer(by_pose),
+            pointer(by_target),
+            pointer(by_anchor),
+        )
+    return distance, by_pose, by_target, by_anchor
 
 
 class Closure(NamedTuple):

@@ -32,11 +32,20 @@ FloatArray = NDArray[np.float64]
 TOP = ("name", "units", "frames", "pose", "parameters", "calibration", "stated", "limb")
 
 
-def builtin_names() -> tuple[str, ...]:
-    """Names of the built-in machines."""
-    folder = resources.files("pkmcal") / "machines"
-    names = (entry.name for entry in folder.iterdir())
+def builtin_names(folder: str = "machines") -> tuple[str, ...]:
+    """Names of the built-in machines; of the serial arms with the folder "arms"."""
+    found = (resources.files("pkmcal") / folder).iterdir()
+    names = (entry.name for entry in found)
     return tuple(sorted(name[: -len(".toml")] for name in names if name.endswith(".toml")))
+
+
+def _builtin() -> dict[str, Any]:
+    root = resources.files("pkmcal")
+    return {
+        name: root / folder / f"{name}.toml"
+        for folder in ("machines", "arms")
+        for name in builtin_names(folder)
+    }
 
 
 def read(robot: str | os.PathLike[str]) -> Model:
@@ -67,14 +76,22 @@ def read(robot: str | os.PathLike[str]) -> Model:
     >>> read("hexapod").map
     'spatial'
     """
+    return parse(*located(robot))
+
+
+def located(robot: str | os.PathLike[str]) -> tuple[bytes, str, str | None]:
+    """Content of a file or a built-in machine, how messages call it, and its path.
+
+    Raises as `read` does, where there is no such file.
+    """
     if not isinstance(robot, str | os.PathLike):
         raise TypeError(f"robot must be a name or a path, found {robot!r}")
-    if isinstance(robot, str) and robot in (known := builtin_names()):
-        resource = resources.files("pkmcal") / "machines" / f"{robot}.toml"
-        return parse(resource.read_bytes(), f"built-in machine {robot}", None)
+    known = _builtin()
+    if isinstance(robot, str) and robot in known:
+        return known[robot].read_bytes(), f"built-in machine {robot}", None
     path = Path(robot)
     if path.is_file():
-        return parse(path.read_bytes(), str(path), str(path))
+        return path.read_bytes(), str(path), str(path)
     if path.is_dir():
         raise ValueError(f"{path}: this is a folder, not a robot file")
     if isinstance(robot, str) and path.name == robot and not path.suffix:
@@ -105,16 +122,10 @@ def write(model: Model, path: str | os.PathLike[str]) -> None:
 
 def parse(content: bytes, place: str, file: str | None) -> Model:
     """Make a model of a robot file's content; `place` stands before every message."""
-    try:
-        data = tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{place}: not a text file in UTF-8 (byte {error.start})") from None
-    except (ValueError, RecursionError) as error:  # a syntax error, an endless number or nesting
-        raise ValueError(f"{place}: not valid TOML: {error}") from None
-
+    data = tables(content, place)
     top = Table(data, place, "", Units())
     top.only(TOP)
-    units = _read_units(_section(top, "units"))
+    units = read_units(top)
     top = Table(data, place, "", units)
     parameters = Parameters(_section(top, "parameters", optional=True))
     limbs = read_limbs(list(_limb_tables(top)), parameters)
@@ -142,6 +153,17 @@ def parse(content: bytes, place: str, file: str | None) -> Model:
     )
 
 
+def tables(content: bytes, place: str) -> dict[str, Any]:
+    """What a TOML file says, before anything is checked; `place` stands before every message."""
+    try:
+        data: dict[str, Any] = tomllib.loads(content.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise ValueError(f"{place}: not a text file in UTF-8 (byte {error.start})") from None
+    except (ValueError, RecursionError) as error:  # a syntax error, an endless number or nesting
+        raise ValueError(f"{place}: not valid TOML: {error}") from None
+    return data
+
+
 def _section(top: Table, key: str, optional: bool = False) -> Table:
     value = top.data.get(key, {}) if optional else top[key]
     if not isinstance(value, Mapping):
@@ -149,7 +171,9 @@ def _section(top: Table, key: str, optional: bool = False) -> Table:
     return Table(value, top.file, f"[{key}]", top.units)
 
 
-def _read_units(table: Table) -> Units:
+def read_units(top: Table) -> Units:
+    """The units that a file states."""
+    table = _section(top, "units")
     table.only(("length", "angle"))
     length = table.choice("length", LENGTH_UNITS, "unit of length")
     angle = table.choice("angle", ANGLE_UNITS, "unit of angle")

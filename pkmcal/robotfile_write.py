@@ -17,14 +17,15 @@ HEADER = "# A robot for pkmcal: lengths in mm, angles in rad.\n"
 def text_of(model: Model) -> str:
     """The TOML text of a model, in mm and rad."""
     head = {"name": model.name, "units": {"length": "mm", "angle": "rad"}}
-    blocks = [HEADER, _lines(head)]
-    blocks += [f"[{key}]\n{_lines(table)}" for key, table in _sections(model).items() if table]
+    blocks = [HEADER, lines(head)]
+    blocks += [f"[{key}]\n{lines(table)}" for key, table in _sections(model).items() if table]
     limbs = (_limb(limb, i, model.geometry) for i, limb in enumerate(model.limbs))
-    blocks += [f"[[limb]]\n{_lines(limb)}" for limb in limbs]
+    blocks += [f"[[limb]]\n{lines(limb)}" for limb in limbs]
     return "\n".join(blocks)
 
 
-def _lines(table: Mapping[str, Any]) -> str:
+def lines(table: Mapping[str, Any]) -> str:
+    """The keys of a table, each with its value on one line."""
     return "".join(f"{_key(key)} = {_value(value)}\n" for key, value in table.items())
 
 

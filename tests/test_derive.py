@@ -14,11 +14,11 @@ from pathlib import Path
 import mpmath as mp
 import pytest
 import sympy as sp
-from pkmcal.derive import elementary, limbs, posemaps, tpr2tps
+from pkmcal.derive import elementary, limbs, posemaps, screws, tpr2tps
 from pkmcal.derive.__main__ import GENERATED, differences
 from pkmcal.derive.emit import Function
 
-FUNCTIONS = {f.name: f for module in (limbs, posemaps, tpr2tps) for f in module.functions()}
+FUNCTIONS = {f.name: f for module in (limbs, posemaps, screws, tpr2tps) for f in module.functions()}
 
 
 # --- what is checked in ------------------------------------------------------------------------
@@ -46,8 +46,8 @@ def test_a_header_that_was_edited_or_is_left_over_is_shown(
 
 def test_the_text_is_the_same_in_another_process_with_another_hash_seed() -> None:
     program = (
-        "import sys; from pkmcal.derive import limbs, tpr2tps;"
-        "made = limbs.functions() + tpr2tps.functions();"
+        "import sys; from pkmcal.derive import limbs, screws, tpr2tps;"
+        "made = limbs.functions() + screws.functions() + tpr2tps.functions();"
         "sys.stdout.buffer.write(''.join(f.emit() for f in made).encode())"
     )
     seed = "1" if os.environ.get("PYTHONHASHSEED") != "1" else "2"
@@ -194,7 +194,7 @@ def run(f: Function, values: dict[str, mp.mpf | list[mp.mpf]]) -> dict[str, list
     """Run the printed statements as they stand, in mpmath: every output as a list."""
     outputs = {a.name: [mp.nan] * (a.size or 1) for a, _ in f.outputs}
     known = {**dict(zip(limbs.CONSTANTS, range(99), strict=False)), **values, **outputs}
-    known |= {"mpf": mp.mpf, "sqrt": mp.sqrt, "sin": mp.sin, "cos": mp.cos}
+    known |= {"SIXTH": mp.mpf(1) / 6, "mpf": mp.mpf, "sqrt": mp.sqrt, "sin": mp.sin, "cos": mp.cos}
     for statement in body(f).split(";")[:-1]:
         line = " ".join(statement.split())
         line = re.sub(r"(\d+\.\d+(?:e[+-]?\d+)?)f\b", r"mpf('\1')", line)
@@ -219,7 +219,9 @@ def test_the_printed_c_computes_what_was_derived(f: Function) -> None:
         scalars = {a.name: values[a.name][0] for a in f.inputs if a.size is None}
         found = run(f, {**values, **scalars})
         for argument, _ in f.outputs:
-            derived = sp.lambdify(arguments, f.result(argument.name), "mpmath")
+            derived = sp.lambdify(
+                arguments, f.result(argument.name).subs(screws.SIXTH, sp.Rational(1, 6)), "mpmath"
+            )
             expected = list(mp.matrix(derived(*values.values())))
             for one, other in zip(found[argument.name], expected, strict=True):
                 assert abs(one - other) < mp.mpf("1e-30") * (1 + abs(other))

@@ -1,0 +1,369 @@
+/* Screws and serial arms: exponential and logarithm of motions, the product of exponentials with
+ * joint errors (B eq. 5 and 19), and its Jacobians. Motions are 4 x 4, row by row. */
+#ifndef SERIAL_H
+#define SERIAL_H
+
+#include "lanes.h"
+#include "screws.h"
+
+typedef struct {
+    real R[9], p[3];
+} motion;
+
+INLINE motion unmoved(void)
+{
+    motion one;
+    for (int k = 0; k < 9; k++) one.R[k] = fill(k % 4 ? 0.0 : 1.0);
+    for (int k = 0; k < 3; k++) one.p[k] = fill(0.0);
+    return one;
+}
+
+INLINE motion gather_motion(const double *matrix, ptrdiff_t stride, const ptrdiff_t *row)
+{
+    motion T;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) T.R[3 * i + j] = gather(matrix + 4 * i + j, stride, row);
+        T.p[i] = gather(matrix + 4 * i + 3, stride, row);
+    }
+    return T;
+}
+
+/* The same motion in every lane. */
+INLINE motion fill_motion(const double *matrix)
+{
+    motion T;
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++) T.R[3 * i + j] = fill(matrix[4 * i + j]);
+        T.p[i] = fill(matrix[4 * i + 3]);
+    }
+    return T;
+}
+
+/* Where one number is not known, all sixteen are NaN. */
+INLINE void scatter_motion(const motion *T, double *matrix, const ptrdiff_t *row, int count)
+{
+    const real *p = T->p;
+    const real zero = ((p[0] - p[0]) + (p[1] - p[1])) + ((p[2] - p[2]) + (T->R[0] - T->R[0]));
+    for (int i = 0; i < 3; i++) {
+        for (int j = 0; j < 3; j++)
+            scatter(T->R[3 * i + j] + zero, matrix + 4 * i + j, 16, row, count);
+        scatter(p[i] + zero, matrix + 4 * i + 3, 16, row, count);
+        scatter(zero, matrix + 12 + i, 16, row, count);
+    }
+    scatter(zero + 1.0, matrix + 15, 16, row, count);
+}
+
+INLINE motion composed(const motion *a, const motion *b)
+{
+    motion T;
+    FN(motion_compose)(a->R, a->p, b->R, b->p, T.R, T.p);
+    return T;
+}
+
+/* c0 ... c5 at x = ω·ω. */
+INLINE void angle_functions(real x, real c[6])
+{
+    real c4 = fill(C4_SERIES[SERIES_COUNT - 1]), c5 = fill(C5_SERIES[SERIES_COUNT - 1]);
+    for (int k = SERIES_COUNT - 2; k >= 0; k--) {
+        c4 = C4_SERIES[k] + x * c4;
+        c5 = C5_SERIES[k] + x * c5;
+    }
+    FN(angle_near)(x, c4, c5, c);
+    const mask near = x <= fill(SERIES_END);
+    if (any(~near)) {
+        real far[6];
+        FN(angle_far)(FN(root)(x), far);
+        for (int k = 0; k < 6; k++) c[k] = select(near, c[k], far[k]);
+    }
+}
+
+INLINE real dot3(const real a[3], const real b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+INLINE void gather_twist(const double *twist, const ptrdiff_t *row, real w[3], real v[3])
+{
+    for (int k = 0; k < 3; k++) {
+        w[k] = gather(twist + k, 6, row);
+        v[k] = gather(twist + 3 + k, 6, row);
+    }
+}
+
+INLINE void exp_rows(ptrdiff_t n, const double *twist, double *matrix)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real w[3], v[3], c[6];
+        motion T;
+        const int count = block_rows(first, n, row);
+        gather_twist(twist, row, w, v);
+        angle_functions(dot3(w, w), c);
+        FN(screw_exp)(w, v, c, T.R, T.p);
+        scatter_motion(&T, matrix, row, count);
+    }
+}
+
+/* ω of a rotation, 0 to π: of the four copies of its quaternion the one with the largest entry,
+ * with the scalar part positive. The ratio angle/n holds where n² underflows. */
+INLINE void rotation_log(const real R[9], real w[3])
+{
+    real K[16], q[4], largest;
+    FN(rotation_quaternions)(R, K);
+    largest = K[0];
+    for (int k = 0; k < 4; k++) q[k] = K[k];
+    for (int i = 1; i < 4; i++) {
+        const mask larger_one = K[5 * i] > largest;
+        largest = select(larger_one, K[5 * i], largest);
+        for (int k = 0; k < 4; k++) q[k] = select(larger_one, K[4 * i + k], q[k]);
+    }
+    const mask turned = q[0] < fill(0.0);
+    for (int k = 0; k < 4; k++) q[k] = select(turned, -q[k], q[k]);
+    const real n = FN(root)(dot3(q + 1, q + 1));
+    const mask still = n == fill(0.0);
+    const real divisor = select(still, fill(1.0), n);
+    const real ratio = select(still, 1.0 / q[0], arctangent2(n, q[0]) / divisor);
+    for (int k = 0; k < 3; k++) w[k] = 2.0 * ratio * q[1 + k];
+}
+
+INLINE void log_rows(ptrdiff_t n, const double *matrix, double *twist)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real w[3], v[3], c[6];
+        const int count = block_rows(first, n, row);
+        const motion T = gather_motion(matrix, 16, row);
+        rotation_log(T.R, w);
+        angle_functions(dot3(w, w), c);
+        FN(screw_log)(w, T.p, c, v);
+        for (int k = 0; k < 3; k++) {
+            scatter(w[k], twist + k, 6, row, count);
+            scatter(v[k], twist + 3 + k, 6, row, count);
+        }
+    }
+}
+
+/* Of the exponential (`inverse` 0) or the logarithm (1), both at the twist. */
+INLINE void exp_jacobian_rows(int inverse, ptrdiff_t n, const double *twist, double *jacobian)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real w[3], v[3], c[6], D[36];
+        const int count = block_rows(first, n, row);
+        gather_twist(twist, row, w, v);
+        angle_functions(dot3(w, w), c);
+        if (inverse)
+            FN(screw_log_jacobian)(w, v, c, D);
+        else
+            FN(screw_exp_jacobian)(w, v, c, D);
+        for (int k = 0; k < 36; k++) scatter(D[k], jacobian + k, 36, row, count);
+    }
+}
+
+INLINE void adjoint_rows(ptrdiff_t n, const double *matrix, double *adjoint)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real A[36];
+        const int count = block_rows(first, n, row);
+        const motion T = gather_motion(matrix, 16, row);
+        FN(motion_adjoint)(T.R, T.p, A);
+        for (int k = 0; k < 36; k++) scatter(A[k], adjoint + k, 36, row, count);
+    }
+}
+
+/* x y z α β γ of motions. */
+INLINE void pose_rows(ptrdiff_t n, const double *matrix, double *pose)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real sine[2], cosine[2];
+        const int count = block_rows(first, n, row);
+        const motion T = gather_motion(matrix, 16, row);
+        const real gamma = arctangent2(T.R[3], T.R[0]);
+        FN(rotation_tilts)(T.R, gamma, sine, cosine);
+        for (int k = 0; k < 3; k++) scatter(T.p[k], pose + k, 6, row, count);
+        for (int k = 0; k < 2; k++)
+            scatter(arctangent2(sine[k], cosine[k]), pose + 3 + k, 6, row, count);
+        scatter(gamma, pose + 5, 6, row, count);
+    }
+}
+
+/* The motion by each of n joint errors (n, 6) at points (n, 3), in the base. */
+INLINE void joint_error_rows(ptrdiff_t n, const double *error, const double *point, double *matrix)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real e[6], r[3];
+        motion E;
+        const int count = block_rows(first, n, row);
+        for (int k = 0; k < 6; k++) e[k] = gather(error + k, 6, row);
+        for (int k = 0; k < 3; k++) r[k] = gather(point + k, 3, row);
+        FN(joint_error)(e, r, E.R, E.p);
+        scatter_motion(&E, matrix, row, count);
+    }
+}
+
+/* --- arms: T = C1 Z(q1) C2 Z(q2) ... C(n+1), which is B eq. 19 with exp(q S) = F Z(q) F^-1 for
+ * the frame F = (Q, r) of a joint, whose z axis is the joint's: Z turns about it or slides along.
+ * A link C is twelve numbers, R then p. ------------------------------------------------------ */
+
+typedef struct {
+    real Q[9], r[3];
+} joint_frame;
+
+/* Of joint 1 to n at zero; joint 0 stands for the base. */
+INLINE joint_frame frame_of(const pkm_arm *arm, int joint)
+{
+    joint_frame F;
+    for (int k = 0; k < 9; k++)
+        F.Q[k] = fill(joint ? arm->axes[9 * (joint - 1) + k] : k % 4 ? 0.0 : 1.0);
+    for (int k = 0; k < 3; k++) F.r[k] = fill(joint ? arm->point[3 * (joint - 1) + k] : 0.0);
+    return F;
+}
+
+/* Links (n, joints + 1, 12) of an arm with errors (n, joints, 6). */
+INLINE void arm_link_rows(const pkm_arm *arm, ptrdiff_t n, const double *error, double *link)
+{
+    const int joints = arm->joints, stride = 12 * (joints + 1);
+    const motion home = fill_motion(arm->home);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        const int count = block_rows(first, n, row);
+        for (int i = 0; i <= joints; i++) {
+            const joint_frame from = frame_of(arm, i);
+            joint_frame to = {{{0}}, {{0}}};
+            real e[6];
+            motion C;
+            if (i < joints) to = frame_of(arm, i + 1);
+            for (int k = 0; k < 9 && i == joints; k++) to.Q[k] = home.R[k];
+            for (int k = 0; k < 3 && i == joints; k++) to.r[k] = home.p[k];
+            for (int k = 0; k < 6; k++)
+                e[k] = i < joints ? gather(error + 6 * i + k, 6 * joints, row) : fill(0.0);
+            FN(arm_link)(e, from.Q, from.r, to.Q, to.r, C.R, C.p);
+            for (int k = 0; k < 9; k++) scatter(C.R[k], link + 12 * i + k, stride, row, count);
+            for (int k = 0; k < 3; k++) scatter(C.p[k], link + 12 * i + 9 + k, stride, row, count);
+        }
+    }
+}
+
+/* Link i + 1, one for all rows or one a row. */
+INLINE motion link_of(const pkm_links *links, int joints, int i, const ptrdiff_t *row)
+{
+    const double *link = links->link + 12 * i;
+    const ptrdiff_t stride = 12 * (joints + 1);
+    motion C;
+    for (int k = 0; k < 9; k++) C.R[k] = links->by_row ? gather(link + k, stride, row) : fill(link[k]);
+    for (int k = 0; k < 3; k++)
+        C.p[k] = links->by_row ? gather(link + 9 + k, stride, row) : fill(link[9 + k]);
+    return C;
+}
+
+INLINE void follow_link(const pkm_links *links, int joints, int i, const ptrdiff_t *row, motion *T)
+{
+    const motion C = link_of(links, joints, i, row);
+    *T = i ? composed(T, &C) : C;
+}
+
+INLINE void move_joint(const pkm_arm *arm, int i, real q, motion *T)
+{
+    motion moved = *T;
+    if (arm->prismatic[i])
+        FN(arm_slid)(T->R, T->p, q, moved.p);
+    else
+        FN(arm_turned)(T->R, q, moved.R);
+    *T = moved;
+}
+
+INLINE motion arm_tool(const pkm_arm *arm, const pkm_links *links, const double *theta,
+                       const ptrdiff_t *row)
+{
+    motion T;
+    for (int i = 0; i < arm->joints; i++) {
+        follow_link(links, arm->joints, i, row, &T);
+        move_joint(arm, i, gather(theta + i, arm->joints, row), &T);
+    }
+    follow_link(links, arm->joints, arm->joints, row, &T);
+    return T;
+}
+
+INLINE void arm_forward_rows(const pkm_arm *arm, const pkm_links *links, ptrdiff_t n,
+                             const double *theta, double *matrix)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        const int count = block_rows(first, n, row);
+        const motion T = arm_tool(arm, links, theta, row);
+        scatter_motion(&T, matrix, row, count);
+    }
+}
+
+/* What moves a space twist into the frame that is asked for. */
+INLINE motion arm_view(const pkm_arm *arm, const pkm_links *links, int frame, const double *theta,
+                       const ptrdiff_t *row)
+{
+    motion view = unmoved();
+    if (frame == PKM_SPACE) return view;
+    const motion tool = arm_tool(arm, links, theta, row);
+    if (frame == PKM_BODY) FN(motion_invert)(tool.R, tool.p, view.R, view.p);
+    if (frame == PKM_TIP)
+        for (int k = 0; k < 3; k++) view.p[k] = -tool.p[k];
+    return view;
+}
+
+INLINE void scatter_column(const motion *view, const real w[3], const real v[3], double *column,
+                           int columns, const ptrdiff_t *row, int count)
+{
+    real seen[6];
+    FN(screw_moved)(view->R, view->p, w, v, seen, seen + 3);
+    for (int k = 0; k < 6; k++) scatter(seen[k], column + k * columns, 6 * columns, row, count);
+}
+
+INLINE void arm_jacobian_rows(const pkm_arm *arm, const pkm_links *links, int frame, ptrdiff_t n,
+                              const double *theta, double *jacobian)
+{
+    const real still[3] = {fill(0.0), fill(0.0), fill(0.0)};
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        motion T;
+        const int count = block_rows(first, n, row);
+        const motion view = arm_view(arm, links, frame, theta, row);
+        for (int i = 0; i < arm->joints; i++) {
+            real w[3], v[3];
+            follow_link(links, arm->joints, i, row, &T);
+            FN(arm_axis_twist)(T.R, T.p, w, v);
+            scatter_column(&view, arm->prismatic[i] ? still : w, arm->prismatic[i] ? w : v,
+                           jacobian + i, arm->joints, row, count);
+            move_joint(arm, i, gather(theta + i, arm->joints, row), &T);
+        }
+    }
+}
+
+/* By joint errors (joints, 6), or (n, joints, 6) where links are by row. */
+INLINE void arm_error_jacobian_rows(const pkm_arm *arm, const pkm_links *links, const double *error,
+                                    int frame, ptrdiff_t n, const double *theta, double *jacobian)
+{
+    const int columns = 6 * arm->joints;
+    const real still[3] = {fill(0.0), fill(0.0), fill(0.0)};
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        motion T = unmoved();
+        const int count = block_rows(first, n, row);
+        const motion view = arm_view(arm, links, frame, theta, row);
+        for (int i = 0; i < arm->joints; i++) {
+            const joint_frame before = frame_of(arm, i);
+            const motion moved = T;
+            double *column = jacobian + 6 * i;
+            real e[6], along[9], turn[9], moment[9];
+            for (int k = 0; k < 6; k++)
+                e[k] = gather(error + 6 * i + k, links->by_row ? columns : 0, row);
+            follow_link(links, arm->joints, i, row, &T);
+            FN(arm_error_twists)(moved.R, before.Q, T.p, e, along, turn, moment);
+            for (int k = 0; k < 3; k++) {
+                scatter_column(&view, still, along + 3 * k, column + k, columns, row, count);
+                scatter_column(&view, turn + 3 * k, moment + 3 * k, column + 3 + k, columns, row,
+                               count);
+            }
+            move_joint(arm, i, gather(theta + i, arm->joints, row), &T);
+        }
+    }
+}
+
+#endif

@@ -1,0 +1,118 @@
+"""Files of serial arms: TOML in, `SerialArm` out, and back to the last bit."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from pkmcal import robotfile, screw
+from pkmcal.core import POSE, FloatArray
+from pkmcal.limb_kinds import Unit
+from pkmcal.robotfile_write import lines
+from pkmcal.serial import ERRORS, SerialArm
+from pkmcal.serial_input import KINDS
+from pkmcal.toml_table import Table, Units, shown
+from pkmcal.whole_file import write_whole
+
+TOP = ("name", "units", "tool", "joint")
+HEADER = "# A serial arm for pkmcal, at zero: lengths in mm, angles in rad.\n"
+
+
+def is_arm(data: Mapping[str, Any]) -> bool:
+    """Whether the content of a file is that of an arm: it has joints in place of limbs."""
+    return "joint" in data and "limb" not in data
+
+
+def parse(data: Mapping[str, Any], place: str) -> SerialArm:
+    """Make an arm of a file's content; `place` stands before every message.
+
+    Raises
+    ------
+    ValueError
+        A mistake in the file: one line with the file, the table, the key and what was found.
+    """
+    top = Table(data, place, "", Units())
+    top.only(TOP, "a serial arm")
+    units = robotfile.read_units(top)
+    tool = Table(top.table("tool").data, place, "[tool]", units)
+    tool.only(("home",))
+    joints = [Table(each, place, f"[[joint]] {i}", units) for i, each in enumerate(_joints(top), 1)]
+    for joint in joints:
+        joint.only(("kind", "axis", "point", "error"))
+    return SerialArm(
+        axes=[joint.vector("axis") for joint in joints],
+        points=[_point(joint) for joint in joints],
+        home=_home(tool),
+        kinds=[joint.choice("kind", KINDS, "kind of joint") for joint in joints],
+        name=top.text("name"),
+        joint_errors=[_error(joint) for joint in joints],
+    )
+
+
+def write(arm: SerialArm, path: str | os.PathLike[str]) -> None:
+    """Write an arm's file in mm and rad; it is complete or untouched.
+
+    Raises
+    ------
+    OSError
+        The folder does not exist or cannot be written.
+    """
+    head = {"name": arm.name, "units": {"length": "mm", "angle": "rad"}}
+    blocks = [HEADER, lines(head), "[tool]\n" + lines({"home": arm.home[:3].tolist()})]
+    for i, kind in enumerate(arm.kinds):
+        joint: dict[str, Any] = {"kind": kind, "axis": arm.axes[i].tolist()}
+        joint["point"] = arm.points[i].tolist()
+        error = dict(zip(ERRORS, arm.joint_errors[i].tolist(), strict=True))
+        if any(error.values()):
+            joint["error"] = error
+        blocks.append("[[joint]]\n" + lines(joint))
+    write_whole(path, "\n".join(blocks))
+
+
+def _joints(top: Table) -> list[Mapping[str, Any]]:
+    found = top["joint"]
+    if not isinstance(found, list) or not all(isinstance(each, Mapping) for each in found):
+        top.fail("joint", "every joint is a table of its own, headed [[joint]] in double brackets")
+    if not found:
+        top.fail("joint", "an arm has at least one joint")
+    return found
+
+
+def _point(joint: Table) -> list[float]:
+    found = joint.list_of("point", 3, "three coordinates")
+    return [joint.as_number("point", each, "mm") for each in found]
+
+
+def _error(joint: Table) -> list[float]:
+    """The joint's six errors; those left out are 0."""
+    if "error" not in joint:
+        return [0.0] * len(ERRORS)
+    error = joint.table("error")
+    error.only(ERRORS)
+    units: tuple[Unit, ...] = ("mm", "mm", "mm", "rad", "rad", "rad")
+    return [error.number(name, unit, 0.0) for name, unit in zip(ERRORS, units, strict=True)]
+
+
+def _home(tool: Table) -> FloatArray:
+    """The tool at zero: a pose by name, or three rows of four numbers."""
+    value = tool["home"]
+    if isinstance(value, Mapping):
+        pose = tool.table("home")
+        pose.only(POSE)
+        units: dict[str, Unit] = {name: "mm" if name in "xyz" else "rad" for name in POSE}
+        return np.array([pose.number(name, units[name], 0.0) for name in POSE])
+    rows = tool.list_of("home", 3, "a pose, or three rows of four numbers")
+    if not all(isinstance(row, list) and len(row) == 4 for row in rows):
+        tool.fail("home", f"must be a pose, or three rows of four numbers, found {shown(value)}")
+    matrix = np.eye(4)
+    for i, row in enumerate(rows):
+        for j, each in enumerate(row):
+            matrix[i, j] = tool.as_number("home", each, "mm" if j == 3 else "1")
+    try:
+        screw.as_motions("home", matrix)
+    except ValueError as error:
+        tool.fail("home", str(error).partition(" ")[2])
+    return matrix

@@ -1,0 +1,146 @@
+"""URDF files in and out: chains, units, mistakes, and joint errors in the origins."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+
+pytest.importorskip("yourdfpy")
+
+# a fixed flange between moving joints, an oblique axis, an origin at 90 degrees and one left out
+URDF = """<?xml version="1.0"?>
+<robot name="demo">
+  <!-- the shoulder -->
+  <link name="base_link"/>
+  <link name="upper"><visual><geometry><box size="1 1 1"/></geometry></visual></link>
+  <link name="fore"/><link name="flange"/><link name="rod"/><link name="tool0"/>
+  <link name="camera"/>
+  <joint name="j1" type="revolute">
+    <parent link="base_link"/><child link="upper"/>
+    <origin xyz="0 0 0.4" rpy="0 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/>
+  </joint>
+  <joint name="j2" type="continuous">
+    <parent link="upper"/><child link="fore"/>
+    <origin xyz="0.1 0 0" rpy="0 1.5707963267948966 0.3"/><axis xyz="0 1 1"/>
+  </joint>
+  <joint name="f" type="fixed">
+    <parent link="fore"/><child link="flange"/><origin xyz="0.3 0 0.2" rpy="0.1 0.2 0.3"/>
+  </joint>
+  <joint name="j3" type="prismatic">
+    <parent link="flange"/><child link="rod"/><axis xyz="0 0 1"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/>
+  </joint>
+  <joint name="t" type="fixed">
+    <parent link="rod"/><child link="tool0"/><origin xyz="0 0 0.05" rpy="0 0.5 0"/>
+  </joint>
+  <joint name="c" type="fixed">
+    <parent link="upper"/><child link="camera"/><origin xyz="0 1 0" rpy="0 0 0"/>
+  </joint>
+</robot>
+"""
+THETA = np.random.default_rng(1).uniform(-2, 2, (20, 3)) * [1, 1, 300]
+ERRORS = np.random.default_rng(2).normal(size=(3, 6)) * [1, 1, 1, 0.01, 0.01, 0.01]
+
+
+@pytest.fixture
+def source(tmp_path: Path) -> Path:
+    (tmp_path / "arm.urdf").write_text(URDF, encoding="utf-8")
+    return tmp_path / "arm.urdf"
+
+
+def test_the_chain_is_read_in_mm(source: Path) -> None:
+    arm = pk.SerialArm.from_urdf(source, tip="tool0")
+    assert (arm.name, arm.kinds) == ("demo", ("revolute", "revolute", "prismatic"))
+    assert arm.points[:2].tolist() == [[0, 0, 400], [100, 0, 400]]
+    assert arm.axes[0].tolist() == [0, 0, 1]
+
+
+def test_pinocchio_reads_the_same_arm(source: Path) -> None:
+    engine = pytest.importorskip("pinocchio")
+    model = engine.buildModelFromUrdf(str(source))
+    data = model.createData()
+    frame = model.getFrameId("tool0")
+    arm = pk.SerialArm.from_urdf(source, tip="tool0")
+    for row, tool in zip(THETA, arm.forward(THETA), strict=True):
+        q = [row[0], np.cos(row[1]), np.sin(row[1]), row[2] / 1000.0]  # continuous: on the circle
+        engine.framesForwardKinematics(model, data, np.array(q))
+        place = data.oMf[frame]
+        assert np.abs(place.rotation - tool[:3, :3]).max() < 1e-14
+        assert np.abs(1000.0 * place.translation - tool[:3, 3]).max() < 1e-11
+
+
+def test_a_part_of_the_chain(source: Path) -> None:
+    whole = pk.SerialArm.from_urdf(source, tip="tool0")
+    fore = pk.SerialArm.from_urdf(source, tip="tool0", base="fore")
+    upper = pk.SerialArm.from_urdf(source, tip="fore")
+    for row in THETA:
+        both = upper.forward(row[:2]) @ fore.forward(row[2:])
+        assert np.abs(both - whole.forward(row)).max() < 1e-11
+
+
+def test_errors_go_into_the_origins(source: Path, tmp_path: Path) -> None:
+    arm = pk.SerialArm.from_urdf(source, tip="tool0").replace(ERRORS)
+    arm.save_urdf(tmp_path / "corrected.urdf", source, tip="tool0")
+    again = pk.SerialArm.from_urdf(tmp_path / "corrected.urdf", tip="tool0")
+    assert np.abs(again.forward(THETA) - arm.forward(THETA)).max() < 1e-11
+
+
+def test_all_else_stays_in_the_file(source: Path, tmp_path: Path) -> None:
+    arm = pk.SerialArm.from_urdf(source, tip="tool0")
+    arm.save_urdf(tmp_path / "same.urdf", source, tip="tool0")
+    text = (tmp_path / "same.urdf").read_text(encoding="utf-8")
+    assert "<!-- the shoulder -->" in text
+    old, new = (
+        {joint.get("name"): joint for joint in ElementTree.parse(path).getroot().findall("joint")}
+        for path in (source, tmp_path / "same.urdf")
+    )
+    for name in ("f", "t", "c"):
+        assert ElementTree.tostring(old[name]) == ElementTree.tostring(new[name])
+    assert ElementTree.tostring(old["j1"].find("limit")) == ElementTree.tostring(
+        new["j1"].find("limit")
+    )
+    origin = new["j2"].find("origin")
+    numbers = [float(n) for n in f"{origin.get('xyz')} {origin.get('rpy')}".split()]
+    assert numbers == pytest.approx([0.1, 0, 0, 0, np.pi / 2, 0.3], abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    "old, new, arguments, message",
+    [
+        ("", "", {}, "tip: name one of the ends of .*: tool0, camera"),
+        ("", "", {"tip": "tool"}, "has no link 'tool'; did you mean 'tool0'"),
+        ("", "", {"tip": "camera", "base": "fore"}, "base: 'fore' is not above 'camera'"),
+        ("", "", {"tip": "base_link"}, "no moving joint above the link 'base_link'"),
+        (
+            "continuous",
+            "floating",
+            {"tip": "tool0"},
+            "'j2' is floating, which a serial arm has not",
+        ),
+        ("</robot>", "", {"tip": "tool0"}, "not valid XML"),
+        ("robot", "mujoco", {"tip": "tool0"}, "begins with <mujoco>, not <robot>"),
+        ('name="j1" ', "", {"tip": "tool0"}, "not a URDF file: KeyError"),
+    ],
+)
+def test_mistakes_are_named(
+    old: str, new: str, arguments: dict[str, str], message: str, source: Path
+) -> None:
+    source.write_text(URDF.replace(old, new), encoding="utf-8")
+    with pytest.raises(ValueError, match=message):
+        pk.SerialArm.from_urdf(source, **arguments)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError, match="no such file"):
+        pk.SerialArm.from_urdf(tmp_path / "arm.urdf")
+
+
+def test_errors_do_not_go_into_another_arms_file(source: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"source: .* holds another arm"):
+        pk.load("3r").save_urdf(tmp_path / "new.urdf", source, tip="tool0")
