@@ -1,0 +1,164 @@
+"""`pkmcal tolerance`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from pkmcal.allocation import allocate_tolerance
+from pkmcal.cli_calibrate import read_prior
+from pkmcal.cli_output import as_json, folder
+from pkmcal.core import FloatArray
+from pkmcal.monte_carlo import Progress
+from pkmcal.pose_csv import read_poses, write_poses
+from pkmcal.robot import Robot, load_parallel
+from pkmcal.sensitivity import own_names
+from pkmcal.tolerance import Sigma, Tolerance
+from pkmcal.tolerance import tolerance as spread
+from pkmcal.workspace import reach, sample_poses, workspace
+
+_CELLS = 40  # of a map, along each axis
+_MACHINES = 2_000  # of a map: its colours are good to 3 %
+
+
+def tolerance(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
+    ],
+    sigma: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[NAME=]σ",
+            help="Standard deviation of the errors: 'base*.z=0.1', 'slider*.tilt1=0.1deg'. Repeat"
+            " it. Without a name, in mm, of every length.",
+        ),
+    ] = None,
+    allowed: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM",
+            help="The inverse question: which sigma may each joint have, so that 99.7 % of the"
+            " machines are within this distance?",
+        ),
+    ] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="CSV",
+            help="Poses, with columns such as 'y [mm]' and 'alpha [deg]'; by default 30 are drawn"
+            " in the workspace.",
+        ),
+    ] = None,
+    samples: Annotated[
+        int, typer.Option(metavar="N", min=2, help="How many machines are drawn.")
+    ] = 100_000,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of machines and poses.")] = 0,
+    map: Annotated[
+        str | None,
+        typer.Option(metavar="A,B", help="Draw a map over two coordinates: 'y,z'. With --sigma."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where files go.")] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
+) -> int:
+    """Draw machines with random errors of their geometry and see how far off they are.
+
+    Machines are solved exactly; beside them the linear propagation and the worst case. Exit code 1:
+    some machines have no pose.
+
+    Example: pkmcal tolerance 2tpr2tps --sigma 0.1 --samples 10000
+    """
+    if (allowed is None) == (not sigma):
+        raise ValueError("tolerance takes --sigma or --allowed, one of the two")
+    if map is not None and (out is None or allowed is not None):
+        raise ValueError("--map is drawn for --sigma, into the folder of --out")
+    machine = load_parallel(robot)
+    at = sample_poses(machine, seed=seed) if poses is None else read_poses(poses, machine)
+    with ThreadPoolExecutor() as executor:
+        if allowed is not None:
+            shared = allocate_tolerance(
+                machine, at, allowed, samples=samples, seed=seed, executor=executor
+            )
+            found, told = shared.check, as_json(shared) if json else str(shared)
+        else:
+            deviations = read_sigma(sigma or [], machine)
+            with _progress() as progress:
+                found = spread(machine, at, deviations, samples, seed, executor, progress)
+            told = as_json(found, "position_share") if json else str(found)
+            if map is not None and out is not None:
+                _draw_map(machine, map, deviations, seed, executor, folder(out))
+    if out is not None:
+        write_poses(folder(out) / "tolerance.csv", found.poses, _columns(found))
+    typer.echo(told)
+    return 1 if found.failed.any() else 0
+
+
+def read_sigma(given: list[str], robot: Robot) -> float | Mapping[str, float]:
+    """The `sigma` of `tolerance` from ``--sigma`` options, which read as those of ``--prior``.
+
+    Raises
+    ------
+    ValueError
+        No number, a unit that does not fit, a wildcard over lengths and angles.
+    """
+    try:
+        sigma = read_prior(given, robot, own_names(robot))
+    except ValueError as error:
+        raise ValueError(str(error).replace("--prior", "--sigma")) from None
+    assert sigma is not None
+    return sigma
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
+    """A bar on the terminal, and nothing elsewhere."""
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    console = Console(stderr=True)
+    with Bar(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("machines x poses")
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def _columns(found: Tolerance) -> dict[str, FloatArray]:
+    """What is written beside each pose."""
+    names = ("x", "y", "z", "alpha", "beta", "gamma")
+    columns: dict[str, FloatArray] = {
+        f"distance {word} [mm]": values
+        for word, values in (
+            ("rms", found.distance_rms),
+            ("95 %", found.distance95),
+            ("99.7 %", found.distance997),
+        )
+    }
+    for word, values in (
+        *(("mean", found.mean), ("std", found.std), ("linear std", found.linear_std)),
+        ("worst case", found.worst_case),
+    ):
+        for k, name in enumerate(names):
+            unit = "mm" if k < 3 else "deg"
+            columns[f"{word} d{name} [{unit}]"] = values[:, k] * (1 if k < 3 else 180 / np.pi)
+    return columns
+
+
+def _draw_map(
+    robot: Robot, axes: str, sigma: Sigma, seed: int, executor: ThreadPoolExecutor, out: Path
+) -> None:
+    from pkmcal import figures
+
+    names = [name.strip() for name in axes.split(",")]
+    if len(names) != 2:
+        raise ValueError(f"--map {axes}: expected two coordinates, such as y,z")
+    ends = reach(robot)
+    unknown = [name for name in names if name not in ends]
+    if unknown:
+        raise ValueError(f"--map {axes}: {unknown[0]!r} is not one of {', '.join(ends)}")
+    grid = workspace(robot, {name: (*ends[name], _CELLS) for name in names})
+    found = spread(robot, grid.poses, sigma, _MACHINES, seed, executor)
+    figures.save(figures.tolerance_map(found, grid), out / "map")
