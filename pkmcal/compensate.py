@@ -10,12 +10,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
 from pkmcal.core import as_rows
-from pkmcal.robot import Robot
+from pkmcal.robot import Match, Robot
+from pkmcal.swarm import PAPER, SwarmSettings, checked_seed, minimise_eq18
 
 FloatArray = NDArray[np.float64]
 Measured = ArrayLike | Callable[[FloatArray], ArrayLike]
 
+METHODS = ("exact", "pso")
 ORIENTATIONS = ("measured", "assumed", "from-position")
+_ASSUMED = {
+    "measured": "orientation as measured",
+    "assumed": "orientation assumed as desired: its error stays, and passes for one of position",
+    "from-position": "beta from the position, the other angles assumed as desired",
+}
 _LISTED = 12  # a longer list of poses is printed with its middle left out
 
 
@@ -30,16 +37,23 @@ class Compensation:
     correction : ndarray (N, n)
         ΔL of eq. 18, mm or rad.
     objective : ndarray (N,)
-        E of eq. 18 at this correction: 0 unless one correction serves all poses.
-    history : ndarray (N, passes)
-        E with the correction that was in force at each measurement: how far off the actuators'
-        readings were, as the ideal machine sees them.
+        E of eq. 18 at the correction of the last pass: 0 for the exact method unless one
+        correction serves all poses, and what the swarm left.
+    history : ndarray (N, passes) or (N, passes · (iterations + 1))
+        Exact: E with the correction that was in force at each measurement, which is how far off
+        the actuators' readings were, as the ideal machine sees them. Of a swarm: its lowest E
+        before the first and after every iteration, pass by pass; with one correction for all
+        poses, the root mean square of E over them.
+    method, orientation : str
+        As asked for.
     """
 
     actuators: FloatArray
     correction: FloatArray
     objective: FloatArray
     history: FloatArray
+    method: str
+    orientation: str
 
     def __str__(self) -> str:
         n = self.actuators.shape[1]
@@ -50,8 +64,13 @@ class Compensation:
         ]
         if len(rows) > _LISTED:
             rows[_LISTED - 4 : -3] = [["⋮"] * len(heads)]
-        off = ", ".join(f"{value:.3g}" for value in np.sqrt(np.nanmean(self.history**2, axis=0)))
-        title = f"{len(self.actuators)} poses; off by {off} (rms of the actuators, pass by pass)"
+        each = np.sqrt(np.nanmean(self.history**2, axis=0))
+        if self.method == "exact":
+            off = ", ".join(f"{value:.3g}" for value in each)
+            story = f"off by {off} (rms of the actuators, pass by pass)"
+        else:
+            story = f"swarm from {each[0]:.3g} to {each[-1]:.3g} (rms of E)"
+        title = f"{len(self.actuators)} poses; {story}; {_ASSUMED[self.orientation]}"
         return title + "\n" + digits.table(heads, rows)
 
 
@@ -61,8 +80,12 @@ def compensate(
     measured: Measured,
     method: str = "exact",
     orientation: str = "measured",
+    match: Match = None,
     common: bool = False,
     passes: int = 1,
+    seed: int = 0,
+    bounds: ArrayLike | None = None,
+    swarm: SwarmSettings = PAPER,
 ) -> Compensation:
     """Correct the commands of a machine by where it went.
 
@@ -79,21 +102,35 @@ def compensate(
     measured : array_like (N, 6) or (N, 3), or callable
         Poses or positions that were reached with the ideal commands; or a function that takes
         commands (N, n), has them carried out and returns what was measured.
-    method : {"exact"}
-        The minimiser in closed form.
+    method : {"exact", "pso"}
+        The minimiser in closed form; or a particle swarm that looks for it (eq. 19), as published.
+        The closed form gives the same answer without the swarm's remainder and in no time.
     orientation : {"measured", "assumed", "from-position"}
         Where the orientation of the measured pose comes from. "measured": from the six numbers.
         "assumed": it is the desired one. "from-position": of the 2TPR&2TPS, whose β follows from
         the position by x = z tan β (eq. 7); the other angles are the desired ones.
+    match : bool or names of coordinates, optional
+        Which coordinates count, as for `Robot.inverse`; all six by default. A real machine of
+        fewer than six degrees of freedom leaves the manifold of the ideal one, and six numbers
+        cannot all be met: then match as many as there are degrees of freedom, the position
+        first, such as ("x", "y", "z", "alpha").
     common : bool
         One correction for all poses, the mean, in place of one for each.
     passes : int
         How often to measure and correct; more than once needs a callable.
+    seed : int
+        Of the swarms, from 0 to 2⁶⁴ - 1; not used by the exact method.
+    bounds : array_like () or (n,), optional
+        The swarm looks for the correction of a pass between minus and plus this, mm or rad; by
+        default twice the largest difference L* - L of any pose.
+    swarm : SwarmSettings
+        Size and factors of the swarms; by default the paper's. `pkmcal.swarm.CONSTRICTION` are
+        stable ones.
 
     Returns
     -------
     Compensation
-        Corrected commands, corrections, and E pass by pass.
+        Corrected commands, corrections, and E pass by pass or iteration by iteration.
 
     Raises
     ------
@@ -112,8 +149,8 @@ def compensate(
     >>> found.correction.round(6) + 0.0
     array([[-0.2,  0. ,  0. ,  0. ,  0. ,  0. ]])
     """
-    if method != "exact":
-        raise ValueError(f"method must be 'exact', found {method!r}")
+    if method not in METHODS:
+        raise ValueError(f"method must be one of {', '.join(METHODS)}; found {method!r}")
     if orientation not in ORIENTATIONS:
         raise ValueError(
             f"orientation must be one of {', '.join(ORIENTATIONS)}; found {orientation!r}"
@@ -130,20 +167,57 @@ def compensate(
     poses, shape = as_rows("desired", desired, 6)
     if len(shape) != 1:
         raise ValueError(f"desired must have shape (N, 6), found {(*shape, 6)}")
-    ideal = robot.inverse(poses)
+    ideal = robot.inverse(poses, match)
+    seed = checked_seed(seed)
+    half_width = None if bounds is None else _half_width(bounds, ideal.shape[1])
     correction = np.zeros_like(ideal)
-    history = np.empty((len(poses), passes))
-    for k in range(passes):
+    history = []
+    for _ in range(passes):
         reached = measured(ideal + correction) if callable(measured) else measured
-        off = ideal - robot.inverse(_pose_of(reached, poses, orientation))
-        history[:, k] = np.linalg.norm(off, axis=1)
-        step = np.broadcast_to(np.nanmean(off, axis=0), off.shape) if common else off
+        off = ideal - robot.inverse(_pose_of(reached, poses, orientation), match)
+        if method == "pso":
+            step, of_pass = _by_swarm(off, common, half_width, seed, swarm)
+        else:
+            step = np.broadcast_to(np.nanmean(off, axis=0), off.shape) if common else off
+            of_pass = np.linalg.norm(off, axis=1)[:, None]
+        history.append(of_pass)
         correction = correction + step
     return Compensation(
         actuators=ideal + correction,
         correction=correction,
         objective=np.linalg.norm(off - step, axis=1),
-        history=history,
+        history=np.concatenate(history, axis=1),
+        method=method,
+        orientation=orientation,
+    )
+
+
+def _half_width(bounds: ArrayLike, n: int) -> FloatArray:
+    given = np.asarray(bounds)
+    if given.dtype.kind not in "iuf" or given.shape not in ((), (n,)):
+        raise ValueError(f"bounds must be a number or have shape ({n},), found {bounds!r}")
+    if not (np.isfinite(given) & (given > 0)).all():
+        raise ValueError(f"bounds must be finite and positive, found {bounds!r}")
+    return np.array(np.broadcast_to(given, (n,)), dtype=np.float64)
+
+
+def _by_swarm(
+    off: FloatArray,
+    common: bool,
+    half_width: FloatArray | None,
+    seed: int,
+    settings: SwarmSettings,
+) -> tuple[FloatArray, FloatArray]:
+    """Corrections (N, n) and the swarms' history (N, iterations + 1)."""
+    reached = np.isfinite(off).all(axis=1)
+    if half_width is None:
+        widest = 2 * float(np.abs(off[reached]).max(initial=0.0))
+        half_width = np.full(off.shape[1], widest)
+    sets = off[None, reached] if common and reached.any() else off[:, None]
+    step, history = minimise_eq18(settings, sets, half_width, seed)
+    return (
+        np.broadcast_to(step, off.shape),
+        np.broadcast_to(history, (len(off), history.shape[1])),
     )
 
 

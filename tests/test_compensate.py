@@ -9,6 +9,7 @@ import pkmcal as pk
 from pkmcal.compensate import compensate
 from pkmcal.geometry import FloatArray
 from pkmcal.robot import Robot
+from pkmcal.swarm import CONSTRICTION
 
 from .simulated import hexapod_poses, tilted_poses, with_errors
 
@@ -132,11 +133,111 @@ def test_a_row_out_of_reach_is_nan_and_leaves_the_others() -> None:
     assert "3 poses" in str(found)
 
 
+# --- by a swarm --------------------------------------------------------------------------------
+
+
+def test_a_swarm_finds_what_the_closed_form_gives(paper: Robot) -> None:
+    rng = np.random.default_rng(8)
+    desired = tilted_poses(paper, 10, rng)
+    reached = with_errors(paper, 0.5, rng).forward(paper.inverse(desired)).pose
+    exact = compensate(paper, desired, reached)
+    found = compensate(paper, desired, reached, method="pso", swarm=CONSTRICTION)
+    np.testing.assert_allclose(found.correction, exact.correction, atol=1e-6)
+    np.testing.assert_allclose(found.actuators, exact.actuators, atol=1e-6)
+    assert found.history.shape == (10, 201)
+    assert (np.diff(found.history, axis=1) <= 0).all()
+    np.testing.assert_allclose(found.objective, found.history[:, -1], rtol=1e-9)
+    assert "swarm" in str(found)
+
+
+def test_one_seed_gives_one_answer(paper: Robot) -> None:
+    rng = np.random.default_rng(9)
+    desired = tilted_poses(paper, 4, rng)
+    reached = with_errors(paper, 0.5, rng).forward(paper.inverse(desired)).pose
+    first, again, other = (
+        compensate(paper, desired, reached, method="pso", seed=seed) for seed in (3, 3, 4)
+    )
+    assert first.correction.tobytes() == again.correction.tobytes()
+    assert not (first.correction == other.correction).any()
+
+
+def test_bounds_hold_the_correction_of_a_swarm(paper: Robot) -> None:
+    desired = tilted_poses(paper, 4, np.random.default_rng(10))
+    true = paper.replace({"offset1": 2.0})
+    found = compensate(
+        paper, desired, lambda q: true.forward(q).pose, method="pso", bounds=[0.5, 1, 1, 1]
+    )
+    np.testing.assert_array_equal(found.correction[:, 0], -0.5)
+    np.testing.assert_allclose(found.objective, 1.5, atol=1e-3)
+
+
+def test_a_common_correction_by_a_swarm_is_the_mean() -> None:
+    robot = pk.load("hexapod")
+    rng = np.random.default_rng(11)
+    desired = hexapod_poses(robot, 15, rng)
+    reached = with_errors(robot, 0.5, rng).forward(robot.inverse(desired)).pose
+    exact = compensate(robot, desired, reached, common=True)
+    found = compensate(
+        robot, desired, reached, common=True, method="pso", swarm=CONSTRICTION, bounds=5.0
+    )
+    # E is flat at its minimum, so half the digits
+    np.testing.assert_allclose(found.correction, exact.correction, atol=1e-5)
+    np.testing.assert_allclose(
+        found.history[:, -1], np.sqrt((exact.objective**2).mean()), rtol=1e-9
+    )
+
+
+def test_a_row_out_of_reach_is_nan_for_a_swarm_too() -> None:
+    robot = pk.load("linear-delta")
+    desired = np.tile(robot.home, (3, 1))
+    desired[1, 0] = 1e4
+    measured = np.tile(robot.home, (3, 1))
+    measured[:, 2] += 0.1
+    for common in (False, True):
+        found = compensate(robot, desired, measured, method="pso", common=common)
+        assert np.isnan(found.actuators[1]).all()
+        assert np.isfinite(found.actuators[[0, 2]]).all()
+
+
+def test_swarms_follow_one_another_over_passes(paper: Robot) -> None:
+    rng = np.random.default_rng(12)
+    true = with_errors(paper, 0.5, rng)
+    desired = tilted_poses(paper, 5, rng)
+    found = compensate(paper, desired, lambda q: true.forward(q).pose, method="pso", passes=3)
+    assert found.history.shape == (5, 3 * 201)
+    np.testing.assert_allclose(true.forward(found.actuators).pose, desired, atol=1e-5)
+
+
+# --- coordinates that count ----------------------------------------------------------------------
+
+
+def test_matched_coordinates_are_met_on_a_machine_that_leaves_the_ideal_manifold() -> None:
+    robot = pk.load("2tpr2tps-spatial")
+    rng = np.random.default_rng(13)
+    true = with_errors(robot, 0.3, rng)
+    desired = np.zeros((8, 6))
+    desired[:, 1], desired[:, 2] = rng.uniform(-50, 50, 8), rng.uniform(360, 430, 8)
+
+    def measured(q: FloatArray) -> FloatArray:
+        return true.forward(q).pose
+
+    six = compensate(robot, desired, measured, passes=4)
+    four = compensate(robot, desired, measured, passes=4, match=("x", "y", "z", "alpha"))
+    np.testing.assert_allclose(measured(four.actuators)[:, :4], desired[:, :4], atol=1e-6)
+    assert left(robot, true, desired, six.actuators) > 0.01
+
+
+# --- what does not fit ---------------------------------------------------------------------------
+
 BAD = [
     ({"method": "fast"}, "method"),
     ({"orientation": "guess"}, "orientation"),
     ({"passes": 0}, "passes"),
     ({"passes": 2}, "passes"),
+    ({"seed": -1}, "seed"),
+    ({"method": "pso", "bounds": -1.0}, "bounds"),
+    ({"method": "pso", "bounds": [1.0, 1.0]}, "bounds"),
+    ({"match": ["y", "z"]}, "match"),
 ]
 
 
