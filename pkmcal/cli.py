@@ -13,8 +13,12 @@ import typer
 from typer.core import TyperGroup
 
 from pkmcal.cli_calibrate import calibrate
+from pkmcal.cli_compensate import compensate
 from pkmcal.cli_demo import demo
 from pkmcal.cli_machines import machines
+from pkmcal.cli_plan import plan
+from pkmcal.cli_sensitivity import sensitivity
+from pkmcal.cli_tolerance import tolerance
 
 _STOPPED = 130  # what shells give a program that Ctrl-C ended
 
@@ -38,7 +42,7 @@ class _Verbs(TyperGroup):
 
 
 app = typer.Typer(cls=_Verbs, pretty_exceptions_enable=False)
-for verb in (demo, machines, calibrate):
+for verb in (demo, machines, sensitivity, tolerance, plan, calibrate, compensate):
     app.command()(verb)
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +18,8 @@ from pkmcal.core import POSE
 from pkmcal.csv_table import UNITS
 from pkmcal.measurement_csv import read_measurements
 from pkmcal.measurements import Measurements
-from pkmcal.robot import Robot, load
+from pkmcal.robot import Robot, load_parallel
+from pkmcal.tracker import Tracker
 
 _FRAME = dict(zip(POSE, ("mm", "mm", "mm", "rad", "rad", "rad"), strict=True))
 _PRIOR = re.compile(
@@ -65,9 +68,21 @@ def calibrate(
         str,
         typer.Option(metavar="WORD", help="unknown: find the measured points of the platform."),
     ] = "known",
+    attachment: Annotated[
+        str,
+        typer.Option(metavar="WORD", help="unknown: find where on the platform distances end."),
+    ] = "known",
+    tracker: Annotated[
+        str | None,
+        typer.Option(
+            metavar="R,A,E[,X,Y,Z]",
+            help="A laser tracker's noise in place of the file's sigma: of its range in mm, azimuth"
+            " and elevation in deg; and where it stands, in mm, if the frame is known.",
+        ),
+    ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write the calibrated robot to DIR/robot.toml."),
+        typer.Option(metavar="DIR", help="Write robot.toml, as calibrated, and residuals.png."),
     ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
 ) -> int:
@@ -79,10 +94,12 @@ def calibrate(
     """
     from pkmcal.identify import identify
 
-    machine = load(robot)
+    machine = load_parallel(robot)
     if out is not None:
         _refuse_own_input(out, robot)
     measured = read_measurements(csv, machine)
+    if tracker is not None:
+        measured = _seen_by(read_tracker(tracker), measured)
     chosen = free_names(machine, free)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
@@ -94,16 +111,19 @@ def calibrate(
             loss=loss,
             frame=frame,
             target=target,
+            attachment=attachment,
             holdout=None if holdout is None else _read_holdout(holdout, machine),
         )
     if out is not None:
         found.robot.save(folder(out) / "robot.toml")
+        found.plot(out / "residuals.png")
     if json:
         typer.echo(as_json(found, "parameters", "correlations"))
     else:
         typer.echo(found.summary())
         if out is not None:
             typer.echo(f"\ncalibrated robot: {out / 'robot.toml'}")
+            typer.echo(f"residuals: {out / 'residuals.png'}")
     return 0 if found.converged and not found.warnings else 1
 
 
@@ -157,6 +177,33 @@ def read_prior(
             return sigma
         sigmas[name] = sigma
     return sigmas or None
+
+
+def read_tracker(text: str) -> Tracker:
+    """A tracker from ``--tracker``: three deviations in mm and deg, and its place in mm.
+
+    Raises
+    ------
+    ValueError
+        Not three or six numbers, or not positive.
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) not in (3, 6):
+        raise ValueError(f"--tracker {text}: expected RANGE,AZIMUTH,ELEVATION or those and X,Y,Z")
+    far, azimuth, elevation, x, y, z = [*numbers, 0.0, 0.0, 0.0][:6]
+    try:
+        return Tracker(far, math.radians(azimuth), math.radians(elevation), (x, y, z))
+    except ValueError as error:
+        raise ValueError(f"--tracker {text}: {error}") from None
+
+
+def _seen_by(tracker: Tracker, measured: Measurements) -> Measurements:
+    if measured.kind != "position":
+        raise ValueError(f"--tracker: a tracker measures positions, the file has {measured.kind}s")
+    return replace(measured, sigma=tracker.covariance(measured.values))
 
 
 def _unit_of(pattern: str, robot: Robot, free: Sequence[str]) -> str:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import typer
 
 from pkmcal import digits, robot
 from pkmcal.cli_output import as_json
+from pkmcal.core import POSE
+from pkmcal.serial import SerialArm
 
 
 def machines(
@@ -19,9 +22,12 @@ def machines(
 
     Example: pkmcal machines
     """
-    rows = {}
+    rows: dict[str, dict[str, Sequence[str]]] = {}
     for name in robot.machines():
         machine = robot.load(name)
+        if isinstance(machine, SerialArm):
+            rows[name] = {"limbs": list(machine.kinds), "coordinates": POSE, "free": ()}
+            continue
         rows[name] = {
             "limbs": [limb.kind for limb in machine.model.limbs],
             "coordinates": machine.coordinates,
@@ -33,7 +39,7 @@ def machines(
     table = (
         [
             name,
-            ", ".join(f"{row['limbs'].count(k)} {k}" for k in dict.fromkeys(row["limbs"])),
+            ", ".join(f"{list(row['limbs']).count(k)} {k}" for k in dict.fromkeys(row["limbs"])),
             " ".join(row["coordinates"]),
             str(len(row["free"])),
         ]

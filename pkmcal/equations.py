@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pkmcal.core import STATUS
 from pkmcal.measurements import Measurements
-from pkmcal.parameters import Parameters, Share
+from pkmcal.parameters import POINTS, Parameters, Share
 from pkmcal.predict import Predicted, difference, distance_per_point, predict
 from pkmcal.robot import Robot
 
@@ -69,8 +70,21 @@ class Equations:
         self.rows = np.concatenate([share.rows for share in shares])
         self.parameters = parameters
         self._framed = [share.framed for share in shares]
-        self._columns = [
-            parameters.target_columns(share.measured) if share.aimed else None for share in shares
+        self._columns = [  # of the points that are sought, by what `predict` calls them
+            {
+                name: parameters.columns_of(role, share.measured)
+                for name, role in POINTS[share.measured.kind].items()
+                if role in share.sought
+            }
+            for share in shares
+        ]
+        self._known = [
+            {
+                name: m.attachments if role == "attachment" else m.targets
+                for name, role in POINTS[m.kind].items()
+                if name not in columns
+            }
+            for m, columns in zip(self.sets, self._columns, strict=True)
         ]
         # several targets or repeats at the same actuators are one pose
         actuators = np.concatenate([m.actuators for m in self.sets])
@@ -88,7 +102,7 @@ class Equations:
 
     def at(self, theta: FloatArray) -> Point:
         """The equations at `theta` (n,)."""
-        robot = self.parameters.robot_at(theta)
+        robot = self.parameters.robot._nudged(self.parameters.values_at(theta))
         solved = robot.forward(self.actuators, self._guess)
         frame = self.parameters.frame_at(theta)
         predicted, residuals = [], []
@@ -96,12 +110,23 @@ class Equations:
             seen = predict(
                 measured.kind,
                 solved.pose[self.pose_of[i]],
-                self._target(i, theta),
-                frame if self._framed[i] else None,
+                frame=frame if self._framed[i] else None,
+                **self._known[i],
+                **{name: theta[columns] for name, columns in self._columns[i].items()},
             )
             predicted.append(seen)
             residuals.append(difference(measured.kind, measured.values, seen.values))
         return Point(theta, robot, solved.pose, solved.status, tuple(predicted), tuple(residuals))
+
+    def with_values(self, values: Sequence[FloatArray], prior_centre: FloatArray) -> Equations:
+        """The same with other measured values (N, k) of each set, and another centre (n,)."""
+        other = copy.copy(self)
+        other.sets = tuple(
+            replace(measured, values=given.reshape(measured.values.shape))
+            for measured, given in zip(self.sets, values, strict=True)
+        )
+        other.parameters = replace(self.parameters, start=prior_centre)
+        return other
 
     def start(self) -> Point:
         """The equations at the present parameters, an unknown frame laid on what was measured.
@@ -128,15 +153,6 @@ class Equations:
         """Let later calls of `at` start from its poses."""
         self._guess = np.where(point.status[:, None] == 0, point.pose, self._guess)
 
-    def _target(self, i: int, theta: FloatArray) -> FloatArray | None:
-        columns = self._columns[i]
-        if columns is not None:
-            place: FloatArray = theta[columns]
-            return place
-        measured = self.sets[i]
-        at_origin = measured.target is None and measured.target_index is None
-        return None if at_origin else measured.targets
-
     def jacobian(self, point: Point) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n)."""
         p = self.parameters
@@ -148,11 +164,10 @@ class Equations:
             part[:, :, : len(p.places)] = seen.by_pose @ by_geometry[self.pose_of[i]]
             if seen.by_frame is not None and p.frame is not None:
                 part[:, :, p.frame : p.frame + 6] = seen.by_frame
-            columns = self._columns[i]
-            if columns is not None and seen.by_target is not None:
-                np.put_along_axis(
-                    part, np.repeat(columns[:, None, :], k, axis=1), seen.by_target, axis=2
-                )
+            for name, columns in self._columns[i].items():
+                by_point = seen.by_target if name == "target" else seen.by_anchor
+                assert by_point is not None
+                np.put_along_axis(part, np.repeat(columns[:, None, :], k, axis=1), by_point, axis=2)
             parts.append(part)
         return parts
 
@@ -170,6 +185,23 @@ class Equations:
             stacked.append((scaled / factor).reshape(-1, *part.shape[2:]))
         return np.concatenate(stacked)
 
+    def coloured(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:
+        """The reverse of `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad."""
+        parts, rest = [], whitened
+        for measured, white, factor in zip(self.sets, self._whiten, noise, strict=True):
+            mine, rest = np.split(rest, [len(measured) * white.shape[1]])
+            part = factor * mine.reshape(len(measured), -1)
+            if white.ndim == 3:
+                parts.append(np.linalg.solve(white, part[:, :, None])[:, :, 0])
+            else:
+                parts.append(part / white)
+        return parts
+
+    def white(self, i: int) -> FloatArray:
+        """Matrices (N, k, k) that make the noise of set `i` one, as its sigma says."""
+        white = self._whiten[i]
+        return white if white.ndim == 3 else white[:, :, None] * np.eye(white.shape[1])
+
     def distances(self, point: Point) -> FloatArray:
         """How far off each measured point is, mm, in the order of the sets."""
         return np.concatenate([distance_per_point(r) for r in point.residuals])
@@ -179,24 +211,6 @@ class Equations:
         off = self.distances(point)
         off = off[np.isfinite(off)]
         return float(np.sqrt(np.mean(off**2))) if off.size else float("nan")
-
-    def repeatability(self, point: Point) -> float:
-        """Scatter of repeats of one pose about their mean, mm per coordinate; NaN without any."""
-        squares, freedom = 0.0, 0
-        for measured, residual in zip(self.sets, point.residuals, strict=True):
-            lengths = residual[:, :3]
-            target = (
-                np.zeros(len(measured)) if measured.target_index is None else measured.target_index
-            )
-            _, group = np.unique(
-                np.column_stack([measured.pose_index, target]), axis=0, return_inverse=True
-            )
-            count = np.bincount(group.reshape(-1))
-            for column in lengths.T:
-                mean = np.bincount(group.reshape(-1), weights=column) / count
-                squares += float(((column - mean[group.reshape(-1)]) ** 2).sum())
-            freedom += (len(measured) - len(count)) * lengths.shape[1]
-        return float(np.sqrt(squares / freedom)) if freedom else float("nan")
 
     def status(self, point: Point) -> NDArray[np.int32]:
         """Of the forward kinematics, for each row."""

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from pkmcal.equations import Equations, Point
 from pkmcal.identifiability import Decomposed, Directions, decompose, directions, triangle
 from pkmcal.loss import Loss
+from pkmcal.outliers import median_ratio
+from pkmcal.repeats import SIGNIFICANT, Split, groups, split
 from pkmcal.search import Search
 
 FloatArray = NDArray[np.float64]
@@ -95,13 +97,14 @@ class Estimator:
         self.unstated = np.array([m.sigma is None for m in equations.sets])
         set_of = np.repeat(equations.set_of, equations.components)
         self._equations_of = [set_of == i for i in range(len(self.unstated))]
+        self._groups = [groups(measured) for measured in equations.sets]
         self._at_start = self.search.jacobian(start, np.ones(len(self.unstated)))
         self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
 
     def solve(self) -> Estimate:
         """The estimate; noise that is not stated is estimated along, set by set."""
         ones = np.ones(len(self.unstated))
-        setting = self._setting(ones, self._loss("linear", ones), None)
+        setting = self._setting(ones, self._first_loss(), None)
         if not setting.searched.rank:
             names = ", ".join(self.equations.parameters.names)
             raise ValueError(f"they tell nothing about {names}")
@@ -127,6 +130,24 @@ class Estimator:
     def _loss(self, name: str, width: FloatArray) -> Loss:
         of_rows = width[self.equations.set_of]
         return Loss(name, self.equations.components, of_rows)
+
+    def _first_loss(self) -> Loss:
+        """Wide enough for the machine as drawn, and not so wide that gross errors lead astray."""
+        ones = np.ones(len(self.unstated))
+        if self.loss == "linear":
+            return self._loss("linear", ones)
+        squares = self._squares(self.equations.whitened(self.start.residuals, ones))
+        set_of, components = self.equations.set_of, self.equations.components
+        medians = [
+            median_ratio(squares[set_of == i], components[set_of == i]) for i in range(len(ones))
+        ]
+        return self._loss(self.loss, np.maximum(np.sqrt(medians), 1.0))
+
+    def _squares(self, residual: FloatArray) -> FloatArray:
+        """Squared length of each row, (N,)."""
+        components = self.equations.components
+        squares: FloatArray = np.add.reduceat(residual**2, np.cumsum(components) - components)
+        return squares
 
     def _setting(self, noise: FloatArray, loss: Loss, point: Point | None) -> Setting:
         """What can be told with this noise, before (`point` None) or after a fit."""
@@ -163,24 +184,46 @@ class Estimator:
 
     def _spread(self, estimate: Estimate) -> FloatArray:
         """Deviation of the whitened residuals of each set, (sets,); 1 where nothing tells it."""
-        from scipy.special import gammaincinv
-
         rows, components = self.equations.set_of, self.equations.components
-        first = np.cumsum(components) - components
-        squares = np.add.reduceat(estimate.residual**2, first)
+        squares = self._squares(estimate.residual)
         factor = np.ones(len(self.unstated))
         for i in np.flatnonzero(estimate.freedom >= _LEAST_FREEDOM):
             mine, k = squares[rows == i], components[rows == i]
             if self.loss == "linear":
                 variance = mine.sum() / estimate.freedom[i]
-            else:  # the median of chi squared
-                variance = np.median(mine / (2 * gammaincinv(k / 2, 0.5)))
-                variance *= k.sum() / estimate.freedom[i]
+            else:
+                variance = median_ratio(mine, k) * k.sum() / estimate.freedom[i]
+            if self.unstated[i]:
+                variance *= self._inflation(estimate, int(i))
             factor[i] = np.sqrt(variance)
         return factor
 
+    def _inflation(self, estimate: Estimate, i: int) -> float:
+        """Where the model misses more than repeats scatter, they tell that once, not each time."""
+        repeated = self._repeats(estimate, i)
+        if not repeated.chance < SIGNIFICANT:
+            return 1.0
+        of_poses = repeated.missed / repeated.missed_freedom
+        return of_poses / ((repeated.pure + repeated.missed) / float(estimate.freedom[i]))
+
+    def repeats(self, estimate: Estimate, plain: bool = False) -> list[Split]:
+        """Pure error and lack of fit of each set, whitened; `plain`: of their lengths in mm."""
+        return [self._repeats(estimate, i, plain) for i in range(len(self._groups))]
+
+    def _repeats(self, estimate: Estimate, i: int, plain: bool = False) -> Split:
+        group, residual = self._groups[i], estimate.point.residuals[i]
+        k = residual.shape[1]
+        leverage = len(residual) * k - float(estimate.freedom[i])
+        if plain:
+            lengths = min(k, 3)
+            white = np.tile(np.eye(lengths), (len(residual), 1, 1))
+            return split(residual[:, :lengths], white, group, leverage * lengths / k)
+        weights = estimate.weights[self.equations.set_of == i]
+        white = self.equations.white(i) * np.sqrt(weights)[:, None, None]
+        return split(residual, white / estimate.setting.noise[i], group, leverage)
+
     def _steady(self, old: Setting, new: Setting) -> bool:
-        if old.searched.rank != new.searched.rank or old.loss.name != new.loss.name:
+        if old.searched.rank != new.searched.rank:
             return False
         if self.loss == "linear" and not len(self.prior) and len(self.unstated) == 1:
             return True  # the noise does not move the solution

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import textwrap
 from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
 from pkmcal.core import as_rows
+from pkmcal.equations import Equations
+from pkmcal.estimate import Estimate
 from pkmcal.predict import predict
+from pkmcal.repeats import SIGNIFICANT
 from pkmcal.robot import Robot
 
 FloatArray = NDArray[np.float64]
@@ -64,6 +69,10 @@ class Identification:
         Of each set of measurements: its deviation in mm as estimated, NaN where sigma was given.
     repeatability : float
         Scatter of repeats about their mean, mm per coordinate; NaN without repeats.
+    lack_of_fit : float
+        What the model misses at a pose beyond that scatter, mm per coordinate; NaN without repeats.
+    lack_of_fit_chance : float
+        How likely that much would be if the model were right, by the F test; NaN without repeats.
     observability : dict of str to float
         O1 … O5 of the Jacobian in scaled parameters, over the combinations that are told.
     residuals : tuple of ndarray (N, k)
@@ -102,6 +111,8 @@ class Identification:
     dof: float
     noise: tuple[float, ...]
     repeatability: float
+    lack_of_fit: float
+    lack_of_fit_chance: float
     observability: dict[str, float]
     residuals: tuple[FloatArray, ...]
     rows: NDArray[np.intp]
@@ -110,9 +121,9 @@ class Identification:
     converged: bool
     evaluations: int
     warnings: tuple[str, ...]
-    _places: NDArray[np.intp]  # of the free numbers in the geometry
     _told: FloatArray  # covariance of what is determined, (n, n)
-    _undetermined: FloatArray  # directions of what is not, mm and rad (n, d)
+    _equations: Equations
+    _estimate: Estimate
 
     @property
     def parameters(self) -> dict[str, dict[str, float]]:
@@ -151,16 +162,35 @@ class Identification:
             combination that cannot be told.
         """
         rows, shape = as_rows("poses", poses, 6)
-        place = None if target is None else as_rows("target", target, 3)[0]
+        place = np.zeros(3) if target is None else as_rows("target", target, 3)[0][0]
         by_pose = predict("position", rows, place).by_pose
-        by_geometry = by_pose @ self.robot.error_jacobian(rows)[:, :, self._places]
-        k = len(self._places)
+        parameters = self._equations.parameters
+        by_geometry = by_pose @ self.robot.error_jacobian(rows)[:, :, parameters.places]
+        k = len(parameters.places)
         variance = np.einsum(
             "nij,jk,nik->n", by_geometry, self._told[:k, :k], by_geometry, optimize=True
         )
-        untold = np.linalg.norm(by_geometry @ self._undetermined[:k], axis=(1, 2))
+        undetermined = self._estimate.setting.determined.untold * parameters.scale[:, None]
+        untold = np.linalg.norm(by_geometry @ undetermined[:k], axis=(1, 2))
         known = np.where(untold < _UNTOLD, np.sqrt(variance), np.inf)
         return known.reshape(shape)
+
+    def plot(self, path: str | PathLike[str]) -> None:
+        """Draw the residuals by row, over the workspace and as quantiles.
+
+        Parameters
+        ----------
+        path : str or path
+            A file that ends in ``.png`` or ``.svg``.
+
+        Raises
+        ------
+        ValueError, OSError
+            Another ending; a file that cannot be written.
+        """
+        from pkmcal import residual_figure
+
+        residual_figure.write(self, Path(path))
 
     def summary(self) -> str:
         """Everything a person should know, on one screen."""
@@ -195,9 +225,14 @@ class Identification:
             facts.append(f"chi²/dof {self.chi2_per_dof:.2f} (1 ± {tolerance:.2f} expected)")
         estimated = [_short(noise) for noise in self.noise if np.isfinite(noise)]
         if estimated:
-            facts.append(f"noise {', '.join(estimated)} mm, estimated from the residuals")
+            misfit = ", lack of fit included" if self.lack_of_fit_chance < SIGNIFICANT else ""
+            facts.append(f"noise {', '.join(estimated)} mm, estimated from the residuals{misfit}")
         if np.isfinite(self.repeatability):
             facts.append(f"repeats scatter by {_short(self.repeatability)} mm")
+        if self.lack_of_fit_chance < SIGNIFICANT:
+            facts[-1] += f", lack of fit beyond that {_short(self.lack_of_fit)} mm"
+        elif np.isfinite(self.lack_of_fit_chance):
+            facts[-1] += f", no lack of fit beyond that (p {self.lack_of_fit_chance:.2g})"
         facts.append(" ".join(f"{key} {value:.2g}" for key, value in self.observability.items()))
         lines.append(_filled("", "; ".join(facts)))
         return "\n".join(line.rstrip() for line in "\n".join(lines).splitlines())

@@ -18,14 +18,14 @@ from pkmcal.loss import LIMITS
 from pkmcal.measurements import Measurements
 from pkmcal.outliers import outliers
 from pkmcal.parameters import Bounds, Prior, Share, parameters
-from pkmcal.plausibility import meagre, misread
+from pkmcal.plausibility import beyond_strokes, meagre, misread, strayed
+from pkmcal.repeats import joined
 from pkmcal.robot import Robot
 from pkmcal.suggest import did_you_mean
 
 FloatArray = NDArray[np.float64]
 
 _POOR = 0.1  # share of the misfit that a fit worth its name does not leave
-_FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
 _NOISY = 9.0  # chi²/dof that a slip in sigma does not explain
 _INVOLVED = 1e-6  # share of a parameter in what cannot be told, above which it cannot be told
 
@@ -40,6 +40,7 @@ def identify(
     target: str | Sequence[str] = "known",
     holdout: float | Measurements | None = None,
     bounds: Bounds = None,
+    attachment: str | Sequence[str] = "known",
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -74,6 +75,9 @@ def identify(
         measurements: they are not fitted, only compared.
     bounds : mapping of str to (float, float), optional
         Lower and upper limit by name or wildcard, mm and rad.
+    attachment : {"known", "unknown"} or a sequence of them
+        Whether the points of the platform from which distances are measured are known or to be
+        found, from where `Measurements.attachment` puts them: ``attachment1.x`` ….
 
     Returns
     -------
@@ -106,7 +110,7 @@ def identify(
     >>> round(found.robot.geometry["offset1"], 6)
     0.3
     """
-    shares = _shares(robot, measurements, frame, target)
+    shares = _shares(robot, measurements, frame, target, attachment)
     held: list[tuple[Share, int]] = []
     if isinstance(holdout, Measurements):
         held = [_like(robot, holdout, shares)]
@@ -124,8 +128,10 @@ def identify(
         estimator = Estimator(equations, start, loss)
         estimate = estimator.solve()
     except ValueError as error:
-        hint = "".join(f"; {text}" for text in misread(shares, chosen, start))
-        raise ValueError(f"measurements: {error}{hint}") from None
+        hint = misread(shares, chosen, start)
+        if not hint and not start.reached:
+            hint = ["check units, signs and columns of their actuators, or leave these rows out"]
+        raise ValueError("; ".join([f"measurements: {error}", *hint])) from None
     result = _result(estimator, estimate, compare(held, estimator, estimate))
     notes = _doubts(result, estimator, estimate, shares)
     for text in notes:
@@ -138,18 +144,16 @@ def _doubts(
 ) -> list[str]:
     """What looks wrong with the measurements or the fit."""
     equations, size = estimator.equations, estimator.start.robot.length
-    moved = np.abs((result.values - result.start) / estimator.scale).max()
-    notes: list[str] = []
-    if result.rms > _POOR * result.rms_before or moved > _FAR * size:
-        notes += misread(shares, equations.parameters, estimator.start)
+    notes = strayed(estimator.start, estimate.point, equations.parameters)
+    if notes or result.rms > _POOR * result.rms_before or result.chi2_per_dof > _NOISY:
+        notes = misread(shares, equations.parameters, estimator.start) or notes
     notes += meagre(equations, result.rank, bool(len(estimator.prior)))
     if result.chi2_per_dof > _NOISY:
-        cure = "free more parameters, or state the true sigma"
-        if result.outliers:
-            cure = "look at the outliers, fit with loss='huber', or " + cure
         notes.append(
-            f"residuals are {np.sqrt(result.chi2_per_dof):.3g} times what sigma says: {cure}"
+            f"residuals are {np.sqrt(result.chi2_per_dof):.3g} times what sigma says:"
+            f" {_cure(result, estimator, estimate)}"
         )
+    notes += beyond_strokes(equations, estimator.start, estimate.point)
     faint = estimate.setting.determined.rank - estimate.setting.searched.rank
     if faint:
         notes.append(
@@ -163,25 +167,41 @@ def _doubts(
     return notes
 
 
+def _cure(result: Identification, estimator: Estimator, estimate: Estimate) -> str:
+    """What to do about residuals far above sigma; repeats know which of two it is."""
+    scatter = joined(estimator.repeats(estimate)).scatter
+    if scatter**2 > _NOISY:
+        return f"repeats of a pose scatter {scatter:.3g} times as much as it, state the true sigma"
+    cure = "free more parameters"
+    if not np.isfinite(scatter):
+        cure += ", or state the true sigma"
+    if result.outliers:
+        cure = "look at the outliers, fit with loss='cauchy', or " + cure
+    return cure
+
+
 def _shares(
     robot: Robot,
     measurements: Measurements | Sequence[Measurements],
     frame: str | Sequence[str],
     target: str | Sequence[str],
+    attachment: str | Sequence[str],
 ) -> list[Share]:
     sets = [measurements] if isinstance(measurements, Measurements) else list(measurements)
     if not sets:
         raise ValueError("measurements: none given")
     shares, first = [], 0
-    for measured, unknown_frame, unknown_target in zip(
-        sets, _words("frame", frame, len(sets)), _words("target", target, len(sets)), strict=True
-    ):
+    words = {"frame": frame, "target": target, "attachment": attachment}
+    unknown = zip(*(_words(name, given, len(sets)) for name, given in words.items()), strict=True)
+    for measured, unknowns in zip(sets, unknown, strict=True):
         _check(robot, measured, "measurements")
-        rows = np.arange(first, first + len(measured))
-        shares.append(Share(measured, rows, unknown_frame, unknown_target))
+        shares.append(Share(measured, np.arange(first, first + len(measured)), *unknowns))
         first += len(measured)
     if any(share.unknown_frame for share in shares) and not any(share.framed for share in shares):
         raise ValueError("frame: distances do not depend on it, it cannot be unknown")
+    distances = any(share.measured.kind == "distance" for share in shares)
+    if any(share.unknown_attachment for share in shares) and not distances:
+        raise ValueError("attachment: distances alone have one, it cannot be unknown")
     return shares
 
 
@@ -190,8 +210,7 @@ def _like(robot: Robot, holdout: Measurements, shares: Sequence[Share]) -> tuple
     _check(robot, holdout, "holdout")
     alike = [i for i, share in enumerate(shares) if share.measured.kind == holdout.kind]
     i = alike[0] if alike else 0
-    rows = np.arange(len(holdout))
-    return Share(holdout, rows, shares[i].unknown_frame, shares[i].unknown_target), i
+    return replace(shares[i], measured=holdout, rows=np.arange(len(holdout))), i
 
 
 def _check(robot: Robot, measured: Measurements, argument: str) -> None:
@@ -238,6 +257,7 @@ def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Iden
     at_bound = np.isclose(theta, chosen.lower, rtol=1e-9, atol=1e-9) | np.isclose(
         theta, chosen.upper, rtol=1e-9, atol=1e-9
     )
+    repeated = joined(estimator.repeats(estimate)), joined(estimator.repeats(estimate, plain=True))
     plain = plain_basis(setting.told.untold, chosen.names)
     odd = outliers(
         estimate.residual,
@@ -247,7 +267,7 @@ def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Iden
         estimator.prior @ searched,
     )
     return Identification(
-        robot=estimate.point.robot,
+        robot=chosen.robot.replace(chosen.values_at(theta)),
         free=chosen.names,
         units=chosen.units,
         values=theta,
@@ -266,7 +286,9 @@ def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Iden
         chi2_per_dof=float("nan") if no_sigma else float((squares + prior_off @ prior_off) / dof),
         dof=dof,
         noise=tuple(np.where(estimator.unstated, setting.noise, np.nan).tolist()),
-        repeatability=equations.repeatability(estimate.point),
+        repeatability=repeated[1].scatter,
+        lack_of_fit=repeated[1].beyond,
+        lack_of_fit_chance=repeated[0].chance,
         observability=observability(
             estimator.plain(estimate.point), len(equations.actuators), setting.told.rank
         ),
@@ -277,7 +299,7 @@ def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Iden
         converged=estimator.search.converged,
         evaluations=estimator.search.evaluations,
         warnings=(),
-        _places=chosen.places,
         _told=covariance,
-        _undetermined=untold * scale[:, None],
+        _equations=equations,
+        _estimate=estimate,
     )

@@ -6,7 +6,7 @@ columns                               meaning
 ``q1 [mm]`` … ``qn [mm]``             actuator coordinates, lengths or angles
 ``x [mm], y [mm], z [mm]``            a position; with ``alpha``, ``beta``, ``gamma [deg]`` a pose
 ``z [mm]`` alone                      a height
-``distance [mm]``                     from the platform's origin to the fixed point ``target``
+``distance [mm]``                     from the fixed point ``target`` to the ``attachment``
 ``A.x [mm], A.y [mm], A.z [mm]`` …    positions of several targets A, B, … in one row
 ``sigma [mm]``                        standard deviation of the row, of every component
 ``sigma.x [mm]``, ``sigma.alpha``…    … or of each component
@@ -14,6 +14,7 @@ columns                               meaning
 ``group``                             a whole number, the same for repeats of one pose
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
+``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
 ====================================  =============================================================
 
 Lengths are in mm, cm, m, um or in; angles in rad, mrad or deg; covariances in products of mm and
@@ -41,7 +42,7 @@ _AXES = ("x", "y", "z")
 _ANGLES = ("alpha", "beta", "gamma")
 _ACTUATOR = re.compile(r"q[1-9][0-9]*")
 _OF_A_TARGET = re.compile(r"(?P<target>[^.]+)\.[xyz]")
-_RESERVED = ("sigma", "cov", "target")
+_RESERVED = ("sigma", "cov", "target", "attachment")
 
 
 def read_measurements(path: str | PathLike[str], robot: Any = None) -> Measurements:
@@ -141,7 +142,8 @@ def _several_targets(table: Table) -> tuple[str, ...]:
 def _refuse_unknown(table: Table, several: tuple[str, ...]) -> None:
     components = _AXES + _ANGLES
     names = [*(f"q{i + 1}" for i in range(len(table.columns))), *components, "distance"]
-    names += ["sigma", "group", "target", *(f"target.{axis}" for axis in _AXES)]
+    names += ["sigma", "group", "target"]
+    names += [f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES]
     names += [f"{target}.{axis}" for target in several for axis in _AXES]
     deviations = [f"sigma.{name}" for name in components]
     pairs = itertools.combinations_with_replacement(components, 2)
@@ -238,7 +240,7 @@ def _read_several(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, Any]]:
     """One measurement per row and target that was seen there, row by row."""
     for name in table.columns:
-        if name.partition(".")[0] == "target":
+        if name.partition(".")[0] in ("target", "attachment"):
             raise table.header_error(f"column {name!r} does not go with '{targets[0]}.x'")
     values = np.empty((len(table), len(targets), 3))
     for t, target in enumerate(targets):
@@ -259,33 +261,49 @@ def _read_several(
 
 def _read_targets(table: Table, kind: str) -> dict[str, Any]:
     """The target of each row, by name, by place or both."""
+    points = {name: _read_point(table, name) for name in ("target", "attachment")}
+    fields: dict[str, Any] = {name: place for name, place in points.items() if place is not None}
     named = "target" in table.columns
-    placed = any(f"target.{axis}" in table.columns for axis in _AXES)
-    if kind == "pose" and (named or placed):
+    if kind == "pose" and (named or "target" in fields):
         raise table.header_error("columns of a target do not go with poses")
-    if kind == "distance" and not placed:
+    if kind == "distance" and "target" not in fields:
         raise table.header_error("missing column 'target.x': a distance is measured to a point")
-    fields: dict[str, Any] = {}
-    if placed:
-        places = np.stack([_read(table, f"target.{axis}", "mm")[0] for axis in _AXES], axis=1)
-        bits = places.view(np.int64)  # that a target moves from 0.0 to -0.0 is kept, too
-        fields["target"] = places[0] if (bits == bits[0]).all() else places
-    if named:
-        names = table.texts("target")
-        order = list(dict.fromkeys(names))
-        index = np.array([order.index(name) for name in names])
-        fields |= {"target_index": index, "target_names": order}
-        if placed:
-            first = [names.index(name) for name in order]
-            moved = (places != places[first][index]).any(axis=1)
-            if moved.any():
-                row = int(np.argmax(moved))
-                line = table.lines[names.index(names[row])]
-                raise table.cell_error(
-                    "target", row, f"{names[row]!r} has another place here than in line {line}"
-                )
-            fields["target"] = places[first]
-    return fields
+    if kind != "distance" and "attachment" in fields:
+        raise table.header_error(f"column 'attachment.x' goes with distances, not with {kind}s")
+    if not named:
+        return {name: _one(place) for name, place in fields.items()}
+    names = table.texts("target")
+    order = list(dict.fromkeys(names))
+    index = np.array([order.index(name) for name in names])
+    first = [names.index(name) for name in order]
+    for name, places in fields.items():
+        moved = (places != places[first][index]).any(axis=1)
+        if moved.any():
+            row = int(np.argmax(moved))
+            line = table.lines[names.index(names[row])]
+            what = "place" if name == "target" else name
+            raise table.cell_error(
+                "target", row, f"{names[row]!r} has another {what} here than in line {line}"
+            )
+    chosen = {name: places[first] for name, places in fields.items()}
+    if "attachment" in chosen:
+        chosen["attachment"] = _one(chosen["attachment"])
+    return chosen | {"target_index": index, "target_names": order}
+
+
+def _read_point(table: Table, name: str) -> NDArray[np.float64] | None:
+    """A point of each row (rows, 3); None where it has no columns."""
+    columns = [f"{name}.{axis}" for axis in _AXES]
+    if not any(column in table.columns for column in columns):
+        return None
+    return np.stack([_read(table, column, "mm")[0] for column in columns], axis=1)
+
+
+def _one(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """One point (3,) where all rows have the same, to the last bit: 0.0 is not -0.0."""
+    bits = places.view(np.int64)
+    one: NDArray[np.float64] = places[0] if (bits == bits[0]).all() else places
+    return one
 
 
 # --- writing -----------------------------------------------------------------------------------
@@ -309,9 +327,12 @@ def _columns(m: Measurements) -> Iterator[tuple[str, Sequence[str]]]:
             yield f"sigma.{name} [{unit}]", _exact(m.sigma[:, i])
     if m.target_index is not None and m.target_names is not None:
         yield "target", [m.target_names[i] for i in m.target_index]
-    if m.target is not None:
+    places = {} if m.target is None else {"target": m.targets}
+    if m.attachment is not None:
+        places["attachment"] = m.attachments
+    for point, rows in places.items():
         for axis, name in enumerate(_AXES):
-            yield f"target.{name} [mm]", _exact(m.targets[:, axis])
+            yield f"{point}.{name} [mm]", _exact(rows[:, axis])
     if m.group is not None:
         yield "group", [str(number) for number in m.group]
 

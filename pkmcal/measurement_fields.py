@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pkmcal.tracker import Tracker
+
 
 def numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:
     """A copy as finite doubles."""
@@ -40,9 +42,16 @@ def integers(name: str, given: ArrayLike, rows: int) -> NDArray[np.int64]:
     return array.astype(np.int64)
 
 
-def sigma_array(given: ArrayLike, kind: str, shape: tuple[int, int]) -> NDArray[np.float64]:
+def sigma_array(
+    given: ArrayLike | Tracker, kind: str, shape: tuple[int, int], values: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Standard deviations (N, k) or covariances (N, k, k)."""
     rows, k = shape
+    if isinstance(given, Tracker):
+        if kind != "position":
+            raise ValueError(f"sigma: a tracker measures positions, not values of kind {kind!r}")
+        covariance = given.covariance(values)
+        return np.asarray(0.5 * (covariance + covariance.transpose(0, 2, 1)))
     sigma = numbers("sigma", given)
     if sigma.ndim == 3 and sigma.shape == (rows, k, k):
         for row, matrix in enumerate(sigma):
@@ -95,6 +104,23 @@ def target_array(
             f" found {target.shape}"
         )
     return target
+
+
+def attachment_array(
+    given: ArrayLike | None, kind: str, targets: int | None, rows: int
+) -> NDArray[np.float64] | None:
+    """One attachment, one per row, or one for each of the several targets; None without."""
+    if given is None:
+        return None
+    if kind != "distance":
+        raise ValueError(f"attachment: distances alone have one, values of kind {kind!r} a target")
+    attachment = numbers("attachment", given)
+    if attachment.shape not in ((3,), (rows if targets is None else targets, 3)):
+        several = rows if targets is None else targets
+        raise ValueError(
+            f"attachment must have shape (3,) or ({several}, 3); found {attachment.shape}"
+        )
+    return attachment
 
 
 def names_of_targets(

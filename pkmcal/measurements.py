@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
 from pkmcal.measurement_fields import (
+    attachment_array,
     integers,
     names_of_targets,
     numbers,
@@ -20,6 +21,7 @@ from pkmcal.measurement_fields import (
     target_array,
     units_of_actuators,
 )
+from pkmcal.tracker import Tracker
 
 _LENGTHS = (("x", "mm"), ("y", "mm"), ("z", "mm"))
 _ANGLES = (("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
@@ -48,12 +50,13 @@ class Measurements:
         `identify` is told that the frame is unknown); see `kind`.
     kind : {"position", "pose", "height", "distance"}
         "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the target,
-        (N, 3). "height": z of the target, (N,). "distance": from the platform's origin to the
-        target, which here is a fixed point of the base frame, (N,).
-    sigma : scalar, (k,), (N, 1), (N, k) or (N, k, k) array, optional
+        (N, 3). "height": z of the target, (N,). "distance": from the target, which here is a
+        fixed point of the base frame, to the attachment, a point of the platform, (N,).
+    sigma : scalar, (k,), (N, 1), (N, k) or (N, k, k) array, or Tracker, optional
         Standard deviation of the values in their own units; k is the number of components of the
         kind. (N, k, k) are covariance matrices. One number for poses counts as mm and as rad.
-        For heights and distances (N,) will do. None: not known. Kept as (N, k) or (N, k, k).
+        For heights and distances (N,) will do. A `Tracker` gives each position the covariance
+        that follows from where it stands. None: not known. Kept as (N, k) or (N, k, k).
     target : (3,), (N, 3) or (k, 3) array, optional
         The measured point in the platform frame, mm: one for all rows, one per row, or several
         with `target_index`. None: the platform's origin. For distances: the fixed point of the
@@ -68,6 +71,10 @@ class Measurements:
         Names of the several targets; "1", "2", … by default.
     actuator_units : str or sequence of str, optional
         "mm" or "rad", one for all or one per actuator. None: not stated; written as mm.
+    attachment : (3,), (N, 3) or (k, 3) array, optional
+        The point in the platform frame, mm, from which distances are measured: of a wire, a ball
+        bar, a leg. One for all rows, one per row, or with `target_index` one for each target.
+        None: the platform's origin.
 
     Raises
     ------
@@ -92,6 +99,7 @@ class Measurements:
     target_index: NDArray[np.int64] | None = None
     target_names: tuple[str, ...] | None = None
     actuator_units: tuple[str, ...] | None = None
+    attachment: NDArray[np.float64] | None = None
 
     # The types above are those of the attributes; anything array-like is taken.
     def __init__(
@@ -99,12 +107,13 @@ class Measurements:
         actuators: ArrayLike,
         values: ArrayLike,
         kind: str = "position",
-        sigma: ArrayLike | None = None,
+        sigma: ArrayLike | Tracker | None = None,
         target: ArrayLike | None = None,
         group: ArrayLike | None = None,
         target_index: ArrayLike | None = None,
         target_names: Sequence[str] | None = None,
         actuator_units: str | Sequence[str] | None = None,
+        attachment: ArrayLike | None = None,
     ) -> None:
         if kind not in COMPONENTS:
             raise ValueError(f"kind must be one of {', '.join(COMPONENTS)}; found {kind!r}")
@@ -121,16 +130,18 @@ class Measurements:
             )
         index = None if target_index is None else integers("target_index", target_index, len(q))
         place = target_array(target, kind, index, len(q))
+        targets = None if place is None or index is None else len(place)
         fields: dict[str, Any] = {
             "actuators": q,
             "values": v,
             "kind": kind,
-            "sigma": None if sigma is None else sigma_array(sigma, kind, shape),
+            "sigma": None if sigma is None else sigma_array(sigma, kind, shape, v),
             "target": place,
             "group": None if group is None else integers("group", group, len(q)),
             "target_index": index,
             "target_names": names_of_targets(target_names, index, place),
             "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
+            "attachment": attachment_array(attachment, kind, targets, len(q)),
         }
         for name, value in fields.items():
             if isinstance(value, np.ndarray):
@@ -164,10 +175,18 @@ class Measurements:
                 f"target: the places of {', '.join(self.target_names)} on the platform are not"
                 ' known; give them as an array, or identify them with target="unknown"'
             )
-        place = np.zeros(3) if self.target is None else self.target
-        if self.target_index is not None:
+        return self._of_rows(self.target)
+
+    @property
+    def attachments(self) -> NDArray[np.float64]:
+        """The attachment of every row, (N, 3) in mm; zeros where none was given."""
+        return self._of_rows(self.attachment)
+
+    def _of_rows(self, place: NDArray[np.float64] | None) -> NDArray[np.float64]:
+        place = np.zeros(3) if place is None else place
+        if self.target_index is not None and place.ndim == 2:
             place = place[self.target_index]
-        return np.array(np.broadcast_to(place, (len(self), 3)))
+        return np.array(np.broadcast_to(place, (len(self), 3)), order="C")
 
     @property
     def pose_index(self) -> NDArray[np.int64]:
@@ -195,8 +214,10 @@ class Measurements:
             for name, value in vars(self).items()
             if name in ("actuators", "values", "sigma", "group", "target_index")
         }
-        if self.target is not None and self.target.ndim == 2 and self.target_index is None:
-            per_row["target"] = self.target[picked]
+        for name in ("target", "attachment"):
+            place = getattr(self, name)
+            if place is not None and place.ndim == 2 and self.target_index is None:
+                per_row[name] = place[picked]
         return dataclasses.replace(self, **per_row)
 
     def split(self, holdout: float, seed: int = 0) -> tuple[Measurements, Measurements]:

@@ -65,7 +65,7 @@ def outliers(
         for mine in alike:
             e = first[mine, None] + np.arange(components[mine[0]])
             squares[mine] = _squares(left[e], jacobian[e], covariance, part[mine])
-        spread = _median_ratio(squares[kept], components[kept])
+        spread = median_ratio(squares[kept], components[kept])
         chance = _chance(squares / max(spread, 1.0), components)
         worst = int(np.argmin(np.where(kept, chance, np.inf)))
         if chance[worst] >= _FALSE_ALARM / rows:
@@ -85,7 +85,8 @@ def _squares(r: FloatArray, j: FloatArray, covariance: FloatArray, part: FloatAr
     return squares
 
 
-def _median_ratio(squares: FloatArray, components: IntArray) -> float:
+def median_ratio(squares: FloatArray, components: IntArray) -> float:
+    """Variance that squared lengths of rows show by their median: 1 if they are chi squared."""
     from scipy.special import gammaincinv
 
     return float(np.median(squares / (2 * gammaincinv(components / 2, 0.5))))

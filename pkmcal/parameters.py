@@ -1,4 +1,4 @@
-"""What a calibration estimates: numbers of the geometry, the instrument's frame, targets."""
+"""What a calibration estimates: numbers of the geometry, the instrument's frame, points."""
 
 from __future__ import annotations
 
@@ -22,6 +22,14 @@ Bounds = Mapping[str, tuple[float, float]] | None
 _POINT = (("x", "mm"), ("y", "mm"), ("z", "mm"))
 _FRAME = (*_POINT, ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
 
+# The points that measurements of a kind depend on: what `predict` calls them, and users.
+POINTS: dict[str, dict[str, str]] = {
+    "pose": {},
+    "position": {"target": "target"},
+    "height": {"target": "target"},
+    "distance": {"target": "attachment", "anchor": "anchor"},
+}
+
 
 @dataclass(frozen=True, eq=False)
 class Share:
@@ -33,7 +41,7 @@ class Share:
         These rows alone.
     rows : ndarray of int (N,)
         Their numbers in what the user gave, counted through all sets.
-    unknown_frame, unknown_target : bool
+    unknown_frame, unknown_target, unknown_attachment : bool
         What the user says is not known of them.
     """
 
@@ -41,6 +49,7 @@ class Share:
     rows: IntArray
     unknown_frame: bool
     unknown_target: bool
+    unknown_attachment: bool = False
 
     @property
     def framed(self) -> bool:
@@ -48,14 +57,19 @@ class Share:
         return self.unknown_frame and self.measured.kind != "distance"
 
     @property
-    def aimed(self) -> bool:
-        """Whether unknown targets are among what it depends on."""
-        return self.unknown_target and self.measured.kind != "pose"
+    def sought(self) -> tuple[str, ...]:
+        """Which of its points are not known: "target", or "attachment" and "anchor"."""
+        unknown = {
+            "target": self.unknown_target,
+            "anchor": self.unknown_target,
+            "attachment": self.unknown_attachment,
+        }
+        return tuple(role for role in POINTS[self.measured.kind].values() if unknown[role])
 
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """The vector that is estimated: numbers of the geometry first, then frame and targets.
+    """The vector that is estimated: numbers of the geometry first, then frame and points.
 
     Attributes
     ----------
@@ -73,8 +87,8 @@ class Parameters:
         Places in the geometry's values of the first names.
     frame : int or None
         Column of frame.x; None where the frame is known.
-    targets : mapping
-        Column of the x of each unknown target, by "target" or "anchor" and its name.
+    points : mapping
+        Column of the x of each unknown point, by "target", "attachment" or "anchor" and its name.
     robot : Robot
         The machine they belong to.
     """
@@ -88,7 +102,7 @@ class Parameters:
     upper: FloatArray
     places: IntArray
     frame: int | None
-    targets: Mapping[tuple[str, str], int]
+    points: Mapping[tuple[str, str], int]
     robot: Robot
 
     def __len__(self) -> int:
@@ -99,24 +113,24 @@ class Parameters:
         """Lower and upper bounds."""
         return self.lower, self.upper
 
-    def robot_at(self, theta: FloatArray) -> Robot:
-        """The machine with the geometry of `theta` (n,)."""
-        values = self.robot.geometry.values.copy()
+    def values_at(self, theta: FloatArray) -> FloatArray:
+        """The geometry's values (p,) for `theta` (n,)."""
+        values: FloatArray = self.robot.geometry.values.copy()
         values[self.places] = theta[: len(self.places)]
-        return self.robot.replace(values)
+        return values
 
     def frame_at(self, theta: FloatArray) -> FloatArray | None:
         """Pose of the base in the instrument's frame (6,); None where it is known."""
         return None if self.frame is None else theta[self.frame : self.frame + 6]
 
-    def target_columns(self, measured: Measurements) -> IntArray:
-        """Columns of the unknown target of each row, (N, 3)."""
-        kind, names, index = _targets_of(measured)
-        for name in names:
-            if (kind, name) not in self.targets:
-                known = did_you_mean(name, (other for _, other in self.targets))
-                raise ValueError(f"holdout: its target {name!r} was not fitted{known}")
-        first = np.array([self.targets[kind, name] for name in names])
+    def columns_of(self, role: str, measured: Measurements) -> IntArray:
+        """Columns of the unknown point of each row, (N, 3)."""
+        places, index = _points_of(role, measured)
+        for name in places:
+            if (role, name) not in self.points:
+                known = did_you_mean(name, (other for _, other in self.points))
+                raise ValueError(f"holdout: its {role} {name!r} was not fitted{known}")
+        first = np.array([self.points[role, name] for name in places])
         columns: IntArray = first[index][:, None] + np.arange(3)
         return columns
 
@@ -152,21 +166,19 @@ def parameters(
         names += [f"frame.{axis}" for axis, _ in _FRAME]
         units += [unit for _, unit in _FRAME]
         start += [0.0] * 6
-    targets: dict[tuple[str, str], int] = {}
+    points: dict[tuple[str, str], int] = {}
     known: dict[tuple[str, str], FloatArray] = {}
-    for share in shares:
-        if not share.aimed:
-            continue
-        for key, place in _places_of(share.measured).items():
-            if key in targets:
-                if (known[key] != place).any():
+    for role, measured in ((role, share.measured) for share in shares for role in share.sought):
+        for name, place in _points_of(role, measured)[0].items():
+            if (role, name) in points:
+                if (known[role, name] != place).any():
                     raise ValueError(
-                        f"target: {' '.join(key)} starts at different places in different"
+                        f"{role}: {role} {name} starts at different places in different"
                         " measurements; give different targets different target_names"
                     )
                 continue
-            targets[key], known[key] = len(names), place
-            names += [f"{''.join(key)}.{axis}" for axis, _ in _POINT]
+            points[role, name], known[role, name] = len(names), place
+            names += [f"{role}{name}.{axis}" for axis, _ in _POINT]
             units += [unit for _, unit in _POINT]
             start += list(place)
     travel = max(_travel(robot, share.measured) for share in shares)
@@ -184,7 +196,7 @@ def parameters(
         upper=upper,
         places=places,
         frame=frame,
-        targets=targets,
+        points=points,
         robot=robot,
     )
 
@@ -195,27 +207,21 @@ def _travel(robot: Robot, measured: Measurements) -> float:
     return max(1.0, float(np.abs(measured.actuators * per_unit).max()))
 
 
-def _targets_of(measured: Measurements) -> tuple[str, tuple[str, ...], IntArray]:
-    """Whether targets or anchors, their names, and which one each row measured."""
-    kind = "anchor" if measured.kind == "distance" else "target"
-    if measured.target_names is None or measured.target_index is None:
-        return kind, ("1",), np.zeros(len(measured), dtype=np.intp)
-    return kind, measured.target_names, measured.target_index
-
-
-def _places_of(measured: Measurements) -> dict[tuple[str, str], FloatArray]:
-    kind, names, _ = _targets_of(measured)
-    given = measured.target
-    if given is None:
-        given = np.zeros((len(names), 3))
-    elif given.ndim == 1:
-        given = given[None, :]
-    elif measured.target_index is None:
+def _points_of(role: str, measured: Measurements) -> tuple[dict[str, FloatArray], IntArray]:
+    """The points of one role by name, where the user puts them, and which one each row has."""
+    given = measured.attachment if role == "attachment" else measured.target
+    names, index = measured.target_names, measured.target_index
+    one = given is None if role == "attachment" else names is None and given is None
+    if one or (given is not None and given.ndim == 1):
+        place = np.zeros(3) if given is None else given
+        return {"1": place}, np.zeros(len(measured), dtype=np.intp)
+    if names is None or index is None:
         raise ValueError(
-            "target: one place per row cannot be estimated; say with target_index which of a few"
-            " targets each row measured"
+            f"{role}: one place per row cannot be estimated; say with target_index which of a few"
+            " each row measured"
         )
-    return {(kind, name): place for name, place in zip(names, given, strict=True)}
+    places = np.zeros((len(names), 3)) if given is None else given
+    return dict(zip(names, places, strict=True)), index
 
 
 def _matching(argument: str, pattern: object, names: Sequence[str]) -> list[int]:

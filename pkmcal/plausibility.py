@@ -10,16 +10,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pkmcal.equations import Equations, Point
+from pkmcal.identifiability import listed
 from pkmcal.measurements import Measurements
 from pkmcal.parameters import Parameters, Share
+from pkmcal.robot import Robot
 
 FloatArray = NDArray[np.float64]
 
 _GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
+FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
+_BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
 _TELLING = 0.2  # a reading that leaves so little of the misfit is what was meant
 _FACTORS = {
     "mm": (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)),
-    "rad": (("degrees", np.pi / 180), ("milliradians", 1e-3)),
+    "rad": (
+        ("degrees", np.pi / 180),
+        ("milliradians", 1e-3),
+        ("radians that were taken for degrees", 180 / np.pi),
+    ),
 }
 
 
@@ -84,10 +92,68 @@ def _readings(
             values = measured.values * (factor if mine.all() else np.where(mine, factor, 1.0))
             yield f"the {what} are in {name}", replace(measured, values=values)
     names = measured.components
-    for one, other in itertools.combinations(range(min(3, len(names))), 2):
+    for one, other in itertools.combinations(range(len(names)), 2):
+        if measured.units[one] != measured.units[other]:
+            continue
         values = measured.values.copy()
         values[:, [one, other]] = values[:, [other, one]]
         yield f"{names[one]} and {names[other]} are exchanged", replace(measured, values=values)
+
+
+def beyond_strokes(equations: Equations, start: Point, end: Point) -> list[str]:
+    """Rows whose actuators are out of the strokes that the robot file states.
+
+    They are if they are both with the machine as drawn, whose offsets may be unknown, and as
+    identified, which may have been misled.
+    """
+    out = np.ones((len(equations.actuators), len(start.robot.model.limbs)), dtype=bool)
+    for point in (end, start):
+        if out.any():
+            drive = point.robot.feasible(point.pose).drive
+            out &= _out_of_stroke(point.robot, drive)
+    if not out.any():
+        return []
+    limbs = []
+    for i in np.flatnonzero(out.any(axis=0)):
+        low, high = start.robot.model.limbs[i].stroke or (0.0, 0.0)
+        beyond = drive[out[:, i], i]
+        limbs.append(
+            f"limb {i + 1} at {beyond.min():.4g} to {beyond.max():.4g}, its stroke is {low:g} to"
+            f" {high:g}"
+        )
+    poses_of = np.concatenate(equations.pose_of)
+    broken = np.asarray(out.any(axis=1))
+    rows = equations.rows[broken[poses_of]].tolist()
+    shown = ", ".join(map(str, rows[:10])) + (", …" if len(rows) > 10 else "")
+    more = f" and {len(limbs) - 2} more limbs" if len(limbs) > 2 else ""
+    return [
+        f"actuators out of stroke in {len(rows)} of {len(poses_of)} rows (rows {shown}):"
+        f" {'; '.join(limbs[:2])}{more}; check units, signs and columns of the actuators, or the"
+        " strokes in the robot file"
+    ]
+
+
+def _out_of_stroke(robot: Robot, drive: FloatArray) -> NDArray[np.bool_]:
+    """Which drives (K, limbs) are beyond their strokes by more than errors explain."""
+    strokes = [limb.stroke or (-np.inf, np.inf) for limb in robot.model.limbs]
+    low, high = np.array(strokes).T
+    room = np.where(np.isfinite(low), _BEYOND * (high - low), 0.0)
+    out: NDArray[np.bool_] = (drive < low - room) | (drive > high + room)
+    return out
+
+
+def strayed(start: Point, end: Point, parameters: Parameters) -> list[str]:
+    """Numbers of the geometry that moved further than errors of manufacture move them."""
+    k = len(parameters.places)
+    moved = np.abs((end.theta - start.theta) / parameters.scale)[:k]
+    far = np.flatnonzero(moved > FAR * parameters.robot.length)
+    if not len(far):
+        return []
+    names = listed([parameters.names[i] for i in far])
+    return [
+        f"{names} moved by up to {moved.max():.3g} mm, further than errors of a machine: check that"
+        " the robot file describes this one, or free fewer parameters"
+    ]
 
 
 def meagre(equations: Equations, jacobian_rank: int, with_prior: bool) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, Protocol
 
 import numpy as np
@@ -9,6 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from pkmcal.measurement_fields import numbers
 from pkmcal.measurements import COMPONENTS, Measurements
+from pkmcal.predict import predict
+from pkmcal.tracker import Tracker
+
+FloatArray = NDArray[np.float64]
 
 _ARM = 200.0  # mm; an instrument good to 0.02 mm over it is good to 1e-4 rad
 
@@ -28,8 +33,9 @@ class VirtualMachine:
     ----------
     true_robot : Robot
         The machine as it really is, with its errors.
-    noise : float
-        Standard deviation of the instrument in mm, for every length it reads. 0: no noise.
+    noise : float or Tracker
+        Standard deviation of the instrument in mm, for every length it reads; or a tracker, which
+        measures positions. 0: no noise.
     seed : int
         Of the noise. Each call of `measure` draws on; two machines with one seed read the same.
     angle_noise : float, optional
@@ -38,26 +44,33 @@ class VirtualMachine:
 
     Examples
     --------
-    >>> import pkmcal as pk                                               # doctest: +SKIP
-    >>> machine = pk.VirtualMachine(pk.load("hexapod"), noise=0.01)       # doctest: +SKIP
-    >>> m = machine.measure(pk.load("hexapod").inverse([0, 0, 400, 0, 0, 0]))  # doctest: +SKIP
+    >>> import pkmcal as pk
+    >>> robot = pk.load("hexapod")
+    >>> machine = pk.VirtualMachine(robot.replace({"offset1": 0.5}), noise=0.01)
+    >>> print(machine.measure(robot.inverse(robot.home)).kind)
+    position
     """
 
     def __init__(
         self,
         true_robot: Solvable,
-        noise: float = 0.02,
+        noise: float | Tracker = 0.02,
         seed: int = 0,
         angle_noise: float | None = None,
     ) -> None:
         self.true_robot = true_robot
-        self.noise = _deviation("noise", noise)
-        angles = noise / _ARM if angle_noise is None else angle_noise
-        self.angle_noise = _deviation("angle_noise", angles)
+        self.noise = noise if isinstance(noise, Tracker) else _deviation("noise", noise)
+        if angle_noise is None:
+            angle_noise = 0.0 if isinstance(noise, Tracker) else noise / _ARM
+        self.angle_noise = _deviation("angle_noise", angle_noise)
         self._random = np.random.default_rng(seed)
 
     def measure(
-        self, q: ArrayLike, kind: str = "position", target: ArrayLike | None = None
+        self,
+        q: ArrayLike,
+        kind: str = "position",
+        target: ArrayLike | None = None,
+        attachment: ArrayLike | None = None,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.
 
@@ -70,6 +83,8 @@ class VirtualMachine:
         target : (3,) or (N, 3) array, optional
             The measured point in the platform frame, mm; by default the platform's origin. For
             distances the fixed point of the base frame, and required.
+        attachment : (3,) or (N, 3) array, optional
+            The point in the platform frame, mm, from which distances are measured.
 
         Returns
         -------
@@ -84,6 +99,15 @@ class VirtualMachine:
         actuators = np.atleast_2d(numbers("q", q))
         if actuators.ndim != 2:
             raise ValueError(f"q must have shape (N, n) or (n,); found {actuators.shape}")
+        width = len(COMPONENTS.get(kind, ()))
+        blank = Measurements(
+            actuators,
+            np.zeros((len(actuators), width) if width > 1 else len(actuators)),
+            kind,
+            target=target,
+            actuator_units=getattr(self.true_robot, "actuator_units", None),
+            attachment=attachment,
+        )
         solved = self.true_robot.forward(actuators)
         failed = np.flatnonzero(~np.asarray(solved.ok))
         if len(failed):
@@ -92,47 +116,24 @@ class VirtualMachine:
                 f"q: {len(failed)} of {len(actuators)} rows have no pose on the true machine"
                 f" (rows {rows})"
             )
-        exact = Measurements(
-            actuators,
-            _readings(np.asarray(solved.pose), kind, target),
-            kind,
-            target=target,
-            actuator_units=getattr(self.true_robot, "actuator_units", None),
-        )
-        sigma = np.array([self.angle_noise if u == "rad" else self.noise for u in exact.units])
-        drawn = sigma * self._random.standard_normal((len(exact), len(sigma)))
-        return Measurements(
-            actuators,
-            exact.values + drawn.reshape(exact.values.shape),
-            kind,
-            sigma=sigma if (sigma > 0).all() else None,
-            target=target,
-            actuator_units=exact.actuator_units,
-        )
+        places = (blank.targets, blank.attachments)
+        point, fixed = places[::-1] if kind == "distance" else places
+        exact = predict(kind, np.asarray(solved.pose), point, fixed).values
+        noise, sigma = self._drawn(blank, exact)
+        values = (exact + noise).reshape(blank.values.shape)
+        return dataclasses.replace(blank, values=values, sigma=sigma)
 
-
-def _readings(
-    pose: NDArray[np.float64], kind: str, target: ArrayLike | None
-) -> NDArray[np.float64]:
-    """What an instrument without noise reads; the checks of the arguments are Measurements'."""
-    if kind not in COMPONENTS or kind == "pose":
-        return pose
-    position = pose[:, :3]
-    if target is None:
-        if kind == "distance":
-            raise ValueError("target: a distance needs the fixed point (3,) it is measured to")
-        return position[:, 2] if kind == "height" else position
-    point = numbers("target", target)
-    if point.shape not in ((3,), position.shape):
-        raise ValueError(f"target must have shape (3,) or {position.shape}; found {point.shape}")
-    if kind == "distance":
-        distance: NDArray[np.float64] = np.linalg.norm(position - point, axis=1)
-        return distance
-    from scipy.spatial.transform import Rotation
-
-    # about the fixed axes x, y, z in turn: R = Rz(gamma) Ry(beta) Rx(alpha)
-    placed: NDArray[np.float64] = position + Rotation.from_euler("xyz", pose[:, 3:]).apply(point)
-    return placed[:, 2] if kind == "height" else placed
+    def _drawn(self, blank: Measurements, exact: FloatArray) -> tuple[FloatArray, Any]:
+        """Noise (N, k), and the sigma to state."""
+        drawn = self._random.standard_normal(exact.shape)
+        if isinstance(self.noise, Tracker):
+            if blank.kind != "position":
+                raise ValueError(f"kind: a tracker measures positions, found {blank.kind!r}")
+            covariance = self.noise.covariance(exact)
+            return (np.linalg.cholesky(covariance) @ drawn[:, :, None])[:, :, 0], self.noise
+        deviations = {"mm": self.noise, "rad": self.angle_noise}
+        sigma = np.array([deviations[unit] for unit in blank.units])
+        return sigma * drawn, sigma if (sigma > 0).all() else None
 
 
 def _deviation(name: str, value: float) -> float:

@@ -200,7 +200,7 @@ def test_unknown_frame_and_targets_are_found(hexapod: Robot) -> None:
     index = np.tile([0, 1], 20)
     targets = np.array([[60.0, 20.0, 30.0], [-50.0, 40.0, 25.0]])
     frame = np.array([2000.0, -3000.0, 500.0, 0.3, -0.5, 2.5])
-    seen = predict("position", true.forward(q).pose, targets[index], frame).values
+    seen = predict("position", true.forward(q).pose, targets[index], frame=frame).values
     measured = Measurements(
         q, seen + rng.normal(0, 0.01, seen.shape), sigma=0.01, target_index=index
     )
@@ -219,7 +219,7 @@ def test_pose_measurements_in_an_unknown_frame(hexapod: Robot) -> None:
     true = hexapod.replace({"offset1": 0.4, "offset4": -0.3})
     q = hexapod.inverse(hexapod_poses(hexapod, 12, rng))
     frame = np.array([-900.0, 100.0, 2000.0, 3.0, 0.2, -1.0])
-    seen = predict("pose", true.forward(q).pose, None, frame).values
+    seen = predict("pose", true.forward(q).pose, frame=frame).values
     found = identify(hexapod, Measurements(q, seen, "pose"), free="offset*", frame="unknown")
     np.testing.assert_allclose(found.values[6:], frame, atol=1e-7)
     np.testing.assert_allclose(found.values[:6], [0.4, 0, 0, -0.3, 0, 0], atol=1e-7)

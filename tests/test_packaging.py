@@ -71,6 +71,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     [
         ("pkmcal", "**/*.py", "pkmcal"),
         ("pkmcal", "machines/*.toml", "pkmcal"),
+        ("pkmcal", "arms/*.toml", "pkmcal"),
         ("pkmcal", "py.typed", "pkmcal"),
         ("derive", "**/*.py", "pkmcal/derive"),
         ("generated", "*.h", "pkmcal/generated"),

@@ -16,6 +16,7 @@ from pkmcal.measurements import Measurements
 from pkmcal.robot import Robot
 from pkmcal.virtual import VirtualMachine
 
+from . import workspaces
 from .simulated import hexapod_poses, tilted_poses, with_errors
 
 Change = Callable[[Measurements], dict[str, Any]]
@@ -78,6 +79,66 @@ def test_angles_in_degrees_are_named() -> None:
     wrong[:, 3:] = np.degrees(wrong[:, 3:])
     texts = said(robot, dataclasses.replace(measured, values=wrong))
     assert any("the angles are in degrees" in text for text in texts)
+
+
+def test_actuators_in_degrees_are_named() -> None:
+    robot = pk.load("rotary-delta")
+    q = robot.inverse(workspaces.poses("rotary-delta", 20))
+    measured = VirtualMachine(with_errors(robot, 0.5, np.random.default_rng(6))).measure(q)
+    for factor, words in ((180 / np.pi, "in degrees"), (np.pi / 180, "taken for degrees")):
+        wrong = dataclasses.replace(measured, actuators=factor * measured.actuators)
+        assert any(words in text for text in said(robot, wrong))
+
+
+def test_exchanged_angles_are_named() -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(hexapod_poses(robot, 20, np.random.default_rng(7)))
+    measured = VirtualMachine(robot).measure(q, kind="pose")
+    wrong = dataclasses.replace(measured, values=measured.values[:, [0, 1, 2, 4, 3, 5]])
+    assert any("alpha and beta are exchanged" in text for text in said(robot, wrong))
+
+
+def test_actuators_out_of_their_strokes_are_named(paper: Robot) -> None:
+    poses = tilted_poses(paper, 20, np.random.default_rng(8))
+    poses[[3, 7], 2] += 150.0
+    poses[:, 0] = poses[:, 2] * np.tan(poses[:, 4])
+    (text,) = said(paper, VirtualMachine(paper).measure(paper.inverse(poses)), prior=0.5)
+    assert "actuators out of stroke in 2 of 20 rows (rows 3, 7): limb" in text
+    assert "its stroke is 300 to 520" in text and "check units, signs and columns" in text
+
+
+def test_a_machine_that_cannot_be_the_drawn_one_is_named() -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(hexapod_poses(robot, 20, np.random.default_rng(9)))
+    measured = VirtualMachine(robot).measure(q, kind="pose")
+    longer = dataclasses.replace(measured, actuators=q - 400.0)
+    (text,) = said(robot, longer, free="offset*")
+    assert text.startswith("offset1 … offset6 moved by up to 400 mm, further than")
+
+
+def test_a_pose_that_no_geometry_reaches_is_an_error_that_says_what_to_do() -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(hexapod_poses(robot, 20, np.random.default_rng(10)))
+    measured = VirtualMachine(robot).measure(q, kind="pose")
+    q[3] = [300, 1100, 300, 1100, 300, 1100]
+    (text,) = said(robot, dataclasses.replace(measured, actuators=q))
+    assert "1 of 20 rows" in text and "(rows 3); check units" in text and "leave these rows" in text
+
+
+def test_a_point_that_no_geometry_reaches_is_an_outlier() -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(hexapod_poses(robot, 30, np.random.default_rng(11)))
+    measured = VirtualMachine(robot).measure(q, kind="pose")
+    values = measured.values.copy()
+    values[3, 0] += 5000.0
+    wrong = dataclasses.replace(measured, values=values)
+    assert any("look at the outliers" in text for text in said(robot, wrong))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = identify(robot, wrong, loss="cauchy")
+    assert found.outliers == (3,)
+    truth = [robot.geometry[name] for name in found.free]
+    assert np.abs((found.values - truth) / found.stderr).max() < 4
 
 
 def test_residuals_far_above_sigma_are_named(paper: Robot, points: Measurements) -> None:

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal import core
 from pkmcal.equations import Equations
 from pkmcal.measurements import Measurements
 from pkmcal.parameters import Share, parameters
 from pkmcal.predict import difference, predict
 from pkmcal.robot import Robot
 
+from . import twin
 from .simulated import hexapod_poses
 
 KINDS = ("pose", "position", "height", "distance")
@@ -26,7 +28,9 @@ def measured(robot: Robot, kind: str, rng: np.random.Generator) -> Measurements:
         return Measurements(q, poses + rng.normal(0, 0.01, poses.shape), kind)
     values = rng.normal(0, 3, SHAPES[kind])
     two = np.array([[60.0, -20.0, 35.0], [300.0, 200.0, -50.0]])
-    return Measurements(q, values, kind, target=two, target_index=np.arange(12) % 2)
+    ends = two[:, ::-1] if kind == "distance" else None
+    index = np.arange(12) % 2
+    return Measurements(q, values, kind, target=two, target_index=index, attachment=ends)
 
 
 def differences(equations: Equations, theta: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -45,7 +49,7 @@ def test_analytic_jacobian_equals_differences(kind: str, unknown: bool) -> None:
     rng = np.random.default_rng(7)
     robot = pk.load("hexapod")
     readings = measured(robot, kind, rng)
-    share = Share(readings, np.arange(12), unknown and kind != "distance", unknown)
+    share = Share(readings, np.arange(12), unknown and kind != "distance", unknown, unknown)
     chosen = parameters(robot, [share], ["base*", "offset*", "gain*"], None, None)
     equations = Equations([share], chosen)
     theta = chosen.start.copy()
@@ -70,11 +74,27 @@ def test_jacobian_passes_through_ties() -> None:
     np.testing.assert_allclose(jacobian, expected, rtol=1e-5, atol=1e-7)
 
 
+def test_points_and_distances_are_those_of_the_twin() -> None:
+    rng = np.random.default_rng(3)
+    pose, target, anchor = rng.normal(0, 1, (9, 6)), rng.normal(0, 9, (9, 3)), rng.normal(0, 9, 3)
+    expected = np.array([p[:3] + twin.rotation(p) @ t for p, t in zip(pose, target, strict=True)])
+    np.testing.assert_allclose(core.points(pose, target)[0], expected, rtol=0, atol=1e-13)
+    lengths = np.linalg.norm(expected - anchor, axis=1)
+    np.testing.assert_allclose(core.distances(pose, target, anchor)[0], lengths, rtol=0, atol=1e-13)
+
+
+def test_a_distance_of_zero_has_no_derivative_and_no_nan() -> None:
+    pose = np.array([[1.0, 2, 3, 0.1, 0.2, 0.3], [1, 2, 4, 0, 0, 0]])
+    seen = predict("distance", pose, anchor=np.array([1.0, 2, 3]))
+    np.testing.assert_array_equal(seen.values[:, 0], [0, 1])
+    assert (seen.by_pose[0] == 0).all() and np.isfinite(seen.by_pose).all()
+
+
 def test_a_frame_moves_points_as_the_pose_of_the_base_in_it() -> None:
     rng = np.random.default_rng(1)
     pose, frame = rng.normal(0, 0.5, (5, 6)), rng.normal(0, 0.5, 6)
     target = rng.normal(0, 50, (5, 3))
-    seen = predict("position", pose, target, frame).values
+    seen = predict("position", pose, target, frame=frame).values
     inner = predict("position", pose, target).values
     outer = predict("position", np.tile(frame, (5, 1)), inner).values
     np.testing.assert_allclose(seen, outer, atol=1e-12)
@@ -84,9 +104,9 @@ def test_poses_in_a_frame_carry_points_there() -> None:
     rng = np.random.default_rng(2)
     pose, frame = rng.normal(0, 0.5, (5, 6)), rng.normal(0, 0.5, 6)
     target = rng.normal(0, 50, (5, 3))
-    composed = predict("pose", pose, None, frame).values
+    composed = predict("pose", pose, frame=frame).values
     there = predict("position", composed, target).values
-    np.testing.assert_allclose(there, predict("position", pose, target, frame).values, atol=1e-12)
+    np.testing.assert_allclose(there, predict("position", pose, target, frame=frame).values, atol=1e-12)
 
 
 def test_angles_differ_the_short_way_round() -> None:

@@ -1,0 +1,160 @@
+"""Calibration side by side: identify, and least squares on a model of the machine in NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import least_squares
+
+import pkmcal as pk
+from benchmarks.timing import Report, medians, times
+from tests.simulated import hexapod_poses, tilted_poses, with_errors
+
+POSES, SIGMA, NOISE = 30, 0.5, 0.02
+WANTED = 50.0
+REPLICATES = 1000
+CANDIDATES, CHOSEN = 500, 20
+
+
+class Plain:
+    """A 2TPR&2TPS in NumPy: Newton on y, z, α, β (eq. 13), `together` poses at once.
+
+    With eq. 7 in the form x = w sin β, z = w cos β; 28 parameters: base, platform, offset by limb.
+    It starts from the pose of the nominal machine and has its derivatives in closed form.
+    """
+
+    def __init__(
+        self, robot: pk.Robot, actuators: np.ndarray, values: np.ndarray, together: int
+    ) -> None:
+        self.q, self.values = actuators, values
+        self.blocks = [slice(i, i + together) for i in range(0, len(actuators), together)]
+        geometry = robot.geometry
+        self.start = np.array([geometry[name] for name in robot.model.free])
+        self.order = [
+            robot.model.free.index(name)
+            for i in range(1, 5)
+            for name in (*(f"base{i}.{a}" for a in "xyz"), *(f"platform{i}.{a}" for a in "xyz"))
+        ]
+        self.offsets = [robot.model.free.index(f"offset{i}") for i in range(1, 5)]
+        pose = robot.forward(actuators).pose
+        self.guess = np.column_stack([pose[:, 1], pose[:, 2] / np.cos(pose[:, 4]), pose[:, 3:5]])
+
+    def points(self, theta: np.ndarray) -> np.ndarray:
+        """Where the platform's origin is, (N, 3)."""
+        return np.concatenate([self.solve(theta, block) for block in self.blocks])
+
+    def solve(self, theta: np.ndarray, block: slice) -> np.ndarray:
+        """The same for some of the poses."""
+        joints = theta[self.order].reshape(4, 2, 3)
+        base, platform, lengths = joints[:, 0], joints[:, 1], self.q[block] + theta[self.offsets]
+        y, w, alpha, beta = self.guess[block].T.copy()
+        for _ in range(20):
+            (sa, ca), (sb, cb) = ((np.sin(t), np.cos(t)) for t in (alpha, beta))
+            zero = np.zeros_like(sa)
+            R = np.array([[cb, sb * sa, sb * ca], [zero, ca, -sa], [-sb, cb * sa, cb * ca]])
+            by_alpha = np.array(
+                [[zero, sb * ca, -sb * sa], [zero, -sa, -ca], [zero, cb * ca, -cb * sa]]
+            )
+            by_beta = np.array(
+                [[-sb, cb * sa, cb * ca], [zero, zero, zero], [-cb, -sb * sa, -sb * ca]]
+            )
+            p = np.array([w * sb, y, w * cb])
+            d = p.T[:, None] + np.einsum("ijn,kj->nki", R, platform) - base
+            length = np.sqrt((d * d).sum(axis=-1))
+            missed = length - lengths
+            if np.abs(missed).max() < 1e-10:
+                break
+            d /= length[..., None]
+            dp_dbeta = np.array([w * cb, zero, -w * sb]).T
+            jacobian = np.stack(
+                [
+                    d[..., 1],
+                    d[..., 0] * sb[:, None] + d[..., 2] * cb[:, None],
+                    np.einsum("nki,ijn,kj->nk", d, by_alpha, platform),
+                    np.einsum("nki,ijn,kj->nk", d, by_beta, platform)
+                    + np.einsum("nki,ni->nk", d, dp_dbeta),
+                ],
+                axis=-1,
+            )
+            step = np.linalg.solve(jacobian, -missed[..., None])[..., 0]
+            y, w, alpha, beta = np.array([y, w, alpha, beta]) + step.T
+        return p.T
+
+    def residual(self, theta: np.ndarray) -> np.ndarray:
+        """Equations of the measurements and of the prior, in standard deviations."""
+        off = (self.points(theta) - self.values).ravel() / NOISE
+        return np.concatenate([off, (theta - self.start) / SIGMA])
+
+    def fit(self) -> np.ndarray:
+        """By SciPy's least squares with finite differences."""
+        return least_squares(self.residual, self.start, method="lm", xtol=1e-10).x
+
+
+def bench_28_parameters(report: Report) -> None:
+    """The paper's machine, one target, 30 poses."""
+    robot = pk.load("2tpr2tps")
+    rng = np.random.default_rng(1)
+    true = with_errors(robot, SIGMA, rng)
+    q = robot.inverse(tilted_poses(robot, POSES, rng))
+    measured = pk.VirtualMachine(true, NOISE, seed=1).measure(q)
+    models = {
+        "one pose after another": Plain(robot, q, measured.values, 1),
+        "all poses at once": Plain(robot, q, measured.values, POSES),
+    }
+    found = pk.identify(robot, measured, prior=SIGMA)
+    apart = max(
+        np.abs((model.fit() - found.values) / found.stderr).max() for model in models.values()
+    )
+    if apart > 0.01:
+        raise RuntimeError(f"the fits differ by {apart} standard deviations")
+    took = medians(
+        {"identify": lambda: pk.identify(robot, measured, prior=SIGMA)}
+        | {f"least_squares, NumPy, {name}": model.fit for name, model in models.items()},
+        5,
+    )
+    report.text(
+        f"2TPR&2TPS, {len(found.free)} parameters with a prior from {POSES} positions. All end"
+        f" within {apart:.1g} standard deviations of each other. The models in NumPy have Newton's"
+        " method with derivatives in closed form from good guesses, and finite differences by the"
+        " parameters; identify's time includes rank, covariance, outliers and the combinations that"
+        " cannot be told."
+    )
+    rows = [
+        [name, f"{1e3 * seconds:.2f}", times(seconds / took["identify"])]
+        for name, seconds in took.items()
+    ]
+    report.table(["fit", "ms", "identify is"], rows)
+    report.text(f"Wanted: {WANTED:.0f}x a model in NumPy.")
+
+
+def bench_others(report: Report) -> None:
+    """What else a calibration takes: the hexapod, bootstrap, a plan."""
+    robot = pk.load("hexapod")
+    rng = np.random.default_rng(1)
+    true = with_errors(robot, SIGMA, rng)
+    q = robot.inverse(hexapod_poses(robot, 40, rng))
+    measured = pk.VirtualMachine(true, NOISE, seed=1).measure(q, kind="pose")
+    candidates = pk.sample_poses(robot, CANDIDATES, share=0.9)
+    found = pk.identify(robot, measured)
+    hexapod = f"hexapod, {len(found.free)} parameters from {len(measured)} poses"
+    took = medians({hexapod: lambda: pk.identify(robot, measured)}, 20)
+    took |= medians(
+        {
+            f"{REPLICATES} bootstrap replicates of it": lambda: pk.bootstrap(found, REPLICATES),
+            f"plan of {CHOSEN} among {CANDIDATES} poses": lambda: pk.plan_poses(
+                robot, candidates, CHOSEN, kind="pose"
+            ),
+        },
+        3,
+    )
+    report.table(["job", "ms"], [[name, f"{1e3 * s:.1f}"] for name, s in took.items()])
+
+
+def main() -> None:
+    report = Report("Calibration")
+    bench_28_parameters(report)
+    bench_others(report)
+    report.write("identify")
+
+
+if __name__ == "__main__":
+    main()

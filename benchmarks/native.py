@@ -1,0 +1,101 @@
+"""C code compiled for a benchmark: other solvers, and the core at one lane."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from cffi import FFI
+
+from csrc.build import CSRC, FLAGS, GENERATED, HEADER, declarations
+from pkmcal import core
+from pkmcal.core import ISAS
+
+HERE = Path(__file__).parent
+COMPILER = os.environ.get("CC", "gcc")
+TARGETS = {"base": [], "avx2": ["-march=x86-64-v3"], "avx512": ["-march=x86-64-v4"]}
+BYTES = {"base": 16, "avx2": 32, "avx512": 64}  # of a vector register
+
+
+class Compiled(NamedTuple):
+    """A shared library and what makes its pointers."""
+
+    ffi: Any
+    lib: Any
+
+
+def compiled(
+    folder: Path, name: str, declared: str, sources: list[Path], flags: list[str]
+) -> Compiled:
+    """Compile and load `sources` into ``folder/name.so``."""
+    library = folder / f"{name}.so"
+    command = [COMPILER, "-shared", "-fPIC", *flags, *map(str, sources), "-o", str(library), "-lm"]
+    subprocess.run(command, check=True)
+    ffi = FFI()
+    ffi.cdef(declared)
+    return Compiled(ffi, ffi.dlopen(str(library)))
+
+
+def scalar_newton(folder: Path) -> Compiled:
+    """The textbook's Newton, compiled for this very processor."""
+    declared = """
+        long scalar_newton(ptrdiff_t n, const double *base, const double *platform,
+                           const double *offset, const double *q, const double *guess,
+                           double closed, double *poses);
+    """
+    return compiled(
+        folder, "scalar", declared, [HERE / "scalar_newton.c"], ["-O3", "-march=native"]
+    )
+
+
+def fma_peak(folder: Path, isa: str) -> Compiled:
+    """The loop of multiply-adds at the width of an ISA."""
+    declared = """
+        double peak_double(ptrdiff_t steps, double start);
+        double peak_float(ptrdiff_t steps, double start);
+    """
+    flags = ["-O3", f"-DBYTES={BYTES[isa]}", "-ffp-contract=fast", *TARGETS[isa]]
+    return compiled(folder, f"peak_{isa}", declared, [HERE / "fma_peak.c"], flags)
+
+
+class OneLane:
+    """The core of csrc/ compiled with LANES 1, in the place of `pkmcal.core.lib` while entered.
+
+    The same source, the same flags and the same three ISAs; only the number of lanes differs.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        sources = [CSRC / "abi.c"]
+        for source in sorted(CSRC.glob("core_*.c")):
+            text, count = re.subn(r"#define LANES \d", "#define LANES 1", source.read_text())
+            if count != 1:
+                raise ValueError(f"{source}: expected one definition of LANES, found {count}")
+            sources.append(folder / source.name)
+            sources[-1].write_text(text)
+        flags = [f"-I{CSRC}", f"-I{GENERATED}", *(f for f in FLAGS if "visibility" not in f)]
+        self._here = compiled(folder, "one_lane", declarations(HEADER), sources, flags)
+        self._lib = core.lib
+
+    def __enter__(self) -> OneLane:
+        core.lib = self
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        core.lib = self._lib
+
+    def pkm_forward(self, *arguments: Any) -> int:
+        """As the core's, which it hands all arguments to."""
+        return int(self._here.lib.pkm_forward(*map(self._own, arguments)))
+
+    def _own(self, argument: Any) -> Any:
+        if isinstance(argument, core.ffi.CData):
+            return self._here.ffi.cast("void *", int(core.ffi.cast("intptr_t", argument)))
+        return argument
+
+
+def available() -> list[str]:
+    """ISAs of this processor."""
+    return list(ISAS[: core.lib.pkm_best_isa() + 1])

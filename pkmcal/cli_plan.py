@@ -1,0 +1,117 @@
+"""`pkmcal plan`."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from pkmcal.cli_calibrate import free_names, read_prior
+from pkmcal.cli_output import as_json, folder
+from pkmcal.plan import Plan, plan_poses
+from pkmcal.pose_csv import read_poses, write_poses
+from pkmcal.robot import load_parallel
+from pkmcal.whole_file import write_whole
+from pkmcal.workspace import sample_poses
+
+_DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach
+
+
+def plan(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
+    ],
+    count: Annotated[
+        int | None, typer.Option(metavar="N", help="How many poses; 30 by default.")
+    ] = None,
+    accuracy: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Instead: as few as will do for this predicted error."),
+    ] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="CSV",
+            help=f"Candidates, with columns such as 'y [mm]' and 'alpha [deg]'; by default {_DRAWN}"
+            " are drawn in the workspace.",
+        ),
+    ] = None,
+    targets: Annotated[
+        Path | None,
+        typer.Option(metavar="CSV", help="Where it is to be accurate; by default the candidates."),
+    ] = None,
+    criterion: Annotated[
+        str, typer.Option(metavar="WORD", help="prediction, D or A: what is made least.")
+    ] = "prediction",
+    kind: Annotated[
+        str, typer.Option(metavar="KIND", help="What is measured: position, pose or height.")
+    ] = "position",
+    noise: Annotated[
+        float, typer.Option(metavar="MM", help="Of the instrument, one standard deviation.")
+    ] = 0.02,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="What will be identified, as for calibrate."),
+    ] = None,
+    prior: Annotated[
+        list[str] | None,
+        typer.Option(metavar="[NAME=]σ", help="How far numbers may be off, as for calibrate."),
+    ] = None,
+    unknown: Annotated[
+        list[str] | None,
+        typer.Option(metavar="WORD", help="frame or target: what is not known of the instrument."),
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the candidates drawn.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write poses.csv and commands.csv, the actuators."),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
+) -> int:
+    """Choose the poses to measure for a calibration.
+
+    To commands.csv add columns of what was measured there, and give it to calibrate.
+    Exit code 1: these poses are too few to tell all parameters.
+
+    Example: pkmcal plan hexapod --kind pose --count 20 --out plan
+    """
+    machine = load_parallel(robot)
+    chosen = free_names(machine, free)
+    if poses is None:
+        candidates = sample_poses(machine, _DRAWN, seed, _SHARE)
+    else:
+        candidates = read_poses(poses, machine)
+    made = plan_poses(
+        machine,
+        candidates,
+        count=30 if count is None and accuracy is None else count,
+        accuracy=accuracy,
+        targets=None if targets is None else read_poses(targets, machine),
+        criterion=criterion,
+        kind=kind,
+        noise=noise,
+        free=chosen or None,
+        prior=read_prior(prior or [], machine, chosen),
+        unknown=unknown or (),
+    )
+    written = [] if out is None else _write(made, folder(out))
+    if json:
+        typer.echo(as_json(made))
+    else:
+        typer.echo("\n".join([str(made), *([""] if written else []), *map(str, written)]))
+    return 0 if np.isfinite(made.predicted) else 1
+
+
+def _write(made: Plan, out: Path) -> list[Path]:
+    poses, commands = out / "poses.csv", out / "commands.csv"
+    write_poses(poses, made.poses)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(f"q{i + 1} [{unit}]" for i, unit in enumerate(made.robot.actuator_units))
+    writer.writerows(map(repr, row) for row in made.actuators.tolist())
+    write_whole(commands, text.getvalue())
+    return [poses, commands]

@@ -1,0 +1,134 @@
+"""Optimal design by exchange: which rows of a large Jacobian to keep.
+
+Everything is in coordinates in which all candidates together tell every combination of parameters
+to one: what a choice of them tells is then a number between 0 and 1, free of units.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal.identifiability import ROUNDING, decompose
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+CRITERIA = ("prediction", "D", "A")
+
+_PASSES = 20  # through all members, in search of one that wants to be exchanged
+_BETTER = 1e-9  # share by which an exchange must gain
+_NOTHING = 1e-12  # share of the information of all candidates that is none
+
+
+class Design:
+    """Candidates, what each would tell, and what for.
+
+    Parameters
+    ----------
+    blocks : ndarray (N, k, n)
+        Derivative of what is measured at each candidate by the parameters, both scaled by their
+        standard deviations.
+    prior : ndarray (p, n)
+        Rows that tell something whatever is chosen.
+    aims : ndarray (T, 3, n)
+        Derivative of the points that are to be known, mm.
+    criterion : str
+        One of `CRITERIA`.
+    faint : float
+        What is told to no better than this deviation, scaled, counts as not told while poses are
+        chosen.
+
+    Attributes
+    ----------
+    untold : ndarray (n, d)
+        Orthonormal combinations of parameters that not even all candidates tell.
+    """
+
+    def __init__(
+        self, blocks: FloatArray, prior: FloatArray, aims: FloatArray, criterion: str, faint: float
+    ) -> None:
+        n = blocks.shape[2]
+        singular, basis = decompose(np.vstack([blocks.reshape(-1, n), prior]))
+        rank = int(np.count_nonzero(singular > ROUNDING * singular[0]))
+        told = basis[:, :rank] / singular[:rank]
+        self.untold = basis[:, rank:]
+        self._determinant = criterion == "D"
+        self._blocks = blocks @ told
+        self._prior = (prior @ told).T @ (prior @ told)
+        metric = told.T @ told  # of the scaled parameters
+        self._ridge = metric / faint**2
+        aimed = (aims @ told).reshape(-1, rank)
+        self._errors = aimed.T @ aimed / len(aims)
+        self._cost = metric if criterion == "A" else self._errors
+
+    def predicted(self, chosen: IntArray) -> float:
+        """Root mean square error (mm) at the aims if these candidates are measured."""
+        told, directions = np.linalg.eigh(self._information(chosen))
+        errors = np.einsum("ij,ik,kj->j", directions, self._errors, directions)
+        known = told > _NOTHING
+        if (errors[~known] > _NOTHING * errors.sum()).any():
+            return float("inf")
+        return float(np.sqrt((errors[known] / told[known]).sum()))
+
+    def at_random(self, count: int, draws: int) -> float:
+        """Median of `predicted` over choices of `count` candidates at random."""
+        random = np.random.default_rng(0)
+        every = len(self._blocks)
+        return float(
+            np.median([self.predicted(random.permutation(every)[:count]) for _ in range(draws)])
+        )
+
+    def grown(self, count: int) -> IntArray:
+        """The best `count` candidates that exchanges find, in order."""
+        chosen: list[int] = []
+        while len(chosen) < count:
+            chosen.append(int(np.argmax(self._gains(chosen))))
+        return self._exchanged(chosen)
+
+    def reaching(self, error: float) -> IntArray:
+        """As few candidates as predict an error (mm) that all together do."""
+        chosen: list[int] = []
+        while self.predicted(np.array(chosen, dtype=np.intp)) > error:
+            chosen.append(int(np.argmax(self._gains(chosen))))
+        best = self._exchanged(chosen)
+        while len(best) > 1:
+            worth = [self._gains([j for j in best if j != i])[i] for i in best]
+            fewer = self._exchanged([int(i) for i in np.delete(best, np.argmin(worth))])
+            if self.predicted(fewer) > error:
+                break
+            best = fewer
+        return best
+
+    def _exchanged(self, chosen: list[int]) -> IntArray:
+        """Each member in turn makes room for the best of all, until none has to."""
+        for _ in range(_PASSES):
+            before = set(chosen)
+            for i in list(chosen):
+                others = [j for j in chosen if j != i]
+                gains = self._gains(others)
+                best = int(np.argmax(gains))
+                if gains[best] > (1.0 + _BETTER) * gains[i]:
+                    chosen = [*others, best]
+            if set(chosen) == before:
+                break
+        return np.sort(np.array(chosen, dtype=np.intp))
+
+    def _information(self, chosen: list[int] | IntArray) -> FloatArray:
+        rows = self._blocks[chosen].reshape(-1, self._blocks.shape[2])
+        information: FloatArray = rows.T @ rows + self._prior
+        return information
+
+    def _gains(self, chosen: list[int]) -> FloatArray:
+        """What each candidate (N,) would add to these; nothing for themselves."""
+        at = np.array(chosen, dtype=np.intp)
+        covariance = np.linalg.inv(self._information(at) + self._ridge)
+        through = self._blocks @ covariance
+        own = np.eye(self._blocks.shape[1]) + through @ self._blocks.transpose(0, 2, 1)
+        if self._determinant:
+            gains: FloatArray = np.linalg.slogdet(own)[1]
+        else:
+            spread = through @ self._cost @ through.transpose(0, 2, 1)
+            gains = np.trace(np.linalg.solve(own, spread), axis1=1, axis2=2)
+        gains[at] = -np.inf
+        return gains
