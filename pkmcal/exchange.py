@@ -16,7 +16,7 @@ IntArray = NDArray[np.intp]
 
 CRITERIA = ("prediction", "D", "A")
 
-_PASSES = 20  # through all members, in search of one that wants to be exchanged
+_TRIED = 12  # members that matter least, one of which must want to be exchanged
 _BETTER = 1e-9  # share by which an exchange must gain
 _NOTHING = 1e-12  # share of the information of all candidates that is none
 
@@ -93,28 +93,27 @@ class Design:
             chosen.append(int(np.argmax(self._gains(chosen))))
         best = self._exchanged(chosen)
         while len(best) > 1:
-            worth = [self._gains([j for j in best if j != i])[i] for i in best]
-            fewer = self._exchanged([int(i) for i in np.delete(best, np.argmin(worth))])
+            fewer = self._exchanged(np.delete(best, np.argmin(self._losses(best))).tolist())
             if self.predicted(fewer) > error:
                 break
             best = fewer
         return best
 
     def _exchanged(self, chosen: list[int]) -> IntArray:
-        """Each member in turn makes room for the best of all, until none has to."""
-        for _ in range(_PASSES):
-            before = set(chosen)
-            for i in list(chosen):
-                others = [j for j in chosen if j != i]
-                gains = self._gains(others)
-                best = int(np.argmax(gains))
-                if gains[best] > (1.0 + _BETTER) * gains[i]:
-                    chosen = [*others, best]
-            if set(chosen) == before:
-                break
+        """Members that matter least make room for the best of all, until none has to."""
+        tried = 0
+        while tried < min(_TRIED, len(chosen)):
+            i = chosen[int(np.argsort(self._losses(chosen), kind="stable")[tried])]
+            others = [j for j in chosen if j != i]
+            gains = self._gains(others)
+            best = int(np.argmax(gains))
+            if gains[best] > (1.0 + _BETTER) * gains[i]:
+                chosen, tried = [*others, best], 0
+            else:
+                tried += 1
         return np.sort(np.array(chosen, dtype=np.intp))
 
-    def _information(self, chosen: list[int] | IntArray) -> FloatArray:
+    def _information(self, chosen: IntArray) -> FloatArray:
         rows = self._blocks[chosen].reshape(-1, self._blocks.shape[2])
         information: FloatArray = rows.T @ rows + self._prior
         return information
@@ -122,13 +121,22 @@ class Design:
     def _gains(self, chosen: list[int]) -> FloatArray:
         """What each candidate (N,) would add to these; nothing for themselves."""
         at = np.array(chosen, dtype=np.intp)
-        covariance = np.linalg.inv(self._information(at) + self._ridge)
-        through = self._blocks @ covariance
-        own = np.eye(self._blocks.shape[1]) + through @ self._blocks.transpose(0, 2, 1)
-        if self._determinant:
-            gains: FloatArray = np.linalg.slogdet(own)[1]
-        else:
-            spread = through @ self._cost @ through.transpose(0, 2, 1)
-            gains = np.trace(np.linalg.solve(own, spread), axis1=1, axis2=2)
+        gains = self._changes(self._blocks, at, 1.0)
         gains[at] = -np.inf
         return gains
+
+    def _losses(self, chosen: list[int] | IntArray) -> FloatArray:
+        """What each of these would take away."""
+        at = np.array(chosen, dtype=np.intp)
+        return self._changes(self._blocks[at], at, -1.0)
+
+    def _changes(self, blocks: FloatArray, chosen: IntArray, sign: float) -> FloatArray:
+        """By how much the criterion changes if a block is added to the chosen ones, or removed."""
+        covariance = np.linalg.inv(self._information(chosen) + self._ridge)
+        through = blocks @ covariance
+        own = np.eye(blocks.shape[1]) + sign * (through @ blocks.transpose(0, 2, 1))
+        if self._determinant:
+            changes: FloatArray = sign * np.linalg.slogdet(own)[1]
+            return changes
+        spread = through @ self._cost @ through.transpose(0, 2, 1)
+        return np.asarray(np.trace(np.linalg.solve(own, spread), axis1=1, axis2=2))

@@ -25,7 +25,7 @@ IntArray = NDArray[np.intp]
 
 _DRAWS = 25  # of poses at random, to compare a plan with
 _ERROR = 0.5  # mm; what numbers may be off by that have no prior
-_MACHINES = 16  # with errors that must reach a candidate, too
+_TIMES, _MACHINES = 2.0, 16  # so many machines with so many times these errors must get there
 _FOUND = 1e-6  # mm, rad: how near to a pose forward kinematics must end
 _UNTOLD = 1e-3  # mm a pose moves per mm along a combination that cannot be told
 
@@ -115,8 +115,8 @@ def plan_poses(
         The machine as drawn, or as last calibrated.
     candidates : array_like (N, 6)
         Poses that could be measured, mm and rad. Those that break the machine's limits are left
-        out, and those that machines with three times the errors of the prior (0.5 mm without one)
-        do not reach. A pose that its closures do not allow is completed (`Robot.complete`).
+        out, and those that machines with twice the errors of the prior (0.5 mm without one) do
+        not reach. A pose that its closures do not allow is completed (`Robot.complete`).
     count : int, optional
         How many to choose.
     accuracy : float, optional
@@ -222,8 +222,9 @@ def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> NDArray[np.bo
     safe = np.ones(len(q), dtype=bool)
     for _ in range(_MACHINES):
         erroneous = values.copy()
-        erroneous[chosen.places] += 3.0 * sigma * random.standard_normal(k)
-        safe &= chosen.robot._nudged(erroneous).forward(q, guess=poses).ok
+        erroneous[chosen.places] += _TIMES * sigma * random.standard_normal(k)
+        machine = chosen.robot._nudged(erroneous)
+        safe[safe] = machine.forward(q[safe], guess=poses[safe]).ok
     if not safe.any():
         raise ValueError("candidates: all are so near a singularity that errors bar the way there")
     return safe

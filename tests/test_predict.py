@@ -106,7 +106,8 @@ def test_poses_in_a_frame_carry_points_there() -> None:
     target = rng.normal(0, 50, (5, 3))
     composed = predict("pose", pose, frame=frame).values
     there = predict("position", composed, target).values
-    np.testing.assert_allclose(there, predict("position", pose, target, frame=frame).values, atol=1e-12)
+    expected = predict("position", pose, target, frame=frame).values
+    np.testing.assert_allclose(there, expected, atol=1e-12)
 
 
 def test_angles_differ_the_short_way_round() -> None:
