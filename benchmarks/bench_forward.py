@@ -127,7 +127,14 @@ def bench_peak(
         rate = {kind: steps * 16 * 2 * lanes[kind] / s for kind, s in found_peak.items()}
         least = needed.floats / rate["float"] + needed.doubles / rate["double"]
         rows.append(
-            [isa, f"{rate['double'] / 1000000000.0:.0f}", f"{rate['float'] / 1000000000.0:.0f}", f"{1000000000.0 * least:.1f}", f"{1000000000.0 * each:.1f}", f"{least / each:.0%}"]
+            [
+                isa,
+                f"{rate['double'] / 1e9:.0f}",
+                f"{rate['float'] / 1e9:.0f}",
+                f"{1e9 * least:.1f}",
+                f"{1e9 * each:.1f}",
+                f"{least / each:.0%}",
+            ]
         )
     heads = ["ISA", "GFLOP/s, doubles", "floats", "ns a row at peak", "ns a row", "of peak"]
     report.table(heads, rows)

@@ -82,7 +82,7 @@ def test_what_does_not_fit_is_named(fields: dict[str, object], words: str) -> No
 
 def test_a_tracker_measures_points_that_have_an_azimuth() -> None:
     with pytest.raises(ValueError, match="row 1 is straight above or below"):
-        TRACKER.covariance([PLACE + 100, [*PLACE, 0, 0, 500]])
+        TRACKER.covariance([PLACE + 100, PLACE + np.array([0, 0, 500])])
     with pytest.raises(ValueError, match="a tracker measures positions, not values of kind 'heig"):
         Measurements(np.ones((2, 6)), np.ones(2), "height", sigma=TRACKER)
     machine = pk.VirtualMachine(pk.load("hexapod"), TRACKER)
