@@ -50,7 +50,8 @@ regenerate: $(DERIVE)
 	$(BIN)/python -m derive
 
 bench: $(TESTS)
-	$(BIN)/pytest --benchmark-only benchmarks
+	for each in $(basename $(notdir $(wildcard benchmarks/bench_*.py))); do \
+		$(BIN)/python -m benchmarks.$$each || exit 1; done
 
 lint: $(TESTS)
 	$(BIN)/ruff check

@@ -68,7 +68,9 @@ def bench_hexapod(report: Report, folder: Path) -> None:
         fast[f"core at one lane, {isa}"] = lambda solve=solve: lane(solve, q)
     slow: dict[str, Callable[[], object]] = {
         "NumPy Newton on the batch": lambda: plain.numpy_newton(q, robot.home, CLOSED),
-        f"scipy root, analytic Jacobian ({FEW} rows)": lambda: plain.scipy_root(q[:FEW], robot.home),
+        f"scipy root, analytic Jacobian ({FEW} rows)": lambda: plain.scipy_root(
+            q[:FEW], robot.home
+        ),
     }
     for name, run in (fast | slow).items():
         found = run()
@@ -102,9 +104,7 @@ def bench_hexapod(report: Report, folder: Path) -> None:
     bench_peak(report, folder, {isa: took[f"core, {isa}"] / ROWS for isa in solvers}, best)
 
 
-def bench_peak(
-    report: Report, folder: Path, took: dict[str, float], found: pk.Forward
-) -> None:
+def bench_peak(report: Report, folder: Path, took: dict[str, float], found: pk.Forward) -> None:
     """What the multiplications and additions alone would take at the peak of one core."""
     needed = operations.hexapod_forward(int(np.median(found.iterations)))
     report.text(
@@ -169,7 +169,8 @@ def bench_all_machines(report: Report) -> None:
         robot, at = pk.load(name), poses(name, ROWS)
         q, limbs = robot.inverse(at), len(robot.model.limbs)
         took = medians(
-            {"forward": lambda: robot.forward(q, threads=1), "inverse": lambda: robot.inverse(at)}, 9
+            {"forward": lambda: robot.forward(q, threads=1), "inverse": lambda: robot.inverse(at)},
+            9,
         )
         rate = limbs * ROWS / took["inverse"] / 1e6
         forward_ns = nanoseconds(took["forward"], ROWS)

@@ -30,7 +30,12 @@ def processor() -> str:
     info = Path("/proc/cpuinfo")
     lines = info.read_text().splitlines() if info.exists() else []
     models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    family = {key: line.split(":")[1].strip() for line in lines for key in ("cpu family", "model") if line.split(":")[0].strip() == key}
+    family = {
+        key: line.split(":")[1].strip()
+        for line in lines
+        for key in ("cpu family", "model")
+        if line.split(":")[0].strip() == key
+    }
     model = models[0] if models else platform.processor() or platform.machine()
     numbers = ", ".join(f"{key} {value}" for key, value in family.items())
     return f"{model} ({numbers})" if numbers else model
@@ -79,7 +84,13 @@ class Report:
 
 def times(number: float) -> str:
     """A ratio for reading."""
-    return f"{number:.0f}x" if number >= 100 else f"{number:.1f}x" if number >= 10 else f"{number:.2f}x"
+    return (
+        f"{number:.0f}x"
+        if number >= 100
+        else f"{number:.1f}x"
+        if number >= 10
+        else f"{number:.2f}x"
+    )
 
 
 def nanoseconds(seconds: float, rows: int) -> str:

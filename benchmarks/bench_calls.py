@@ -1,0 +1,109 @@
+"""What a call costs beside the kinematics: single poses, threads, the inverse, importing."""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+
+import pkmcal as pk
+from benchmarks import native
+from benchmarks.timing import Report, medians, nanoseconds, times
+from tests.workspaces import poses
+
+
+def bench_one_pose(report: Report) -> None:
+    """One pose through Python, wanted in 10 us."""
+    robot, rows, many = pk.load("hexapod"), [], 1000
+    pose = poses("hexapod", 1)[0]
+    q = robot.inverse(pose)
+    framed = pk.load("hexapod")
+    calls = {
+        "forward": lambda: robot.forward(q),
+        "forward, from a guess": lambda: robot.forward(q, guess=pose),
+        "inverse": lambda: robot.inverse(pose),
+        "jacobian": lambda: robot.jacobian(pose),
+        "forward_jacobian": lambda: robot.forward_jacobian(pose),
+        "error_jacobian": lambda: robot.error_jacobian(pose),
+        "feasible": lambda: framed.feasible(pose).ok,
+    }
+
+    def repeated(call):
+        return lambda: [call() for _ in range(many)]
+
+    took = medians({name: repeated(call) for name, call in calls.items()}, 11)
+    rows = [[name, f"{1e6 * seconds / many:.1f}"] for name, seconds in took.items()]
+    report.text("One pose of the hexapod through Python (wanted: forward and inverse in 10 us).")
+    report.table(["call", "us"], rows)
+
+
+def bench_threads(report: Report) -> None:
+    """Two threads against one, wanted 1.8x."""
+    robot, rows = pk.load("hexapod"), []
+    for count in (5_000, 20_000, 100_000, 1_000_000):
+        q = robot.inverse(poses("hexapod", count))
+        took = medians(
+            {n: lambda n=n: robot.forward(q, threads=n) for n in (1, 2, None)},
+            25 if count <= 100_000 else 9,
+        )
+        one = took[1]
+        cells = [f"{count}", *(nanoseconds(seconds, count) for seconds in took.values())]
+        rows.append([*cells, times(one / took[2]), times(one / took[None])])
+    report.text("Forward kinematics of the hexapod in threads, ns a row (wanted: two at 1.8x).")
+    report.table(["rows", "one", "two", "None", "two is", "None is"], rows)
+
+
+def bench_inverse(report: Report) -> None:
+    """Limbs a second, wanted 300 million on AVX2 and up."""
+    rows = []
+    for name in ("hexapod", "2tpr2tps", "rbt-6t03p", "rotary-delta"):
+        robot = pk.load(name)
+        for count in (2_000, 100_000):
+            at = poses(name, count)
+            cases = {}
+            for isa in native.available():
+                same = pk.load(name)
+                same._machine.isa = native.ISAS.index(isa)
+                cases[isa] = lambda same=same, at=at: same.inverse(at)
+            took = medians(cases, 25)
+            limbs = count * len(robot.model.limbs)
+            rates = [f"{limbs / took[isa] / 1e6:.0f}" for isa in native.available()]
+            rows.append([name, count, *rates])
+    report.text(
+        "Inverse kinematics through Python, one core, million limbs a second (wanted: 300)."
+    )
+    report.table(["machine", "rows", *native.available()], rows)
+
+
+def bench_import(report: Report) -> None:
+    """Importing in fresh processes, wanted at most twice as long as NumPy."""
+
+    def seconds(module: str) -> float:
+        code = (
+            f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
+        )
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+        return float(done.stdout)
+
+    found: dict[str, list[float]] = {"numpy": [], "pkmcal": []}
+    for _ in range(21):
+        for module, list_ in found.items():
+            list_.append(seconds(module))
+    numpy, own = (statistics.median(found[module]) for module in found)
+    report.text(
+        f"import numpy {1e3 * numpy:.0f} ms, import pkmcal (with numpy) {1e3 * own:.0f} ms: "
+        f"{times(own / numpy)} (wanted: 2x)."
+    )
+
+
+def main() -> None:
+    report = Report("Calls")
+    bench_one_pose(report)
+    bench_threads(report)
+    bench_inverse(report)
+    bench_import(report)
+    report.write("calls")
+
+
+if __name__ == "__main__":
+    main()
