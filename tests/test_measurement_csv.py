@@ -113,6 +113,19 @@ def test_a_constant_place_of_the_target_is_one_target(tmp_path: Path) -> None:
     np.testing.assert_array_equal(moving.target, [[0, 0, 5], [0, 1, 5]])
 
 
+def test_distances_may_end_anywhere_on_the_platform(tmp_path: Path) -> None:
+    ends = "attachment.x [mm],attachment.y [mm],attachment.z [cm]"
+    head = f"q1 [mm],distance [mm],target.x [mm],target.y [mm],target.z [mm],{ends}\n"
+    m = read(tmp_path, head + "1,10,0,0,5,1,2,3\n2,20,0,0,5,1,2,3\n")
+    np.testing.assert_array_equal(m.attachment, [1, 2, 30])
+    moving = read(tmp_path, head + "1,10,0,0,5,1,2,3\n2,20,0,0,5,1,2,4\n")
+    np.testing.assert_array_equal(moving.attachment, [[1, 2, 30], [1, 2, 40]])
+    named = head.replace("q1 [mm]", "q1 [mm],target")
+    two = read(tmp_path, named + "1,A,10,0,0,5,1,2,3\n2,B,20,0,9,5,1,2,4\n3,A,11,0,0,5,1,2,3\n")
+    np.testing.assert_array_equal(two.attachment, [[1, 2, 30], [1, 2, 40]])
+    np.testing.assert_array_equal(two.target_index, [0, 1, 0])
+
+
 def test_the_robot_says_how_many_actuators_and_in_which_unit(tmp_path: Path) -> None:
     text = "q1 [mm],q2 [mm],z [mm]\n1,2,3\n"
     robot = SimpleNamespace(actuator_units=("mm", "mm"))
@@ -134,9 +147,10 @@ def same(one: Measurements, other: Measurements) -> None:
         assert (a is None) == (b is None), name
         if a is not None:
             assert a.shape == b.shape and a.tobytes() == b.tobytes(), name
-    assert (one.target is None) == (other.target is None)
-    if one.target is not None:
-        assert one.targets.tobytes() == other.targets.tobytes()
+    for name in ("target", "attachment"):
+        assert (getattr(one, name) is None) == (getattr(other, name) is None)
+        if getattr(one, name) is not None:
+            assert getattr(one, name + "s").tobytes() == getattr(other, name + "s").tobytes()
 
 
 @st.composite
@@ -152,6 +166,9 @@ def measurements(draw: st.DrawFn) -> Measurements:
     if kind == "distance" or (kind != "pose" and draw(st.booleans())):
         shape = draw(st.sampled_from([(3,), (rows, 3)]))
         fields["target"] = draw(arrays(float, shape, elements=NUMBERS))
+    if kind == "distance" and draw(st.booleans()):
+        shape = draw(st.sampled_from([(3,), (rows, 3)]))
+        fields["attachment"] = draw(arrays(float, shape, elements=NUMBERS))
     units = draw(st.lists(st.sampled_from(["mm", "rad"]), min_size=n, max_size=n))
     return Measurements(
         draw(arrays(float, (rows, n), elements=NUMBERS)),
@@ -266,6 +283,10 @@ ERRORS = [
     ("q1 [mm],distance [mm]\n1,2\n", "line 1: missing column 'target.x'"),
     (POSE + ",target\n1,2,3,4,5,6,7,A\n", "columns of a target do not go with poses"),
     (PLACED + "\n1,2,A,0,0,0\n1,2,A,0,0,1\n", "line 3, column 'target': 'A' has another place"),
+    (
+        "q1 [mm],z [mm],attachment.x [mm],attachment.y [mm],attachment.z [mm]\n1,2,3,4,5\n",
+        "column 'attachment.x' goes with distances, not with heights",
+    ),
     (PLACED + "\n1,2,,0,0,0\n", "line 2, column 'target': found an empty cell"),
     ('q1 [mm],z [mm]\n1,"2\n', "line 2: unexpected end of data"),
 ]

@@ -77,6 +77,19 @@ def test_the_target_of_every_row() -> None:
     assert several.target_names == ("1", "2")
 
 
+def test_the_attachment_of_every_row() -> None:
+    np.testing.assert_array_equal(make("distance").attachments, np.zeros((5, 3)))
+    per_row = np.arange(15.0).reshape(5, 3)
+    wires = make("distance", attachment=per_row)
+    np.testing.assert_array_equal(wires.attachments, per_row)
+    np.testing.assert_array_equal(wires.select([4, 1]).attachments, per_row[[4, 1]])
+    several: dict[str, Any] = {"target": np.eye(3)[:2], "target_index": [0, 1, 1, 0, 1]}
+    each = make("distance", attachment=[[7, 0, 0], [8, 0, 0]], **several)
+    np.testing.assert_array_equal(each.attachments[:, 0], [7, 8, 8, 7, 8])
+    one = make("distance", attachment=[7, 8, 9], **several)
+    np.testing.assert_array_equal(one.attachments, [[7, 8, 9]] * 5)
+
+
 def test_targets_without_places_are_an_error_only_when_places_are_asked_for() -> None:
     m = make(target_index=[0, 1, 0, 1, 0], target_names=["A", "B"])
     with pytest.raises(ValueError, match="target: the places of A, B"):
@@ -103,6 +116,12 @@ BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"target_index": [0, 1], "target_names": "AB"}, TypeError, "target_names"),
     ({"target_index": [0, 1], "target_names": ["A", "A"]}, ValueError, "different names"),
     ({"target_index": [0, 1], "target_names": ["A"]}, ValueError, "must name 2 targets; found 1"),
+    ({"attachment": [0, 0, 1]}, ValueError, "attachment: distances alone have one.*'position'"),
+    (
+        {"kind": "distance", "values": [1, 2], "target": [0, 0, 0], "attachment": [1, 2]},
+        ValueError,
+        r"attachment must have shape \(3,\) or \(2, 3\); found \(2,\)",
+    ),
     ({"target_names": ["A"]}, ValueError, "target_names need target_index"),
     ({"group": [1, 2, 3]}, ValueError, r"group must have shape \(2,\)"),
     ({"actuator_units": "deg"}, ValueError, "actuator_units .*'deg'"),
@@ -237,6 +256,12 @@ def test_without_noise_a_virtual_machine_reads_what_is_there(
     m = VirtualMachine(Gantry(), noise=0).measure(Q, kind, target)
     np.testing.assert_allclose(m.values, expected, atol=1e-14)
     assert m.sigma is None and m.kind == kind and m.actuator_units == ("mm",) * 3
+
+
+def test_distances_run_from_the_target_to_the_attachment() -> None:
+    m = VirtualMachine(Gantry(), noise=0).measure(Q, "distance", [0, 0, 10], [2, 0, 0])
+    np.testing.assert_allclose(m.values, [np.sqrt(9 + 36 + 100), 2], atol=1e-14)
+    np.testing.assert_array_equal(m.attachment, [2, 0, 0])
 
 
 def test_noise_has_the_stated_deviation_and_is_stated() -> None:

@@ -247,6 +247,11 @@ def test_measurements_of_another_machine_are_refused(points: Measurements) -> No
         identify(pk.load("2tpr2tps"), radians)
 
 
+def test_points_alone_have_no_attachment(paper: Robot, points: Measurements) -> None:
+    with pytest.raises(ValueError, match="attachment: distances alone have one"):
+        identify(paper, points, attachment="unknown")
+
+
 def test_distances_alone_have_no_frame(paper: Robot) -> None:
     q = paper.inverse(tilted_poses(paper, 5, np.random.default_rng(5)))
     far = VirtualMachine(paper).measure(q, kind="distance", target=[500, 0, 0])
