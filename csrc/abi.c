@@ -303,6 +303,13 @@ int pkm_motion_pose(int isa, ptrdiff_t n, const double *motion, double *pose)
     return 0;
 }
 
+int pkm_angle_rates(int isa, ptrdiff_t n, const double *pose, double *rates)
+{
+    CHECKED(isa);
+    chosen->angle_rates(n, pose, rates);
+    return 0;
+}
+
 int pkm_exp_jacobian(int isa, int inverse, ptrdiff_t n, const double *twist, double *jacobian)
 {
     CHECKED(isa);

@@ -207,6 +207,11 @@ static void core_motion_pose(ptrdiff_t n, const double *motion, double *pose)
     pose_rows(n, motion, pose);
 }
 
+static void core_angle_rates(ptrdiff_t n, const double *pose, double *rates)
+{
+    angle_rates_rows(n, pose, rates);
+}
+
 static void core_exp_jacobian(int inverse, ptrdiff_t n, const double *twist, double *jacobian)
 {
     exp_jacobian_rows(inverse, n, twist, jacobian);
@@ -245,6 +250,6 @@ const pkm_core CORE = {core_inverse, core_forward, core_jacobian, core_response,
                        core_compose_rates, core_points, core_distances,
                        core_swarm_start, core_swarm_move, core_swarm_judge, core_swarm_eq18,
                        core_closure_cost,
-                       core_exp, core_log, core_adjoint, core_motion_pose, core_exp_jacobian,
+                       core_exp, core_log, core_adjoint, core_motion_pose, core_angle_rates, core_exp_jacobian,
                        core_joint_motions, core_arm_links, core_arm_forward, core_arm_jacobian,
                        core_arm_error_jacobian};

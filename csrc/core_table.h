@@ -46,6 +46,7 @@ typedef struct {
     void (*log)(ptrdiff_t n, const double *motion, double *twist);
     void (*adjoint)(ptrdiff_t n, const double *motion, double *adjoint);
     void (*motion_pose)(ptrdiff_t n, const double *motion, double *pose);
+    void (*angle_rates)(ptrdiff_t n, const double *pose, double *rates);
     void (*exp_jacobian)(int inverse, ptrdiff_t n, const double *twist, double *jacobian);
     void (*joint_motions)(ptrdiff_t n, const double *error, const double *point, double *motion);
     void (*arm_links)(const pkm_arm *, ptrdiff_t n, const double *error, double *link);

@@ -147,6 +147,9 @@ int pkm_log(int isa, ptrdiff_t n, const double *motion, double *twist);
 int pkm_adjoint(int isa, ptrdiff_t n, const double *motion, double *adjoint);
 int pkm_motion_pose(int isa, ptrdiff_t n, const double *motion, double *pose);
 
+/* Rates of alpha beta gamma by a turning in base axes (n, 3, 3), at poses (n, 6). */
+int pkm_angle_rates(int isa, ptrdiff_t n, const double *pose, double *rates);
+
 /* At a twist (n, 6): dT T^-1 by dtwist (n, 6, 6), or with `inverse` dtwist by dT T^-1. */
 int pkm_exp_jacobian(int isa, int inverse, ptrdiff_t n, const double *twist, double *jacobian);
 

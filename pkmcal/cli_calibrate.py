@@ -13,12 +13,13 @@ from typing import Annotated
 
 import typer
 
+from pkmcal.arm_machine import as_machine
 from pkmcal.cli_output import as_json, folder
 from pkmcal.core import POSE
 from pkmcal.csv_table import UNITS
 from pkmcal.measurement_csv import read_measurements
 from pkmcal.measurements import Measurements
-from pkmcal.robot import Robot, load_parallel
+from pkmcal.robot import Robot, load
 from pkmcal.tracker import Tracker
 
 _FRAME = dict(zip(POSE, ("mm", "mm", "mm", "rad", "rad", "rad"), strict=True))
@@ -94,7 +95,7 @@ def calibrate(
     """
     from pkmcal.identify import identify
 
-    machine = load_parallel(robot)
+    machine = as_machine(load(robot))
     if out is not None:
         _refuse_own_input(out, robot)
     measured = read_measurements(csv, machine)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from pkmcal import digits, robot
+from pkmcal.arm_machine import ArmMachine
 from pkmcal.cli_output import as_json
 from pkmcal.core import POSE
 from pkmcal.serial import SerialArm
@@ -26,7 +27,8 @@ def machines(
     for name in robot.machines():
         machine = robot.load(name)
         if isinstance(machine, SerialArm):
-            rows[name] = {"limbs": list(machine.kinds), "coordinates": POSE, "free": ()}
+            free = ArmMachine(machine).model.free
+            rows[name] = {"limbs": list(machine.kinds), "coordinates": POSE, "free": free}
             continue
         rows[name] = {
             "limbs": [limb.kind for limb in machine.model.limbs],

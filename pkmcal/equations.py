@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal.arm_machine import ArmMachine
 from pkmcal.core import STATUS
 from pkmcal.measurements import Measurements
 from pkmcal.parameters import POINTS, Parameters, Share
@@ -93,8 +94,8 @@ class Equations:
         self.pose_of = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
         self._guess = np.tile(parameters.robot.home, (len(self.actuators), 1))
         for measured, framed, place in zip(self.sets, self._framed, self.pose_of, strict=True):
-            if measured.kind == "pose" and not framed:
-                self._guess[place] = measured.values
+            if measured.kind in ("pose", "position") and not framed:
+                self._guess[place, : len(measured.components)] = measured.values
         self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
         self.components = np.concatenate([np.full(len(m), len(m.components)) for m in self.sets])
         self.first = np.cumsum(self.components) - self.components  # equation of each row
@@ -156,12 +157,18 @@ class Equations:
     def jacobian(self, point: Point) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n)."""
         p = self.parameters
-        by_geometry = point.robot.error_jacobian(point.pose, self.actuators)[:, :, p.places]
+        if isinstance(point.robot, ArmMachine):
+            by_geometry = point.robot.twist_jacobian(self.actuators)[:, :, p.places]
+        else:
+            by_geometry = point.robot.error_jacobian(point.pose, self.actuators)[:, :, p.places]
         parts = []
         for i, seen in enumerate(point.predicted):
             rows, k = seen.values.shape
             part = np.zeros((rows, k, len(p)))
-            part[:, :, : len(p.places)] = seen.by_pose @ by_geometry[self.pose_of[i]]
+            place = self.pose_of[i]
+            is_arm = isinstance(point.robot, ArmMachine)
+            by_motion = seen.by_twist(point.pose[place]) if is_arm else seen.by_pose
+            part[:, :, : len(p.places)] = by_motion @ by_geometry[place]
             if seen.by_frame is not None and p.frame is not None:
                 part[:, :, p.frame : p.frame + 6] = seen.by_frame
             for name, columns in self._columns[i].items():

@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
+from pkmcal.arm_machine import ArmMachine, as_machine
 from pkmcal.core import as_rows
 from pkmcal.equations import Equations
 from pkmcal.estimate import Estimate
+from pkmcal.identifiability import decompose
 from pkmcal.predict import predict
 from pkmcal.repeats import SIGNIFICANT
 from pkmcal.robot import Robot
@@ -149,8 +151,8 @@ class Identification:
 
         Parameters
         ----------
-        poses : array_like (..., 6)
-            mm and rad; they need not have been measured.
+        poses : array_like (..., 6), for a serial arm (..., n)
+            mm and rad; they need not have been measured. Of an arm its joint coordinates.
         target : array_like (3,), optional
             A point of the platform, mm; its origin by default.
 
@@ -161,19 +163,40 @@ class Identification:
             covariance C of the numbers of the geometry. inf where the point moves along with a
             combination that cannot be told.
         """
-        rows, shape = as_rows("poses", poses, 6)
         place = np.zeros(3) if target is None else as_rows("target", target, 3)[0][0]
-        by_pose = predict("position", rows, place).by_pose
         parameters = self._equations.parameters
-        by_geometry = by_pose @ self.robot.error_jacobian(rows)[:, :, parameters.places]
+        machine = as_machine(self.robot)
+        if isinstance(machine, ArmMachine):
+            rows, shape = as_rows("poses", poses, machine.n_actuators)
+            at = machine.forward(rows).pose
+            by_motion = predict("position", at, place).by_twist(at)
+            by_geometry = by_motion @ machine.twist_jacobian(rows)[:, :, parameters.places]
+            unknown = self._untold_here()
+        else:
+            rows, shape = as_rows("poses", poses, 6)
+            by_motion = predict("position", rows, place).by_pose
+            by_geometry = by_motion @ machine.error_jacobian(rows)[:, :, parameters.places]
+            unknown = self._estimate.setting.determined.untold
         k = len(parameters.places)
         variance = np.einsum(
             "nij,jk,nik->n", by_geometry, self._told[:k, :k], by_geometry, optimize=True
         )
-        undetermined = self._estimate.setting.determined.untold * parameters.scale[:, None]
+        undetermined = unknown * parameters.scale[:, None]
         untold = np.linalg.norm(by_geometry @ undetermined[:k], axis=(1, 2))
         known = np.where(untold < _UNTOLD, np.sqrt(variance), np.inf)
         return known.reshape(shape)
+
+    def _untold_here(self) -> FloatArray:
+        """Scaled combinations (n, d) that are not determined, at the identified geometry.
+
+        `Estimate.setting` has them at the machine as drawn. Those of an arm turn with its errors.
+        """
+        parameters = self._equations.parameters
+        sigma = parameters.prior / parameters.scale
+        stated = np.flatnonzero(np.isfinite(sigma))
+        prior = np.eye(len(sigma))[stated] / sigma[stated, None]
+        _, basis = decompose(np.vstack([self._estimate.jacobian, prior]))
+        return basis[:, self._estimate.setting.determined.rank :]
 
     def plot(self, path: str | PathLike[str]) -> None:
         """Draw the residuals by row, over the workspace and as quantiles.

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal.arm_machine import as_given, as_machine
 from pkmcal.equations import Equations
 from pkmcal.estimate import Estimate, Estimator
 from pkmcal.holdout import HeldOut, compare, drawn
@@ -21,6 +22,7 @@ from pkmcal.parameters import Bounds, Prior, Share, parameters
 from pkmcal.plausibility import beyond_strokes, meagre, misread, strayed
 from pkmcal.repeats import joined
 from pkmcal.robot import Robot
+from pkmcal.serial import SerialArm
 from pkmcal.suggest import did_you_mean
 
 FloatArray = NDArray[np.float64]
@@ -31,7 +33,7 @@ _INVOLVED = 1e-6  # share of a parameter in what cannot be told, above which it 
 
 
 def identify(
-    robot: Robot,
+    robot: Robot | SerialArm,
     measurements: Measurements | Sequence[Measurements],
     free: str | Sequence[str] | None = None,
     prior: Prior = None,
@@ -49,8 +51,9 @@ def identify(
 
     Parameters
     ----------
-    robot : Robot
-        The machine as drawn, or as last calibrated.
+    robot : Robot or SerialArm
+        The machine as drawn, or as last calibrated. The numbers of an arm are its joint errors,
+        ``joint1.dx`` … ``joint6.dpsi``.
     measurements : Measurements or sequence of Measurements
         Of any kinds.
     free : str or sequence of str, optional
@@ -110,6 +113,7 @@ def identify(
     >>> round(found.robot.geometry["offset1"], 6)
     0.3
     """
+    robot = as_machine(robot)
     shares = _shares(robot, measurements, frame, target, attachment)
     held: list[tuple[Share, int]] = []
     if isinstance(holdout, Measurements):
@@ -267,7 +271,7 @@ def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Iden
         estimator.prior @ searched,
     )
     return Identification(
-        robot=chosen.robot.replace(chosen.values_at(theta)),
+        robot=as_given(chosen.robot.replace(chosen.values_at(theta))),
         free=chosen.names,
         units=chosen.units,
         values=theta,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pkmcal import core
+from pkmcal import core, core_serial
 
 FloatArray = NDArray[np.float64]
 
@@ -31,6 +31,8 @@ class Predicted:
         Derivative to the fixed point of the base; distances alone have one.
     by_frame : ndarray (N, k, 6) or None
         Derivative to the pose of the base in the instrument's frame; None where there is none.
+    target : ndarray (3,) or (N, 3) or None
+        The measured point of the platform; None for poses.
     """
 
     values: FloatArray
@@ -38,6 +40,29 @@ class Predicted:
     by_target: FloatArray | None = None
     by_anchor: FloatArray | None = None
     by_frame: FloatArray | None = None
+    target: FloatArray | None = None
+
+    def by_twist(self, pose: FloatArray) -> FloatArray:
+        """Derivative to the velocity of the platform's origin and its turning, in base axes.
+
+        Unlike `by_pose` it is regular at every orientation, but for measured poses.
+
+        Parameters
+        ----------
+        pose : ndarray (N, 6)
+            Of the platform, as in `predict`.
+
+        Returns
+        -------
+        ndarray (N, k, 6)
+            mm per mm, then per rad.
+        """
+        by_place, by_angles = np.split(self.by_pose, 2, axis=2)
+        if self.target is None:
+            return np.concatenate([by_place, by_angles @ core_serial.angle_rates(pose)], axis=2)
+        lever = core.points(pose, self.target)[0] - pose[:, :3]
+        by_turn = np.cross(lever[:, None, :], by_place)  # u · (ω × r) = (r × u) · ω
+        return np.concatenate([by_place, by_turn], axis=2)
 
 
 def predict(
@@ -73,16 +98,19 @@ def predict(
 def _points(pose: FloatArray, target: FloatArray, frame: FloatArray | None) -> Predicted:
     point, by_pose, by_target = core.points(pose, target)
     if frame is None:
-        return Predicted(point, by_pose, by_target)
+        return Predicted(point, by_pose, by_target, target=target)
     seen, by_frame, turn = core.points(frame, point)
-    return Predicted(seen, turn @ by_pose, turn @ by_target, by_frame=by_frame)
+    return Predicted(seen, turn @ by_pose, turn @ by_target, by_frame=by_frame, target=target)
 
 
 def _heights(seen: Predicted) -> Predicted:
-    parts = (seen.values, seen.by_pose, seen.by_target, None, seen.by_frame)
-    values, by_pose, *others = (None if part is None else part[:, 2:3] for part in parts)
-    assert values is not None and by_pose is not None
-    return Predicted(values, by_pose, *others)
+    def last(part: FloatArray | None) -> FloatArray | None:
+        return None if part is None else part[:, 2:3]
+
+    values, by_pose = seen.values[:, 2:3], seen.by_pose[:, 2:3]
+    return Predicted(
+        values, by_pose, last(seen.by_target), None, last(seen.by_frame), target=seen.target
+    )
 
 
 def _distances(pose: FloatArray, target: FloatArray, anchor: FloatArray) -> Predicted:
@@ -90,7 +118,7 @@ def _distances(pose: FloatArray, target: FloatArray, anchor: FloatArray) -> Pred
     for by in derivatives:
         by[distance == 0] = 0.0  # no direction there
     by_pose, by_target, by_anchor = (by[:, None, :] for by in derivatives)
-    return Predicted(distance[:, None], by_pose, by_target, by_anchor)
+    return Predicted(distance[:, None], by_pose, by_target, by_anchor, target=target)
 
 
 def _poses(pose: FloatArray, frame: FloatArray | None) -> Predicted:

@@ -186,11 +186,24 @@ class SerialArm:
         return tuple("rad" if kind == "revolute" else "mm" for kind in self.kinds)
 
     @property
+    def length(self) -> float:
+        """Characteristic length, mm: at this radius a rotation counts as its arc.
+
+        The root mean square distance of the joints' points from the tool at zero.
+        """
+        reach = np.linalg.norm(self._points - self._home[:3, 3], axis=1)
+        return float(np.sqrt(np.mean(reach**2))) or 1.0
+
+    @property
     def screws(self) -> FloatArray:
         """Nominal unit screws (ω, v) at zero, (n, 6): (ω, r × ω), or (0, v) (eq. 1)."""
         none = np.zeros((self.n_joints, 6))
         screws: FloatArray = self.jacobian(np.zeros(self.n_joints), none).T.copy()
         return screws
+
+    def __reduce__(self) -> tuple[type[SerialArm], tuple[object, ...]]:
+        given = (self._axes, self._points, self._home, self.kinds, self.name, self._errors)
+        return SerialArm, given
 
     def __repr__(self) -> str:
         return f"<SerialArm {self.name}: {' '.join(self.kinds)}>"

@@ -96,8 +96,7 @@ class _Search:
         self, arm: SerialArm, goal: FloatArray, errors: ArrayLike | None, parts: slice
     ) -> None:
         self.arm, self.goal, self.errors, self.parts = arm, goal, errors, parts
-        reach = np.linalg.norm(arm.points - arm.home[:3, 3], axis=1)
-        self.length = float(np.sqrt(np.mean(reach**2))) or 1.0
+        self.length = arm.length
         by_unit = [self.length if unit == "rad" else 1.0 for unit in arm.actuator_units]
         self.travel = np.array(by_unit)  # mm of each coordinate, so that λ fits all
 

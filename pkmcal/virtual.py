@@ -8,9 +8,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pkmcal.arm_machine import ArmMachine
 from pkmcal.measurement_fields import numbers
 from pkmcal.measurements import COMPONENTS, Measurements
 from pkmcal.predict import predict
+from pkmcal.serial import SerialArm
 from pkmcal.tracker import Tracker
 
 FloatArray = NDArray[np.float64]
@@ -31,7 +33,7 @@ class VirtualMachine:
 
     Parameters
     ----------
-    true_robot : Robot
+    true_robot : Robot or SerialArm
         The machine as it really is, with its errors.
     noise : float or Tracker
         Standard deviation of the instrument in mm, for every length it reads; or a tracker, which
@@ -53,12 +55,15 @@ class VirtualMachine:
 
     def __init__(
         self,
-        true_robot: Solvable,
+        true_robot: Solvable | SerialArm,
         noise: float | Tracker = 0.02,
         seed: int = 0,
         angle_noise: float | None = None,
     ) -> None:
         self.true_robot = true_robot
+        self._machine: Solvable = (
+            ArmMachine(true_robot) if isinstance(true_robot, SerialArm) else true_robot
+        )
         self.noise = noise if isinstance(noise, Tracker) else _deviation("noise", noise)
         if angle_noise is None:
             angle_noise = 0.0 if isinstance(noise, Tracker) else noise / _ARM
@@ -105,10 +110,10 @@ class VirtualMachine:
             np.zeros((len(actuators), width) if width > 1 else len(actuators)),
             kind,
             target=target,
-            actuator_units=getattr(self.true_robot, "actuator_units", None),
+            actuator_units=getattr(self._machine, "actuator_units", None),
             attachment=attachment,
         )
-        solved = self.true_robot.forward(actuators)
+        solved = self._machine.forward(actuators)
         failed = np.flatnonzero(~np.asarray(solved.ok))
         if len(failed):
             rows = ", ".join(map(str, failed[:10])) + (", …" if len(failed) > 10 else "")

@@ -190,7 +190,7 @@ def test_rows_out_of_reach_on_the_way_do_not_stop_the_search() -> None:
         assert found.chi2_per_dof < 1.5
 
 
-# --- frames, targets, distances ----------------------------------------------------------------
+# --- frames, targets ---------------------------------------------------------------------------
 
 
 def test_unknown_frame_and_targets_are_found(hexapod: Robot) -> None:
@@ -223,18 +223,6 @@ def test_pose_measurements_in_an_unknown_frame(hexapod: Robot) -> None:
     found = identify(hexapod, Measurements(q, seen, "pose"), free="offset*", frame="unknown")
     np.testing.assert_allclose(found.values[6:], frame, atol=1e-7)
     np.testing.assert_allclose(found.values[:6], [0.4, 0, 0, -0.3, 0, 0], atol=1e-7)
-
-
-def test_the_unknown_fixed_point_of_distances_is_found(hexapod: Robot) -> None:
-    rng = np.random.default_rng(17)
-    true = hexapod.replace({"offset2": 0.5})
-    q = hexapod.inverse(hexapod_poses(hexapod, 30, rng))
-    anchor = np.array([400.0, 300.0, -100.0])
-    exact = VirtualMachine(true, noise=0).measure(q, kind="distance", target=anchor)
-    rough = dataclasses.replace(exact, target=anchor + np.array([3.0, -4.0, 5.0]))
-    found = identify(hexapod, rough, free="offset2", target="unknown")
-    assert found.free == ("offset2", "anchor1.x", "anchor1.y", "anchor1.z")
-    np.testing.assert_allclose(found.values, [0.5, *anchor], atol=1e-6)
 
 
 # --- hold-out, accuracy, bounds, repeats -------------------------------------------------------

@@ -83,6 +83,19 @@ def test_points_and_distances_are_those_of_the_twin() -> None:
     np.testing.assert_allclose(core.distances(pose, target, anchor)[0], lengths, rtol=0, atol=1e-13)
 
 
+def test_points_and_distances_have_the_same_bits_on_every_isa(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(4)
+    pose, target, anchor = rng.normal(0, 1, (13, 6)), rng.normal(0, 9, (13, 3)), np.ones(3)
+    found = []
+    for isa in range(core.lib.pkm_best_isa() + 1):
+        monkeypatch.setattr(core, "ISA", isa)
+        arrays = core.points(pose, target) + core.distances(pose, target, anchor)
+        found.append([array.tobytes() for array in arrays])
+    assert all(bits == found[0] for bits in found)
+
+
 def test_a_distance_of_zero_has_no_derivative_and_no_nan() -> None:
     pose = np.array([[1.0, 2, 3, 0.1, 0.2, 0.3], [1, 2, 4, 0, 0, 0]])
     seen = predict("distance", pose, anchor=np.array([1.0, 2, 3]))

@@ -5,7 +5,11 @@ Two multibody engines that know nothing of screws stand beside it.
 
 from __future__ import annotations
 
+import doctest
 import math
+import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -424,3 +428,26 @@ def test_what_is_given_and_returned_is_not_shared() -> None:
     for name in ("axes", "points", "home", "joint_errors"):
         getattr(arm, name)[:] = 9.0
     assert (arm.forward([0.3, 0.4]) == before).all()
+
+
+# --- what is written about it -----------------------------------------------------------------
+
+
+def test_the_page_on_serial_arms_is_true() -> None:
+    page = Path(__file__).parents[1] / "docs" / "serial-arms.md"
+    failed, examples = doctest.testfile(str(page), module_relative=False)
+    assert (failed, examples > 8) == (0, True)
+
+
+def test_the_example_prints_the_numbers_of_its_page_and_draws_the_curves(tmp_path: Path) -> None:
+    folder = Path(__file__).parents[1] / "examples" / "3r-joint-errors"
+    curves = tmp_path / "curves.png"
+    command = [sys.executable, folder / "joint_errors.py", curves]
+    done = subprocess.run(command, capture_output=True, check=True, text=True)
+    page = (folder / "README.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| [0−].*?° \| (.*) \| (.*) \| (.*) \|$", page, re.MULTILINE)
+    assert len(rows) == 3
+    printed = [float(number) for number in re.findall(r"\d+\.\d+", done.stdout)]
+    for number in (float(cell) for row in rows for cell in row):
+        assert number in printed
+    assert curves.stat().st_size > 10_000

@@ -1,0 +1,123 @@
+"""A serial arm as calibration sees a machine: numbers with names, and poses of its tool."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pkmcal import core_serial
+from pkmcal.core import FloatArray, IntArray
+from pkmcal.robot import Robot
+from pkmcal.serial import ERRORS, SerialArm
+from pkmcal.suggest import did_you_mean
+
+_OK, _INVALID = 0, 4  # of a row, as in `Forward`
+
+
+@dataclass(frozen=True, eq=False)
+class ArmGeometry:
+    """The joint errors of an arm by name: ``joint1.dx`` … ``joint6.dpsi``.
+
+    Attributes
+    ----------
+    names, units : tuple of str, 6 n
+    values : ndarray (6 n,)
+        mm and rad.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: FloatArray
+
+    def match(self, patterns: str | Sequence[str]) -> list[str]:
+        """Find names and wildcards, each name once, in the order of the patterns.
+
+        Raises
+        ------
+        ValueError
+            A pattern that matches nothing.
+        """
+        found: dict[str, None] = {}
+        for pattern in [patterns] if isinstance(patterns, str) else patterns:
+            hits = [name for name in self.names if fnmatchcase(name, pattern)]
+            if not hits:
+                known = did_you_mean(pattern, self.names)
+                raise ValueError(f"no joint error matches {pattern!r}{known}")
+            found.update(dict.fromkeys(hits))
+        return list(found)
+
+
+@dataclass(frozen=True)
+class ArmModel:
+    """What an arm declares: all its joint errors are free, and no limb has a stroke."""
+
+    free: tuple[str, ...]
+    limbs: tuple[()] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class ArmPoses:
+    """Poses (N, 6) of the tool, x y z α β γ, and status (N,): 0 ok, 4 invalid input."""
+
+    pose: FloatArray
+    status: IntArray
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """Which rows have a pose."""
+        return np.equal(self.status, _OK)
+
+
+class ArmMachine:
+    """An arm behind the face of a parallel machine.
+
+    Parameters
+    ----------
+    arm : SerialArm
+        The arm; its joint errors are the numbers of the geometry.
+    """
+
+    def __init__(self, arm: SerialArm) -> None:
+        self.arm = arm
+        self.name, self.length = arm.name, arm.length
+        self.n_actuators, self.actuator_units = arm.n_joints, arm.actuator_units
+        joints = range(1, arm.n_joints + 1)
+        names = tuple(f"joint{i}.{error}" for i in joints for error in ERRORS)
+        units = ("mm", "mm", "mm", "rad", "rad", "rad") * arm.n_joints
+        self.geometry = ArmGeometry(names, units, arm.joint_errors.reshape(-1))
+        self.model = ArmModel(names)
+        self.home = core_serial.pose(arm.home.reshape(1, 16))[0]
+
+    def replace(self, values: ArrayLike) -> ArmMachine:
+        """With other joint errors (6 n,), mm and rad."""
+        return ArmMachine(self.arm.replace(np.reshape(values, (-1, 6))))
+
+    _nudged = replace
+
+    def forward(self, q: ArrayLike, guess: ArrayLike | None = None) -> ArmPoses:
+        """Poses at joint coordinates (N, n); an arm needs no guess."""
+        motions = self.arm.forward(q).reshape(-1, 16)
+        known = np.isfinite(motions[:, 0])
+        status = np.where(known, _OK, _INVALID).astype(np.int32)
+        return ArmPoses(core_serial.pose(motions), status)
+
+    def twist_jacobian(self, q: ArrayLike) -> FloatArray:
+        """Velocity of the tool's origin, then its turning, by each error: (N, 6, 6 n)."""
+        jacobian = self.arm.error_jacobian(q, frame="tip")
+        return jacobian[:, [3, 4, 5, 0, 1, 2]]
+
+
+def as_machine(robot: Robot | SerialArm) -> Robot:
+    """The robot itself, or an arm behind the face of one."""
+    return cast(Robot, ArmMachine(robot)) if isinstance(robot, SerialArm) else robot
+
+
+def as_given(robot: Robot) -> Robot:
+    """The reverse of `as_machine`: what the user gave, an arm as an arm."""
+    machine: Any = robot
+    return cast(Robot, machine.arm) if isinstance(machine, ArmMachine) else robot

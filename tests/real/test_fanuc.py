@@ -1,0 +1,77 @@
+"""A real FANUC R-2000iC/165F, calibrated from its laser-tracker log: 24 poses, three reflectors."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.identify import identify
+from pkmcal.measurements import Measurements
+
+LOG = Path(__file__).parents[3] / "shared" / "data" / "fanuc-r2000ic" / "tracker.csv"
+
+pytestmark = pytest.mark.skipif(
+    not LOG.exists(), reason="the tracker log is not beside this checkout (../shared/data)"
+)
+
+UNKNOWN = {"frame": "unknown", "target": "unknown"}
+PRIOR = 1.0  # mm: what an arm's errors of manufacture are, more or less
+
+
+@pytest.fixture(scope="module")
+def arm() -> pk.SerialArm:
+    """As drawn: upper arm up and forearm level at zero, joints 3 to 6 counted the other way."""
+    axes = np.array([[0, 0, 1], [0, 1, 0], [0, -1, 0], [-1, 0, 0], [0, -1, 0], [-1, 0, 0]])
+    shoulder, elbow, wrist = 670.0, 670.0 + 1075.0, 670.0 + 1075.0 + 225.0
+    reach = 312.0 + 1280.0
+    points = [[0, 0, 0], [312, 0, shoulder], [312, 0, elbow], [312, 0, wrist], [reach, 0, wrist],
+              [reach, 0, wrist]]  # fmt: skip
+    home = np.eye(4)
+    home[:3, 3] = [reach + 215.0, 0, wrist]
+    return pk.SerialArm(axes, points, home, name="R-2000iC/165F")
+
+
+@pytest.fixture(scope="module")
+def log() -> Measurements:
+    return pk.read_measurements(LOG)
+
+
+def test_the_log_is_24_poses_of_10_repeats_and_3_reflectors(log: Measurements) -> None:
+    assert (len(log), log.pose_index.max() + 1) == (720, 24)
+    assert log.target_names == ("A", "B", "C")
+
+
+def test_base_and_reflectors_alone(arm: pk.SerialArm, log: Measurements) -> None:
+    found = identify(arm, log, free="joint1.dx", **UNKNOWN)  # which is the base's x
+    assert found.rank == 15
+    assert found.rms == pytest.approx(0.621, abs=0.001)
+
+
+def test_all_joint_errors(arm: pk.SerialArm, log: Measurements) -> None:
+    found = identify(arm, log, **UNKNOWN)
+    assert (found.rank, len(found.free)) == (33, 51)
+    assert found.rms == pytest.approx(0.161, abs=0.001)
+    assert found.repeatability == pytest.approx(0.090 / np.sqrt(3), rel=0.02)
+
+
+def test_a_prior_costs_nothing(arm: pk.SerialArm, log: Measurements) -> None:
+    assert identify(arm, log, prior=PRIOR, **UNKNOWN).rms < 0.163
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("prior, limit", [(None, 0.25), (PRIOR, 0.23)])
+def test_every_pose_left_out_in_turn(
+    arm: pk.SerialArm, log: Measurements, prior: float | None, limit: float
+) -> None:
+    squares = []
+    for pose in range(24):
+        left_out = log.pose_index == pose
+        found = identify(
+            arm, log.select(~left_out), holdout=log.select(left_out), prior=prior, **UNKNOWN
+        )
+        assert found.converged
+        squares.append(found.holdout_rms**2)
+    assert np.sqrt(np.mean(squares)) <= limit
