@@ -12,11 +12,10 @@ GENERATED = CSRC.parent / "generated"
 HEADER = CSRC / "pkmcal.h"
 BEGIN, END = "/* cffi begin */", "/* cffi end */"
 
-# Contraction off: every ISA gives the same bits. Scheduling before allocation gains 10 % (gcc).
+# Contraction off: every ISA gives the same bits.
 FLAGS = [
     "-std=c11",
     "-O3",
-    "-fschedule-insns",
     "-fno-math-errno",
     "-fno-trapping-math",
     "-ffp-contract=off",

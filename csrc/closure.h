@@ -87,8 +87,7 @@ INLINE void sphere_of_numbers(int driver, const limb_numbers *limb, FN(limb_sphe
     if (driver == DRIVER_LENGTH) {
         memcpy(sphere->c, limb->g + BASE_X, sizeof sphere->c);
     } else {
-        sphere->rho2 = limb->g[ROD] * limb->g[ROD];
-        sphere->scale = rough_reciprocal(limb->g[ROD]);
+        sphere->rho = limb->g[ROD];
     }
 }
 
@@ -100,14 +99,13 @@ INLINE void sphere_at(int driver, const limb_numbers *limb, real q, FN(limb_sphe
     real qt;
     FN(limb_drive)(q, limb->g, &qt);
     if (driver == DRIVER_LENGTH) {
-        sphere->rho2 = qt * qt;
-        sphere->scale = rough_reciprocal(qt);
+        sphere->rho = qt;
     } else if (driver == DRIVER_SLIDER) {
         FN(slider_anchor)(qt, limb->g + BASE_X, limb->first, sphere->c);
     } else {
         FN(crank_anchor)(qt, limb->g + BASE_X, limb->first, limb->second, sphere->c);
     }
-    *reachable &= (sphere->scale > fill(0.0)) & finite(sphere->scale) & (absolute(qt) < fill(1e30));
+    *reachable &= (sphere->rho > fill(1e-30)) & (sphere->rho < fill(1e30)) & (absolute(qt) < fill(1e30));
 }
 
 /* Both, for every limb. */

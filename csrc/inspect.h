@@ -46,7 +46,7 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
                 if (k == 0)
                     sphere_derivatives(machine, i, &limb[i], R, p, lane_q[machine->actuator[i]],
                                        &by_q, by_g);
-                by_q *= sphere[i].scale * machine->weight[r];
+                by_q *= rough_reciprocal(sphere[i].rho) * machine->weight[r];
                 for (int a = 0; a < actuators; a++)
                     scatter(a == machine->actuator[i] ? by_q : fill(0.0),
                             out->by_q + r * actuators + a, rows * actuators, row, count);

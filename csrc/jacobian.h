@@ -56,7 +56,7 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
         reached &= finite(own);
         sphere_of_numbers(machine->driver[i], &limb[i], &sphere);
         sphere_at(machine->driver[i], &limb[i], own, &sphere, &reachable);
-        FN(sphere_row)(R, p, limb[i].g + PLATFORM_X, sphere.c, sphere.rho2, &phi, omega, v);
+        FN(sphere_row)(R, p, limb[i].g + PLATFORM_X, sphere.c, sphere.rho * sphere.rho, &phi, omega, v);
         FN(map_pull)(map, state, omega, v, row);
         map_free(map, state, row, by_free);
         sphere_derivatives(machine, i, &limb[i], R, p, own, &by_q, by_g);
@@ -100,7 +100,7 @@ INLINE void response_block(int map, const pkm_machine *machine, const limb_numbe
     const int rows = pose_response(map, machine, sphere, state, response);
     for (int k = 0; k < 6 * columns; k++) out[k] = fill(0.0);
     for (int i = 0; i < machine->limbs; i++) {
-        real by_q, by_g[SLOTS], scale = sphere[i].scale * machine->weight[r];
+        real by_q, by_g[SLOTS], scale = rough_reciprocal(sphere[i].rho) * machine->weight[r];
         sphere_derivatives(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
         int end = c;
         if (column)

@@ -18,7 +18,7 @@ INLINE real FN(absolute)(real x)
 /* A limb at a known actuator coordinate: a sphere around its anchor, and the axes of its
  * constraint rows. */
 typedef struct {
-    real b[3], c[3], rho2, scale; /* scale: 1/ρ, which makes Φ mm */
+    real b[3], c[3], rho;
     real base_axis[3], platform_axis[3];
 } FN(limb_sphere);
 
@@ -54,6 +54,16 @@ INLINE void FN(map_retract)(int map, const real *state, const real *delta, real 
 {
     switch (map) {
 #define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_retract)(state, delta, moved); break;
+    EACH_MAP(CASE)
+#undef CASE
+    }
+}
+
+/* The state a state stands for that rounding moved off its manifold. */
+INLINE void FN(map_tidy)(int map, const real *state, real *tidy)
+{
+    switch (map) {
+#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_tidy)(state, tidy); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -96,8 +106,9 @@ INLINE int FN(closure_rows)(int map, int scaling, const pkm_machine *machine,
     FN(map_frame)(map, state, R, p);
     for (int i = 0; i < machine->limbs; i++) {
         const FN(limb_sphere) *one = &limb[i];
-        FN(sphere_row)(R, p, one->b, one->c, one->rho2, &phi, omega, v);
-        const real scale = one->scale * (NUMBER)machine->weight[r];
+        FN(sphere_row)(R, p, one->b, one->c, one->rho * one->rho, &phi, omega, v);
+        /* Φ is mm² */
+        const real scale = FN(rough_reciprocal)(one->rho) * (NUMBER)machine->weight[r];
         FN(store_row)(map, scaling == SCALED, state, phi, omega, v, scale, scale * inverse_length,
                       &residual[machine->order[r]],
                       jacobian ? &jacobian[machine->order[r] * m] : NULL);
@@ -123,17 +134,21 @@ INLINE int FN(closure_rows)(int map, int scaling, const pkm_machine *machine,
 }
 
 /* LU of `count` matrices A (m x m, row by row) in place and in the order given; the diagonals hold
- * reciprocals. Side by side, for the steps of one depend on each other and those of two do not. */
+ * reciprocals. Row by row, which stay in registers; side by side, for the steps of one matrix
+ * depend on each other and those of two do not. */
 INLINE void FN(factor)(int m, int count, real (*A)[36])
 {
-    for (int c = 0; c < m; c++) {
-        for (int t = 0; t < count; t++) A[t][c * m + c] = 1.0f / A[t][c * m + c];
-        for (int i = c + 1; i < m; i++)
-            for (int t = 0; t < count; t++) {
-                A[t][i * m + c] *= A[t][c * m + c];
-                for (int j = c + 1; j < m; j++) A[t][i * m + j] -= A[t][i * m + c] * A[t][c * m + j];
+    for (int i = 0; i < m; i++)
+        for (int t = 0; t < count; t++) {
+            real row[6];
+            for (int j = 0; j < m; j++) row[j] = A[t][i * m + j];
+            for (int k = 0; k < i; k++) {
+                row[k] *= A[t][k * m + k];
+                for (int j = k + 1; j < m; j++) row[j] -= row[k] * A[t][k * m + j];
             }
-    }
+            row[i] = 1.0f / row[i];
+            for (int j = 0; j < m; j++) A[t][i * m + j] = row[j];
+        }
 }
 
 /* Solve with those factors, in place. */

@@ -126,7 +126,8 @@ INLINE wide half(narrow x, int which)
 }
 
 /* 1/x to the precision of floats: enough for a scale, and cheaper. */
-INLINE wide rough_reciprocal(wide x) { return half(1.0f / join(x, x), 0); }
+INLINE narrow rough_reciprocal_narrow(narrow x) { return 1.0f / x; }
+INLINE wide rough_reciprocal_wide(wide x) { return half(1.0f / join(x, x), 0); }
 
 enum { PLAIN, SCALED }; /* systems of closure rows: see kernel.h */
 
@@ -154,6 +155,7 @@ enum { PLAIN, SCALED }; /* systems of closure rows: see kernel.h */
 #define select(m, yes, no) select_wide(m, yes, no)
 #define absolute(x) absolute_wide(x)
 #define larger(a, b) larger_wide(a, b)
+#define rough_reciprocal(x) rough_reciprocal_wide(x)
 #define fill(x) fill_wide(x)
 
 INLINE mask fill_mask(int64_t x) { return (mask){0} + x; }
@@ -180,10 +182,8 @@ INLINE mask finite(real x) { return absolute(x) <= fill(1.7976931348623157e308);
 /* Column k of the given rows of a row-major array. */
 INLINE real gather(const double *column, ptrdiff_t stride, const ptrdiff_t *row)
 {
-    double lane[LANES];
-    for (int l = 0; l < LANES; l++) lane[l] = column[stride * row[l]];
-    real r;
-    memcpy(&r, lane, sizeof r);
+    real r = {0};
+    for (int l = 0; l < LANES; l++) r[l] = column[stride * row[l]];
     return r;
 }
 

@@ -117,10 +117,7 @@ INLINE void join_spheres(const pkm_machine *machine, int i, int once, const FN(l
 {
     if (once || machine->driver[i] != DRIVER_LENGTH)
         for (int k = 0; k < 3; k++) both->c[k] = join(low->c[k], high->c[k]);
-    if (once || machine->driver[i] == DRIVER_LENGTH) {
-        both->rho2 = join(low->rho2, high->rho2);
-        both->scale = join(low->scale, high->scale);
-    }
+    if (once || machine->driver[i] == DRIVER_LENGTH) both->rho = join(low->rho, high->rho);
     if (!once) return;
     for (int k = 0; k < 3; k++) both->b[k] = join(low->b[k], high->b[k]);
     if (!machine->rows[i]) return;
@@ -164,41 +161,63 @@ INLINE void steps_in_floats(int map, const pkm_machine *machine, int steps,
     }
 }
 
-/* Two steps in doubles with the factors found in floats. */
+/* What is left of the closures of a block: in doubles, for they nearly cancel, then as floats. */
+INLINE void closures_of_block(int map, const pkm_machine *machine, const batch *all, int t,
+                              narrow *phi)
+{
+    real low[PKM_MAX_ROWS], high[PKM_MAX_ROWS];
+    FN(closure_rows)(map, PLAIN, machine, all->in[2 * t].sphere, all->fine[2 * t], low, NULL);
+    FN(closure_rows)(map, PLAIN, machine, all->in[2 * t + 1].sphere, all->fine[2 * t + 1], high, NULL);
+    for (int r = 0; r < map_m(map); r++) phi[r] = join(low[r], high[r]);
+}
+
+/* Two steps in doubles with the factors found in floats: of a step that small floats hold enough. */
 INLINE void steps_in_doubles(int map, const pkm_machine *machine, batch *all)
 {
     const int m = map_m(map);
-    const double size = machine->size;
-    real phi[HALVES][PKM_MAX_ROWS], moved[MAX_STATE], longest[HALVES][2], A[HALVES][36];
-    for (int h = 0; h < all->halves; h++) {
-        for (int k = 0; k < m * m; k++) A[h][k] = half(all->factors[h / 2][k], h % 2);
+    const real size = fill(machine->size);
+    const narrow angular = fill_narrow((float)machine->length);
+    narrow phi[BLOCKS][PKM_MAX_ROWS], longest[BLOCKS][2];
+    real step[6], moved[MAX_STATE];
+    for (int h = 0; h < 2 * all->blocks; h++) {
         for (int s = 0; s < MAX_STATE; s++) moved[s] = half(all->state[h / 2][s], h % 2);
-        for (int j = 0; j < m; j++) phi[h][j] = fill(0.0);
-        FN(map_retract)(map, moved, phi[h], all->fine[h]); /* unit length to double precision */
+        FN(map_tidy)(map, moved, all->fine[h]);
     }
     for (int round = 0; round < 2; round++) {
-        for (int h = 0; h < all->halves; h++)
-            FN(closure_rows)(map, PLAIN, machine, all->in[h].sphere, all->fine[h], phi[h], NULL);
-        FN(substitute)(m, HALVES, A, phi);
-        for (int h = 0; h < all->halves; h++) {
-            longest[h][round] = fill(0.0);
+        for (int t = 0; t < all->blocks; t++) closures_of_block(map, machine, all, t, phi[t]);
+        substitute_narrow(m, BLOCKS, all->factors, phi);
+        for (int t = 0; t < all->blocks; t++) {
+            longest[t][round] = fill_narrow(0);
             for (int j = 0; j < m; j++) {
-                const real length = absolute(phi[h][j]) * (map_is_angle(map, j) ? machine->length : 1.0);
-                longest[h][round] = larger(longest[h][round], length);
-                phi[h][j] = -phi[h][j];
+                const narrow length = absolute_narrow(phi[t][j]);
+                longest[t][round] = larger_narrow(longest[t][round],
+                                                  map_is_angle(map, j) ? length * angular : length);
             }
-            FN(map_retract)(map, all->fine[h], phi[h], moved);
-            memcpy(all->fine[h], moved, sizeof moved);
+            for (int h = 2 * t; h < 2 * t + 2; h++) {
+                for (int j = 0; j < m; j++) step[j] = -half(phi[t][j], h % 2);
+                FN(map_retract)(map, all->fine[h], step, moved);
+                memcpy(all->fine[h], moved, sizeof moved);
+            }
         }
     }
-    for (int h = 0; h < all->halves; h++) {
-        FN(closure_rows)(map, SCALED, machine, all->in[h].sphere, all->fine[h], phi[h], NULL);
-        all->worst[h] = fill(0.0);
-        for (int r = 0; r < m; r++) all->worst[h] = larger(all->worst[h], absolute(phi[h][r]));
-        /* what is left after two steps a, b that contract is about b²/a */
-        const real first = larger(longest[h][0], longest[h][1]), second = longest[h][1];
-        all->solved[h] &= (all->worst[h] <= fill(CLOSED * size))
-                        & (second * second <= SETTLED * size * first);
+    for (int t = 0; t < all->blocks; t++) {
+        closures_of_block(map, machine, all, t, phi[t]);
+        narrow worst = fill_narrow(0);
+        for (int i = 0, r = 0; i < machine->limbs; i++) { /* in mm */
+            narrow scale = rough_reciprocal_narrow(all->sphere[t][i].rho);
+            for (int kinds = 2 * machine->rows[i] + 1; kinds; kinds &= kinds - 1) {
+                worst = larger_narrow(worst, absolute_narrow(phi[t][machine->order[r++]]) * scale);
+                scale = fill_narrow((float)(1.0 / machine->size));
+            }
+        }
+        for (int h = 2 * t; h < 2 * t + 2; h++) {
+            /* what is left after two steps a, b that contract is about b²/a */
+            const real a = half(longest[t][0], h % 2), second = half(longest[t][1], h % 2);
+            const real first = larger(a, second);
+            all->worst[h] = half(worst, h % 2);
+            all->solved[h] &= (all->worst[h] <= CLOSED * size)
+                            & (second * second <= SETTLED * size * first);
+        }
     }
 }
 

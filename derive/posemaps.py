@@ -1,12 +1,14 @@
 """Pose maps: the m free coordinates of a machine and the frame (R, p) they stand for.
 
 A map iterates on a `state` (no Euler angles, so no singular orientation inside Newton) by steps
-`delta`, m numbers, mm and rad. Each map is five functions of the state, all derived here from one
+`delta`, m numbers, mm and rad. Each map is eight functions of the state, all derived here from one
 definition: the state's frame, its retraction, and the pose it reports.
 
 * ``from_pose``  pose -> state
 * ``frame``      state -> R, p
 * ``retract``    state, delta -> state
+* ``tidy``       state, off its manifold by rounding -> state
+* ``angles``     state -> sines and cosines of the reported orientation
 * ``pull``       covector of a twist at the state -> covector of delta
 * ``rates``      delta -> rates of the pose x y z α β γ
 * ``free``       covector of delta -> covector of the reported free coordinates
@@ -226,6 +228,10 @@ def _functions(pose_map: PoseMap) -> list[Function]:
     delta = retract.vector("delta", m, "step [mm, rad]")
     retract.output("moved", pose_map.retract(retract, s, delta), "the new state")
 
+    tidy = new("tidy", "the state without what rounding added", "state ⊕ 0")
+    s = tidy.vector("state", size, "of the map, nearly")
+    tidy.output("moved", pose_map.retract(tidy, s, sp.zeros(m, 1)), "the state")
+
     angles = new("angles", "the reported orientation", "sine and cosine up to a positive factor")
     s = angles.vector("state", size, "of the map")
     R, _ = pose_map.frame(s)
@@ -251,7 +257,7 @@ def _functions(pose_map: PoseMap) -> list[Function]:
     s = free.vector("state", size, "of the map")
     row = free.vector("row", m, "covector of the step")
     free.output("out", _free(free, pose_map, s, row), "by " + " ".join(pose_map.free))
-    return [from_pose, frame, retract, angles, pull, rates, free]
+    return [from_pose, frame, retract, tidy, angles, pull, rates, free]
 
 
 def _euler(f: Function, pose_map: PoseMap, s: sp.Matrix) -> tuple[sp.Expr, ...]:

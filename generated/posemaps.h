@@ -1,5 +1,5 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation d697dc7f3af1d141
+ * derivation 76ade68c424edd2a
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -127,6 +127,28 @@ INLINE void FN(map_spatial_retract)(const real state[7], const real delta[6], re
     moved[4] = q1*k;
     moved[5] = q2*k;
     moved[6] = q3*k;
+}
+
+/*
+ * spatial: the state without what rounding added
+ *     state ⊕ 0
+ * in  state[7]       of the map, nearly
+ * out moved[7]       the state
+ * operations: 8 +, 12 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_spatial_tidy)(const real state[7], real moved[7])
+{
+    /* how far from unit length: 1/√(1 + e) by its series */
+    const real e = state[3]*state[3] + state[4]*state[4] + state[5]*state[5] + state[6]*state[6] -
+        1.0f;
+    const real k = 1.0f + e*(e*(0.375f + (0.2734375f*e - 0.3125f)*e) - 0.5f);
+    moved[0] = state[0];
+    moved[1] = state[1];
+    moved[2] = state[2];
+    moved[3] = state[3]*k;
+    moved[4] = state[4]*k;
+    moved[5] = state[5]*k;
+    moved[6] = state[6]*k;
 }
 
 /*
@@ -286,6 +308,20 @@ INLINE void FN(map_translation_retract)(const real state[3], const real delta[3]
 }
 
 /*
+ * translation: the state without what rounding added
+ *     state ⊕ 0
+ * in  state[3]       of the map, nearly
+ * out moved[3]       the state
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_translation_tidy)(const real state[3], real moved[3])
+{
+    moved[0] = state[0];
+    moved[1] = state[1];
+    moved[2] = state[2];
+}
+
+/*
  * translation: the reported orientation
  *     sine and cosine up to a positive factor
  * in  state[3]       of the map
@@ -415,6 +451,24 @@ INLINE void FN(map_planar_retract)(const real state[4], const real delta[3], rea
     moved[1] = state[1] + delta[1];
     moved[2] = xg*kg;
     moved[3] = yg*kg;
+}
+
+/*
+ * planar: the state without what rounding added
+ *     state ⊕ 0
+ * in  state[4]       of the map, nearly
+ * out moved[4]       the state
+ * operations: 6 +, 8 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_planar_tidy)(const real state[4], real moved[4])
+{
+    /* how far from unit length: 1/√(1 + e) by its series */
+    const real eg = state[2]*state[2] + state[3]*state[3] - 1.0f;
+    const real kg = 1.0f + eg*(eg*(0.375f + (0.2734375f*eg - 0.3125f)*eg) - 0.5f);
+    moved[0] = state[0];
+    moved[1] = state[1];
+    moved[2] = state[2]*kg;
+    moved[3] = state[3]*kg;
 }
 
 /*
@@ -558,6 +612,29 @@ INLINE void FN(map_2tpr2tps_retract)(const real state[6], const real delta[4], r
     moved[3] = ya*ka;
     moved[4] = xb*kb;
     moved[5] = yb*kb;
+}
+
+/*
+ * 2tpr2tps: the state without what rounding added
+ *     state ⊕ 0
+ * in  state[6]       of the map, nearly
+ * out moved[6]       the state
+ * operations: 12 +, 16 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_2tpr2tps_tidy)(const real state[6], real moved[6])
+{
+    /* how far from unit length: 1/√(1 + e) by its series */
+    const real ea = state[2]*state[2] + state[3]*state[3] - 1.0f;
+    const real ka = 1.0f + ea*(ea*(0.375f + (0.2734375f*ea - 0.3125f)*ea) - 0.5f);
+    /* how far from unit length: 1/√(1 + e) by its series */
+    const real eb = state[4]*state[4] + state[5]*state[5] - 1.0f;
+    const real kb = 1.0f + eb*(eb*(0.375f + (0.2734375f*eb - 0.3125f)*eb) - 0.5f);
+    moved[0] = state[0];
+    moved[1] = state[1];
+    moved[2] = state[2]*ka;
+    moved[3] = state[3]*ka;
+    moved[4] = state[4]*kb;
+    moved[5] = state[5]*kb;
 }
 
 /*
