@@ -14,11 +14,10 @@ INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *
     } else if (machine->driver[i] == DRIVER_SLIDER) {
         FN(slider_inverse)(limb->g, h, limb->first, fill(machine->branch[i]), &qt);
     } else {
-        real sine[2], cosine[2];
-        FN(crank_inverse)(limb->g, h, limb->first, limb->second, sine, cosine);
-        qt = arctangent2(sine[0], cosine[0]) - machine->branch[i] * arctangent2(sine[1], cosine[1]);
-        qt = select(qt > fill(PI), qt - 2.0 * PI, qt);
-        qt = select(qt < fill(-PI), qt + 2.0 * PI, qt);
+        real sine, cosine;
+        FN(crank_inverse)(limb->g, h, limb->first, limb->second, fill(machine->branch[i]), &sine,
+                          &cosine);
+        qt = arctangent2(sine, cosine);
     }
     FN(limb_command)(qt, limb->per_gain, limb->g, &q);
     return q;

@@ -210,13 +210,15 @@ def _inverse(driver: Driver) -> Function:
         f.output("qt", along - branch * root, "q̃ [mm]")
         return f
     second = f.vector("second", 3, "crank axis × e")
+    branch = f.scalar("branch", "sign of d·∂c/∂q̃")
     # both sides times the crank's length, which scales the two atan2 arguments alike
     x, y = f.let("x", h.dot(first)), f.let("y", h.dot(second))
     twice = f.let("twice", h.dot(h) + f.g["crank"] ** 2 - f.g["rod"] ** 2)
     kappa = f.let("kappa", twice / 2)
     root = f.let("root", sp.sqrt(x**2 + y**2 - kappa**2))
-    f.output("sine", sp.Matrix([y, root]), "of the two angles, up to a positive factor")
-    f.output("cosine", sp.Matrix([x, kappa]), "of the two angles")
+    side = f.let("side", branch * root)
+    f.output("sine", sp.Matrix([y * kappa - x * side]), "of q̃, up to a positive factor")
+    f.output("cosine", sp.Matrix([x * kappa + y * side]), "of q̃")
     return f
 
 

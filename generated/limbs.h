@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation 1d3e8cc01e7c0f6c
+ * derivation 3fc8bc8258140682
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*
@@ -258,22 +258,22 @@ INLINE void FN(slider_inverse)(const real g[14], const real h[3], const real fir
  * in  h[3]           p + R b - base [mm]
  * in  first[3]       s, or crank e
  * in  second[3]      crank axis × e
- * out sine[2]        of the two angles, up to a positive factor
- * out cosine[2]      of the two angles
- * operations: 10 +, 15 *, 0 /, 1 sqrt
+ * in  branch         sign of d·∂c/∂q̃
+ * out sine[1]        of q̃, up to a positive factor
+ * out cosine[1]      of q̃
+ * operations: 12 +, 20 *, 0 /, 1 sqrt
  */
 INLINE void FN(crank_inverse)(const real g[14], const real h[3], const real first[3],
-        const real second[3], real sine[2], real cosine[2])
+        const real second[3], real branch, real sine[1], real cosine[1])
 {
     const real x = h[0]*first[0] + h[1]*first[1] + h[2]*first[2];
     const real y = h[0]*second[0] + h[1]*second[1] + h[2]*second[2];
     const real twice = g[CRANK]*g[CRANK] + h[0]*h[0] + h[1]*h[1] + h[2]*h[2] - g[ROD]*g[ROD];
     const real kappa = 0.5f*twice;
     const real root = FN(root)(x*x + y*y - kappa*kappa);
-    sine[0] = y;
-    sine[1] = root;
-    cosine[0] = x;
-    cosine[1] = kappa;
+    const real side = branch*root;
+    sine[0] = y*kappa - x*side;
+    cosine[0] = x*kappa + y*side;
 }
 
 /*

@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation 1d3e8cc01e7c0f6c
+ * derivation 3fc8bc8258140682
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* the numbers of one limb, in the order of the core */

@@ -157,9 +157,8 @@ def test_inverse_puts_the_limb_at_its_length_on_its_branch(driver: str, branch: 
             )
     values[sp.Symbol("branch", real=True)] = branch
     if driver == "crank":
-        sine, cosine = (made.result(name).subs(values) for name in ("sine", "cosine"))
-        angles = [sp.atan2(s, c) for s, c in zip(sine, cosine, strict=True)]
-        solution = sp.N(angles[0] - branch * angles[1], 40)
+        sine, cosine = (made.result(name).subs(values)[0] for name in ("sine", "cosine"))
+        solution = sp.N(sp.atan2(sine, cosine), 40)
     else:
         solution = sp.N(made.result("qt").subs(values)[0], 40)
     centre, rho = anchor(driver, qt)
