@@ -4,6 +4,7 @@
 
 #include "closure.h"
 
+/* NaN out of reach, or so far away that squares overflow. */
 INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *limb, const real *R,
                          const real *p)
 {
@@ -20,7 +21,7 @@ INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *
         qt = arctangent2(sine, cosine);
     }
     FN(limb_command)(qt, limb->per_gain, limb->g, &q);
-    return q;
+    return select(finite(q), q, fill(NAN));
 }
 
 /* Limbs that share an actuator are averaged; one limb out of reach makes the whole row NaN. */
@@ -29,18 +30,15 @@ INLINE void inverse_at(const pkm_machine *machine, const limb_numbers *limb, con
 {
     real lane[PKM_MAX_LIMBS];
     double sharing[PKM_MAX_LIMBS] = {0};
-    mask reached = fill_mask(-1);
     for (int i = 0; i < machine->limbs; i++) {
         lane[i] = limb_inverse(machine, i, &limb[i], R, p);
-        reached &= finite(lane[i]);
         sharing[machine->actuator[i]] += 1.0;
     }
     for (int a = 0; a < machine->actuators; a++) q[a] = fill(0.0);
     for (int i = 0; i < machine->limbs; i++) q[machine->actuator[i]] += lane[i];
-    for (int a = 0; a < machine->actuators; a++) {
+    for (int a = 0; a < machine->actuators; a++)
         if (sharing[a] > 1.0) q[a] /= sharing[a];
-        q[a] = select(reached, q[a], fill(NAN));
-    }
+    whole_or_nan(q, machine->actuators);
 }
 
 INLINE void inverse_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,

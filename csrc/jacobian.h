@@ -35,7 +35,8 @@ INLINE void constraint_derivatives(const pkm_machine *machine, int i, int kind,
                                fill(machine->lever[i]), by_g);
 }
 
-/* ∂q/∂free of every actuator, -Φ_free / Φ_q limb by limb, averaged where limbs share one. */
+/* ∂q/∂free of every actuator, -Φ_free / Φ_q limb by limb, averaged where limbs share one. NaN where
+ * a limb does not reach, or is at right angles to its slider or in line with its crank. */
 INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbers *limb,
                            const real *pose, real *out)
 {
@@ -46,14 +47,12 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
     FN(map_frame)(map, state, R, p);
     for (int i = 0; i < machine->limbs; i++) sharing[machine->actuator[i]] += 1.0;
     for (int k = 0; k < machine->actuators * m; k++) out[k] = fill(0.0);
-    mask reached = fill_mask(-1);
     for (int i = 0; i < machine->limbs; i++) {
         real phi, omega[3], v[3], row[6], by_free[6], by_q, by_g[SLOTS];
         FN(limb_sphere) sphere;
         mask reachable = fill_mask(-1);
         const int a = machine->actuator[i];
         const real own = limb_inverse(machine, i, &limb[i], R, p);
-        reached &= finite(own);
         sphere_of_numbers(machine->driver[i], &limb[i], &sphere);
         sphere_at(machine->driver[i], &limb[i], own, &sphere, &reachable);
         FN(sphere_row)(R, p, limb[i].g + PLATFORM_X, sphere.c, sphere.rho * sphere.rho, &phi, omega, v);
@@ -62,7 +61,7 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
         sphere_derivatives(machine, i, &limb[i], R, p, own, &by_q, by_g);
         for (int j = 0; j < m; j++) out[a * m + j] -= by_free[j] / (by_q * sharing[a]);
     }
-    for (int k = 0; k < machine->actuators * m; k++) out[k] = select(reached, out[k], fill(NAN));
+    whole_or_nan(out, machine->actuators * m);
 }
 
 /* How the pose answers a residual in each row: -M Φ⁻¹ (6 x rows), per unit of the scaled rows. */

@@ -179,6 +179,14 @@ INLINE int any(mask m)
 
 INLINE mask finite(real x) { return absolute(x) <= fill(1.7976931348623157e308); }
 
+/* What is known of a row in part is not known: all its numbers become NaN. */
+INLINE void whole_or_nan(real *numbers, int count)
+{
+    mask known = fill_mask(-1);
+    for (int k = 0; k < count; k++) known &= finite(numbers[k]);
+    for (int k = 0; k < count; k++) numbers[k] = select(known, numbers[k], fill(NAN));
+}
+
 /* Column k of the given rows of a row-major array. */
 INLINE real gather(const double *column, ptrdiff_t stride, const ptrdiff_t *row)
 {

@@ -127,16 +127,15 @@ INLINE void log_rows(ptrdiff_t n, const double *matrix, double *twist)
 {
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
-        real w[3], v[3], c[6];
+        real whole[6], c[6];
+        real *const w = whole, *const v = whole + 3;
         const int count = block_rows(first, n, row);
         const motion T = gather_motion(matrix, 16, row);
         rotation_log(T.R, w);
         angle_functions(dot3(w, w), c);
         FN(screw_log)(w, T.p, c, v);
-        for (int k = 0; k < 3; k++) {
-            scatter(w[k], twist + k, 6, row, count);
-            scatter(v[k], twist + 3 + k, 6, row, count);
-        }
+        whole_or_nan(whole, 6);
+        for (int k = 0; k < 6; k++) scatter(whole[k], twist + k, 6, row, count);
     }
 }
 
@@ -153,6 +152,7 @@ INLINE void exp_jacobian_rows(int inverse, ptrdiff_t n, const double *twist, dou
             FN(screw_log_jacobian)(w, v, c, D);
         else
             FN(screw_exp_jacobian)(w, v, c, D);
+        whole_or_nan(D, 36);
         for (int k = 0; k < 36; k++) scatter(D[k], jacobian + k, 36, row, count);
     }
 }
@@ -165,6 +165,7 @@ INLINE void adjoint_rows(ptrdiff_t n, const double *matrix, double *adjoint)
         const int count = block_rows(first, n, row);
         const motion T = gather_motion(matrix, 16, row);
         FN(motion_adjoint)(T.R, T.p, A);
+        whole_or_nan(A, 36);
         for (int k = 0; k < 36; k++) scatter(A[k], adjoint + k, 36, row, count);
     }
 }
@@ -328,6 +329,15 @@ INLINE void scatter_column(const motion *view, const real w[3], const real v[3],
     for (int k = 0; k < 6; k++) scatter(seen[k], column + k * columns, 6 * columns, row, count);
 }
 
+/* Where the arm cannot be said to be there are no derivatives either: NaN, as the tool. */
+INLINE void drop_unknown(const motion *T, double *rows, int width, const ptrdiff_t *row, int count)
+{
+    const mask known = finite(T->p[0]) & finite(T->p[1]) & finite(T->p[2]) & finite(T->R[0]);
+    if (!any(~known)) return;
+    for (int l = 0; l < count; l++)
+        for (int k = 0; !known[l] && k < width; k++) rows[row[l] * width + k] = NAN;
+}
+
 INLINE void arm_jacobian_rows(const pkm_arm *arm, const pkm_links *links, int frame, ptrdiff_t n,
                               const double *theta, double *jacobian)
 {
@@ -345,6 +355,7 @@ INLINE void arm_jacobian_rows(const pkm_arm *arm, const pkm_links *links, int fr
                            jacobian + i, arm->joints, row, count);
             move_joint(arm, i, gather(theta + i, arm->joints, row), &T);
         }
+        drop_unknown(&T, jacobian, 6 * arm->joints, row, count);
     }
 }
 
@@ -375,6 +386,7 @@ INLINE void arm_error_jacobian_rows(const pkm_arm *arm, const pkm_links *links, 
             }
             move_joint(arm, i, gather(theta + i, arm->joints, row), &T);
         }
+        drop_unknown(&T, jacobian, 6 * columns, row, count);
     }
 }
 

@@ -58,6 +58,25 @@ def _default_isa() -> int:
 ISA = _default_isa()
 
 
+def as_numbers(name: str, array: ArrayLike, shape: str) -> NDArray[Any]:
+    """Numbers of any kind as an array; `shape` is for the message of a ragged list.
+
+    Raises
+    ------
+    TypeError
+        Not numbers.
+    ValueError
+        A ragged list.
+    """
+    try:
+        given = np.asarray(array)
+    except ValueError:
+        raise ValueError(f"{name} must have shape {shape}, found a ragged list") from None
+    if given.dtype.kind not in "iuf":
+        raise TypeError(f"{name} must be an array of numbers, found dtype {given.dtype}")
+    return given
+
+
 def as_rows(name: str, array: ArrayLike, width: int) -> tuple[FloatArray, tuple[int, ...]]:
     """Numbers (..., width) as contiguous float64 rows (N, width), and the leading shape.
 
@@ -68,12 +87,7 @@ def as_rows(name: str, array: ArrayLike, width: int) -> tuple[FloatArray, tuple[
     ValueError
         Another last axis.
     """
-    try:
-        given = np.asarray(array)
-    except ValueError:
-        raise ValueError(f"{name} must have shape (..., {width}), found a ragged list") from None
-    if given.dtype.kind not in "iuf":
-        raise TypeError(f"{name} must be an array of numbers, found dtype {given.dtype}")
+    given = as_numbers(name, array, f"(..., {width})")
     if given.ndim == 0 or given.shape[-1] != width:
         raise ValueError(f"{name} must have shape (..., {width}), found {given.shape}")
     rows = np.ascontiguousarray(given, dtype=np.float64).reshape(-1, width)
@@ -88,6 +102,12 @@ def pointer(array: FloatArray, start: int = 0) -> Any:
 def int_pointer(array: IntArray, start: int = 0) -> Any:
     """C pointer to entry `start` of a contiguous int32 array."""
     return ffi.from_buffer("int32_t *", array if start == 0 else array[start:])
+
+
+def ensure(code: int) -> None:
+    """Raise ValueError where the core refused a call."""
+    if code < 0:
+        raise ValueError(f"the core refused the call (code {code})")
 
 
 def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) -> None:
@@ -107,6 +127,8 @@ def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) 
         threads = min(threads, len(os.sched_getaffinity(0))) if threads > 1 else 1
     elif isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
         raise ValueError(f"threads must be a whole number from 1 or None, found {threads!r}")
+    if threads == 1:
+        return ensure(call(0, rows))
     edges = [rows * k // threads for k in range(threads + 1)]
     codes: list[int] = []
     others = [
@@ -118,8 +140,7 @@ def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) 
     codes.append(call(edges[0], edges[1]))
     for thread in others:
         thread.join()
-    if min(codes) < 0:
-        raise ValueError(f"the core refused the call (code {min(codes)})")
+    ensure(min(codes))
 
 
 def tpr2tps_lengths(size: FloatArray, free: FloatArray, out: FloatArray) -> None:
@@ -289,7 +310,7 @@ class Machine:
             weights += limb["weights"]
         for r, weight in enumerate(weights):
             struct.weight[r] = weight
-        self._ensure(lib.pkm_order_rows(struct, pointer(slots), pointer(home)))
+        ensure(lib.pkm_order_rows(struct, pointer(slots), pointer(home)))
         self.struct = struct
         self.isa = isa
         self.actuators: int = struct.actuators
@@ -300,7 +321,7 @@ class Machine:
         """Poses (N, 6) to actuator coordinates (N, n)."""
         q = np.empty((len(pose), self.actuators))
         if len(pose):
-            self._ensure(
+            ensure(
                 lib.pkm_inverse(
                     self.struct, self.isa, len(pose), pointer(slots), 0, pointer(pose), pointer(q)
                 )
@@ -346,7 +367,7 @@ class Machine:
         """∂q/∂free at poses (N, 6): (N, n, m)."""
         out = np.empty((len(pose), self.actuators, self.m))
         if len(pose):
-            self._ensure(
+            ensure(
                 lib.pkm_jacobian(
                     self.struct, self.isa, len(pose), pointer(slots), 0, pointer(pose), pointer(out)
                 )
@@ -357,7 +378,7 @@ class Machine:
         """∂pose/∂q at poses (N, 6): (N, 6, n)."""
         out = np.empty((len(pose), 6, self.actuators))
         if len(pose):
-            self._ensure(
+            ensure(
                 lib.pkm_forward_jacobian(
                     self.struct,
                     self.isa,
@@ -377,7 +398,7 @@ class Machine:
         """∂pose/∂(numbers at `columns` of the flattened slots): (N, 6, columns)."""
         out = np.empty((len(pose), 6, len(columns)))
         if out.size:
-            self._ensure(
+            ensure(
                 lib.pkm_error_jacobian(
                     self.struct,
                     self.isa,
@@ -403,7 +424,7 @@ class Machine:
             np.empty((n, self.rows, self.actuators)),
         )
         if n:
-            self._ensure(
+            ensure(
                 lib.pkm_closure(
                     self.struct,
                     self.isa,
@@ -431,7 +452,7 @@ class Machine:
         drive = np.empty((n, limbs))
         base, platform = np.empty((n, limbs, 3)), np.empty((n, limbs, 3))
         if n:
-            self._ensure(
+            ensure(
                 lib.pkm_limbs(
                     self.struct,
                     self.isa,
@@ -444,8 +465,3 @@ class Machine:
                 )
             )
         return drive, base, platform
-
-    @staticmethod
-    def _ensure(code: int) -> None:
-        if code < 0:
-            raise ValueError(f"the core refused the call (code {code})")

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pkmcal._core import ffi, lib
-from pkmcal.core import ISA, FloatArray, IntArray, in_threads, int_pointer, pointer
+from pkmcal.core import ISA, FloatArray, IntArray, ensure, in_threads, int_pointer, pointer
 
 FRAMES = ("space", "body", "tip")  # PKM_SPACE, ...
 
@@ -17,13 +17,8 @@ def _rows(call: Callable[..., int], given: FloatArray, width: int, isa: int) -> 
     """``call(isa, n, in, out)`` over rows (N, k), to (N, width)."""
     out = np.empty((len(given), width))
     if len(given):
-        _ensure(call(isa, len(given), pointer(given), pointer(out)))
+        ensure(call(isa, len(given), pointer(given), pointer(out)))
     return out
-
-
-def _ensure(code: int) -> None:
-    if code < 0:
-        raise ValueError(f"the core refused the call (code {code})")
 
 
 def exp(twist: FloatArray, isa: int = ISA) -> FloatArray:
@@ -133,7 +128,7 @@ class Arm:
         numbers = np.empty((rows, self.joints + 1, 12))
         if rows:
             given = pointer(errors)
-            _ensure(lib.pkm_arm_links(self.struct, self.isa, rows, given, pointer(numbers)))
+            ensure(lib.pkm_arm_links(self.struct, self.isa, rows, given, pointer(numbers)))
         return Links(errors, numbers if by_row else numbers[0])
 
     def forward(self, theta: FloatArray, links: Links, threads: int | None) -> FloatArray:

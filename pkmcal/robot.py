@@ -210,7 +210,8 @@ class Robot:
         -------
         ndarray (..., n, m)
             mm or rad of the actuator per mm or rad of the coordinate, in the order of
-            `coordinates`.
+            `coordinates`. NaN where a limb does not reach, and at a type-1 singularity: a rod at
+            right angles to its slider, or in line with its crank.
         """
         rows, shape = self._own_rows(pose)
         n, m = self.n_actuators, len(self.coordinates)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import core_serial
-from pkmcal.core import FloatArray, as_rows
+from pkmcal.core import FloatArray, as_numbers, as_rows
 
 _RIGID = 1e-6  # by so much a matrix may miss being a motion
 _NO_SLIDE = 1e-13  # mm along the axis per mm of v: a rotation, up to rounding
@@ -294,7 +294,7 @@ def joint_error(
     Raises
     ------
     ValueError, TypeError
-        An error that is not a finite number.
+        An error that is not a finite number, or too large for its unit screw.
 
     Examples
     --------
@@ -318,7 +318,12 @@ def joint_error(
     else:
         slide = float(twist[:3] @ twist[3:]) / angle
         kind, magnitude = ("helical" if abs(slide) > _NO_SLIDE * way else "rotation"), angle
-    return JointError(twist / (magnitude or 1.0), magnitude, kind)
+    with np.errstate(over="ignore"):
+        unit = twist / (magnitude or 1.0)
+    if not np.isfinite(unit).all():
+        found = ", ".join(f"{name} {value:g}" for name, value in given.items())
+        raise ValueError(f"joint errors are too large for a unit screw, found {found}")
+    return JointError(unit, magnitude, kind)
 
 
 def at_points(errors: FloatArray, points: FloatArray) -> FloatArray:
@@ -338,9 +343,7 @@ def as_motions(name: str, motion: ArrayLike) -> tuple[FloatArray, tuple[int, ...
     ValueError
         Another shape, or a matrix that is no rigid motion.
     """
-    given = np.asarray(motion)
-    if given.dtype.kind not in "iuf":
-        raise TypeError(f"{name} must be an array of numbers, found dtype {given.dtype}")
+    given = as_numbers(name, motion, "(..., 4, 4)")
     if given.ndim < 2 or given.shape[-2:] != (4, 4):
         raise ValueError(f"{name} must have shape (..., 4, 4), found {given.shape}")
     rows = np.ascontiguousarray(given, dtype=np.float64).reshape(-1, 4, 4)

@@ -269,7 +269,7 @@ class SerialArm:
         """
         number = checked.frame_number(frame)
         rows, shape, links = self._given(theta, joint_errors)
-        return self._arm.jacobian(rows, links, number).reshape(*shape, 6, -1)
+        return self._arm.jacobian(rows, links, number).reshape(*shape, 6, self.n_joints)
 
     def error_jacobian(
         self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: str = "space"
@@ -297,7 +297,7 @@ class SerialArm:
         """
         number = checked.frame_number(frame)
         rows, shape, links = self._given(theta, joint_errors)
-        return self._arm.error_jacobian(rows, links, number).reshape(*shape, 6, -1)
+        return self._arm.error_jacobian(rows, links, number).reshape(*shape, 6, 6 * self.n_joints)
 
     def inverse(
         self,

@@ -113,14 +113,16 @@ class _Search:
         off[:, 3:] = self.goal[rows, :3, 3] - tool[:, :3, 3]
         return off[:, self.parts]
 
+    # a target too far for squares is not reached, and needs no warning
+    @np.errstate(over="ignore", invalid="ignore")
     def run(self, theta: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
         """Improve `theta` in place."""
         count = len(theta)
         everyone = np.arange(count)
         off = self.left(theta, everyone)
-        residual = np.linalg.norm(off, axis=1)
+        residual = np.hypot.reduce(off, axis=1)  # no squares: they overflow
         status = np.full(count, _NOT_CONVERGED, dtype=np.int32)
-        status[~np.isfinite(residual)] = _INVALID
+        status[np.isnan(residual)] = _INVALID
         iterations = np.zeros(count, dtype=np.int32)
         damping = np.full(count, 1e-3)
         goal_size = np.abs(self.goal[:, :3, 3]).max(axis=1, initial=0.0) + self.length
@@ -138,7 +140,7 @@ class _Search:
             step = J.transpose(0, 2, 1) @ np.linalg.solve(square, off[rows, :, None])
             trial = theta[rows] + step[:, :, 0] / self.travel
             trial_off = self.left(trial, rows)
-            trial_residual = np.linalg.norm(trial_off, axis=1)
+            trial_residual = np.hypot.reduce(trial_off, axis=1)
             better = trial_residual < residual[rows]
             taken = rows[better]
             theta[taken], off[taken] = trial[better], trial_off[better]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal._core import ffi, lib
-from pkmcal.core import ISA, FloatArray, in_threads, pointer
+from pkmcal.core import ISA, FloatArray, ensure, in_threads, pointer
 
 SWARMS_PER_THREAD = 16  # fewer do not pay for a thread
 
@@ -103,7 +103,7 @@ class Swarm:
         dims, width = len(lower), -(-settings.particles // 8) * 8
         self._x = self._state[: dims * width].reshape(dims, width)[:, : settings.particles]
         self._values = self._state[-dims - 1 - width : -dims - 1][: settings.particles]
-        _ensure(
+        ensure(
             lib.pkm_swarm_start(
                 self._struct, isa, seed, pointer(lower), pointer(upper), pointer(self._state)
             )
@@ -124,12 +124,12 @@ class Swarm:
     def judge(self, values: FloatArray) -> None:
         """Take the particles' values (particles,), which decide pBest and gBest."""
         self._values[:] = values
-        _ensure(lib.pkm_swarm_judge(self._struct, self._isa, pointer(self._state)))
+        ensure(lib.pkm_swarm_judge(self._struct, self._isa, pointer(self._state)))
 
     def move(self) -> None:
         """Eq. 19. A particle that would leave the bounds stops there, at rest in that direction."""
         lower, upper = map(pointer, self._bounds)
-        _ensure(lib.pkm_swarm_move(self._struct, self._isa, lower, upper, pointer(self._state)))
+        ensure(lib.pkm_swarm_move(self._struct, self._isa, lower, upper, pointer(self._state)))
 
 
 def minimise_eq18(
@@ -219,8 +219,3 @@ def _struct(settings: SwarmSettings, dims: int) -> Any:
     struct.inertia, struct.cognitive = settings.inertia, settings.cognitive
     struct.social = settings.social
     return struct
-
-
-def _ensure(code: int) -> None:
-    if code < 0:
-        raise ValueError(f"the core refused the call (code {code})")

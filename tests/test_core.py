@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -148,6 +149,13 @@ def test_an_isa_can_be_forced_and_a_wrong_name_is_named() -> None:
     assert run(print_isa, PKMCAL_ISA="").stdout.strip() == ISAS[lib.pkm_best_isa()]
     wrong = run(print_isa, PKMCAL_ISA="sse9")
     assert "PKMCAL_ISA must be one of base, avx2, avx512, found 'sse9'" in wrong.stderr
+
+
+def test_an_isa_the_processor_has_not_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(core, "lib", SimpleNamespace(pkm_best_isa=lambda: 0))
+    monkeypatch.setenv("PKMCAL_ISA", "avx2")
+    with pytest.raises(ValueError, match="PKMCAL_ISA=avx2: this processor has no avx2"):
+        core._default_isa()
 
 
 def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:

@@ -135,6 +135,32 @@ def test_a_pose_that_is_no_number_has_no_coordinates_and_no_derivatives(
 
 
 @every
+def test_a_row_is_known_as_a_whole_or_not_at_all(name: str) -> None:
+    robot, numbers = pk.load(name), np.random.default_rng(6)
+    at = salted(poses(name, 3_000, seed=6), 0.1, numbers)
+    q = salted(robot.inverse(poses(name, 3_000, seed=6)), 0.1, numbers)
+    found = [
+        *(robot.inverse(at), robot.inverse(at, match=True), robot.complete(at)),
+        *(robot.jacobian(at), robot.forward_jacobian(at), robot.error_jacobian(at)),
+        *(robot.error_jacobian(at, actuators=q), robot.violation(at)),
+    ]
+    for rows in found:
+        finite = np.isfinite(rows.reshape(len(at), -1))
+        known = finite.all(axis=1)
+        assert np.isnan(rows[~known]).all() and 0.02 < known.mean() < 1.0
+    limits = robot.feasible(at)
+    assert not (limits.ok & ~np.isfinite(at[:, :3]).all(axis=1)).any()
+    assert not (limits.ok & ~np.isfinite(limits.drive).all(axis=1)).any()
+
+
+def test_a_rod_at_right_angles_to_its_slider_has_no_jacobian() -> None:
+    robot = robots.linear_delta(rod=100.0, radius=160.0)
+    pose = robot.home
+    pose[:2] = robot.geometry["base1.x"] - 100.0, robot.geometry["base1.y"]
+    assert np.isnan(robot.jacobian(pose)).all()
+
+
+@every
 def test_a_pose_too_far_for_squares_has_no_derivatives(name: str) -> None:
     robot, pose = pk.load(name), pk.load(name).home
     pose[1] = 1e300
