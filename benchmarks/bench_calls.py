@@ -14,10 +14,9 @@ from tests.workspaces import poses
 
 def bench_one_pose(report: Report) -> None:
     """One pose through Python, wanted in 10 us."""
-    robot, rows, many = pk.load("hexapod"), [], 1000
+    robot, many = pk.load("hexapod"), 1000
     pose = poses("hexapod", 1)[0]
     q = robot.inverse(pose)
-    framed = pk.load("hexapod")
     calls = {
         "forward": lambda: robot.forward(q),
         "forward, from a guess": lambda: robot.forward(q, guess=pose),
@@ -25,7 +24,7 @@ def bench_one_pose(report: Report) -> None:
         "jacobian": lambda: robot.jacobian(pose),
         "forward_jacobian": lambda: robot.forward_jacobian(pose),
         "error_jacobian": lambda: robot.error_jacobian(pose),
-        "feasible": lambda: framed.feasible(pose).ok,
+        "feasible": lambda: robot.feasible(pose).ok,
     }
 
     def repeated(call):

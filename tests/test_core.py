@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -183,6 +184,22 @@ def test_importing_pkmcal_loads_nothing_heavy() -> None:
     loaded = set(run(code).stdout.split())
     assert "numpy" in loaded
     assert not loaded & {"sympy", "scipy", "matplotlib", "typer", "rich", "dask", "mpmath"}
+
+
+@pytest.mark.parametrize("call", ["inverse", "forward", "jacobian", "error_jacobian"])
+def test_a_batch_needs_its_inputs_its_outputs_and_no_more(call: str) -> None:
+    robot = pk.load("hexapod")
+    more = []
+    for count in (1_000, 10_000):
+        rows = argument(robot, call, count)
+        given = (rows, robot.inverse(rows)) if call == "error_jacobian" else (rows,)
+        tracemalloc.start()
+        found = getattr(robot, call)(*given)
+        most = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        fields = [getattr(found, name) for name in FOUND] if call == "forward" else [found]
+        more.append(most - sum(field.nbytes for field in fields))
+    assert max(more) < 20_000  # bytes; one more copy of the rows would be 48 a row
 
 
 # arrays -------------------------------------------------------------------------------------------

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -95,6 +97,21 @@ def test_built_in_machines_are_untied_with_offset_0_and_gain_1(name: str) -> Non
     for number in geometry.numbers:
         if number.slot in ("offset", "gain"):
             assert geometry[number.name] == (1.0 if number.slot == "gain" else 0.0)
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_built_in_machines_say_where_their_numbers_are_from(name: str) -> None:
+    text = robotfile.located(name)[0].decode()
+    comment = [line for line in text.splitlines() if line.startswith("#")]
+    assert any(line.startswith("# Numbers: ") for line in comment)
+
+
+def test_file_to_start_from_is_a_machine_that_keeps_its_limits() -> None:
+    path = Path(__file__).parent.parent / "examples" / "robot.toml"
+    robot, numbers = pk.load(path), np.random.default_rng(7)
+    at = robot.home + numbers.uniform(-1, 1, (50, 6)) * [30, 30, 30, 0.1, 0.1, 0.1]
+    assert robot.feasible(at).ok.all()
+    assert np.allclose(robot.forward(robot.inverse(at)).pose, at, rtol=0, atol=1e-9)
 
 
 # published numbers --------------------------------------------------------------------------------
