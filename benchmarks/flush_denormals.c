@@ -1,7 +1,4 @@
-/* Numbers too small for full precision count as 0, or not, in this thread.
- *
- * Two floats leave half of a register unused, and what is left there may be such a number: harmless,
- * but it costs a processor's assistance at every instruction. */
+/* Numbers too small for full precision count as 0, or not, in this thread: see bench_denormals.py. */
 #ifdef __SSE2__
 #include <immintrin.h>
 

@@ -64,9 +64,8 @@ def fma_peak(folder: Path, isa: str) -> Compiled:
 class OneLane:
     """The core of csrc/ compiled with LANES 1, in the place of `pkmcal.core.lib` while entered.
 
-    The same source, the same flags and the same three ISAs; only the number of lanes differs. Two
-    floats are half a register then: see flush_denormals.c, without which one lane is by chance two
-    and a half times slower. In one thread only.
+    The same source, the same flags and the same three ISAs; only the number of lanes differs. To be
+    compared with `flush_denormals` on: bench_denormals says why. In one thread only.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -85,12 +84,14 @@ class OneLane:
 
     def __enter__(self) -> OneLane:
         core.lib = self
-        self._here.lib.flush_denormals(1)
         return self
 
     def __exit__(self, *_: object) -> None:
         core.lib = self._lib
-        self._here.lib.flush_denormals(0)
+
+    def flush_denormals(self, on: bool) -> None:
+        """Count numbers too small for full precision as 0 in this thread, or not."""
+        self._here.lib.flush_denormals(on)
 
     def pkm_forward(self, *arguments: Any) -> int:
         """As the core's, which it hands all arguments to."""

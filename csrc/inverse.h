@@ -4,7 +4,7 @@
 
 #include "closure.h"
 
-/* NaN out of reach, or so far away that squares overflow. */
+/* Not finite out of reach, or so far away that squares overflow. */
 INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *limb, const real *R,
                          const real *p)
 {
@@ -21,7 +21,7 @@ INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *
         qt = arctangent2(sine, cosine);
     }
     FN(limb_command)(qt, limb->per_gain, limb->g, &q);
-    return select(finite(q), q, fill(NAN));
+    return q;
 }
 
 /* Limbs that share an actuator are averaged; one limb out of reach makes the whole row NaN. */

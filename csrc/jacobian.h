@@ -52,7 +52,8 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
         FN(limb_sphere) sphere;
         mask reachable = fill_mask(-1);
         const int a = machine->actuator[i];
-        const real own = limb_inverse(machine, i, &limb[i], R, p);
+        real own = limb_inverse(machine, i, &limb[i], R, p);
+        own = select(finite(own), own, fill(NAN));
         sphere_of_numbers(machine->driver[i], &limb[i], &sphere);
         sphere_at(machine->driver[i], &limb[i], own, &sphere, &reachable);
         FN(sphere_row)(R, p, limb[i].g + PLATFORM_X, sphere.c, sphere.rho * sphere.rho, &phi, omega, v);

@@ -58,8 +58,8 @@ def _default_isa() -> int:
 ISA = _default_isa()
 
 
-def as_numbers(name: str, array: ArrayLike, shape: str) -> NDArray[Any]:
-    """Numbers of any kind as an array; `shape` is for the message of a ragged list.
+def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:
+    """Numbers of any kind as an array; `last` axes are for the message of a ragged list.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def as_numbers(name: str, array: ArrayLike, shape: str) -> NDArray[Any]:
     try:
         given = np.asarray(array)
     except ValueError:
-        raise ValueError(f"{name} must have shape {shape}, found a ragged list") from None
+        raise ValueError(f"{name} must have shape (..., {last}), found a ragged list") from None
     if given.dtype.kind not in "iuf":
         raise TypeError(f"{name} must be an array of numbers, found dtype {given.dtype}")
     return given
@@ -87,7 +87,7 @@ def as_rows(name: str, array: ArrayLike, width: int) -> tuple[FloatArray, tuple[
     ValueError
         Another last axis.
     """
-    given = as_numbers(name, array, f"(..., {width})")
+    given = as_numbers(name, array, width)
     if given.ndim == 0 or given.shape[-1] != width:
         raise ValueError(f"{name} must have shape (..., {width}), found {given.shape}")
     rows = np.ascontiguousarray(given, dtype=np.float64).reshape(-1, width)

@@ -343,7 +343,7 @@ def as_motions(name: str, motion: ArrayLike) -> tuple[FloatArray, tuple[int, ...
     ValueError
         Another shape, or a matrix that is no rigid motion.
     """
-    given = as_numbers(name, motion, "(..., 4, 4)")
+    given = as_numbers(name, motion, "4, 4")
     if given.ndim < 2 or given.shape[-2:] != (4, 4):
         raise ValueError(f"{name} must have shape (..., 4, 4), found {given.shape}")
     rows = np.ascontiguousarray(given, dtype=np.float64).reshape(-1, 4, 4)

@@ -1,0 +1,75 @@
+"""Numbers too small for full precision: what they cost the core, and the core at one lane.
+
+At one lane two floats leave half of a register unused, and what is left there may be such a number.
+It changes no result, but every instruction on it waits for the processor's assistance. With such
+numbers counted as 0 one lane is as fast as it can be, so that is what the core is compared with.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+import pkmcal as pk
+from benchmarks import native
+from benchmarks.bench_forward import forward
+from benchmarks.timing import Report, medians, nanoseconds, times
+from tests.workspaces import poses
+
+ROWS = 20_000
+MACHINES = ("hexapod", "2tpr2tps", "rbt-6t03p", "rotary-delta")
+HEADS = ("machine", "ISA", "core, ns", "flushed", "ratio", "one lane, ns", "flushed", "ratio")
+
+
+def main() -> None:
+    report, rows = Report("Denormals"), []
+    with tempfile.TemporaryDirectory() as folder:
+        lane = native.OneLane(Path(folder))
+
+        def flushing(on: bool, run: Callable[[], pk.Forward]) -> Callable[[], pk.Forward]:
+            def flushed() -> pk.Forward:
+                lane.flush_denormals(on)
+                found = run()
+                lane.flush_denormals(False)
+                return found
+
+            return flushed
+
+        for name in MACHINES:
+            q = pk.load(name).inverse(poses(name, ROWS))
+            for isa in native.available():
+                solve = forward(name, isa)
+
+                def one_lane(
+                    solve: Callable[[np.ndarray], pk.Forward] = solve, q: np.ndarray = q
+                ) -> pk.Forward:
+                    with lane:
+                        return solve(q)
+
+                cases = {
+                    "core": flushing(False, lambda solve=solve, q=q: solve(q)),
+                    "core flushed": flushing(True, lambda solve=solve, q=q: solve(q)),
+                    "lane": flushing(False, one_lane),
+                    "lane flushed": flushing(True, one_lane),
+                }
+                poses_found = {case: run().pose.tobytes() for case, run in cases.items()}
+                if len(set(poses_found.values())) != 1:
+                    raise RuntimeError(f"{name}, {isa}: flushing changes results")
+                took = medians(cases, 11, time.thread_time)
+                cells = [name, isa]
+                for case in ("core", "lane"):
+                    plain, flushed = took[case], took[f"{case} flushed"]
+                    cells += [nanoseconds(plain, ROWS), nanoseconds(flushed, ROWS)]
+                    cells.append(times(plain / flushed))
+                rows.append(cells)
+    report.text(f"Forward kinematics, {ROWS} rows, one thread, ns a row of processor time.")
+    report.table(HEADS, rows)
+    report.write("denormals")
+
+
+if __name__ == "__main__":
+    main()
