@@ -40,7 +40,7 @@ def one_lane(folder: Path) -> Callable[[Callable[[np.ndarray], pk.Forward], np.n
     lane = native.OneLane(folder)
 
     def run(solve: Callable[[np.ndarray], pk.Forward], q: np.ndarray) -> pk.Forward:
-        lane.flush_denormals(True)  # or one lane is by chance up to four times slower
+        lane.flush_denormals(True)  # or one lane is by chance two and a half times slower
         with lane:
             found = solve(q)
         lane.flush_denormals(False)
