@@ -128,20 +128,21 @@ int pkm_forward_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const
                          double *jacobian)
 {
     CHECKED_MACHINE(machine, isa);
-    chosen->response(machine, n, geometry, geometry_stride, pose, q, NULL, machine->actuators,
+    chosen->response(machine, n, geometry, geometry_stride, pose, q, NULL, machine->actuators, 0,
                      jacobian);
     return 0;
 }
 
 int pkm_error_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
                        ptrdiff_t geometry_stride, const double *pose, const double *q,
-                       const int32_t *column, int columns, double *jacobian)
+                       const int32_t *column, int columns, int twists, double *jacobian)
 {
     CHECKED_MACHINE(machine, isa);
     for (int c = 0; c < columns; c++)
         if (column[c] < 0 || column[c] >= SLOTS * machine->limbs || (c && column[c] <= column[c - 1]))
             return PKM_BAD_COLUMN;
-    chosen->response(machine, n, geometry, geometry_stride, pose, q, column, columns, jacobian);
+    chosen->response(machine, n, geometry, geometry_stride, pose, q, column, columns, twists,
+                     jacobian);
     return 0;
 }
 
@@ -185,21 +186,43 @@ int pkm_compose_rates(int isa, ptrdiff_t n, const double *a, const double *pose,
     return 0;
 }
 
-int pkm_points(int isa, ptrdiff_t n, const double *pose, ptrdiff_t pose_stride,
-               const double *target, ptrdiff_t target_stride, double *point, double *by_pose,
-               double *by_target)
+int pkm_compose_twists(int isa, ptrdiff_t n, const double *a, const double *pose, const double *c,
+                       double *twists)
 {
     CHECKED(isa);
-    chosen->points(n, pose, pose_stride, target, target_stride, point, by_pose, by_target);
+    chosen->compose_twists(n, a, pose, c, twists);
+    return 0;
+}
+
+int pkm_points(int isa, ptrdiff_t n, const double *pose, const double *target,
+               ptrdiff_t target_stride, double *point, double *by_twist, double *by_target)
+{
+    CHECKED(isa);
+    chosen->points(n, pose, target, target_stride, point, by_twist, by_target);
+    return 0;
+}
+
+int pkm_seen_points(int isa, ptrdiff_t n, const double *frame, const double *point, double *seen,
+                    double *by_frame, double *by_point)
+{
+    CHECKED(isa);
+    chosen->seen_points(n, frame, point, seen, by_frame, by_point);
+    return 0;
+}
+
+int pkm_seen_poses(int isa, ptrdiff_t n, const double *frame, const double *seen, double *by_twist)
+{
+    CHECKED(isa);
+    chosen->seen_poses(n, frame, seen, by_twist);
     return 0;
 }
 
 int pkm_distances(int isa, ptrdiff_t n, const double *pose, const double *target,
                   ptrdiff_t target_stride, const double *anchor, ptrdiff_t anchor_stride,
-                  double *distance, double *by_pose, double *by_target, double *by_anchor)
+                  double *distance, double *by_twist, double *by_target, double *by_anchor)
 {
     CHECKED(isa);
-    chosen->distances(n, pose, target, target_stride, anchor, anchor_stride, distance, by_pose,
+    chosen->distances(n, pose, target, target_stride, anchor, anchor_stride, distance, by_twist,
                       by_target, by_anchor);
     return 0;
 }
@@ -300,13 +323,6 @@ int pkm_motion_pose(int isa, ptrdiff_t n, const double *motion, double *pose)
 {
     CHECKED(isa);
     chosen->motion_pose(n, motion, pose);
-    return 0;
-}
-
-int pkm_angle_rates(int isa, ptrdiff_t n, const double *pose, double *rates)
-{
-    CHECKED(isa);
-    chosen->angle_rates(n, pose, rates);
     return 0;
 }
 

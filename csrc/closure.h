@@ -43,6 +43,15 @@ INLINE void map_rates(int map, const real *state, const real *delta, real *pose)
     }
 }
 
+INLINE void map_twist(int map, const real *state, const real *delta, real *twist)
+{
+    switch (map) {
+#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_twist)(state, delta, twist); break;
+    EACH_MAP(CASE)
+#undef CASE
+    }
+}
+
 INLINE void map_free(int map, const real *state, const real *row, real *out)
 {
     switch (map) {

@@ -48,13 +48,13 @@ static void core_jacobian(const pkm_machine *machine, ptrdiff_t n, const double 
 
 static void core_response(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                    ptrdiff_t geometry_stride, const double *pose, const double *q,
-                   const int32_t *column, int columns, double *jacobian)
+                   const int32_t *column, int columns, int twists, double *jacobian)
 {
     switch (machine->map) {
 #define CASE(NAME, name, M)                                                                       \
     case MAP_##NAME:                                                                              \
         response_map(MAP_##NAME, machine, n, geometry, geometry_stride, pose, q, column, columns, \
-                     jacobian);                                                                   \
+                     twists, jacobian);                                                           \
         break;
         EACH_MAP(CASE)
 #undef CASE
@@ -142,18 +142,35 @@ static void core_compose_rates(ptrdiff_t n, const double *a, const double *pose,
     compose_rates_rows(n, a, pose, c, c_stride, composed, rates);
 }
 
-static void core_points(ptrdiff_t n, const double *pose, ptrdiff_t pose_stride,
-                        const double *target, ptrdiff_t target_stride, double *point,
-                        double *by_pose, double *by_target)
+static void core_compose_twists(ptrdiff_t n, const double *a, const double *pose, const double *c,
+                                double *twists)
 {
-    point_rows(n, pose, pose_stride, target, target_stride, point, by_pose, by_target);
+    compose_twists_rows(n, a, pose, c, twists);
+}
+
+static void core_points(ptrdiff_t n, const double *pose, const double *target,
+                        ptrdiff_t target_stride, double *point, double *by_twist,
+                        double *by_target)
+{
+    point_rows(n, pose, target, target_stride, point, by_twist, by_target);
+}
+
+static void core_seen_points(ptrdiff_t n, const double *frame, const double *point, double *seen,
+                             double *by_frame, double *by_point)
+{
+    seen_point_rows(n, frame, point, seen, by_frame, by_point);
+}
+
+static void core_seen_poses(ptrdiff_t n, const double *frame, const double *seen, double *by_twist)
+{
+    seen_pose_rows(n, frame, seen, by_twist);
 }
 
 static void core_distances(ptrdiff_t n, const double *pose, const double *target,
                            ptrdiff_t target_stride, const double *anchor, ptrdiff_t anchor_stride,
-                           double *distance, double *by_pose, double *by_target, double *by_anchor)
+                           double *distance, double *by_twist, double *by_target, double *by_anchor)
 {
-    distance_rows(n, pose, target, target_stride, anchor, anchor_stride, distance, by_pose,
+    distance_rows(n, pose, target, target_stride, anchor, anchor_stride, distance, by_twist,
                   by_target, by_anchor);
 }
 
@@ -207,11 +224,6 @@ static void core_motion_pose(ptrdiff_t n, const double *motion, double *pose)
     pose_rows(n, motion, pose);
 }
 
-static void core_angle_rates(ptrdiff_t n, const double *pose, double *rates)
-{
-    angle_rates_rows(n, pose, rates);
-}
-
 static void core_exp_jacobian(int inverse, ptrdiff_t n, const double *twist, double *jacobian)
 {
     exp_jacobian_rows(inverse, n, twist, jacobian);
@@ -247,9 +259,10 @@ static void core_arm_error_jacobian(const pkm_arm *arm, const pkm_links *links, 
 
 const pkm_core CORE = {core_inverse, core_forward, core_jacobian, core_response, core_tpr2tps,
                        core_home,    core_closure, core_limbs,    core_compose,  core_invert,
-                       core_compose_rates, core_points, core_distances,
+                       core_compose_rates, core_compose_twists, core_points, core_seen_points,
+                       core_seen_poses, core_distances,
                        core_swarm_start, core_swarm_move, core_swarm_judge, core_swarm_eq18,
                        core_closure_cost,
-                       core_exp, core_log, core_adjoint, core_motion_pose, core_angle_rates, core_exp_jacobian,
+                       core_exp, core_log, core_adjoint, core_motion_pose, core_exp_jacobian,
                        core_joint_motions, core_arm_links, core_arm_forward, core_arm_jacobian,
                        core_arm_error_jacobian};

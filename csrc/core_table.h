@@ -14,7 +14,7 @@ typedef struct {
                      const double *pose, double *jacobian);
     void (*response)(const pkm_machine *, ptrdiff_t n, const double *geometry, ptrdiff_t stride,
                      const double *pose, const double *q, const int32_t *column, int columns,
-                     double *jacobian);
+                     int twists, double *jacobian);
     void (*tpr2tps)(ptrdiff_t n, const double *size, const double *free, double *lengths,
                     double *jacobian);
     int (*home)(const pkm_machine *, const double *geometry, const double *home, double *jacobian);
@@ -28,11 +28,16 @@ typedef struct {
     void (*invert)(ptrdiff_t n, const double *a, double *out);
     void (*compose_rates)(ptrdiff_t n, const double *a, const double *pose, const double *c,
                           ptrdiff_t c_stride, const double *composed, double *rates);
-    void (*points)(ptrdiff_t n, const double *pose, ptrdiff_t pose_stride, const double *target,
-                   ptrdiff_t target_stride, double *point, double *by_pose, double *by_target);
+    void (*compose_twists)(ptrdiff_t n, const double *a, const double *pose, const double *c,
+                           double *twists);
+    void (*points)(ptrdiff_t n, const double *pose, const double *target, ptrdiff_t target_stride,
+                   double *point, double *by_twist, double *by_target);
+    void (*seen_points)(ptrdiff_t n, const double *frame, const double *point, double *seen,
+                        double *by_frame, double *by_point);
+    void (*seen_poses)(ptrdiff_t n, const double *frame, const double *seen, double *by_twist);
     void (*distances)(ptrdiff_t n, const double *pose, const double *target,
                       ptrdiff_t target_stride, const double *anchor, ptrdiff_t anchor_stride,
-                      double *distance, double *by_pose, double *by_target, double *by_anchor);
+                      double *distance, double *by_twist, double *by_target, double *by_anchor);
     void (*swarm_start)(const pkm_swarm *, uint64_t seed, const double *lower, const double *upper,
                         double *state);
     void (*swarm_move)(const pkm_swarm *, const double *lower, const double *upper, double *state);
@@ -46,7 +51,6 @@ typedef struct {
     void (*log)(ptrdiff_t n, const double *motion, double *twist);
     void (*adjoint)(ptrdiff_t n, const double *motion, double *adjoint);
     void (*motion_pose)(ptrdiff_t n, const double *motion, double *pose);
-    void (*angle_rates)(ptrdiff_t n, const double *pose, double *rates);
     void (*exp_jacobian)(int inverse, ptrdiff_t n, const double *twist, double *jacobian);
     void (*joint_motions)(ptrdiff_t n, const double *error, const double *point, double *motion);
     void (*arm_links)(const pkm_arm *, ptrdiff_t n, const double *error, double *link);

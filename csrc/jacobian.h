@@ -65,9 +65,10 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
     whole_or_nan(out, machine->actuators * m);
 }
 
-/* How the pose answers a residual in each row: -M Φ⁻¹ (6 x rows), per unit of the scaled rows. */
+/* How the pose, or where `twists` the platform, answers a residual in each row: -M Φ⁻¹ (6 x rows),
+ * per unit of the scaled rows. */
 INLINE int pose_response(int map, const pkm_machine *machine, const FN(limb_sphere) *sphere,
-                         const real *state, real *response)
+                         const real *state, int twists, real *response)
 {
     const int m = map_m(map);
     real residual[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6], A[36], X[6 * PKM_MAX_ROWS], pivot;
@@ -79,17 +80,19 @@ INLINE int pose_response(int map, const pkm_machine *machine, const FN(limb_sphe
         real step[6], rates[6];
         for (int j = 0; j < m; j++)
             step[j] = X[j * rows + r] * (map_is_angle(map, j) ? -1.0 / machine->length : -1.0);
-        map_rates(map, state, step, rates);
+        if (twists) map_twist(map, state, step, rates);
+        else map_rates(map, state, step, rates);
         for (int k = 0; k < 6; k++)
             response[k * rows + r] = select(known, rates[k], fill(NAN));
     }
     return rows;
 }
 
-/* ∂pose/∂q (6 x actuators) where `column` is NULL, else ∂pose/∂numbers (6 x columns). */
+/* ∂pose/∂q (6 x actuators) where `column` is NULL, else ∂pose/∂numbers (6 x columns); of the twist
+ * (ω, v) where `twists`. */
 INLINE void response_block(int map, const pkm_machine *machine, const limb_numbers *limb,
                            const real *pose, const real *q, const int32_t *column, int columns,
-                           real *out)
+                           int twists, real *out)
 {
     FN(limb_sphere) sphere[PKM_MAX_LIMBS];
     real state[MAX_STATE], R[9], p[3], response[6 * PKM_MAX_ROWS];
@@ -97,7 +100,7 @@ INLINE void response_block(int map, const pkm_machine *machine, const limb_numbe
     map_from_pose(map, pose, state);
     FN(map_frame)(map, state, R, p);
     spheres_at(machine, limb, q, sphere);
-    const int rows = pose_response(map, machine, sphere, state, response);
+    const int rows = pose_response(map, machine, sphere, state, twists, response);
     for (int k = 0; k < 6 * columns; k++) out[k] = fill(0.0);
     for (int i = 0; i < machine->limbs; i++) {
         real by_q, by_g[SLOTS], scale = rough_reciprocal(sphere[i].rho) * machine->weight[r];
@@ -143,7 +146,7 @@ INLINE void jacobian_map(int map, const pkm_machine *machine, ptrdiff_t n, const
 
 INLINE void response_map(int map, const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                          ptrdiff_t geometry_stride, const double *pose, const double *q,
-                         const int32_t *column, int columns, double *jacobian)
+                         const int32_t *column, int columns, int twists, double *jacobian)
 {
     limb_numbers limb[PKM_MAX_LIMBS];
     const int actuators = machine->actuators, width = 6 * columns;
@@ -155,7 +158,7 @@ INLINE void response_map(int map, const pkm_machine *machine, ptrdiff_t n, const
             prepare_limbs(machine, geometry, geometry_stride, row, limb);
         for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
         for (int a = 0; a < actuators; a++) lane_q[a] = gather(q + a, actuators, row);
-        response_block(map, machine, limb, lane_pose, lane_q, column, columns, out);
+        response_block(map, machine, limb, lane_pose, lane_q, column, columns, twists, out);
         for (int k = 0; k < width; k++) scatter(out[k], jacobian + k, width, row, count);
     }
 }

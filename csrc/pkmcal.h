@@ -74,11 +74,12 @@ int pkm_forward_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const
                          ptrdiff_t geometry_stride, const double *pose, const double *q,
                          double *jacobian);
 
-/* pose (n, 6), q (n, actuators) -> dpose/d(numbers) (n, 6, columns) at held actuators;
- * columns are indices into limbs x SLOTS. */
+/* pose (n, 6), q (n, actuators) -> dpose/d(numbers) (n, 6, columns) at held actuators, or with
+ * `twists` the twist (omega, v) of the platform's origin in base axes by them; columns are indices
+ * into limbs x SLOTS. */
 int pkm_error_jacobian(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
                        ptrdiff_t geometry_stride, const double *pose, const double *q,
-                       const int32_t *column, int columns, double *jacobian);
+                       const int32_t *column, int columns, int twists, double *jacobian);
 
 /* pose (n, 6), q (n, actuators) -> the closure rows, limb by limb and the sphere first: residual
  * (n, rows) [mm]; their derivatives by a scaled twist (n, rows, m), by the free coordinates
@@ -93,24 +94,33 @@ int pkm_limbs(const pkm_machine *machine, int isa, ptrdiff_t n, const double *ge
               const double *pose, double *drive, double *on_base, double *on_platform);
 
 /* Poses as frames: out = A B (strides 0 or 6), out = A^-1, and the rates (n, 6, 6) of A T C by those
- * of T. */
+ * of T, or its twists by those of T: A and C are (6,) there, T (n, 6). */
 int pkm_compose(int isa, ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
                 ptrdiff_t b_stride, double *out);
 int pkm_invert(int isa, ptrdiff_t n, const double *a, double *out);
 int pkm_compose_rates(int isa, ptrdiff_t n, const double *a, const double *pose, const double *c,
                       ptrdiff_t c_stride, const double *composed, double *rates);
 
-/* Targets (n, 3) of the platform as points (n, 3) of the base, and their derivatives by the pose
- * (n, 3, 6) and by the target (n, 3, 3); strides 0 or 6, 0 or 3. */
-int pkm_points(int isa, ptrdiff_t n, const double *pose, ptrdiff_t pose_stride,
-               const double *target, ptrdiff_t target_stride, double *point, double *by_pose,
-               double *by_target);
+int pkm_compose_twists(int isa, ptrdiff_t n, const double *a, const double *pose, const double *c,
+                       double *twists);
+
+/* Targets of the platform (stride 0 or 3) as points (n, 3) of the base, and their derivatives by the
+ * twist (n, 3, 6) and by the target (n, 3, 3). */
+int pkm_points(int isa, ptrdiff_t n, const double *pose, const double *target,
+               ptrdiff_t target_stride, double *point, double *by_twist, double *by_target);
+
+/* Points (n, 3) of the base in a frame (6,) and their derivatives by the frame (n, 3, 6) and by the
+ * point (n, 3, 3); and of poses (n, 6) as seen from it the derivatives by the twist (n, 6, 6). */
+int pkm_seen_points(int isa, ptrdiff_t n, const double *frame, const double *point, double *seen,
+                    double *by_frame, double *by_point);
+int pkm_seen_poses(int isa, ptrdiff_t n, const double *frame, const double *seen,
+                   double *by_twist);
 
 /* Distances (n,) from anchors of the base to targets of the platform, and their derivatives by the
- * pose (n, 6), by the target (n, 3) and by the anchor (n, 3); strides 0 or 3. */
+ * twist (n, 6), by the target (n, 3) and by the anchor (n, 3); strides 0 or 3. */
 int pkm_distances(int isa, ptrdiff_t n, const double *pose, const double *target,
                   ptrdiff_t target_stride, const double *anchor, ptrdiff_t anchor_stride,
-                  double *distance, double *by_pose, double *by_target, double *by_anchor);
+                  double *distance, double *by_twist, double *by_target, double *by_anchor);
 
 /* 2TPR&2TPS in closed form: size a b c d e f, free (n, 4) = y z alpha beta -> lengths (n, 4) of
  * eq. 8, and their derivatives (n, 4, 4) of eq. 12. */
@@ -146,9 +156,6 @@ int pkm_exp(int isa, ptrdiff_t n, const double *twist, double *motion);
 int pkm_log(int isa, ptrdiff_t n, const double *motion, double *twist);
 int pkm_adjoint(int isa, ptrdiff_t n, const double *motion, double *adjoint);
 int pkm_motion_pose(int isa, ptrdiff_t n, const double *motion, double *pose);
-
-/* Rates of alpha beta gamma by a turning in base axes (n, 3, 3), at poses (n, 6). */
-int pkm_angle_rates(int isa, ptrdiff_t n, const double *pose, double *rates);
 
 /* At a twist (n, 6): dT T^-1 by dtwist (n, 6, 6), or with `inverse` dtwist by dT T^-1. */
 int pkm_exp_jacobian(int isa, int inverse, ptrdiff_t n, const double *twist, double *jacobian);

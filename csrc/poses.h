@@ -63,4 +63,23 @@ INLINE void compose_rates_rows(ptrdiff_t n, const double *a, const double *pose,
     }
 }
 
+/* Twists (n, 6, 6) of A T C by those of T, for poses T. */
+INLINE void compose_twists_rows(ptrdiff_t n, const double *a, const double *pose, const double *c,
+                                double *twists)
+{
+    real lane_a[6], lane_c[6];
+    for (int k = 0; k < 6; k++) {
+        lane_a[k] = fill(a[k]);
+        lane_c[k] = fill(c[k]);
+    }
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], out[36];
+        const int count = block_rows(first, n, row);
+        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
+        FN(pose_compose_twists)(lane_a, lane_pose, lane_c, out);
+        for (int k = 0; k < 36; k++) scatter(out[k], twists + k, 36, row, count);
+    }
+}
+
 #endif

@@ -170,18 +170,6 @@ INLINE void adjoint_rows(ptrdiff_t n, const double *matrix, double *adjoint)
     }
 }
 
-/* Rates of α β γ by the turning (n, 3, 3), at poses (n, 6). */
-INLINE void angle_rates_rows(ptrdiff_t n, const double *pose, double *rates)
-{
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        real out[9];
-        const int count = block_rows(first, n, row);
-        FN(rotation_rates)(gather(pose + 4, 6, row), gather(pose + 5, 6, row), out);
-        for (int k = 0; k < 9; k++) scatter(out[k], rates + k, 9, row, count);
-    }
-}
-
 /* x y z α β γ of motions. */
 INLINE void pose_rows(ptrdiff_t n, const double *matrix, double *pose)
 {

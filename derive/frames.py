@@ -77,6 +77,23 @@ def _rates() -> Function:
     return f
 
 
+def _twists() -> Function:
+    f = Function(
+        "pose_compose_twists",
+        "the twist (ω, v) of A T C by that of T, each of its own origin and in its own base axes",
+        "ω' = A ω, v' = A (v + ω × R c)",
+    )
+    _, Ra, _ = posed(f, "a", "A")
+    _, R, _ = posed(f, "b", "T")
+    pose = f.vector("c", 6, "C; only its origin matters")
+    arm = f.let("arm", R * sp.Matrix(pose[:3]), "R c")
+    matrix = sp.Matrix.vstack(
+        sp.Matrix.hstack(Ra, sp.zeros(3, 3)), sp.Matrix.hstack(-(Ra * skew(arm)), Ra)
+    )
+    f.output("twists", matrix, "6 x 6, row by row")
+    return f
+
+
 def functions() -> list[Function]:
     """The emitted functions of frames."""
-    return [_compose(), _invert(), _rates()]
+    return [_compose(), _invert(), _rates(), _twists()]

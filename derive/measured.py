@@ -1,7 +1,8 @@
-"""What an instrument measures of a platform: a point that it carries, and how far that is away.
+"""What an instrument measures of a platform, and how that follows its motion.
 
-A target t is a point of the platform; seen from the base it is at p + R t. The same formula gives a
-point of the base in the frame of the instrument.
+A target t is a point of the platform; seen from the base it is at p + R t. A motion of the platform
+is a twist (ω, v): its turning and the velocity of its origin, in base axes. Unlike the rates of
+α β γ it is regular at every orientation.
 """
 
 from __future__ import annotations
@@ -10,16 +11,34 @@ import sympy as sp
 
 from .emit import Function
 from .frames import posed
+from .posemaps import euler_rate_matrix
+from .rotation import skew
 
 
 def _point() -> Function:
     f = Function("measured_point", "a point that the platform carries", "p + R t")
-    pose, R, p = posed(f, "pose", "of the platform")
+    _, R, p = posed(f, "pose", "of the platform")
     target = f.vector("target", 3, "t, in platform axes [mm]")
-    point = p + R * target
-    f.output("point", point, "in base axes [mm]")
-    f.output("by_pose", f.gradient(point, pose), "∂point/∂pose, 3 x 6 row by row")
-    f.output("by_target", f.gradient(point, target), "∂point/∂t, 3 x 3 row by row")
+    lever = f.let("lever", R * target, "R t")
+    f.output("point", p + lever, "in base axes [mm]")
+    f.output("by_twist", _carried(lever), "v + ω × R t by (ω, v), 3 x 6 row by row")
+    f.output("by_target", R, "∂point/∂t, 3 x 3 row by row")
+    return f
+
+
+def _carried(lever: sp.Matrix) -> sp.Matrix:
+    """Velocity by (ω, v) of a point that is `lever` from the platform's origin."""
+    return sp.Matrix.hstack(-skew(lever), sp.eye(3))
+
+
+def _seen() -> Function:
+    f = Function("seen_point", "a point of the base in the frame of an instrument", "pf + Rf x")
+    frame, R, p = posed(f, "frame", "of the base, as the instrument has it")
+    x = f.vector("x", 3, "in base axes [mm]")
+    seen = p + R * x
+    f.output("seen", seen, "in the instrument's axes [mm]")
+    f.output("by_frame", f.gradient(seen, frame), "∂seen/∂frame, 3 x 6 row by row")
+    f.output("by_point", R, "∂seen/∂x, 3 x 3 row by row")
     return f
 
 
@@ -27,18 +46,38 @@ def _distance() -> Function:
     f = Function(
         "measured_distance", "from a point of the base to one of the platform", "‖p + R t - a‖"
     )
-    pose, R, p = posed(f, "pose", "of the platform")
+    _, R, p = posed(f, "pose", "of the platform")
     target = f.vector("target", 3, "t, in platform axes [mm]")
     anchor = f.vector("anchor", 3, "a, in base axes [mm]")
-    d = f.let("d", p + R * target - anchor, "d = p + R t - a")
+    lever = f.let("lever", R * target, "R t")
+    d = f.let("d", p + lever - anchor, "d = p + R t - a")
     distance = f.let("rho", sp.sqrt(d.dot(d)), "ρ = ‖d‖")
+    by_point = f.let("u", d / distance, "u = ∂ρ/∂d")
     f.output("distance", distance, "ρ [mm]")
-    f.output("by_pose", f.gradient(distance, pose), "∂ρ/∂pose")
-    f.output("by_target", f.gradient(distance, target), "∂ρ/∂t")
-    f.output("by_anchor", f.gradient(distance, anchor), "∂ρ/∂a")
+    f.output("by_twist", by_point.T * _carried(lever), "u · (v + ω × R t) by (ω, v)")
+    f.output("by_target", by_point.T * R, "∂ρ/∂t")
+    f.output("by_anchor", -by_point, "∂ρ/∂a")
+    return f
+
+
+def _pose() -> Function:
+    f = Function(
+        "measured_pose",
+        "rates of a pose as an instrument sees it, by the twist (ω, v) of the platform",
+        "Rf v and E⁻¹ Rf ω;  E (α̇, β̇, γ̇) is the turning of R = Rz(γ) Ry(β) Rx(α)",
+    )
+    _, R, _ = posed(f, "frame", "of the base, as the instrument has it")
+    seen = f.vector("seen", 6, "the pose as seen")
+    sb, cb = f.sincos("b", seen[4])
+    sg, cg = f.sincos("g", seen[5])
+    rates = euler_rate_matrix(sb, cb, sg, cg).inv()
+    rates = f.let("rates", rates.applyfunc(lambda e: sp.simplify(e.subs(sg**2, 1 - cg**2))), "E⁻¹")
+    zero = sp.zeros(3, 3)
+    matrix = sp.Matrix.vstack(sp.Matrix.hstack(zero, R), sp.Matrix.hstack(rates * R, zero))
+    f.output("by_twist", matrix, "6 x 6, row by row")
     return f
 
 
 def functions() -> list[Function]:
     """The emitted functions of what is measured."""
-    return [_point(), _distance()]
+    return [_point(), _seen(), _distance(), _pose()]

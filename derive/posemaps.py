@@ -1,7 +1,7 @@
 """Pose maps: the m free coordinates of a machine and the frame (R, p) they stand for.
 
 A map iterates on a `state` (no Euler angles, so no singular orientation inside Newton) by steps
-`delta`, m numbers, mm and rad. Each map is eight functions of the state, all derived here from one
+`delta`, m numbers, mm and rad. Each map is nine functions of the state, all derived here from one
 definition: the state's frame, its retraction, and the pose it reports.
 
 * ``from_pose``  pose -> state
@@ -11,6 +11,7 @@ definition: the state's frame, its retraction, and the pose it reports.
 * ``angles``     state -> sines and cosines of the reported orientation
 * ``pull``       covector of a twist at the state -> covector of delta
 * ``rates``      delta -> rates of the pose x y z α β γ
+* ``twist``      delta -> (ω, v) of the frame
 * ``free``       covector of delta -> covector of the reported free coordinates
 """
 
@@ -253,11 +254,16 @@ def _functions(pose_map: PoseMap) -> list[Function]:
     d_p, d_omega, d_state = _tangent(pose_map, s)
     rates.output("pose", _pose_rates(rates, pose_map, s, d_p, d_omega, d_state, delta), "rates")
 
+    twist = new("twist", "twist of the frame for a step", "ω = ∂ω/∂δ δ, v = ∂p/∂δ δ")
+    s = twist.vector("state", size, "of the map")
+    delta = twist.vector("delta", m, "step [mm, rad]")
+    twist.output("twist", sp.Matrix([*(d_omega * delta), *(d_p * delta)]), "(ω, v), base axes")
+
     free = new("free", "covector of a step to one of the free coordinates", "∂/∂free")
     s = free.vector("state", size, "of the map")
     row = free.vector("row", m, "covector of the step")
     free.output("out", _free(free, pose_map, s, row), "by " + " ".join(pose_map.free))
-    return [from_pose, frame, retract, tidy, angles, pull, rates, free]
+    return [from_pose, frame, retract, tidy, angles, pull, rates, twist, free]
 
 
 def _euler(f: Function, pose_map: PoseMap, s: sp.Matrix) -> tuple[sp.Expr, ...]:

@@ -300,22 +300,6 @@ def _error_twists() -> Function:
     return f
 
 
-def _rates() -> Function:
-    f = Function(
-        "rotation_rates",
-        "rates of α β γ by the turning ω of R = Rz(γ) Ry(β) Rx(α)",
-        "the inverse of ω = (R ex, Rz ey, ez) (α̇, β̇, γ̇)",
-    )
-    sb, cb = f.sincos("b", f.scalar("beta", "β [rad]"))
-    sg, cg = f.sincos("g", f.scalar("gamma", "γ [rad]"))
-    secant, tangent = f.let("secant", 1 / cb), f.let("tangent", sb / cb)
-    rates = sp.Matrix(
-        [[cg * secant, sg * secant, 0], [-sg, cg, 0], [cg * tangent, sg * tangent, 1]]
-    )
-    f.output("rates", rates, "3 x 3, row by row")
-    return f
-
-
 def _tilts() -> Function:
     f = Function(
         "rotation_tilts",
@@ -334,6 +318,6 @@ def functions() -> list[Function]:
     """The emitted functions of screws and serial arms."""
     return [
         _near(), _far(), _exp(), _rotation_log(), _log(), _exp_jacobian(), _log_jacobian(),
-        _adjoint(), _moved(), _compose(), _invert(), _joint_error(), _rates(), _tilts(),
+        _adjoint(), _moved(), _compose(), _invert(), _joint_error(), _tilts(),
         _link(), _turned(), _slid(), _axis_twist(), _error_twists(),
     ]  # fmt: skip

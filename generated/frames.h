@@ -1,5 +1,5 @@
 /* Generated from derive/frames.py by `python -m derive`; never edited by hand.
- * derivation 649788cb7c4336de
+ * derivation 5b18b990409ff2ad
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -225,5 +225,96 @@ INLINE void FN(pose_compose_rates)(const real a[6], const real b[6], const real 
     rates[33] = spin0*t20 + spin3*t21 + spin6;
     rates[34] = spin1*t20 + spin4*t21 + spin7;
     rates[35] = a_R2*t20 + a_R5*t21 + a_R8;
+}
+#endif
+
+#ifndef NARROW
+/*
+ * the twist (ω, v) of A T C by that of T, each of its own origin and in its own base axes
+ *     ω' = A ω, v' = A (v + ω × R c)
+ * in  a[6]           A: x y z [mm], α β γ [rad]
+ * in  b[6]           T: x y z [mm], α β γ [rad]
+ * in  c[6]           C; only its origin matters
+ * out twists[36]     6 x 6, row by row
+ * operations: 23 +, 53 *, 0 /, 0 sqrt
+ */
+INLINE void FN(pose_compose_twists)(const real a[6], const real b[6], const real c[6],
+        real twists[36])
+{
+    real sa_a, ca_a;
+    FN(sincos)(a[3], &sa_a, &ca_a);
+    real sa_b, ca_b;
+    FN(sincos)(a[4], &sa_b, &ca_b);
+    real sa_g, ca_g;
+    FN(sincos)(a[5], &sa_g, &ca_g);
+    const real a_R0 = ca_b*ca_g;
+    const real t0 = ca_a*sa_g;
+    const real a_R1 = sa_a*sa_b*ca_g - t0;
+    const real t1 = sa_a*sa_g;
+    const real t2 = ca_a*ca_g;
+    const real a_R2 = sa_b*t2 + t1;
+    const real a_R3 = ca_b*sa_g;
+    const real a_R4 = sa_b*t1 + t2;
+    const real a_R5 = sa_b*t0 - sa_a*ca_g;
+    const real a_R7 = sa_a*ca_b;
+    const real a_R8 = ca_a*ca_b;
+    real sb_a, cb_a;
+    FN(sincos)(b[3], &sb_a, &cb_a);
+    real sb_b, cb_b;
+    FN(sincos)(b[4], &sb_b, &cb_b);
+    real sb_g, cb_g;
+    FN(sincos)(b[5], &sb_g, &cb_g);
+    const real b_R0 = cb_b*cb_g;
+    const real t3 = cb_a*sb_g;
+    const real b_R1 = sb_a*sb_b*cb_g - t3;
+    const real t4 = sb_a*sb_g;
+    const real t5 = cb_a*cb_g;
+    const real b_R2 = sb_b*t5 + t4;
+    const real b_R3 = cb_b*sb_g;
+    const real b_R4 = sb_b*t4 + t5;
+    const real b_R5 = sb_b*t3 - sb_a*cb_g;
+    const real b_R7 = sb_a*cb_b;
+    const real b_R8 = cb_a*cb_b;
+    /* R c */
+    const real arm0 = b_R0*c[0] + b_R1*c[1] + b_R2*c[2];
+    const real arm1 = b_R3*c[0] + b_R4*c[1] + b_R5*c[2];
+    const real arm2 = b_R7*c[1] + b_R8*c[2] - sb_b*c[0];
+    twists[0] = a_R0;
+    twists[1] = a_R1;
+    twists[2] = a_R2;
+    twists[3] = FN(fill)(0.0f);
+    twists[4] = FN(fill)(0.0f);
+    twists[5] = FN(fill)(0.0f);
+    twists[6] = a_R3;
+    twists[7] = a_R4;
+    twists[8] = a_R5;
+    twists[9] = FN(fill)(0.0f);
+    twists[10] = FN(fill)(0.0f);
+    twists[11] = FN(fill)(0.0f);
+    const real t6 = -sa_b;
+    twists[12] = t6;
+    twists[13] = a_R7;
+    twists[14] = a_R8;
+    twists[15] = FN(fill)(0.0f);
+    twists[16] = FN(fill)(0.0f);
+    twists[17] = FN(fill)(0.0f);
+    twists[18] = a_R2*arm1 - a_R1*arm2;
+    twists[19] = a_R0*arm2 - a_R2*arm0;
+    twists[20] = a_R1*arm0 - a_R0*arm1;
+    twists[21] = a_R0;
+    twists[22] = a_R1;
+    twists[23] = a_R2;
+    twists[24] = a_R5*arm1 - a_R4*arm2;
+    twists[25] = a_R3*arm2 - a_R5*arm0;
+    twists[26] = a_R4*arm0 - a_R3*arm1;
+    twists[27] = a_R3;
+    twists[28] = a_R4;
+    twists[29] = a_R5;
+    twists[30] = a_R8*arm1 - a_R7*arm2;
+    twists[31] = -sa_b*arm2 - a_R8*arm0;
+    twists[32] = sa_b*arm1 + a_R7*arm0;
+    twists[33] = t6;
+    twists[34] = a_R7;
+    twists[35] = a_R8;
 }
 #endif

@@ -1,5 +1,5 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation 76ade68c424edd2a
+ * derivation 21a577ea22c96497
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -227,6 +227,24 @@ INLINE void FN(map_spatial_rates)(const real state[7], const real delta[6], real
 }
 
 /*
+ * spatial: twist of the frame for a step
+ *     ω = ∂ω/∂δ δ, v = ∂p/∂δ δ
+ * in  state[7]       of the map
+ * in  delta[6]       step [mm, rad]
+ * out twist[6]       (ω, v), base axes
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_spatial_twist)(const real state[7], const real delta[6], real twist[6])
+{
+    twist[0] = delta[3];
+    twist[1] = delta[4];
+    twist[2] = delta[5];
+    twist[3] = delta[0];
+    twist[4] = delta[1];
+    twist[5] = delta[2];
+}
+
+/*
  * spatial: covector of a step to one of the free coordinates
  *     ∂/∂free
  * in  state[7]       of the map
@@ -372,6 +390,24 @@ INLINE void FN(map_translation_rates)(const real state[3], const real delta[3], 
     pose[3] = FN(fill)(0.0f);
     pose[4] = FN(fill)(0.0f);
     pose[5] = FN(fill)(0.0f);
+}
+
+/*
+ * translation: twist of the frame for a step
+ *     ω = ∂ω/∂δ δ, v = ∂p/∂δ δ
+ * in  state[3]       of the map
+ * in  delta[3]       step [mm, rad]
+ * out twist[6]       (ω, v), base axes
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_translation_twist)(const real state[3], const real delta[3], real twist[6])
+{
+    twist[0] = FN(fill)(0.0f);
+    twist[1] = FN(fill)(0.0f);
+    twist[2] = FN(fill)(0.0f);
+    twist[3] = delta[0];
+    twist[4] = delta[1];
+    twist[5] = delta[2];
 }
 
 /*
@@ -522,6 +558,24 @@ INLINE void FN(map_planar_rates)(const real state[4], const real delta[3], real 
     pose[3] = FN(fill)(0.0f);
     pose[4] = FN(fill)(0.0f);
     pose[5] = delta[2];
+}
+
+/*
+ * planar: twist of the frame for a step
+ *     ω = ∂ω/∂δ δ, v = ∂p/∂δ δ
+ * in  state[4]       of the map
+ * in  delta[3]       step [mm, rad]
+ * out twist[6]       (ω, v), base axes
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_planar_twist)(const real state[4], const real delta[3], real twist[6])
+{
+    twist[0] = FN(fill)(0.0f);
+    twist[1] = FN(fill)(0.0f);
+    twist[2] = delta[2];
+    twist[3] = delta[0];
+    twist[4] = delta[1];
+    twist[5] = FN(fill)(0.0f);
 }
 
 /*
@@ -690,6 +744,25 @@ INLINE void FN(map_2tpr2tps_rates)(const real state[6], const real delta[4], rea
     pose[3] = delta[2];
     pose[4] = delta[3];
     pose[5] = FN(fill)(0.0f);
+}
+
+/*
+ * 2tpr2tps: twist of the frame for a step
+ *     ω = ∂ω/∂δ δ, v = ∂p/∂δ δ
+ * in  state[6]       of the map
+ * in  delta[4]       step [mm, rad]
+ * out twist[6]       (ω, v), base axes
+ * operations: 2 +, 7 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_2tpr2tps_twist)(const real state[6], const real delta[4], real twist[6])
+{
+    twist[0] = state[4]*delta[2];
+    twist[1] = delta[3];
+    twist[2] = -state[5]*delta[2];
+    const real t0 = state[1]*delta[3];
+    twist[3] = state[4]*t0 + state[5]*delta[1];
+    twist[4] = delta[0];
+    twist[5] = state[4]*delta[1] - state[5]*t0;
 }
 
 /*

@@ -1,5 +1,5 @@
 /* Generated from derive/screws.py by `python -m derive`; never edited by hand.
- * derivation 47cdbdfcaba03dc1
+ * derivation 531774715477e6ee
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #define SERIES_END 10.0
@@ -559,36 +559,6 @@ INLINE void FN(joint_error)(const real e[6], const real r[3], real R[9], real p[
     p[0] = e[0] + r[0]*(1.0f - R_e0) - r[1]*R_e1 - r[2]*R_e2;
     p[1] = e[1] + r[1]*(1.0f - R_e4) - r[0]*R_e3 - r[2]*R_e5;
     p[2] = e[2] + r[0]*sb + r[2]*(1.0f - R_e8) - r[1]*R_e7;
-}
-#endif
-
-#ifndef NARROW
-/*
- * rates of α β γ by the turning ω of R = Rz(γ) Ry(β) Rx(α)
- *     the inverse of ω = (R ex, Rz ey, ez) (α̇, β̇, γ̇)
- * in  beta           β [rad]
- * in  gamma          γ [rad]
- * out rates[9]       3 x 3, row by row
- * operations: 0 +, 5 *, 1 /, 0 sqrt
- */
-INLINE void FN(rotation_rates)(real beta, real gamma, real rates[9])
-{
-    real sb, cb;
-    FN(sincos)(beta, &sb, &cb);
-    real sg, cg;
-    FN(sincos)(gamma, &sg, &cg);
-    const real t0 = 1.0f/cb;
-    const real secant = t0;
-    const real tangent = sb*t0;
-    rates[0] = cg*secant;
-    rates[1] = sg*secant;
-    rates[2] = FN(fill)(0.0f);
-    rates[3] = -sg;
-    rates[4] = cg;
-    rates[5] = FN(fill)(0.0f);
-    rates[6] = cg*tangent;
-    rates[7] = sg*tangent;
-    rates[8] = FN(fill)(1.0f);
 }
 #endif
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import core_serial
-from pkmcal.core import FloatArray, IntArray
+from pkmcal.core import FloatArray, IntArray, as_rows
 from pkmcal.robot import Robot
 from pkmcal.serial import ERRORS, SerialArm
 from pkmcal.suggest import did_you_mean
@@ -106,10 +106,17 @@ class ArmMachine:
         status = np.where(known, _OK, _INVALID).astype(np.int32)
         return ArmPoses(core_serial.pose(motions), status)
 
-    def twist_jacobian(self, q: ArrayLike) -> FloatArray:
-        """Velocity of the tool's origin, then its turning, by each error: (N, 6, 6 n)."""
-        jacobian = self.arm.error_jacobian(q, frame="tip")
-        return jacobian[:, [3, 4, 5, 0, 1, 2]]
+    def error_twists(self, pose: ArrayLike, q: ArrayLike) -> FloatArray:
+        """Turning of the tool, then velocity of its origin, by each error: (N, 6, 6 n).
+
+        In base axes, at joint coordinates `q` (N, n); an arm needs no pose.
+        """
+        return self.arm.error_jacobian(q, frame="tip")
+
+    def visited(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+        """Pose, coordinates and batch shape of joint coordinates (..., n)."""
+        q, shape = as_rows("poses", places, self.n_actuators)
+        return self.forward(q).pose, q, shape
 
 
 def as_machine(robot: Robot | SerialArm) -> Robot:

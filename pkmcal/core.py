@@ -192,55 +192,12 @@ def compose_rates(
     return out
 
 
-def points(pose: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Where poses carry a target: `pose` (6,) and `target` (3,), or (N, 6) and (N, 3).
-
-    Returns the points (N, 3) and their derivatives by the pose (N, 3, 6) and by the target
-    (N, 3, 3).
-    """
-    n = len(pose) if pose.ndim == 2 else len(target)
-    point, by_pose, by_target = np.empty((n, 3)), np.empty((n, 3, 6)), np.empty((n, 3, 3))
+def compose_twists(a: FloatArray, pose: FloatArray, c: FloatArray) -> FloatArray:
+    """Twists (N, 6, 6) of A T C by those of T, for T = `pose` (N, 6); A and C are (6,)."""
+    n, out = len(pose), np.empty((len(pose), 6, 6))
     if n:
-        lib.pkm_points(
-            ISA,
-            n,
-            pointer(pose),
-            6 if pose.ndim == 2 else 0,
-            pointer(target),
-            3 if target.ndim == 2 else 0,
-            pointer(point),
-            pointer(by_pose),
-            pointer(by_target),
-        )
-    return point, by_pose, by_target
-
-
-def distances(
-    pose: FloatArray, target: FloatArray, anchor: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """How far targets of the platform are from anchors of the base, at poses (N, 6).
-
-    `target` and `anchor` are (3,) or (N, 3). Returns the distances (N,) and their derivatives by
-    the pose (N, 6), by the target (N, 3) and by the anchor (N, 3).
-    """
-    n = len(pose)
-    distance, by_pose = np.empty(n), np.empty((n, 6))
-    by_target, by_anchor = np.empty((n, 3)), np.empty((n, 3))
-    if n:
-        lib.pkm_distances(
-            ISA,
-            n,
-            pointer(pose),
-            pointer(target),
-            3 if target.ndim == 2 else 0,
-            pointer(anchor),
-            3 if anchor.ndim == 2 else 0,
-            pointer(distance),
-            pointer(by_pose),
-            pointer(by_target),
-            pointer(by_anchor),
-        )
-    return distance, by_pose, by_target, by_anchor
+        lib.pkm_compose_twists(ISA, n, pointer(a), pointer(pose), pointer(c), pointer(out))
+    return out
 
 
 class Closure(NamedTuple):
@@ -393,9 +350,17 @@ class Machine:
         return out
 
     def error_jacobian(
-        self, slots: FloatArray, pose: FloatArray, q: FloatArray, columns: IntArray
+        self,
+        slots: FloatArray,
+        pose: FloatArray,
+        q: FloatArray,
+        columns: IntArray,
+        twists: bool = False,
     ) -> FloatArray:
-        """∂pose/∂(numbers at `columns` of the flattened slots): (N, 6, columns)."""
+        """∂pose/∂(numbers at `columns` of the flattened slots): (N, 6, columns).
+
+        Or of the twist (ω, v) of the platform by them.
+        """
         out = np.empty((len(pose), 6, len(columns)))
         if out.size:
             ensure(
@@ -409,6 +374,7 @@ class Machine:
                     pointer(q),
                     int_pointer(columns),
                     len(columns),
+                    twists,
                     pointer(out),
                 )
             )

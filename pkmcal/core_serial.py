@@ -41,11 +41,6 @@ def pose(motion: FloatArray, isa: int = ISA) -> FloatArray:
     return _rows(lib.pkm_motion_pose, motion, 6, isa)
 
 
-def angle_rates(pose: FloatArray, isa: int = ISA) -> FloatArray:
-    """At poses (N, 6): rates of α β γ by a turning in base axes, (N, 3, 3)."""
-    return _rows(lib.pkm_angle_rates, pose, 9, isa).reshape(-1, 3, 3)
-
-
 def exp_jacobian(twist: FloatArray, inverse: bool, isa: int = ISA) -> FloatArray:
     """At twists (N, 6): how the motion follows the twist, or inversely, (N, 36)."""
 

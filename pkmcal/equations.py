@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pkmcal.arm_machine import ArmMachine
 from pkmcal.core import STATUS
 from pkmcal.measurements import Measurements
 from pkmcal.parameters import POINTS, Parameters, Share
@@ -157,18 +156,12 @@ class Equations:
     def jacobian(self, point: Point) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n)."""
         p = self.parameters
-        if isinstance(point.robot, ArmMachine):
-            by_geometry = point.robot.twist_jacobian(self.actuators)[:, :, p.places]
-        else:
-            by_geometry = point.robot.error_jacobian(point.pose, self.actuators)[:, :, p.places]
+        by_geometry = point.robot.error_twists(point.pose, self.actuators)[:, :, p.places]
         parts = []
         for i, seen in enumerate(point.predicted):
             rows, k = seen.values.shape
             part = np.zeros((rows, k, len(p)))
-            place = self.pose_of[i]
-            is_arm = isinstance(point.robot, ArmMachine)
-            by_motion = seen.by_twist(point.pose[place]) if is_arm else seen.by_pose
-            part[:, :, : len(p.places)] = by_motion @ by_geometry[place]
+            part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
             if seen.by_frame is not None and p.frame is not None:
                 part[:, :, p.frame : p.frame + 6] = seen.by_frame
             for name, columns in self._columns[i].items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.core import FloatArray, compose, compose_rates, invert
+from pkmcal.core import FloatArray, compose, compose_rates, compose_twists, invert
 
 NOWHERE = np.zeros(6)
 
@@ -41,4 +41,11 @@ class Frames:
         if self.trivial:
             return rates
         outward: FloatArray = compose_rates(self._base, own, self._tool, pose) @ rates
+        return outward
+
+    def twists_outward(self, own: FloatArray, twists: FloatArray) -> FloatArray:
+        """Twists (N, 6, k) of the machine's own poses to those of the user's poses."""
+        if self.trivial:
+            return twists
+        outward: FloatArray = compose_twists(self._base, own, self._tool) @ twists
         return outward

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
-from pkmcal.arm_machine import ArmMachine, as_machine
+from pkmcal.arm_machine import as_machine
 from pkmcal.core import as_rows
 from pkmcal.equations import Equations
 from pkmcal.estimate import Estimate
@@ -166,22 +166,14 @@ class Identification:
         place = np.zeros(3) if target is None else as_rows("target", target, 3)[0][0]
         parameters = self._equations.parameters
         machine = as_machine(self.robot)
-        if isinstance(machine, ArmMachine):
-            rows, shape = as_rows("poses", poses, machine.n_actuators)
-            at = machine.forward(rows).pose
-            by_motion = predict("position", at, place).by_twist(at)
-            by_geometry = by_motion @ machine.twist_jacobian(rows)[:, :, parameters.places]
-            unknown = self._untold_here()
-        else:
-            rows, shape = as_rows("poses", poses, 6)
-            by_motion = predict("position", rows, place).by_pose
-            by_geometry = by_motion @ machine.error_jacobian(rows)[:, :, parameters.places]
-            unknown = self._estimate.setting.determined.untold
+        at, actuators, shape = machine.visited(poses)
+        by_numbers = machine.error_twists(at, actuators)[:, :, parameters.places]
+        by_geometry = predict("position", at, place).by_twist @ by_numbers
         k = len(parameters.places)
         variance = np.einsum(
             "nij,jk,nik->n", by_geometry, self._told[:k, :k], by_geometry, optimize=True
         )
-        undetermined = unknown * parameters.scale[:, None]
+        undetermined = self._untold_here() * parameters.scale[:, None]
         untold = np.linalg.norm(by_geometry @ undetermined[:k], axis=(1, 2))
         known = np.where(untold < _UNTOLD, np.sqrt(variance), np.inf)
         return known.reshape(shape)
@@ -189,7 +181,7 @@ class Identification:
     def _untold_here(self) -> FloatArray:
         """Scaled combinations (n, d) that are not determined, at the identified geometry.
 
-        `Estimate.setting` has them at the machine as drawn. Those of an arm turn with its errors.
+        `Estimate.setting` has them at the machine as drawn; they turn with its errors.
         """
         parameters = self._equations.parameters
         sigma = parameters.prior / parameters.scale

@@ -253,23 +253,43 @@ class Robot:
             alone would do; the column of a parameter what it does through all its ties.
             NaN at a type-2 singularity.
         """
-        given, shape = as_rows("pose", pose, 6)
-        rows = self._frames.inward(given)
-        if actuators is None:
-            q = self._machine.inverse(self._slots, rows)
-        else:
-            q, q_shape = as_rows("actuators", actuators, self.n_actuators)
-            if q_shape != shape:
-                raise ValueError(f"actuators are a batch {q_shape}, poses a batch {shape}")
-        geometry = self.geometry
-        columns = geometry.slot_index.astype(np.int32)
-        errors = self._machine.error_jacobian(self._slots, rows, q, columns)
-        errors = self._frames.rates_outward(rows, given, errors)
-        count = len(geometry) - len(columns)
-        if count:
-            named = errors @ geometry.chain[:, -count:]
-            errors = np.concatenate([errors, named], axis=-1)
-        return errors.reshape(*shape, 6, len(geometry))
+        given, own, q, shape = self._visited(pose, actuators)
+        errors = self._by_numbers(own, q, twists=False)
+        errors = self._through_ties(self._frames.rates_outward(own, given, errors))
+        return errors.reshape(*shape, 6, len(self.geometry))
+
+    def error_twists(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
+        """`error_jacobian` with the motion as a twist, which is regular at every orientation.
+
+        Parameters
+        ----------
+        pose, actuators : array_like
+            As for `error_jacobian`.
+
+        Returns
+        -------
+        ndarray (..., 6, p)
+            The platform's turning, then the velocity of its origin, both in base axes, by each
+            number: rad and mm per mm or rad. NaN at a type-2 singularity.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")
+        >>> upright = [0, 0, 850, 0, 0, 0]  # where α β γ turn about the axes
+        >>> twists, rates = robot.error_twists(upright), robot.error_jacobian(upright)
+        >>> bool(abs(twists[[3, 4, 5, 0, 1, 2]] - rates).max() < 1e-12)
+        True
+        """
+        _, own, q, shape = self._visited(pose, actuators)
+        errors = self._by_numbers(own, q, twists=True)
+        errors = self._through_ties(self._frames.twists_outward(own, errors))
+        return errors.reshape(*shape, 6, len(self.geometry))
+
+    def visited(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+        """Pose, actuator coordinates and batch shape of poses (..., 6)."""
+        rows, _, q, shape = self._visited(places, None)
+        return rows, q, shape
 
     # poses the machine can take -----------------------------------------------------------------
 
@@ -373,6 +393,32 @@ class Robot:
         robotfile.write(self.model, path)
 
     # --------------------------------------------------------------------------------------------
+
+    def _visited(
+        self, pose: ArrayLike, actuators: ArrayLike | None
+    ) -> tuple[FloatArray, FloatArray, FloatArray, tuple[int, ...]]:
+        """Poses as given and the machine's own, their actuators, and the batch's shape."""
+        given, shape = as_rows("pose", pose, 6)
+        own = self._frames.inward(given)
+        if actuators is None:
+            return given, own, self._machine.inverse(self._slots, own), shape
+        q, q_shape = as_rows("actuators", actuators, self.n_actuators)
+        if q_shape != shape:
+            raise ValueError(f"actuators are a batch {q_shape}, poses a batch {shape}")
+        return given, own, q, shape
+
+    def _by_numbers(self, own: FloatArray, q: FloatArray, twists: bool) -> FloatArray:
+        """How the machine's own pose follows each number of each limb, (N, 6, numbers)."""
+        columns = self.geometry.slot_index.astype(np.int32)
+        return self._machine.error_jacobian(self._slots, own, q, columns, twists)
+
+    def _through_ties(self, errors: FloatArray) -> FloatArray:
+        """The same (N, 6, p) with the columns of named parameters after those of the numbers."""
+        count = len(self.geometry) - errors.shape[2]
+        if not count:
+            return errors
+        named = errors @ self.geometry.chain[:, -count:]
+        return np.concatenate([errors, named], axis=-1)
 
     def _own_rows(self, pose: ArrayLike, name: str = "pose") -> tuple[FloatArray, tuple[int, ...]]:
         """Poses of the user as rows of the machine's own, and the batch's shape."""

@@ -105,6 +105,7 @@ def test_poses_are_composed_and_inverted_with_the_same_bits_on_every_isa(
             assert same_bits(core.compose(a[:n], b[:n]), composed[:n])
         rates = core.compose_rates(a[0], b, a[1], core.compose(core.compose(a[0], b), a[1]))
         arrays = [composed, core.compose(a[0], b), core.compose(a, b[0]), core.invert(a[0]), rates]
+        arrays.append(core.compose_twists(a[0], b, a[1]))
         found.append(b"".join(array.tobytes() for array in arrays))
     assert len(set(found)) == 1
 

@@ -181,16 +181,6 @@ def test_motions_compose_invert_and_move_twists_as_matrices() -> None:
     assert adjoint * sp.Matrix([*w, *v]) == moved
 
 
-def test_rates_of_angles_undo_the_axes_they_turn_about() -> None:
-    (ca, sa), (cb, sb), (cg, sg) = circle(), circle(), circle()
-    beta, gamma = sp.symbols("beta gamma", real=True)
-    places = {sp.sin(beta): sb, sp.cos(beta): cb, sp.sin(gamma): sg, sp.cos(gamma): cg}
-    R = rot_z(cg, sg) * rot_y(cb, sb) * rot_x(ca, sa)
-    about = sp.Matrix.hstack(R[:, 0], rot_z(cg, sg)[:, 1], sp.Matrix([0, 0, 1]))
-    rates = FUNCTIONS["rotation_rates"].result("rates").subs(places).reshape(3, 3)
-    assert rates * about == sp.eye(3)
-
-
 def test_angles_come_back_from_their_rotation() -> None:
     (ca, sa), (cb, sb), (cg, sg) = circle(), circle(), circle()
     R = rot_z(cg, sg) * rot_y(cb, sb) * rot_x(ca, sa)

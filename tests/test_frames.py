@@ -190,3 +190,26 @@ def test_rates_of_a_composed_pose_are_its_differences() -> None:
 def test_a_rotation_by_scipy_is_the_twins() -> None:
     for pose in SOME[0, :5]:
         np.testing.assert_allclose(matrix(pose)[:3, :3], twin.rotation(pose), atol=1e-14)
+
+
+@every
+def test_error_twists_are_differences_of_the_motion(name: str) -> None:
+    """Of the user's poses, on a wall too, where beta is 90 degrees and angles have no rates."""
+    wall = np.array([100.0, 0.0, 50.0, 0.0, np.pi / 2, 0.0])
+    robot = with_frames(pk.load(name), (wall, TOOL))
+    at = robot.forward(pk.load(name).inverse(poses(name, 5, seed=64))).pose
+    q = robot.inverse(at)
+    twists = robot.error_twists(at, q)
+    for place in range(0, len(robot.geometry), 3):
+        step = 1e-4 * (1.0 if robot.geometry.units[place] == "mm" else 1e-2)
+        ends = []
+        for sign in (1, -1):
+            values = robot.geometry.values.copy()
+            values[place] += sign * step
+            ends.append(robot.replace(values).forward(q, guess=at).pose)
+        for row, (ahead, back) in enumerate(zip(*ends, strict=True)):
+            turn = matrix(ahead)[:3, :3] @ matrix(back)[:3, :3].T
+            moved = np.array([turn[2, 1], turn[0, 2], turn[1, 0], *(ahead - back)[:3]])
+            np.testing.assert_allclose(
+                twists[row, :, place], moved / (2 * step), rtol=1e-4, atol=1e-4
+            )

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal import core_readings
 from pkmcal.identify import identify
 from pkmcal.measurements import Measurements
 from pkmcal.predict import predict
@@ -364,3 +365,19 @@ def test_the_robot_given_is_untouched(paper: Robot) -> None:
     q = paper.inverse(tilted_poses(paper, 5, np.random.default_rng(30)))
     identify(paper, VirtualMachine(paper).measure(q), free="offset*")
     np.testing.assert_array_equal(paper.geometry.values, before)
+
+
+def test_a_machine_on_a_wall_is_calibrated_as_one_on_the_floor(paper: Robot) -> None:
+    """With its base turned by 90 degrees about y, where the angles of its poses have no rates."""
+    wall = np.array([500.0, 100.0, 900.0, 0.0, np.pi / 2, 0.0])
+    hung = Robot(dataclasses.replace(paper.model, base_frame=wall))
+    rng = np.random.default_rng(31)
+    true = with_errors(paper, 0.5, rng)
+    q = paper.inverse(tilted_poses(paper, 30, rng))
+    measured = VirtualMachine(true).measure(q)
+    seen, *_ = core_readings.seen_points(wall, measured.values)
+    there = identify(hung, dataclasses.replace(measured, values=seen), prior=0.5)
+    here = identify(paper, measured, prior=0.5)
+    np.testing.assert_allclose(there.values, here.values, atol=1e-6)
+    np.testing.assert_allclose(there.stderr, here.stderr, rtol=1e-6)
+    assert there.accuracy(hung.home) == pytest.approx(here.accuracy(paper.home), rel=1e-6)

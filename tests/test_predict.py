@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import core
+from pkmcal import core, core_readings
 from pkmcal.equations import Equations
 from pkmcal.measurements import Measurements
 from pkmcal.parameters import Share, parameters
@@ -78,20 +78,22 @@ def test_points_and_distances_are_those_of_the_twin() -> None:
     rng = np.random.default_rng(3)
     pose, target, anchor = rng.normal(0, 1, (9, 6)), rng.normal(0, 9, (9, 3)), rng.normal(0, 9, 3)
     expected = np.array([p[:3] + twin.rotation(p) @ t for p, t in zip(pose, target, strict=True)])
-    np.testing.assert_allclose(core.points(pose, target)[0], expected, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(core_readings.points(pose, target)[0], expected, rtol=0, atol=1e-13)
     lengths = np.linalg.norm(expected - anchor, axis=1)
-    np.testing.assert_allclose(core.distances(pose, target, anchor)[0], lengths, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(
+        core_readings.distances(pose, target, anchor)[0], lengths, rtol=0, atol=1e-13
+    )
 
 
-def test_points_and_distances_have_the_same_bits_on_every_isa(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_readings_have_the_same_bits_on_every_isa() -> None:
     rng = np.random.default_rng(4)
     pose, target, anchor = rng.normal(0, 1, (13, 6)), rng.normal(0, 9, (13, 3)), np.ones(3)
     found = []
     for isa in range(core.lib.pkm_best_isa() + 1):
-        monkeypatch.setattr(core, "ISA", isa)
-        arrays = core.points(pose, target) + core.distances(pose, target, anchor)
+        arrays = core_readings.points(pose, target, isa)
+        arrays += core_readings.distances(pose, target, anchor, isa)
+        arrays += core_readings.seen_points(pose[0], target, isa)
+        arrays += (core_readings.seen_pose_rates(pose[0], pose, isa),)
         found.append([array.tobytes() for array in arrays])
     assert all(bits == found[0] for bits in found)
 
@@ -100,7 +102,7 @@ def test_a_distance_of_zero_has_no_derivative_and_no_nan() -> None:
     pose = np.array([[1.0, 2, 3, 0.1, 0.2, 0.3], [1, 2, 4, 0, 0, 0]])
     seen = predict("distance", pose, anchor=np.array([1.0, 2, 3]))
     np.testing.assert_array_equal(seen.values[:, 0], [0, 1])
-    assert (seen.by_pose[0] == 0).all() and np.isfinite(seen.by_pose).all()
+    assert (seen.by_twist[0] == 0).all() and np.isfinite(seen.by_twist).all()
 
 
 def test_a_frame_moves_points_as_the_pose_of_the_base_in_it() -> None:
@@ -109,7 +111,9 @@ def test_a_frame_moves_points_as_the_pose_of_the_base_in_it() -> None:
     target = rng.normal(0, 50, (5, 3))
     seen = predict("position", pose, target, frame=frame).values
     inner = predict("position", pose, target).values
-    outer = predict("position", np.tile(frame, (5, 1)), inner).values
+    outer = core_readings.seen_points(frame, inner)[0]
+    again = predict("position", np.tile(frame, (5, 1)), inner).values
+    np.testing.assert_allclose(again, outer, atol=1e-12)
     np.testing.assert_allclose(seen, outer, atol=1e-12)
 
 
