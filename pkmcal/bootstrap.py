@@ -209,5 +209,6 @@ class Replicate:
         kept = setting.searched.untold
         pins = setting.searched.singular[0] * kept.T
         u = search.best(np.zeros(len(at.theta)), setting.noise, setting.loss, pins)
-        found: FloatArray = at.theta + search.scale * (u - kept @ (kept.T @ u))
+        theta = at.theta + search.scale * (u - kept @ (kept.T @ u))
+        found = equations.parameters.reported(theta)
         return found if search.converged else np.full_like(found, np.nan)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import copy
 import itertools
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal import core_readings
+from pkmcal.alignment import Seen, of_heights, of_points, of_poses
 from pkmcal.core import STATUS
 from pkmcal.measurements import Measurements
 from pkmcal.parameters import POINTS, Parameters, Share
@@ -111,6 +112,7 @@ class Equations:
                 measured.kind,
                 solved.pose[self.pose_of[i]],
                 frame=frame if self._framed[i] else None,
+                origin=self.parameters.origin,
                 **self._known[i],
                 **{name: theta[columns] for name, columns in self._columns[i].items()},
             )
@@ -138,16 +140,55 @@ class Equations:
         if not point.reached:
             self._guess[point.status != 0] = self.parameters.robot.home
             point = self.at(theta)
-        first = self.parameters.frame
-        if first is None or not point.reached:
+        if self.parameters.frame is None or not point.reached:
             return point
-        pairs = [
-            (measured, seen.values)
-            for measured, seen, framed in zip(self.sets, point.predicted, self._framed, strict=True)
-            if framed
-        ]
-        theta[first : first + 6] = _laid_on(pairs)
+        frame, theta = self._laid(point)
+        self.parameters, theta = self.parameters.laid(theta, frame)
         return self.at(theta)
+
+    def _laid(self, point: Point) -> tuple[FloatArray, FloatArray]:
+        """The frame (6,) in which readings lie nearest, and parameters with targets moved along."""
+        theta = point.theta.copy()
+        framed = {
+            kind: [i for i, m in enumerate(self.sets) if self._framed[i] and m.kind == kind]
+            for kind in ("position", "pose", "height")
+        }
+        if not framed["position"]:
+            kind = "pose" if framed["pose"] else "height"
+            values = np.concatenate([self.sets[i].values for i in framed[kind]])
+            if kind == "pose":
+                poses = np.concatenate([point.pose[self.pose_of[i]] for i in framed[kind]])
+                return of_poses(values, poses), theta
+            points = np.concatenate([self._points(point, i)[0] for i in framed[kind]])
+            return of_heights(values, points), theta
+        columns = np.concatenate([
+            self._columns[i]["target"][:, 0]
+            if "target" in self._columns[i]
+            else np.full(len(self.sets[i]), -1)
+            for i in framed["position"]
+        ])  # fmt: skip
+        sought, target = np.unique(columns, return_inverse=True)
+        target = target.reshape(-1) - int(sought[0] < 0)
+        parts = [self._points(point, i) for i in framed["position"]]
+        seen = Seen(
+            values=np.concatenate([self.sets[i].values for i in framed["position"]]),
+            point=np.concatenate([places for places, _ in parts]),
+            turn=np.concatenate([turn for _, turn in parts]),
+            target=target,
+        )
+        frame, shifts = of_points(seen)
+        for first, shift in zip(sought[sought >= 0], shifts, strict=True):
+            mine = slice(first, first + 3)
+            moved = theta[mine] + shift
+            theta[mine] = np.clip(moved, self.parameters.lower[mine], self.parameters.upper[mine])
+        return frame, theta
+
+    def _points(self, point: Point, i: int) -> tuple[FloatArray, FloatArray]:
+        """Where the targets of set `i` are in the base frame (N, 3), and how they are turned."""
+        sought = self._columns[i].get("target")
+        target = self._known[i]["target"] if sought is None else point.theta[sought]
+        places, _, turn = core_readings.points(point.pose[self.pose_of[i]], target)
+        return places, turn
 
     def go_on_from(self, point: Point) -> None:
         """Let later calls of `at` start from its poses."""
@@ -236,34 +277,3 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     if sigma.ndim == 2:
         return 1.0 / sigma
     return np.linalg.inv(np.linalg.cholesky(sigma))
-
-
-def _laid_on(pairs: Sequence[tuple[Measurements, FloatArray]]) -> FloatArray:
-    """The frame (6,) in which predicted values come nearest to measured ones."""
-    from scipy.spatial.transform import Rotation
-
-    frame = np.zeros(6)
-    points = [(m.values, seen) for m, seen in pairs if m.kind == "position"]
-    if points:
-        measured, seen = (np.concatenate(side) for side in zip(*points, strict=True))
-        with warnings.catch_warnings():  # points in a line: any of the best rotations will do
-            warnings.simplefilter("ignore", UserWarning)
-            turn, _ = Rotation.align_vectors(
-                measured - measured.mean(axis=0), seen - seen.mean(axis=0)
-            )
-        frame[:3] = measured.mean(axis=0) - turn.apply(seen.mean(axis=0))
-        frame[3:] = turn.as_euler("xyz")
-        return frame
-    poses = [(m.values, seen) for m, seen in pairs if m.kind == "pose"]
-    if poses:
-        measured, seen = (np.concatenate(side) for side in zip(*poses, strict=True))
-        turn = (
-            Rotation.from_euler("xyz", measured[:, 3:])
-            * Rotation.from_euler("xyz", seen[:, 3:]).inv()
-        ).mean()
-        frame[:3] = (measured[:, :3] - turn.apply(seen[:, :3])).mean(axis=0)
-        frame[3:] = turn.as_euler("xyz")
-        return frame
-    heights = [m.values - seen[:, 0] for m, seen in pairs]
-    frame[2] = np.concatenate(heights).mean()
-    return frame

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,9 +45,7 @@ def drawn(share: Share, holdout: float) -> tuple[Share, Share]:
 
 
 def _rows(share: Share, chosen: NDArray[np.intp]) -> Share:
-    return Share(
-        share.measured.select(chosen), share.rows[chosen], share.unknown_frame, share.unknown_target
-    )
+    return replace(share, measured=share.measured.select(chosen), rows=share.rows[chosen])
 
 
 def compare(held: Sequence[tuple[Share, int]], estimator: Estimator, estimate: Estimate) -> HeldOut:

@@ -247,10 +247,11 @@ def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Iden
     equations, chosen = estimator.equations, estimator.equations.parameters
     setting, theta, scale = estimate.setting, estimate.point.theta, chosen.scale
     untold, searched = setting.determined.untold, setting.searched.told
-    covariance = estimate.covariance * np.outer(scale, scale)
+    to_scale = chosen.reported_rates(theta) * scale
+    covariance = to_scale @ estimate.covariance @ to_scale.T
     if (estimator.unstated & (estimate.freedom < 0.5)).any():
         covariance = np.full_like(covariance, np.inf)  # the noise is not known
-    unknown = np.linalg.norm(untold, axis=1) > _INVOLVED
+    unknown = np.linalg.norm(to_scale @ untold, axis=1) > _INVOLVED * scale
     shown = covariance.copy()
     shown[unknown] = shown[:, unknown] = np.nan
     shown[unknown, unknown] = np.inf
@@ -274,8 +275,8 @@ def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Iden
         robot=as_given(chosen.robot.replace(chosen.values_at(theta))),
         free=chosen.names,
         units=chosen.units,
-        values=theta,
-        start=estimator.start.theta,
+        values=chosen.reported(theta),
+        start=chosen.reported(estimator.start.theta),
         stderr=np.sqrt(np.diagonal(shown)),
         covariance=shown,
         rank=setting.told.rank,

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal import core
 from pkmcal.measurements import Measurements
 from pkmcal.robot import Robot
 from pkmcal.suggest import did_you_mean
@@ -87,6 +88,9 @@ class Parameters:
         Places in the geometry's values of the first names.
     frame : int or None
         Column of frame.x; None where the frame is known.
+    origin : ndarray (6,)
+        Where the frame's six numbers count from: the base in the instrument's frame is at `origin`
+        followed by them. Near it they are small, and their angles regular.
     points : mapping
         Column of the x of each unknown point, by "target", "attachment" or "anchor" and its name.
     robot : Robot
@@ -102,6 +106,7 @@ class Parameters:
     upper: FloatArray
     places: IntArray
     frame: int | None
+    origin: FloatArray
     points: Mapping[tuple[str, str], int]
     robot: Robot
 
@@ -120,8 +125,35 @@ class Parameters:
         return values
 
     def frame_at(self, theta: FloatArray) -> FloatArray | None:
-        """Pose of the base in the instrument's frame (6,); None where it is known."""
+        """Pose (6,) of the base counted from `origin`; None where the frame is known."""
         return None if self.frame is None else theta[self.frame : self.frame + 6]
+
+    def laid(self, theta: FloatArray, frame: FloatArray) -> tuple[Parameters, FloatArray]:
+        """Parameters with the base at `frame` (6,), counted from there unless limits are stated."""
+        assert self.frame is not None
+        mine, theta = slice(self.frame, self.frame + 6), theta.copy()
+        stated = np.isfinite([self.prior[mine], self.lower[mine], self.upper[mine]]).any()
+        theta[mine] = frame if stated else 0.0
+        return replace(self, origin=np.zeros(6) if stated else frame), theta
+
+    def reported(self, theta: FloatArray) -> FloatArray:
+        """The parameters (n,) with the frame's numbers counted from zero."""
+        if self.frame is None:
+            return theta
+        out: FloatArray = theta.copy()
+        mine = slice(self.frame, self.frame + 6)
+        out[mine] = core.compose(self.origin, np.ascontiguousarray(theta[None, mine]))[0]
+        return out
+
+    def reported_rates(self, theta: FloatArray) -> FloatArray:
+        """Derivative (n, n) of `reported` to the parameters (n,)."""
+        rates = np.eye(len(self))
+        if self.frame is not None:
+            mine, nowhere = slice(self.frame, self.frame + 6), np.zeros(6)
+            at = np.ascontiguousarray(theta[None, mine])
+            whole = core.compose(self.origin, at)
+            rates[mine, mine] = core.compose_rates(self.origin, at, nowhere, whole)[0]
+        return rates
 
     def columns_of(self, role: str, measured: Measurements) -> IntArray:
         """Columns of the unknown point of each row, (N, 3)."""
@@ -196,6 +228,7 @@ def parameters(
         upper=upper,
         places=places,
         frame=frame,
+        origin=np.zeros(6),
         points=points,
         robot=robot,
     )

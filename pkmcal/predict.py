@@ -30,7 +30,7 @@ class Predicted:
     by_anchor : ndarray (N, k, 3) or None
         Derivative to the fixed point of the base; distances alone have one.
     by_frame : ndarray (N, k, 6) or None
-        Derivative to the pose of the base in the instrument's frame; None where there is none.
+        Derivative to the pose of the base, counted from the origin; None where there is no frame.
     """
 
     values: FloatArray
@@ -46,6 +46,7 @@ def predict(
     target: FloatArray = _ORIGIN,
     anchor: FloatArray = _ORIGIN,
     frame: FloatArray | None = None,
+    origin: FloatArray = _NOWHERE,
 ) -> Predicted:
     """Readings at poses.
 
@@ -61,21 +62,27 @@ def predict(
         The point of the base frame that distances are measured from, mm.
     frame : ndarray (6,) or None
         Pose of the base in the instrument's frame; None: they are one. Distances have no frame.
+    origin : ndarray (6,)
+        Where that pose counts from, another one in the instrument's frame.
     """
     if kind == "distance":
         return _distances(pose, target, anchor)
     if kind == "pose":
-        return _poses(pose, frame)
-    seen = _points(pose, target, frame)
+        return _poses(pose, frame, origin)
+    seen = _points(pose, target, frame, origin)
     return _heights(seen) if kind == "height" else seen
 
 
-def _points(pose: FloatArray, target: FloatArray, frame: FloatArray | None) -> Predicted:
+def _points(
+    pose: FloatArray, target: FloatArray, frame: FloatArray | None, origin: FloatArray
+) -> Predicted:
     point, by_twist, by_target = core_readings.points(pose, target)
     if frame is None:
         return Predicted(point, by_twist, by_target)
-    seen, by_frame, by_point = core_readings.seen_points(frame, point)
-    return Predicted(seen, by_point @ by_twist, by_point @ by_target, by_frame=by_frame)
+    near, by_frame, by_point = core_readings.seen_points(frame, point)
+    seen, _, by_near = core_readings.seen_points(origin, near)
+    by_point = by_near @ by_point
+    return Predicted(seen, by_point @ by_twist, by_point @ by_target, by_frame=by_near @ by_frame)
 
 
 def _heights(seen: Predicted) -> Predicted:
@@ -90,12 +97,13 @@ def _distances(pose: FloatArray, target: FloatArray, anchor: FloatArray) -> Pred
     return Predicted(distance[:, None], *(by[:, None, :] for by in derivatives))
 
 
-def _poses(pose: FloatArray, frame: FloatArray | None) -> Predicted:
+def _poses(pose: FloatArray, frame: FloatArray | None, origin: FloatArray) -> Predicted:
     if frame is None:
         return Predicted(pose, core_readings.seen_pose_rates(_NOWHERE, pose))
-    seen = core.compose(frame, pose)
-    by_frame = core.compose_rates(_NOWHERE, np.tile(frame, (len(pose), 1)), pose, seen)
-    return Predicted(seen, core_readings.seen_pose_rates(frame, seen), by_frame=by_frame)
+    whole = core.compose(origin, frame[None])[0]
+    seen = core.compose(whole, pose)
+    by_frame = core.compose_rates(origin, np.tile(frame, (len(pose), 1)), pose, seen)
+    return Predicted(seen, core_readings.seen_pose_rates(whole, seen), by_frame=by_frame)
 
 
 def difference(kind: str, values: FloatArray, predicted: FloatArray) -> FloatArray:

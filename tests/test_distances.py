@@ -58,6 +58,20 @@ def test_wires_are_found_at_both_ends(hexapod: Robot) -> None:
     )
 
 
+def test_wires_may_be_held_out_with_both_ends_unknown(hexapod: Robot) -> None:
+    rng = np.random.default_rng(20)
+    q = hexapod.inverse(hexapod_poses(hexapod, 60, rng))
+    anchor, end = np.array([400.0, 300.0, -100.0]), np.array([60.0, -40.0, 20.0])
+    measured = VirtualMachine(hexapod, noise=0.02).measure(q, "distance", anchor, end)
+    rough = dataclasses.replace(measured, target=anchor + 3.0, attachment=end - 2.0)
+    words = {"target": "unknown", "attachment": "unknown"}
+    found = identify(hexapod, rough, free="offset2", prior=0.5, holdout=0.25, **words)
+    assert found.free[1:] == tuple(
+        f"{point}1.{axis}" for point in ("attachment", "anchor") for axis in "xyz"
+    )
+    assert found.holdout_rms == pytest.approx(found.holdout_expected, rel=0.5)
+
+
 def test_one_end_may_be_known_and_the_other_not(hexapod: Robot) -> None:
     rng = np.random.default_rng(19)
     q = hexapod.inverse(hexapod_poses(hexapod, 40, rng))
