@@ -237,7 +237,12 @@ class Identification:
         facts = []
         if np.isfinite(self.chi2_per_dof):
             tolerance = np.sqrt(2 / self.dof)
-            facts.append(f"chi²/dof {self.chi2_per_dof:.2f} (1 ± {tolerance:.2f} expected)")
+            shown = (
+                f"{self.chi2_per_dof:.2f}"
+                if self.chi2_per_dof < 100
+                else f"{self.chi2_per_dof:.2g}"
+            )
+            facts.append(f"chi²/dof {shown} (1 ± {tolerance:.2f} expected)")
         estimated = [_short(noise) for noise in self.noise if np.isfinite(noise)]
         if estimated:
             misfit = ", lack of fit included" if self.lack_of_fit_chance < SIGNIFICANT else ""
@@ -278,7 +283,7 @@ class Identification:
 
 def _parameter_table(result: Identification) -> str:
     """The parameters in as many columns as one screen takes."""
-    columns = 1 if len(result.free) <= 12 else 2 if len(result.free) <= 30 else 3
+    columns = 1 if len(result.free) <= 12 else 2 if len(result.free) <= 24 else 3
     heads = ["parameter", "value", "change"] if columns < 3 else ["parameter", "value"]
     cells = []
     for name, unit, value, sigma, start in zip(

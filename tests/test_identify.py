@@ -349,7 +349,7 @@ def test_result_reads_itself_out(paper: Robot) -> None:
     found = identify(paper, measured, prior=0.5, holdout=0.25)
     text = str(found)
     assert text == found.summary()
-    assert len(text.splitlines()) <= 30
+    assert len(text.splitlines()) <= 24
     assert max(map(len, text.splitlines())) <= 100
     for word in ("rank 25 of 28", "held out", "expected", "chi²/dof", "platform3.x by itself"):
         assert word in text
