@@ -101,7 +101,8 @@ def bootstrap(
         How many times it is repeated.
     seed : int
         Of the draws; each replicate has its own, so that the numbers do not depend on how many
-        workers there are.
+        workers there are. Other processes may stop at another of the points that all are the
+        least to rounding, within 1e-4 of a standard deviation.
     executor : concurrent.futures.Executor, optional
         Where replicates are computed: threads, processes, or whatever else hands out tasks this
         way. None: here.
