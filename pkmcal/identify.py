@@ -151,7 +151,7 @@ def _doubts(
     notes = strayed(estimator.start, estimate.point, equations.parameters)
     if notes or result.rms > _POOR * result.rms_before or result.chi2_per_dof > _NOISY:
         notes = misread(shares, equations.parameters, estimator.start) or notes
-    notes += meagre(equations, result.rank, bool(len(estimator.prior)))
+    notes += meagre(equations, result.rank, result.dof, bool(len(estimator.prior)))
     if result.chi2_per_dof > _NOISY:
         notes.append(
             f"residuals are {np.sqrt(result.chi2_per_dof):.3g} times what sigma says:"

@@ -143,6 +143,9 @@ class Measurements:
             "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
             "attachment": attachment_array(attachment, kind, targets, len(q)),
         }
+        self.__setstate__(fields)
+
+    def __setstate__(self, fields: dict[str, Any]) -> None:
         for name, value in fields.items():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)

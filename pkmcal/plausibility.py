@@ -20,6 +20,7 @@ FloatArray = NDArray[np.float64]
 _GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
 FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
 _BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
+_LEFT_OVER = 0.5  # equations that show how good a fit is
 _TELLING = 0.2  # a reading that leaves so little of the misfit is what was meant
 _FACTORS = {
     "mm": (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)),
@@ -156,7 +157,7 @@ def strayed(start: Point, end: Point, parameters: Parameters) -> list[str]:
     ]
 
 
-def meagre(equations: Equations, jacobian_rank: int, with_prior: bool) -> list[str]:
+def meagre(equations: Equations, rank: int, dof: float, with_prior: bool) -> list[str]:
     """Too few measurements, one pose only, rows that were entered twice."""
     found = []
     n, count = len(equations.parameters), int(equations.components.sum())
@@ -167,9 +168,9 @@ def meagre(equations: Equations, jacobian_rank: int, with_prior: bool) -> list[s
             f"{count} equations for {n} parameters: measure more poses, free fewer parameters or"
             " state a prior"
         )
-    elif count <= jacobian_rank and not with_prior:
+    elif dof < _LEFT_OVER:
         found.append(
-            f"{count} equations for {jacobian_rank} combinations of parameters: nothing is left"
+            f"{count} equations for {rank} combinations of parameters: nothing is left"
             " over to show how good the fit is; measure more poses"
         )
     start = 0

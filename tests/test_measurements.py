@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import doctest
+import pickle
 from types import SimpleNamespace
 from typing import Any
 
@@ -52,6 +53,16 @@ def test_sigma_of_any_stated_shape_is_one_per_component_and_row(shape: tuple[int
     given_sigma = 0.01 * (1 + np.arange(np.prod(shape, dtype=int))).reshape(shape)
     sigma = make(sigma=given_sigma).sigma
     np.testing.assert_array_equal(sigma, np.broadcast_to(given_sigma, (5, 3)))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_measurements_pickle_and_stay_read_only(kind: str) -> None:
+    m = make(kind, sigma=0.1, group=[1, 1, 2, 3, 4])
+    again = pickle.loads(pickle.dumps(m))
+    assert str(again) == str(m)
+    assert (again.actuators == m.actuators).all() and (again.group == m.group).all()
+    with pytest.raises(ValueError, match="read-only"):
+        again.values[0] = 0.0
 
 
 def test_sigma_of_heights_may_be_one_per_row() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from typing import Any
 
 import numpy as np
@@ -156,6 +157,14 @@ def test_too_few_poses_are_said_to_tell_too_little(hexapod: Robot, candidates: n
     plan = pk.plan_poses(hexapod, candidates, 5, kind="pose")
     assert plan.predicted == float("inf")
     assert "too few: not all of them would be told" in str(plan)
+
+
+def test_a_plan_pickles(twenty: Plan) -> None:
+    again = pickle.loads(pickle.dumps(twenty))
+    assert str(again) == str(twenty)
+    np.testing.assert_array_equal(
+        again.robot.inverse(again.poses), twenty.robot.inverse(twenty.poses)
+    )
 
 
 def test_plan_is_read_by_a_person(twenty: Plan) -> None:

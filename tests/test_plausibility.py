@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal import core_readings
 from pkmcal.identify import identify
 from pkmcal.measurements import Measurements
 from pkmcal.robot import Robot
@@ -178,6 +179,30 @@ def test_no_equation_left_over_is_named(paper: Robot, points: Measurements) -> N
     two = points.select(slice(0, 2))
     texts = said(paper, two, free=["offset*", "base1.x", "base2.y"])
     assert any("nothing is left over" in text for text in texts)
+
+
+def test_no_equation_left_over_is_named_with_a_prior_that_leaves_the_frame_out(
+    paper: Robot, points: Measurements
+) -> None:
+    three = points.select(slice(0, 3))
+    (text,) = said(paper, three, prior=0.5, frame="unknown", target="unknown")
+    assert "9 equations for 9 combinations of parameters: nothing is left over" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "change"),
+    [
+        ("the measured lengths are in metres", lambda v: v / 1000),
+        ("are exchanged", lambda v: v * [1, -1, 1]),  # a left-handed instrument
+    ],
+)
+def test_a_misreading_is_named_wherever_the_instrument_stands(
+    paper: Robot, points: Measurements, words: str, change: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    values = core_readings.seen_points(np.array([5e3, -8e3, 1e3, 2.9, 0.3, -2.8]), points.values)[0]
+    wrong = dataclasses.replace(points, values=change(values))
+    texts = said(paper, wrong, prior=0.5, frame="unknown", target="unknown")
+    assert any(words in text for text in texts)
 
 
 def test_without_sigma_and_nothing_left_over_nothing_is_certain(
