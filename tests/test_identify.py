@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import doctest
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -381,3 +383,9 @@ def test_a_machine_on_a_wall_is_calibrated_as_one_on_the_floor(paper: Robot) -> 
     np.testing.assert_allclose(there.values, here.values, atol=1e-6)
     np.testing.assert_allclose(there.stderr, here.stderr, rtol=1e-6)
     assert there.accuracy(hung.home) == pytest.approx(here.accuracy(paper.home), rel=1e-6)
+
+
+def test_the_examples_of_the_document_are_run() -> None:
+    document = Path(__file__).resolve().parent.parent / "docs" / "calibration.md"
+    found = doctest.testfile(str(document), module_relative=False)
+    assert found.attempted >= 7 and found.failed == 0
