@@ -56,7 +56,8 @@ class Identification:
         prior. Shares are in mm at the machine: an angle counts as its arc.
     rms, rms_before : float
         √(Σ r²/N) over the N fitted points, unweighted, r the distance in mm; of poses that of
-        their positions.
+        their positions. Before: the machine as drawn, with an unknown frame and the unknown
+        targets seen from it laid on the readings.
     holdout_rms, holdout_rms_before : float
         The same of points that were held out; NaN where none were.
     holdout_expected : float

@@ -68,7 +68,7 @@ def identify(
     frame : {"known", "unknown"} or a sequence of them
         Whether the instrument's frame is the robot's base frame or is to be found: six parameters
         ``frame.x`` … ``frame.gamma``, the pose of the base in the instrument's frame. With
-        several sets one word each, if not the same for all.
+        several sets one word each, if not the same for all. No start near it is needed.
     target : {"known", "unknown"} or a sequence of them
         Whether the measured points of the platform are known or to be found, from where
         `Measurements.target` puts them: ``target1.x`` …; for distances the fixed point,
