@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import core, core_serial, screw
+from pkmcal import core, core_readings, core_serial, screw
 from pkmcal.core_serial import Arm
 from pkmcal.limb_residual import LimbResidual
 
@@ -22,7 +22,7 @@ ROWS = 37
 TAILS = [*(slice(0, n) for n in range(1, 18)), slice(3, ROWS), slice(0, ROWS)]
 ELSEWHERE = {
     *("inverse", "forward", "jacobian", "forward_jacobian", "error_jacobian", "closure", "limbs"),
-    *("compose", "invert", "compose_rates"),
+    *("compose", "invert", "compose_rates", "compose_twists"),
     *("swarm_start", "swarm_judge", "swarm_move", "swarm_eq18"),
 }
 
@@ -57,18 +57,14 @@ def closed_forms(isa: int, part: slice, call: Callable[..., None], shape: tuple[
 
 
 def points(isa: int, part: slice) -> list[np.ndarray]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(core, "ISA", isa)
-        one_target = core.points(POSES[part], POINTS[0])
-        one_pose = core.points(POSES[0], POINTS[part])
-        return [*core.points(POSES[part], POINTS[part]), *one_target, *one_pose]
+    one_target = core_readings.points(POSES[part], POINTS[0], isa)
+    return [*core_readings.points(POSES[part], POINTS[part], isa), *one_target]
 
 
 def distances(isa: int, part: slice) -> list[np.ndarray]:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(core, "ISA", isa)
-        own = core.distances(POSES[part], POINTS[part], POINTS[::-1][part].copy())
-        return [*own, *core.distances(POSES[part], POINTS[0], POINTS[1])]
+    ends = POINTS[::-1][part].copy()
+    own = core_readings.distances(POSES[part], POINTS[part], ends, isa)
+    return [*own, *core_readings.distances(POSES[part], POINTS[0], POINTS[1], isa)]
 
 
 def closure_cost(isa: int, part: slice) -> list[np.ndarray]:
@@ -105,6 +101,8 @@ def exp_jacobian(isa: int, part: slice) -> list[np.ndarray]:
 
 CASES: dict[str, Case] = {
     "points": points,
+    "seen_points": lambda isa, part: [*core_readings.seen_points(POSES[0], POINTS[part], isa)],
+    "seen_poses": lambda isa, part: [core_readings.seen_pose_rates(POSES[0], POSES[part], isa)],
     "distances": distances,
     "tpr2tps_lengths": lambda isa, part: closed_forms(isa, part, core.tpr2tps_lengths, (4,)),
     "tpr2tps_jacobian": lambda isa, part: closed_forms(isa, part, core.tpr2tps_jacobian, (4, 4)),
@@ -113,7 +111,6 @@ CASES: dict[str, Case] = {
     "log": by_rows(core_serial.log, MOTIONS),
     "adjoint": by_rows(core_serial.adjoint, MOTIONS),
     "motion_pose": by_rows(core_serial.pose, MOTIONS),
-    "angle_rates": by_rows(core_serial.angle_rates, POSES),
     "exp_jacobian": exp_jacobian,
     "joint_motions": by_rows(core_serial.joint_motions, ERRORS[:, 0].copy(), POINTS),
     "arm_links": lambda isa, part: arm(isa, part, "links"),

@@ -82,6 +82,7 @@ def test_the_other_calls_give_the_same_bits_on_every_isa_and_in_every_tail(name:
             "jacobian": lambda part, r=robot: r.jacobian(at[part]),
             "forward_jacobian": lambda part, r=robot: r.forward_jacobian(at[part]),
             "error_jacobian": lambda part, r=robot: r.error_jacobian(at[part]),
+            "error_twists": lambda part, r=robot: r.error_twists(at[part]),
             "closure": lambda part, m=machine, s=slots: m.closure(s, at[part], q[part]),
             "limbs": lambda part, m=machine, s=slots: m.limbs(s, at[part]),
         }
