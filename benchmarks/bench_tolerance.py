@@ -14,6 +14,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -122,28 +123,34 @@ def test_loop_over_root(benchmark: Any, way: str) -> None:
     benchmark.pedantic(loop, (LOOPED, way), rounds=3)
 
 
-def ratios(rounds: int = 3) -> dict[str, tuple[float, float]]:
-    """How many times as long the loops take for a machine as the package on one and two cores."""
-    own = [least(lambda t=t: monte_carlo(SAMPLES, t), rounds) for t in (1, 2)]
-    loops = {way: least(lambda way=way: loop(LOOPED, way), rounds) / LOOPED for way in WAYS}
-    again = (least(lambda t=t: monte_carlo(SAMPLES, t), rounds) for t in (1, 2))
-    one, two = (min(pair) / SAMPLES for pair in zip(own, again, strict=True))
-    print(f"Monte Carlo of {ROBOT.name}, {SAMPLES} machines: {SAMPLES * one:.2f} s on one core,"
-          f" {SAMPLES * two:.2f} s by two threads")  # fmt: skip
-    for way, each in loops.items():
-        print(f"  loop over scipy.optimize.root, closures {way:15} {1e6 * each:7.1f} us a machine"
-              f" {each / one:5.0f} x {each / two:5.0f} x")  # fmt: skip
-    return {way: (each / one, each / two) for way, each in loops.items()}
-
-
-def least(call: Callable[[], object], rounds: int) -> float:
-    """Seconds of the fastest run."""
-    times = []
-    for _ in range(rounds):
+def ratios(rounds: int = 5) -> dict[str, float]:
+    """How many times as long the loops take for a machine as the package, in processor time."""
+    own: list[float] = []
+    loops: dict[str, list[float]] = {way: [] for way in WAYS}
+    for _ in range(rounds):  # each once a round, so that all see the same machine
+        own.append(processor_seconds(monte_carlo) / SAMPLES)
+        for way, times in loops.items():
+            times.append(processor_seconds(lambda way=way: loop(LOOPED, way)) / LOOPED)
+    elapsed = []
+    for threads in (1, 2):
         begin = time.perf_counter()
-        call()
-        times.append(time.perf_counter() - begin)
-    return min(times)
+        monte_carlo(threads=threads)
+        elapsed.append(time.perf_counter() - begin)
+    print(f"Monte Carlo of {ROBOT.name}, {SAMPLES} machines: {SAMPLES * median(own):.2f} s of the"
+          f" processor; by the clock {elapsed[0]:.2f} s on one core, {elapsed[1]:.2f} s by two"
+          " threads")  # fmt: skip
+    found = {way: median(times) / median(own) for way, times in loops.items()}
+    for way, times in loops.items():
+        print(f"  loop over scipy.optimize.root, closures {way:15} {1e6 * median(times):7.1f} us a"
+              f" machine {found[way]:5.0f} x")  # fmt: skip
+    return found
+
+
+def processor_seconds(call: Callable[[], object]) -> float:
+    """Of this process, whatever else the machine does."""
+    begin = time.process_time()
+    call()
+    return time.process_time() - begin
 
 
 if __name__ == "__main__":

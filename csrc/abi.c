@@ -255,6 +255,35 @@ ptrdiff_t pkm_swarm_size(const pkm_swarm *swarm)
     CHECKED(isa);                                                                                 \
     if (!swarm_fits(swarm)) return PKM_BAD_SWARM
 
+int pkm_with_errors(ptrdiff_t n, int k, const double *error, const int32_t *place, ptrdiff_t size,
+                    const double *ideal, double *out)
+{
+    for (int j = 0; j < k; j++)
+        if (place[j] < 0 || place[j] >= size) return PKM_BAD_COLUMN;
+    for (ptrdiff_t i = 0; i < n; i++)
+        for (int j = 0; j < k; j++) out[i * size + place[j]] = ideal[place[j]] + error[i * k + j];
+    return 0;
+}
+
+int pkm_count(int k, ptrdiff_t n, const double *value, const double *low, const double *width,
+              int bins, int64_t *count)
+{
+    for (int j = 0; j < k; j++, value += n, count += bins + 2)
+        for (ptrdiff_t i = 0; i < n; i++) {
+            const double place = (value[i] - low[j]) / width[j] + 1.0;
+            const double most = bins + 1.0;
+            count[place >= most ? bins + 1 : place >= 0.0 ? (ptrdiff_t)place : 0]++;
+        }
+    return 0;
+}
+
+int pkm_normals(int isa, ptrdiff_t n, uint64_t *state, double *out)
+{
+    CHECKED(isa);
+    chosen->normals(n, state, out);
+    return 0;
+}
+
 int pkm_swarm_start(const pkm_swarm *swarm, int isa, uint64_t seed, const double *lower,
                     const double *upper, double *state)
 {

@@ -9,6 +9,7 @@
 #include "jacobian.h"
 #include "poses.h"
 #include "pso.h"
+#include "random.h"
 #include "readings.h"
 #include "serial.h"
 #include "tpr2tps.h"
@@ -174,6 +175,11 @@ static void core_distances(ptrdiff_t n, const double *pose, const double *target
                   by_target, by_anchor);
 }
 
+static void core_normals(ptrdiff_t n, uint64_t *state, double *out)
+{
+    normal_numbers(n, state, out);
+}
+
 static void core_swarm_start(const pkm_swarm *swarm, uint64_t seed, const double *lower,
                              const double *upper, double *state)
 {
@@ -261,7 +267,7 @@ const pkm_core CORE = {core_inverse, core_forward, core_jacobian, core_response,
                        core_home,    core_closure, core_limbs,    core_compose,  core_invert,
                        core_compose_rates, core_compose_twists, core_points, core_seen_points,
                        core_seen_poses, core_distances,
-                       core_swarm_start, core_swarm_move, core_swarm_judge, core_swarm_eq18,
+                       core_normals, core_swarm_start, core_swarm_move, core_swarm_judge, core_swarm_eq18,
                        core_closure_cost,
                        core_exp, core_log, core_adjoint, core_motion_pose, core_exp_jacobian,
                        core_joint_motions, core_arm_links, core_arm_forward, core_arm_jacobian,

@@ -38,6 +38,7 @@ typedef struct {
     void (*distances)(ptrdiff_t n, const double *pose, const double *target,
                       ptrdiff_t target_stride, const double *anchor, ptrdiff_t anchor_stride,
                       double *distance, double *by_twist, double *by_target, double *by_anchor);
+    void (*normals)(ptrdiff_t n, uint64_t *state, double *out);
     void (*swarm_start)(const pkm_swarm *, uint64_t seed, const double *lower, const double *upper,
                         double *state);
     void (*swarm_move)(const pkm_swarm *, const double *lower, const double *upper, double *state);

@@ -129,6 +129,21 @@ int pkm_tpr2tps_lengths(int isa, ptrdiff_t n, const double *size, const double *
 int pkm_tpr2tps_jacobian(int isa, ptrdiff_t n, const double *size, const double *free,
                          double *jacobian);
 
+/* Geometries that differ: of each row of out (n, size) the numbers at `place` (k) become those of
+ * `ideal` (size) plus the row's errors (n, k); the others are left. */
+int pkm_with_errors(ptrdiff_t n, int k, const double *error, const int32_t *place, ptrdiff_t size,
+                    const double *ideal, double *out);
+
+/* Of each quantity of value (k, n), finite, how many numbers are in each bin: count (k, bins + 2) goes
+ * up, its first and last column by what is below and above the bins. */
+int pkm_count(int k, ptrdiff_t n, const double *value, const double *low, const double *width,
+              int bins, int64_t *count);
+
+/* Standard normal numbers (n), of one state the same bits with every isa. The state, any bits but
+ * zeros alone, is 4 words of each of eight generators (4, 8) and moves on; what is left of the last
+ * sixteen numbers is dropped. */
+int pkm_normals(int isa, ptrdiff_t n, uint64_t *state, double *out);
+
 /* A swarm step by step: start within the bounds; set the particles' values in the state and judge
  * (pBest, gBest); move (eq. 19); judge again. Of one seed the same bits with every isa. */
 ptrdiff_t pkm_swarm_size(const pkm_swarm *swarm);

@@ -8,36 +8,7 @@
 #define PSO_H
 
 #include "closure.h"
-
-typedef uint64_t bits __attribute__((vector_size(8 * LANES)));
-
-/* xoshiro256+ of Blackman and Vigna, a state for each lane. */
-typedef struct { bits s[4]; } generator;
-
-INLINE real load(const double *from)
-{
-    real r;
-    memcpy(&r, from, sizeof r);
-    return r;
-}
-
-/* `fill` for numbers from memory: x - 0 is x for every x, which the compiler leaves out. */
-INLINE real spread(double x) { return x - (real){0}; }
-
-INLINE void store(real x, double *to) { memcpy(to, &x, sizeof x); }
-
-/* The next number of each lane, uniform in [0, 1): 52 bits as the fraction of a double in [1, 2). */
-INLINE real draw(generator *g)
-{
-    const bits sum = g->s[0] + g->s[3], shifted = g->s[1] << 17;
-    g->s[2] ^= g->s[0];
-    g->s[3] ^= g->s[1];
-    g->s[1] ^= g->s[2];
-    g->s[0] ^= g->s[3];
-    g->s[2] ^= shifted;
-    g->s[3] = (g->s[3] << 45) | (g->s[3] >> 19);
-    return (real)((sum >> 12) | UINT64_C(0x3ff0000000000000)) - 1.0;
-}
+#include "random.h"
 
 /* splitmix64: seeds for the generators. */
 INLINE uint64_t split(uint64_t *counter)

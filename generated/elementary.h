@@ -1,5 +1,5 @@
 /* Generated from derive/elementary.py by `python -m derive`; never edited by hand.
- * derivation defbc19e0eccc947
+ * derivation a8e819560f995898
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* (sin(x)/x - 1)/x²,  |x| <= π/4, as a polynomial in x² */
@@ -31,11 +31,23 @@
 #define ATAN_9 0x1.4162c02b1dda3p-5
 #define ATAN_10 -0x1.3a31b1c0fd3b7p-6
 
+/* (artanh(x)/x - 1)/x²,  |x| <= tan(π/8)² = 3 - √8, as a polynomial in x² */
+#define ATANH_0 0x1.5555555555558p-2
+#define ATANH_1 0x1.99999999952e2p-3
+#define ATANH_2 0x1.2492492df148dp-3
+#define ATANH_3 0x1.c71c62e5800a1p-4
+#define ATANH_4 0x1.7462b4ab2ef6bp-4
+#define ATANH_5 0x1.39fe606542ddep-4
+#define ATANH_6 0x1.2b584aae78a57p-4
+
 #define TWO_OVER_PI 0x1.45f306dc9c883p-1
 #define QUARTER_PI 0x1.921fb54442d18p-1
 #define HALF_PI 0x1.921fb54442d18p+0
 #define PI 0x1.921fb54442d18p+1
+#define TWO_PI 0x1.921fb54442d18p+2
 #define TAN_PI_8 0x1.a827999fcef32p-2
+#define SQRT_HALF 0x1.6a09e667f3bcdp-1
+#define LN_2 0x1.62e42fefa39efp-1
 /* π/2 in three parts; k times the first two is exact for |k| < 2^20 */
 #define HALF_PI_PART0 0x1.921fb54400000p+0
 #define HALF_PI_PART1 0x1.0b4611a600000p-34

@@ -23,7 +23,7 @@ from pkmcal.robot import Robot, load
 from pkmcal.tracker import Tracker
 
 _FRAME = dict(zip(POSE, ("mm", "mm", "mm", "rad", "rad", "rad"), strict=True))
-_PRIOR = re.compile(
+_DEVIATION = re.compile(
     r"(?:(?P<name>[^=]+)=)?\s*"
     r"(?P<number>[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(?P<unit>\D*)"
 )
@@ -108,7 +108,7 @@ def calibrate(
             machine,
             measured,
             free=chosen or None,
-            prior=read_prior(prior or [], machine, chosen),
+            prior=read_deviations("--prior", prior or [], machine, chosen),
             loss=loss,
             frame=frame,
             target=target,
@@ -145,19 +145,22 @@ def free_names(robot: Robot, given: Sequence[str] | None) -> list[str]:
         raise ValueError(f"--free: {error}") from None
 
 
-def read_prior(
-    given: Sequence[str], robot: Robot, free: Sequence[str]
+def read_deviations(
+    option: str, given: Sequence[str], robot: Robot, names: Sequence[str]
 ) -> float | Mapping[str, float] | None:
-    """The `prior` of `identify` from ``--prior`` options.
+    """Standard deviations from the command line; None where none is given.
 
     Parameters
     ----------
+    option : str
+        Which option gave them, for messages: ``--prior`` of identification, ``--sigma`` of
+        tolerances.
     given : sequence of str
-        "σ" for all free numbers in mm, or "NAME=σ"; σ may have a unit, and for angles must.
+        "σ" for all numbers in mm, or "NAME=σ"; σ may have a unit, and for angles must.
     robot : Robot
         The machine.
-    free : sequence of str
-        The free numbers of its geometry.
+    names : sequence of str
+        The numbers of its geometry that may have one.
 
     Raises
     ------
@@ -166,18 +169,26 @@ def read_prior(
     """
     sigmas: dict[str, float] = {}
     for text in given:
-        match = _PRIOR.fullmatch(text.strip())
-        if match is None:
-            raise ValueError(f"--prior {text}: expected NAME=NUMBER, such as base1.x=0.5")
-        name = (match["name"] or "").strip()
-        if not name and len(given) > 1:
-            raise ValueError(f"--prior {text}: a number without a name stands alone, for all")
-        unit = _unit_of(name, robot, free) if name else "mm"
-        sigma = _in_unit(text, float(match["number"]), match["unit"].strip(), unit, name)
+        try:
+            name, sigma = _deviation(text, robot, names)
+            if not name and len(given) > 1:
+                raise ValueError("a number without a name stands alone, for all")
+        except ValueError as error:
+            raise ValueError(f"{option} {text}: {error}") from None
         if not name:
             return sigma
         sigmas[name] = sigma
     return sigmas or None
+
+
+def _deviation(text: str, robot: Robot, names: Sequence[str]) -> tuple[str, float]:
+    """Name or wildcard, "" for all, and σ in mm, rad or 1."""
+    match = _DEVIATION.fullmatch(text.strip())
+    if match is None:
+        raise ValueError("expected NAME=NUMBER, such as base1.x=0.5")
+    name = (match["name"] or "").strip()
+    unit = _unit_of(name, robot, names) if name else "mm"
+    return name, _in_unit(float(match["number"]), match["unit"].strip(), unit, name)
 
 
 def read_tracker(text: str) -> Tracker:
@@ -207,30 +218,30 @@ def _seen_by(tracker: Tracker, measured: Measurements) -> Measurements:
     return replace(measured, sigma=tracker.covariance(measured.values))
 
 
-def _unit_of(pattern: str, robot: Robot, free: Sequence[str]) -> str:
-    """Unit of the free numbers that a pattern covers; what is not known is a length."""
+def _unit_of(pattern: str, robot: Robot, names: Sequence[str]) -> str:
+    """Unit of the numbers that a pattern covers; what is not known is a length."""
     units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
-    known = {name: str(units[name]) for name in free}
+    known = {name: str(units[name]) for name in names}
     known |= {f"frame.{name}": unit for name, unit in _FRAME.items()}
     covered = {known[name] for name in known if fnmatchcase(name, pattern)}
     if len(covered) > 1:
         raise ValueError(
-            f"--prior {pattern}: covers lengths, angles or ratios together; name them apart, or"
-            " give one number without a name"
+            "covers lengths, angles or ratios together; name them apart, or give one number"
+            " without a name"
         )
     return covered.pop() if covered else "mm"
 
 
-def _in_unit(text: str, number: float, unit: str, quantity: str, name: str) -> float:
+def _in_unit(number: float, unit: str, quantity: str, name: str) -> float:
     """A number in mm, rad or 1."""
     factors = UNITS.get(quantity, {})
     if not unit and quantity == "rad":
-        raise ValueError(f"--prior {text}: {name} is an angle; give it a unit, such as 0.1deg")
+        raise ValueError(f"{name} is an angle; give it a unit, such as 0.1deg")
     if not unit:
         return number
     if unit not in factors:
         expected = f"one of {', '.join(u for u in factors if u.isascii())}" if factors else "none"
-        raise ValueError(f"--prior {text}: unit {unit!r}; expected {expected}")
+        raise ValueError(f"unit {unit!r}; expected {expected}")
     times, over = factors[unit]
     return number * times / over
 

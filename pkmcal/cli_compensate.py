@@ -62,7 +62,8 @@ def compensate(
 
     Exit code 1: a limb cannot reach some of the poses.
 
-    Example: pkmcal compensate 2tpr2tps desired.csv measured.csv --out corrected
+    Example: pkmcal compensate 2tpr2tps examples/2tpr2tps-compensation/desired.csv
+    examples/2tpr2tps-compensation/measured.csv
     """
     from pkmcal.compensate import compensate as corrected
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from pkmcal.cli_calibrate import free_names, read_prior
+from pkmcal.cli_calibrate import free_names, read_deviations
 from pkmcal.cli_output import as_json, folder
 from pkmcal.plan import Plan, plan_poses
 from pkmcal.pose_csv import read_poses, write_poses
@@ -95,7 +95,7 @@ def plan(
         kind=kind,
         noise=noise,
         free=chosen or None,
-        prior=read_prior(prior or [], machine, chosen),
+        prior=read_deviations("--prior", prior or [], machine, chosen),
         unknown=unknown or (),
     )
     written = [] if out is None else _write(made, folder(out))

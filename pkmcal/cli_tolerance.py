@@ -12,7 +12,7 @@ import numpy as np
 import typer
 
 from pkmcal.allocation import allocate_tolerance
-from pkmcal.cli_calibrate import read_prior
+from pkmcal.cli_calibrate import read_deviations
 from pkmcal.cli_output import as_json, folder
 from pkmcal.core import FloatArray
 from pkmcal.monte_carlo import Progress
@@ -86,7 +86,8 @@ def tolerance(
             )
             found, told = shared.check, as_json(shared) if json else str(shared)
         else:
-            deviations = read_sigma(sigma or [], machine)
+            deviations = read_deviations("--sigma", sigma or [], machine, own_names(machine))
+            assert deviations is not None
             with _progress() as progress:
                 found = spread(machine, at, deviations, samples, seed, executor, progress)
             told = as_json(found, "position_share") if json else str(found)
@@ -96,22 +97,6 @@ def tolerance(
         write_poses(folder(out) / "tolerance.csv", found.poses, _columns(found))
     typer.echo(told)
     return 1 if found.failed.any() else 0
-
-
-def read_sigma(given: list[str], robot: Robot) -> float | Mapping[str, float]:
-    """The `sigma` of `tolerance` from ``--sigma`` options, which read as those of ``--prior``.
-
-    Raises
-    ------
-    ValueError
-        No number, a unit that does not fit, a wildcard over lengths and angles.
-    """
-    try:
-        sigma = read_prior(given, robot, own_names(robot))
-    except ValueError as error:
-        raise ValueError(str(error).replace("--prior", "--sigma")) from None
-    assert sigma is not None
-    return sigma
 
 
 @contextmanager

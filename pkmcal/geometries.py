@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pkmcal.core import FloatArray, as_rows
+from pkmcal._core import lib
+from pkmcal.core import FloatArray, as_rows, int_pointer, pointer
 from pkmcal.geometry import Geometry
 from pkmcal.robot import Robot
 from pkmcal.ties import Term, Tie
@@ -83,14 +84,7 @@ class Geometries:
         self._geometry = geometry
         self._slots = np.repeat(geometry.slots.reshape(1, -1), rows, axis=0)
         own = int(np.searchsorted(places, len(geometry.numbers)))  # parameters come after
-        at = geometry.slot_index[places[:own]]
-        # neighbours in the slots together: slices are faster than columns one by one
-        runs = np.split(np.arange(own), 1 + np.flatnonzero(np.diff(at) != 1))
-        self._runs = [
-            (slice(run[0], run[-1] + 1), slice(at[run[0]], at[run[-1]] + 1))
-            for run in runs
-            if run.size
-        ]
+        self._own = np.ascontiguousarray(geometry.slot_index[places[:own]], dtype=np.int32)
         self._parameters = {geometry.names[place]: own + i for i, place in enumerate(places[own:])}
         self._tied = [
             (place, number.tie)
@@ -104,9 +98,17 @@ class Geometries:
         Tied numbers follow their parameters exactly.
         """
         geometry, slots = self._geometry, self._slots[: len(errors)]
-        ideal = geometry.slots.reshape(-1)
-        for columns, places in self._runs:
-            np.add(errors[:, columns], ideal[places], out=slots[:, places])
+        code = lib.pkm_with_errors(
+            len(errors),
+            len(self._own),
+            pointer(np.ascontiguousarray(errors[:, : len(self._own)])),
+            int_pointer(self._own),
+            slots.shape[1],
+            pointer(geometry.slots),
+            pointer(slots),
+        )
+        if code < 0:
+            raise ValueError(f"the core refused the call (code {code})")
         changed = {
             name: geometry[name] + errors[:, column] for name, column in self._parameters.items()
         }

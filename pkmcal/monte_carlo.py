@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pkmcal.core import FloatArray
 from pkmcal.geometries import Geometries, forward_of, quantities_off
 from pkmcal.model import Model
+from pkmcal.normals import Normals
 from pkmcal.robot import Robot
 from pkmcal.streaming import Bins, Stream
 
@@ -64,11 +65,11 @@ class Draw:
     def errors(self) -> Iterator[list[FloatArray]]:
         """Pose errors of a batch of machines after the other: for each pose (7, n)."""
         robot = Robot(self.model)
-        random = np.random.Generator(np.random.SFC64(self.seed))
-        geometries = Geometries(robot.geometry, self.places, min(BATCH, self.count))
+        normals = Normals(self.seed)
+        errors = np.empty((min(BATCH, self.count), len(self.sigma)))
+        geometries = Geometries(robot.geometry, self.places, len(errors))
         for start in range(0, self.count, BATCH):
-            rows = min(BATCH, self.count - start)
-            drawn = random.standard_normal((rows, len(self.sigma)))
+            drawn = normals.fill(errors[: self.count - start])
             drawn *= self.sigma
             slots = geometries.with_errors(drawn)
             yield [

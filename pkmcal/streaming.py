@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from pkmcal._core import ffi, lib
+from pkmcal.core import FloatArray, pointer
 
 BINS = 2048
 REACH = 8.0  # standard deviations, to either side of the mean, that the bins cover
@@ -67,21 +67,23 @@ class Stream:
         good = np.isfinite(values).all(axis=0)
         if not good.all():
             self.failed += int((~good).sum())
-            values = np.ascontiguousarray(values[:, good])
+            values = values[:, good]
         k, n = values.shape
         if not n:
             return
         mean = values.mean(axis=1)
-        place = values - mean[:, None]
-        squares = np.einsum("ij,ij->i", place, place)
+        off = values - mean[:, None]
+        squares = np.einsum("ij,ij->i", off, off)
         self._combine(n, mean, squares, values.min(axis=1), values.max(axis=1))
-        np.subtract(values, self.bins.low[:, None], out=place)
-        place /= self.bins.width[:, None]
-        place += 1.0
-        np.clip(place, 0.0, BINS + 1.0, out=place)
-        index = place.astype(np.intp)
-        index += np.arange(k)[:, None] * (BINS + 2)
-        self._in_bin += np.bincount(index.ravel(), minlength=k * (BINS + 2)).reshape(k, -1)
+        lib.pkm_count(
+            k,
+            n,
+            pointer(np.ascontiguousarray(values)),
+            pointer(self.bins.low),
+            pointer(self.bins.width),
+            BINS,
+            ffi.from_buffer("int64_t *", self._in_bin),
+        )
 
     def merge(self, other: Stream) -> None:
         """Take what another stream with the same bins has taken."""

@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import typer
 from typer.testing import CliRunner
 
 import pkmcal as pk
 from pkmcal import cli, cli_calibrate, whole_file
-from pkmcal.cli_calibrate import read_prior
+from pkmcal.cli_calibrate import read_deviations
 from pkmcal.demo import demonstrate
 from pkmcal.identification import Identification
 from pkmcal.identify import identify
@@ -28,7 +29,7 @@ from pkmcal.measurements import Measurements
 ROOT = Path(__file__).resolve().parent.parent
 DELTA = ROOT / "examples" / "linear-delta"
 ROBOT, PROBE = str(DELTA / "robot.toml"), str(DELTA / "probe.csv")
-VERBS = ["demo", "machines", "calibrate"]
+VERBS = sorted(typer.main.get_group(cli.app).commands)
 
 
 @pytest.fixture(autouse=True)
@@ -77,7 +78,8 @@ def test_without_a_verb_the_verbs_are_listed() -> None:
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_help_shows_an_example_that_runs(verb: str, tmp_path: Path) -> None:
-    shutil.copytree(DELTA, tmp_path / "examples" / "linear-delta")
+    for folder in (DELTA, DELTA.parent / "2tpr2tps-compensation"):
+        shutil.copytree(folder, tmp_path / "examples" / folder.name)
     words = " ".join(run(verb, "--help").stdout.split())
     match = re.search(r"Example: (pkmcal .*?) [╭+]", words)
     assert match
@@ -205,14 +207,14 @@ def test_prior_holds_what_is_given_a_small_sigma() -> None:
 def test_prior_units_are_those_of_the_number() -> None:
     robot = pk.load(ROBOT)
     free = ["radius", "angle1", "angle2", "offset1"]
-    assert read_prior([], robot, free) is None
-    assert read_prior(["0.5"], robot, free) == 0.5
-    assert read_prior(["500um"], robot, free) == 0.5
-    assert read_prior(["radius = 2e-1", "angle*=90deg"], robot, free) == {
+    assert read_deviations("--prior", [], robot, free) is None
+    assert read_deviations("--prior", ["0.5"], robot, free) == 0.5
+    assert read_deviations("--prior", ["500um"], robot, free) == 0.5
+    assert read_deviations("--prior", ["radius = 2e-1", "angle*=90deg"], robot, free) == {
         "radius": 0.2,
         "angle*": math.pi / 2,
     }
-    assert read_prior(["frame.alpha=2mrad"], robot, free) == {"frame.alpha": 0.002}
+    assert read_deviations("--prior", ["frame.alpha=2mrad"], robot, free) == {"frame.alpha": 0.002}
 
 
 def test_result_with_a_warning_is_not_to_be_trusted() -> None:
@@ -299,7 +301,7 @@ def test_mistake_in_a_robot_file_is_named_with_the_file(old: str, new: str, said
         ([ROBOT, PROBE, "--prior", "radius=-1"], "prior of radius must be positive"),
         ([ROBOT, PROBE, "--prior", "radius=1deg"], "expected one of mm, "),
         ([ROBOT, PROBE, "--prior", "angle1=1"], "angle1 is an angle; give it a unit"),
-        ([ROBOT, PROBE, "--prior", "*=1"], "--prior *: covers lengths, angles"),
+        ([ROBOT, PROBE, "--prior", "*=1"], "--prior *=1: covers lengths, angles"),
         ([ROBOT, PROBE, "--prior", "1", "--prior", "radius=2"], "--prior 1: a number without"),
         ([ROBOT, PROBE, "--free", "gain*", "--prior", "gain*=1mm"], "unit 'mm'; expected none"),
         ([ROBOT, PROBE, "--holdout", "1.5"], "holdout must be a fraction between 0 and 1"),

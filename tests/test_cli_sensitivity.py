@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 
 import pkmcal as pk
 from pkmcal import cli, cli_tolerance, figures
-from pkmcal.cli_tolerance import read_sigma
+from pkmcal.cli_calibrate import read_deviations
 from pkmcal.pose_csv import read_poses, write_poses
-from pkmcal.sensitivity import STUDIES, study_cases
+from pkmcal.sensitivity import STUDIES, own_names, study_cases
 
 
 @pytest.fixture(autouse=True)
@@ -169,8 +169,10 @@ def test_tolerance_as_json_holds_the_attributes_of_the_result() -> None:
 
 def test_sigma_has_the_units_of_prior() -> None:
     robot = pk.load("rbt-6t03p")
-    assert read_sigma(["0.1"], robot) == 0.1
-    read = read_sigma(["slider*.tilt1=0.1deg", "rod*=10um"], robot)
+    names = own_names(robot)
+    assert read_deviations("--sigma", ["0.1"], robot, names) == 0.1
+    given = ["slider*.tilt1=0.1deg", "rod*=10um"]
+    read = read_deviations("--sigma", given, robot, names)
     assert isinstance(read, dict)
     assert read["slider*.tilt1"] == pytest.approx(np.radians(0.1))
     assert read["rod*"] == pytest.approx(0.01)
@@ -186,6 +188,9 @@ def test_wrong_options_are_refused_in_one_line() -> None:
     )
     assert "--sigma base1.x: expected NAME=NUMBER" in refused(
         "tolerance", "2tpr2tps", "--sigma", "base1.x"
+    )
+    assert "--sigma *=1: covers lengths, angles" in refused(
+        "tolerance", "rbt-6t03p", "--sigma", "*=1"
     )
     few = ["tolerance", "2tpr2tps", "--sigma", "0.1", "--samples", "10", "--out", "t"]
     assert "'x' is not one of y, z, alpha, beta" in refused(*few, "--map", "x,z")
