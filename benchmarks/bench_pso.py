@@ -160,7 +160,7 @@ class Residual:
         source, library = folder / "scalar.c", folder / "scalar.so"
         source.write_text(SCALAR % self.slots.shape[2])
         compiler = os.environ.get("CC", "gcc")
-        flags = ("-std=c11", "-O3", "-fno-math-errno", "-ffp-contract=off", "-shared", "-fPIC")
+        flags = ("-std=c11", "-O3", "-march=native", "-fno-tree-vectorize", "-fno-math-errno", "-ffp-contract=off", "-shared", "-fPIC")
         subprocess.run([compiler, *flags, source, "-o", library, "-lm"], check=True)
         self._scalar = ctypes.CDLL(str(library))
         self._arrays = [

@@ -28,7 +28,7 @@ def compensate(
         typer.Argument(
             metavar="MEASURED.csv",
             help="Where the machine went with the commands of its inverse kinematics, row by row:"
-            " poses, or positions 'x [mm], y [mm], z [mm]'.",
+            " poses, or positions 'x \\[mm], y \\[mm], z \\[mm]'.",
         ),
     ],
     method: Annotated[

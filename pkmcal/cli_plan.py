@@ -36,8 +36,8 @@ def plan(
         Path | None,
         typer.Option(
             metavar="CSV",
-            help=f"Candidates, with columns such as 'y [mm]' and 'alpha [deg]'; by default {_DRAWN}"
-            " are drawn in the workspace.",
+            help="Candidates, with columns such as 'y \\[mm]' and 'alpha \\[deg]'; by default"
+            f" {_DRAWN} are drawn in the workspace.",
         ),
     ] = None,
     targets: Annotated[

@@ -34,8 +34,8 @@ def sensitivity(
         Path | None,
         typer.Option(
             metavar="CSV",
-            help="Poses, with columns such as 'y [mm]' and 'alpha [deg]'; by default 30 are drawn"
-            " in the workspace.",
+            help="Poses, with columns such as 'y \\[mm]' and 'alpha \\[deg]'; by default 30"
+            " are drawn in the workspace.",
         ),
     ] = None,
     step: Annotated[

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -51,8 +51,8 @@ def tolerance(
         Path | None,
         typer.Option(
             metavar="CSV",
-            help="Poses, with columns such as 'y [mm]' and 'alpha [deg]'; by default 30 are drawn"
-            " in the workspace.",
+            help="Poses, with columns such as 'y \\[mm]' and 'alpha \\[deg]'; by default 30"
+            " are drawn in the workspace.",
         ),
     ] = None,
     samples: Annotated[

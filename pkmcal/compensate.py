@@ -46,6 +46,8 @@ class Compensation:
         poses, the root mean square of E over them.
     method, orientation : str
         As asked for.
+    units : tuple of str, n
+        Of the actuators, "mm" or "rad".
     """
 
     actuators: FloatArray
@@ -54,10 +56,11 @@ class Compensation:
     history: FloatArray
     method: str
     orientation: str
+    units: tuple[str, ...]
 
     def __str__(self) -> str:
-        n = self.actuators.shape[1]
-        heads = ["row", *(f"q{i + 1}" for i in range(n)), *(f"correction{i + 1}" for i in range(n))]
+        heads = ["row"]
+        heads += [f"{q}{i} [{u}]" for q in ("q", "dq") for i, u in enumerate(self.units, 1)]
         rows = [
             [str(row), *(digits.fixed(float(value), 4) for value in (*q, *dq))]
             for row, (q, dq) in enumerate(zip(self.actuators, self.correction, strict=True))
@@ -65,11 +68,12 @@ class Compensation:
         if len(rows) > _LISTED:
             rows[_LISTED - 4 : -3] = [["⋮"] * len(heads)]
         each = np.sqrt(np.nanmean(self.history**2, axis=0))
+        unit = " and ".join(sorted(set(self.units)))
         if self.method == "exact":
             off = ", ".join(f"{value:.3g}" for value in each)
-            story = f"off by {off} (rms of the actuators, pass by pass)"
+            story = f"off by {off} {unit} (rms of the actuators, pass by pass)"
         else:
-            story = f"swarm from {each[0]:.3g} to {each[-1]:.3g} (rms of E)"
+            story = f"swarm from {each[0]:.3g} to {each[-1]:.3g} {unit} (rms of E)"
         title = f"{len(self.actuators)} poses; {story}; {_ASSUMED[self.orientation]}"
         return title + "\n" + digits.table(heads, rows)
 
@@ -189,6 +193,7 @@ def compensate(
         history=np.concatenate(history, axis=1),
         method=method,
         orientation=orientation,
+        units=robot.actuator_units,
     )
 
 

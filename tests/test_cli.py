@@ -88,6 +88,13 @@ def test_help_shows_an_example_that_runs(verb: str, tmp_path: Path) -> None:
     assert run(*arguments).exit_code == 0
 
 
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_shows_the_units_of_columns(verb: str) -> None:
+    words = " ".join(run(verb, "--help").stdout.replace("│", " ").split())
+    for column in re.findall(r"'(?:x|y|z|alpha) [^']*'", words):
+        assert "[" in column, column
+
+
 def test_process_refuses_in_one_line_and_with_exit_code_2(tmp_path: Path) -> None:
     code = "from pkmcal.cli import main; main()"
     done = subprocess.run(

@@ -89,7 +89,7 @@ def test_the_distribution_is_normal_into_its_tails(numbers: np.ndarray) -> None:
 
 
 def test_neighbours_and_lanes_are_independent(numbers: np.ndarray) -> None:
-    """No correlation of values nor of squares, between any two of 32 neighbours or from row to row."""
+    """Neither values nor squares correlate, among 32 neighbours or from one row to the next."""
     rows = numbers.reshape(-1, 32)
     table = np.hstack([rows[:-1], rows[1:]])
     for values in (table, table**2):
