@@ -1,6 +1,7 @@
 """Screws, arms and readings give the same bits on every ISA, and in every lane and tail.
 
-What the core does with machines is in `test_core`, swarms are in `test_pso`.
+What the core does with machines is in `test_core`, swarms are in `test_pso`, normal numbers in
+`test_normals`.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ ROWS = 37
 TAILS = [*(slice(0, n) for n in range(1, 18)), slice(3, ROWS), slice(0, ROWS)]
 ELSEWHERE = {
     *("inverse", "forward", "jacobian", "forward_jacobian", "error_jacobian", "closure", "limbs"),
-    *("compose", "invert", "compose_rates", "compose_twists"),
+    *("compose", "invert", "compose_rates", "compose_twists", "normals"),
     *("swarm_start", "swarm_judge", "swarm_move", "swarm_eq18"),
 }
 
