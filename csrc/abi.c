@@ -163,6 +163,14 @@ int pkm_limbs(const pkm_machine *machine, int isa, ptrdiff_t n, const double *ge
     return 0;
 }
 
+int pkm_rates(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+              const double *motion, double *q1, double *q2)
+{
+    CHECKED_MACHINE(machine, isa);
+    chosen->rates(machine, n, geometry, motion, q1, q2);
+    return 0;
+}
+
 int pkm_compose(int isa, ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
                 ptrdiff_t b_stride, double *out)
 {

@@ -7,6 +7,7 @@
 #include "inverse.h"
 #include "inspect.h"
 #include "jacobian.h"
+#include "motion.h"
 #include "poses.h"
 #include "pso.h"
 #include "random.h"
@@ -32,6 +33,12 @@ static void core_forward(const pkm_machine *machine, ptrdiff_t n, const double *
         EACH_MAP(CASE)
 #undef CASE
     }
+}
+
+static void core_rates(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                       const double *motion, double *q1, double *q2)
+{
+    rates_rows(machine, n, geometry, motion, q1, q2);
 }
 
 static void core_jacobian(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
@@ -271,4 +278,4 @@ const pkm_core CORE = {core_inverse, core_forward, core_jacobian, core_response,
                        core_closure_cost,
                        core_exp, core_log, core_adjoint, core_motion_pose, core_exp_jacobian,
                        core_joint_motions, core_arm_links, core_arm_forward, core_arm_jacobian,
-                       core_arm_error_jacobian};
+                       core_arm_error_jacobian, core_rates};

@@ -61,6 +61,8 @@ typedef struct {
                          const double *theta, double *jacobian);
     void (*arm_error_jacobian)(const pkm_arm *, const pkm_links *, const double *error, int frame,
                                ptrdiff_t n, const double *theta, double *jacobian);
+    void (*rates)(const pkm_machine *, ptrdiff_t n, const double *geometry, const double *motion,
+                  double *q1, double *q2);
 } pkm_core;
 
 extern const pkm_core pkm_base, pkm_v3, pkm_v4;

@@ -4,12 +4,11 @@
 
 #include "closure.h"
 
-/* Not finite out of reach, or so far away that squares overflow. */
-INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *limb, const real *R,
-                         const real *p)
+/* q̃ of a limb whose platform joint is h from its base point; not finite out of reach, or so far away
+ * that squares overflow. */
+INLINE real limb_drive_at(const pkm_machine *machine, int i, const limb_numbers *limb, const real *h)
 {
-    real h[3], qt, q;
-    FN(limb_joint)(R, p, limb->g + PLATFORM_X, limb->g + BASE_X, h);
+    real qt;
     if (machine->driver[i] == DRIVER_LENGTH) {
         FN(length_inverse)(limb->g, h, &qt);
     } else if (machine->driver[i] == DRIVER_SLIDER) {
@@ -20,7 +19,15 @@ INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *
                           &cosine);
         qt = arctangent2(sine, cosine);
     }
-    FN(limb_command)(qt, limb->per_gain, limb->g, &q);
+    return qt;
+}
+
+INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *limb, const real *R,
+                         const real *p)
+{
+    real h[3], q;
+    FN(limb_joint)(R, p, limb->g + PLATFORM_X, limb->g + BASE_X, h);
+    FN(limb_command)(limb_drive_at(machine, i, limb, h), limb->per_gain, limb->g, &q);
     return q;
 }
 

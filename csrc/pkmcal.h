@@ -93,6 +93,11 @@ int pkm_closure(const pkm_machine *machine, int isa, ptrdiff_t n, const double *
 int pkm_limbs(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
               const double *pose, double *drive, double *on_base, double *on_platform);
 
+/* motion (n, 3, 4, 4), the platform's homogeneous matrix with its first and second derivative by time
+ * -> velocity and acceleration of the actuators, (n, actuators) each; NaN out of reach. */
+int pkm_rates(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+              const double *motion, double *q1, double *q2);
+
 /* Poses as frames: out = A B (strides 0 or 6), out = A^-1, and the rates (n, 6, 6) of A T C by those
  * of T, or its twists by those of T: A and C are (6,) there, T (n, 6). */
 int pkm_compose(int isa, ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,

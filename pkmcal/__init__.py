@@ -7,6 +7,7 @@ from typing import Any
 from pkmcal import screw
 from pkmcal.allocation import Allocation, allocate_tolerance
 from pkmcal.bootstrap import Bootstrap, bootstrap
+from pkmcal.check_geometry import GeometryCheck, check_geometry
 from pkmcal.compensate import Compensation, compensate
 from pkmcal.feasible import Feasibility
 from pkmcal.forward import Forward
@@ -31,6 +32,7 @@ __all__ = [
     "Dexterity",
     "Feasibility",
     "Forward",
+    "GeometryCheck",
     "Identification",
     "Measurements",
     "Plan",
@@ -44,6 +46,7 @@ __all__ = [
     "Workspace",
     "allocate_tolerance",
     "bootstrap",
+    "check_geometry",
     "compensate",
     "dexterity",
     "identify",

@@ -13,6 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from pkmcal.cli_calibrate import calibrate
+from pkmcal.cli_check import check
 from pkmcal.cli_compensate import compensate
 from pkmcal.cli_demo import demo
 from pkmcal.cli_machines import machines
@@ -42,7 +43,7 @@ class _Verbs(TyperGroup):
 
 
 app = typer.Typer(cls=_Verbs, pretty_exceptions_enable=False)
-for verb in (demo, machines, sensitivity, tolerance, plan, calibrate, compensate):
+for verb in (demo, machines, check, sensitivity, tolerance, plan, calibrate, compensate):
     app.command()(verb)
 
 

@@ -380,6 +380,28 @@ class Machine:
             )
         return out
 
+    def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Velocity and acceleration of the actuators, (N, n) each.
+
+        `motion` (N, 3, 4, 4) is the platform's homogeneous matrix and its first and second
+        derivative by time.
+        """
+        n = len(motion)
+        velocity, acceleration = np.empty((n, self.actuators)), np.empty((n, self.actuators))
+        if n:
+            self._ensure(
+                lib.pkm_rates(
+                    self.struct,
+                    self.isa,
+                    n,
+                    pointer(slots),
+                    pointer(motion),
+                    pointer(velocity),
+                    pointer(acceleration),
+                )
+            )
+        return velocity, acceleration
+
     def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
         """The closure rows and their derivatives at poses (N, 6) and coordinates (N, n)."""
         n, m = len(pose), self.m

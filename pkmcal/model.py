@@ -95,7 +95,8 @@ class Model:
     free : tuple of str
         Names that a calibration frees unless told otherwise; empty when the file has none.
     stated : mapping of str to float
-        What a data sheet claims, by name of a number or of a slot ("rod": every rod).
+        What a data sheet claims, by name of a number, of a slot ("rod": every rod), or of
+        `pkmcal.robotfile.STATED_SIZES`.
     base_frame : ndarray (6,) or None
         Pose of the machine's own frame in the frame poses are given in.
     tool_frame : ndarray (6,) or None

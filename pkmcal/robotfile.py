@@ -29,6 +29,9 @@ else:
 
 FloatArray = NDArray[np.float64]
 
+# What a data sheet states beside single numbers: of the circles of the joints, and of the legs at
+# home, which a machine with length limbs has.
+STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_diameter", "length")
 TOP = ("name", "units", "frames", "pose", "parameters", "calibration", "stated", "limb")
 
 
@@ -234,6 +237,8 @@ def _read_stated(table: Table, geometry: Geometry, limbs: tuple[Limb, ...]) -> M
         for _, name, unit in KINDS[limb.kind].numbers("", limb.couple > 0.0):
             if unit == "mm":
                 units.setdefault(name, unit)
+    for name in STATED_SIZES:
+        units.setdefault(name, "mm")
     stated = {}
     for name, value in _flat(table.data):
         if name not in units:

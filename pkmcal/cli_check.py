@@ -1,0 +1,44 @@
+"""`pkmcal check`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pkmcal.check_geometry import check_geometry
+from pkmcal.cli_output import as_json
+from pkmcal.measurement_csv import read_measurements
+from pkmcal.robot import load_parallel
+
+
+def check(
+    robot: Annotated[
+        str, typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
+    ],
+    measurements: Annotated[
+        Path | None,
+        typer.Argument(metavar="CSV", help="Measurements of it: columns, units, numbers."),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+) -> int:
+    """Look for what tables of a machine's geometry get wrong.
+
+    Limbs that are not alike, joints off their circle, angles used as lengths, other wrong units,
+    strokes that cannot be used, singular machines, contradictions to what the file states; each
+    with its numbers and a suggestion. Exit code 1: something was found.
+
+    Example: pkmcal check hexapod
+    """
+    machine = load_parallel(robot)
+    measured = None if measurements is None else read_measurements(measurements, machine)
+    found = check_geometry(machine)
+    if json:
+        typer.echo(as_json(found, "ok"))
+    else:
+        typer.echo(str(found))
+        if measured is not None:
+            rows = f"{len(measured)} row{'s' * (len(measured) > 1)} of kind {measured.kind}"
+            typer.echo(f"{measurements}: {rows}, readable")
+    return 0 if found.ok else 1
