@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from pkmcal import screw
+from pkmcal import screw, trajectory
 from pkmcal.allocation import Allocation, allocate_tolerance
 from pkmcal.bootstrap import Bootstrap, bootstrap
 from pkmcal.check_geometry import GeometryCheck, check_geometry
@@ -59,6 +59,7 @@ __all__ = [
     "screw",
     "sensitivity",
     "tolerance",
+    "trajectory",
     "workspace",
 ]
 

@@ -36,6 +36,24 @@ class Frames:
             return pose
         return compose(compose(self._base, pose), self._tool)
 
+    def motion_inward(self, motion: FloatArray) -> FloatArray:
+        """Motions with their derivatives (N, 3, 4, 4), from the user's frames to the machine's."""
+        if self.trivial:
+            return motion
+        from pkmcal.screw import from_pose
+
+        inward: FloatArray = from_pose(self._base_inverse) @ motion @ from_pose(self._tool_inverse)
+        return inward
+
+    def motion_outward(self, motion: FloatArray) -> FloatArray:
+        """The reverse of `motion_inward`."""
+        if self.trivial:
+            return motion
+        from pkmcal.screw import from_pose
+
+        outward: FloatArray = from_pose(self._base) @ motion @ from_pose(self._tool)
+        return outward
+
     def rates_outward(self, own: FloatArray, pose: FloatArray, rates: FloatArray) -> FloatArray:
         """Rates (N, 6, k) of the machine's own poses to those of the user's poses."""
         if self.trivial:

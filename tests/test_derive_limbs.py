@@ -167,3 +167,24 @@ def test_inverse_puts_the_limb_at_its_length_on_its_branch(driver: str, branch: 
     assert abs((d.dot(d) - rho**2).xreplace(at).n(30)) < 1e-20
     if driver != "length":
         assert sp.sign(d.dot(centre.diff(qt)).xreplace(at).n(30)) == branch
+
+
+@pytest.mark.parametrize("driver", ["length", "slider", "crank"])
+def test_rates_keep_the_closure_to_second_order(driver: str) -> None:
+    """With q̃ + qt1 t + qt2 t²/2 the closure along h + h1 t + h2 t²/2 has no t and no t²."""
+    made = FUNCTIONS[f"{driver}_rates"]
+    t = sp.Symbol("t", real=True)
+    first, second, h1, h2 = (symbols(name, 3) for name in ("first", "second", "h1", "h2"))
+    numbers = rational_point(column([*h, *h1, *h2, *first, *second, qt]), seed=5)
+    qt1, qt2 = (made.result(name)[0].subs(numbers).n(40) for name in ("qt1", "qt2"))
+    drive = qt + qt1 * t + qt2 * t**2 / 2
+    joint = h + h1 * t + h2 * t**2 / 2
+    if driver == "length":  # at a q̃ that is the length: elsewhere Φ is another constant
+        phi = joint.dot(joint) - drive**2
+    else:
+        carried = drive * first
+        if driver == "crank":
+            carried = sp.cos(drive) * first + sp.sin(drive) * second
+        phi = (joint - carried).dot(joint - carried)
+    for order in (1, 2):
+        assert abs(sp.diff(phi, t, order).subs(t, 0).subs(numbers).n(30)) < 1e-20

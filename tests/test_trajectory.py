@@ -1,0 +1,344 @@
+"""Trajectories: laws in time, exact accelerations, fastest moves, limits and their times."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal import motion as motions
+from pkmcal import move_figures
+
+from . import twin
+
+MOVED = ("rbt-6t03p", "hexapod", "6-rus", "linear-delta", "rotary-delta", "3rrr-planar")
+CONSTRAINED = ("2tpr2tps", "2tpr2tps-spatial", "3rps")
+
+
+def ends(robot: pk.Robot) -> np.ndarray:
+    return pk.sample_poses(robot, 2, seed=1, share=0.4)
+
+
+def slope(values: Any, t: np.ndarray, h: float = 1e-3) -> np.ndarray:
+    """Derivative of `values(t)` by central differences of sixth order."""
+    f = {k: values(t + k * h) for k in (-3, -2, -1, 1, 2, 3)}
+    return np.asarray((f[3] - f[-3] - 9 * (f[2] - f[-2]) + 45 * (f[1] - f[-1])) / (60 * h))
+
+
+# --- laws ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("law", [pk.trajectory.cubic, pk.trajectory.quintic])
+def test_laws_run_from_rest_to_rest(law: Any) -> None:
+    made = law([1.0, -2.0], [4.0, 7.0], 1.7)
+    position, velocity, _ = made.sample(np.array([0.0, 1.7]))
+    np.testing.assert_allclose(position, [[1, -2], [4, 7]], atol=1e-14)
+    np.testing.assert_allclose(velocity, 0.0, atol=1e-14)
+    t = np.linspace(0.1, 1.6, 9)
+    np.testing.assert_allclose(slope(lambda s: made.sample(s)[0], t), made.sample(t)[1], atol=1e-10)
+    np.testing.assert_allclose(slope(lambda s: made.sample(s)[1], t), made.sample(t)[2], atol=1e-10)
+
+
+def test_the_cubic_jumps_in_acceleration_and_the_quintic_does_not() -> None:
+    """From rest before to the move: 6 Δ/T² at both ends with the cubic, 0 with the quintic."""
+    near = np.array([-1e-9, 0.0, 2.0, 2.0 + 1e-9])
+    jumps = {}
+    for name in ("cubic", "quintic"):
+        before, start, end, after = getattr(pk.trajectory, name)(0.0, 10.0, 2.0).sample(near)[2]
+        jumps[name] = float(start - before), float(after - end)
+    assert jumps["cubic"] == pytest.approx((15.0, 15.0))
+    assert jumps["quintic"] == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+def test_time_is_the_first_axis_and_scalars_are_allowed() -> None:
+    law = pk.trajectory.quintic(np.zeros((2, 3)), np.ones((2, 3)), 1.0)
+    assert [each.shape for each in law.sample(np.zeros((5, 4)))] == [(5, 4, 2, 3)] * 3
+    assert [np.shape(each) for each in pk.trajectory.cubic(0, 1, 1.0).sample(0.5)] == [()] * 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (([0, 1], [0], 1.0), "start and end must have one shape"),
+        ((0.0, np.nan, 1.0), "end must be finite"),
+        ((0.0, 1.0, 0.0), "duration must be positive"),
+    ],
+)
+def test_wrong_laws_are_refused(arguments: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        pk.trajectory.cubic(*arguments)
+
+
+# --- platform and actuators along a move -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("space", ["pose", "joint"])
+@pytest.mark.parametrize("name", MOVED)
+def test_velocities_and_accelerations_are_those_of_the_positions(name: str, space: Any) -> None:
+    robot = pk.load(name)
+    move = pk.trajectory.move(robot, *ends(robot), duration=2.0, space=space)
+    t = np.linspace(0.1, 1.9, 13)
+    at = move.sample(t)
+    pairs = (
+        (lambda s: move.sample(s).actuators, at.velocities),
+        (lambda s: move.sample(s).velocities, at.accelerations),
+        (lambda s: move.sample(s).pose[:, :3], at.twist[:, 3:]),
+        (lambda s: move.sample(s).twist, at.twist_rate),
+    )
+    for values, expected in pairs:
+        np.testing.assert_allclose(slope(values, t), expected, atol=2e-8)
+    np.testing.assert_allclose(robot.inverse(at.pose), at.actuators, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", MOVED)
+def test_velocities_are_the_jacobian_times_the_rates_of_the_pose(name: str) -> None:
+    robot = pk.load(name)
+    move = pk.trajectory.move(robot, *ends(robot), duration=2.0)
+    at = move.sample(np.linspace(0.2, 1.8, 5))
+    rates = slope(lambda s: move.sample(s).pose, at.time)
+    free = [list("x y z alpha beta gamma".split()).index(each) for each in robot.coordinates]
+    found = np.einsum("nij,nj->ni", robot.jacobian(at.pose), rates[:, free])
+    np.testing.assert_allclose(found, at.velocities, atol=1e-8)
+
+
+@pytest.mark.parametrize("name", CONSTRAINED)
+def test_machines_whose_limbs_constrain_the_pose_move_straight_in_their_actuators(
+    name: str,
+) -> None:
+    robot = pk.load(name)
+    with pytest.raises(ValueError, match="cannot follow the straight path.*space='joint'"):
+        pk.trajectory.move(robot, *ends(robot), duration=2.0)
+    move = pk.trajectory.move(robot, *ends(robot), duration=2.0, space="joint")
+    at = move.sample(np.linspace(0.0, 2.0, 9))
+    assert robot.violation(at.pose).max() < 1e-8
+    assert np.isnan(at.twist_rate).all()
+    velocity = slope(lambda s: move.sample(s).pose[:, :3], at.time[1:-1])
+    np.testing.assert_allclose(velocity, at.twist[1:-1, 3:], atol=1e-7)
+
+
+def inverse_in_50_digits(robot: pk.Robot, start: np.ndarray, end: np.ndarray, limb: int) -> Any:
+    """q of one limb at s on the straight path: SLERP by Rodrigues, the closure by a root."""
+    R0, R1 = (mp.matrix(twin.rotation(pose).tolist()) for pose in (start, end))
+    between = R0.T * R1
+    angle = mp.acos((between[0, 0] + between[1, 1] + between[2, 2] - 1) / 2)
+    axis = mp.matrix([between[2, 1] - between[1, 2], between[0, 2] - between[2, 0],
+                      between[1, 0] - between[0, 1]]) / (2 * mp.sin(angle))  # fmt: skip
+    K = mp.matrix([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    model = robot.model.limbs[limb]
+    n = twin.numbers(robot.model, None)[limb]
+    platform, base = mp.matrix(twin.platform_point(n)), mp.matrix(twin.base_point(n))
+    frame = mp.matrix(twin.tilted(model, n).tolist())
+    p0, p1 = mp.matrix(start[:3].tolist()), mp.matrix(end[:3].tolist())
+
+    def q(s: Any) -> Any:
+        turn = mp.eye(3) + mp.sin(s * angle) * K + (1 - mp.cos(s * angle)) * K * K
+        h = p0 + s * (p1 - p0) + R0 * (turn * platform) - base
+        square = sum(each**2 for each in h)
+        if model.kind == "UPS":
+            return mp.sqrt(square)
+        along = frame.T * h
+        if model.kind == "PUS":
+            root = mp.sqrt(mp.mpf(n["rod"]) ** 2 - along[0] ** 2 - along[1] ** 2)
+            return along[2] - model.branch * root
+        kappa = (square + mp.mpf(n["crank"]) ** 2 - mp.mpf(n["rod"]) ** 2) / (2 * n["crank"])
+        far = mp.sqrt(along[0] ** 2 + along[1] ** 2)
+        return mp.atan2(along[1], along[0]) - model.branch * mp.acos(kappa / far)
+
+    return q
+
+
+@pytest.mark.parametrize("name", ["rbt-6t03p", "hexapod", "6-rus"])
+def test_accelerations_agree_with_derivatives_in_50_digits(name: str) -> None:
+    robot = pk.load(name)
+    start, end = ends(robot)
+    with mp.workdps(50):
+        t = 0.7
+        law = lambda x: 10 * x**3 - 15 * x**4 + 6 * x**5  # noqa: E731
+        at = pk.trajectory.move(robot, start, end, duration=2.0).sample(t)
+        for limb in range(6):
+            q = inverse_in_50_digits(robot, start, end, limb)
+            along = [float(mp.diff(lambda x, q=q: q(law(x / 2)), mp.mpf(t), k)) for k in range(3)]
+            found = [at.actuators[limb], at.velocities[limb], at.accelerations[limb]]
+            np.testing.assert_allclose(found, along, rtol=1e-10, atol=1e-11)
+
+
+def test_frames_of_base_and_tool_carry_the_motion_along() -> None:
+    from dataclasses import replace
+
+    robot = pk.load("hexapod")
+    base, tool = np.array([100.0, 20, 5, 0.1, -0.2, 0.6]), np.array([3.0, -8, 60, 0.2, 0.1, -0.3])
+    framed = pk.Robot(replace(robot.model, base_frame=base, tool_frame=tool))
+    first = framed.home
+    move = pk.trajectory.move(framed, first, first + [30, -20, 25, 0.1, 0.05, -0.1], duration=1.5)
+    for space in ("pose", "joint"):
+        move = pk.trajectory.move(framed, first, move.end, duration=1.5, space=space)  # type: ignore[arg-type]
+        t = np.linspace(0.1, 1.4, 6)
+        at = move.sample(t)
+        for values, expected in (
+            (lambda s, m=move: m.sample(s).velocities, at.accelerations),
+            (lambda s, m=move: m.sample(s).pose[:, :3], at.twist[:, 3:]),
+            (lambda s, m=move: m.sample(s).twist, at.twist_rate),
+        ):
+            np.testing.assert_allclose(slope(values, t), expected, atol=2e-8)
+
+
+def test_orientation_turns_about_one_axis() -> None:
+    """SLERP, against SciPy's, and an angular velocity of constant direction."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    robot = pk.load("hexapod")
+    start, end = robot.home + [0, 0, 0, 0.2, -0.1, 0.3], robot.home + [10, 0, 0, -0.1, 0.15, -0.2]
+    at = pk.trajectory.move(robot, start, end, duration=1.0).sample(np.linspace(0, 1, 11))
+    share = pk.trajectory.quintic(0, 1, 1.0).sample(at.time)[0]
+    turned = Rotation.from_euler("xyz", [start[3:], end[3:]])
+    expected = Slerp([0, 1], turned)(share).as_euler("xyz")
+    np.testing.assert_allclose(at.pose[:, 3:], expected, atol=1e-12)
+    inside = at.twist[1:-1, :3]
+    unit = inside / np.linalg.norm(inside, axis=1, keepdims=True)
+    np.testing.assert_allclose(unit, np.broadcast_to(unit[0], unit.shape), atol=1e-12)
+
+
+def test_motion_of_a_pose_agrees_with_differences() -> None:
+    rng = np.random.default_rng(0)
+    pose, rate, bend = rng.uniform(-1, 1, (3, 6))
+    at = lambda t: pk.screw.from_pose(pose + t * rate + t * t / 2 * bend)  # noqa: E731
+    found = motions.of_pose(pose[None], rate[None], bend[None])[0]
+    h = 1e-3
+    np.testing.assert_allclose(found[0], at(0.0), atol=1e-14)
+    np.testing.assert_allclose(found[1], (at(h) - at(-h)) / (2 * h), atol=1e-6)
+    np.testing.assert_allclose(found[2], (at(h) - 2 * at(0) + at(-h)) / h**2, atol=1e-5)
+
+
+# --- the fastest move ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("space", ["pose", "joint"])
+def test_the_fastest_move_touches_a_limit_and_breaks_none(space: Any) -> None:
+    robot = pk.load("rbt-6t03p")
+    most = np.array([40.0, 50, 60, 60, 60, 60])
+    for limits in (
+        {"velocity": most},
+        {"acceleration": 200.0},
+        {"velocity": most, "acceleration": 90.0},
+    ):
+        move = pk.trajectory.move(robot, *ends(robot), space=space, **limits)
+        at = move.sample(np.linspace(0, move.duration, 20001))
+        used = []
+        for values, name in ((at.velocities, "velocity"), (at.accelerations, "acceleration")):
+            if name in limits:
+                used.append(float((np.abs(values) / limits[name]).max()))
+        assert max(used) == pytest.approx(1.0, abs=1e-6)
+        assert max(used) <= 1.0 + 1e-9
+
+
+def test_the_fastest_quintic_in_joint_space_is_known() -> None:
+    """Peak speed 15/8 Δ/T, peak acceleration 10/√3 Δ/T²."""
+    robot = pk.load("rbt-6t03p")
+    way = np.abs(np.subtract(*robot.inverse(ends(robot)))).max()
+    by_speed = pk.trajectory.move(robot, *ends(robot), space="joint", velocity=30.0)
+    assert by_speed.duration == pytest.approx(15 / 8 * way / 30, rel=1e-10)
+    by_force = pk.trajectory.move(robot, *ends(robot), space="joint", acceleration=500.0)
+    assert by_force.duration == pytest.approx(np.sqrt(10 / np.sqrt(3) * way / 500), rel=1e-10)
+
+
+# --- limits and singularities on the way -----------------------------------------------------------
+
+
+def test_a_broken_stroke_is_reported_with_its_times() -> None:
+    """Straight up by 80 mm: the sliders pass 258.8966 at a rise of 50 mm, known from the law."""
+    robot = pk.load("rbt-6t03p")
+    move = pk.trajectory.move(robot, robot.home, [0, 0, 80, 0, 0, 0], duration=2.0)
+    events = move.events()
+    assert [(event.what, event.limb) for event in events] == [("stroke", i) for i in range(1, 7)]
+    roots = np.roots([6, -15, 10, 0, 0, -(258.8966 - 208.8966245) / 80])
+    (root,) = [each.real for each in roots if abs(each.imag) < 1e-9 and 0 < each.real < 1]
+    for event in events:
+        assert event.time == pytest.approx(2 * root, abs=1e-6)
+        assert event.until == 2.0
+    assert "limb 3: stroke broken" in str(move)
+
+
+def test_a_singularity_on_the_way_is_reported_where_the_determinant_changes_sign() -> None:
+    from dataclasses import replace
+
+    robot = pk.load("hexapod")
+    free = pk.Robot(replace(robot.model, limbs=tuple(
+        replace(limb, stroke=None) for limb in robot.model.limbs
+    )))  # fmt: skip
+    end = free.home + [0, 0, 0, 0, 0, np.radians(120)]
+    move = pk.trajectory.move(free, free.home, end, duration=2.0)
+    (event,) = move.events()
+    assert event.what == "singularity"
+    assert np.degrees(move.sample(event.time).pose[5]) == pytest.approx(90.0, abs=1e-6)
+    assert move.conditioning(event.time) < 1e-9
+
+
+def test_a_move_within_limits_has_no_events() -> None:
+    robot = pk.load("rbt-6t03p")
+    assert pk.trajectory.move(robot, *ends(robot), duration=1.0).events() == []
+
+
+def test_wrong_moves_are_refused() -> None:
+    robot = pk.load("rbt-6t03p")
+    move, home = pk.trajectory.move, robot.home
+    up = home + [0, 0, 10, 0, 0, 0]
+    for words, arguments in (
+        ("give a duration, or limits", {}),
+        ("duration must be positive", {"duration": -1.0}),
+        ("velocity must be positive", {"velocity": -3.0}),
+        ("velocity must be one limit or 6", {"velocity": [1.0, 2.0]}),
+        ("space must be", {"duration": 1.0, "space": "poses"}),
+        ("law must be", {"duration": 1.0, "law": "linear"}),
+        ("straight in joint space", {"law": "jerk-limited", "velocity": 1.0}),
+    ):
+        with pytest.raises(ValueError, match=words):
+            move(robot, home, up, **arguments)
+    with pytest.raises(ValueError, match="end: RBT-6T03P cannot take this pose, out of reach"):
+        move(robot, home, [900, 0, 0, 0, 0, 0], duration=1.0)
+    with pytest.raises(ValueError, match="the same pose"):
+        move(robot, home, home, velocity=1.0)
+
+
+# --- limited jerk ----------------------------------------------------------------------------------
+
+
+def test_jerk_limited_moves_keep_every_limit() -> None:
+    pytest.importorskip("ruckig", reason="the extra pkmcal[ruckig] is not installed")
+    robot = pk.load("rbt-6t03p")
+    limits = {"velocity": 60.0, "acceleration": 300.0, "jerk": [2000.0] * 6}
+    start, end = ends(robot)
+    move = pk.trajectory.move(robot, start, end, law="jerk-limited", space="joint", **limits)
+    t = np.linspace(0, move.duration, 4001)
+    at = move.sample(t)
+    np.testing.assert_allclose(at.pose[[0, -1]], [start, end], atol=1e-8)
+    assert np.abs(at.velocities).max() <= 60.0 + 1e-6
+    assert np.abs(at.accelerations).max() <= 300.0 + 1e-6
+    jerk = np.abs(np.diff(at.accelerations, axis=0)).max() / (t[1] - t[0])
+    assert 0.9 * 2000 <= jerk <= 2000.0 + 1e-3
+    np.testing.assert_allclose(at.accelerations[[0, -1]], 0.0, atol=1e-9)  # no jump
+
+
+# --- pictures --------------------------------------------------------------------------------------
+
+
+def test_limbs_drawn_have_their_lengths() -> None:
+    for name in ("rbt-6t03p", "hexapod", "6-rus"):
+        robot = pk.load(name)
+        poses = ends(robot)
+        _, anchors, joints = move_figures.places(robot, np.ascontiguousarray(poses))
+        lengths = np.linalg.norm(joints - anchors, axis=2)
+        expected = {"rbt-6t03p": 223.0, "hexapod": robot.inverse(poses), "6-rus": 230.0}[name]
+        np.testing.assert_allclose(lengths, np.broadcast_to(expected, lengths.shape), atol=1e-9)
+
+
+def test_curves_are_those_of_the_move() -> None:
+    robot = pk.load("rbt-6t03p")
+    move = pk.trajectory.move(robot, *ends(robot), duration=2.0)
+    figure = move_figures.curves([move], ["quintic"], "title")
+    line = figure.axes[0].lines[2]
+    t = np.asarray(line.get_xdata())[2:-2]
+    np.testing.assert_allclose(line.get_ydata()[2:-2], move.sample(t).actuators[:, 2])
+    assert len(move_figures.in_space(robot, move.sample([0.0, 1.0]).pose, "ab", "t").axes) == 2
