@@ -358,7 +358,7 @@ def _fastest(unit: Move, limits: dict[str, FloatArray]) -> float:
 
 
 def _peaks(unit: Move, part: Callable[[MoveSample], FloatArray]) -> FloatArray:
-    """The largest size of each actuator's velocity or acceleration, looked for again at its peak."""
+    """The largest size of each actuator's velocity or acceleration, looked at again closely."""
     coarse = np.linspace(0.0, 1.0, _STEPS + 1)
     sizes = np.abs(part(unit.sample(coarse)))
     peaks = sizes.max(axis=0)

@@ -42,9 +42,8 @@ def curves(moves: Sequence[Move], labels: Sequence[str], title: str) -> Figure:
     for column, (made, label) in enumerate(zip(moves, labels, strict=True)):
         lead = _LEAD * made.duration
         inside = np.linspace(0.0, made.duration, _POINTS)
-        time = np.concatenate(
-            [[-lead, -1e-9], inside, [made.duration + 1e-9, made.duration + lead]]
-        )
+        edge = made.duration + 1e-9
+        time = np.concatenate([[-lead, -1e-9], inside, [edge, edge + lead]])
         at = made.sample(np.clip(time, 0.0, made.duration))
         resting = (time < 0) | (time > made.duration)
         rows = (

@@ -11,6 +11,7 @@ import pytest
 import pkmcal as pk
 from pkmcal import motion as motions
 from pkmcal import move_figures
+from pkmcal.core import POSE
 
 from . import twin
 
@@ -72,7 +73,7 @@ def test_wrong_laws_are_refused(arguments: Any, words: str) -> None:
         pk.trajectory.cubic(*arguments)
 
 
-# --- platform and actuators along a move -----------------------------------------------------------
+# --- platform and actuators along a move ---------------------------------------------------------
 
 
 @pytest.mark.parametrize("space", ["pose", "joint"])
@@ -99,7 +100,7 @@ def test_velocities_are_the_jacobian_times_the_rates_of_the_pose(name: str) -> N
     move = pk.trajectory.move(robot, *ends(robot), duration=2.0)
     at = move.sample(np.linspace(0.2, 1.8, 5))
     rates = slope(lambda s: move.sample(s).pose, at.time)
-    free = [list("x y z alpha beta gamma".split()).index(each) for each in robot.coordinates]
+    free = [POSE.index(each) for each in robot.coordinates]
     found = np.einsum("nij,nj->ni", robot.jacobian(at.pose), rates[:, free])
     np.testing.assert_allclose(found, at.velocities, atol=1e-8)
 
@@ -109,7 +110,7 @@ def test_machines_whose_limbs_constrain_the_pose_move_straight_in_their_actuator
     name: str,
 ) -> None:
     robot = pk.load(name)
-    with pytest.raises(ValueError, match="cannot follow the straight path.*space='joint'"):
+    with pytest.raises(ValueError, match="cannot follow the straight path"):
         pk.trajectory.move(robot, *ends(robot), duration=2.0)
     move = pk.trajectory.move(robot, *ends(robot), duration=2.0, space="joint")
     at = move.sample(np.linspace(0.0, 2.0, 9))
@@ -172,9 +173,9 @@ def test_frames_of_base_and_tool_carry_the_motion_along() -> None:
     base, tool = np.array([100.0, 20, 5, 0.1, -0.2, 0.6]), np.array([3.0, -8, 60, 0.2, 0.1, -0.3])
     framed = pk.Robot(replace(robot.model, base_frame=base, tool_frame=tool))
     first = framed.home
-    move = pk.trajectory.move(framed, first, first + [30, -20, 25, 0.1, 0.05, -0.1], duration=1.5)
+    end = np.add(first, [30, -20, 25, 0.1, 0.05, -0.1])
     for space in ("pose", "joint"):
-        move = pk.trajectory.move(framed, first, move.end, duration=1.5, space=space)  # type: ignore[arg-type]
+        move = pk.trajectory.move(framed, first, end, duration=1.5, space=space)  # type: ignore[arg-type]
         t = np.linspace(0.1, 1.4, 6)
         at = move.sample(t)
         for values, expected in (
@@ -190,7 +191,8 @@ def test_orientation_turns_about_one_axis() -> None:
     from scipy.spatial.transform import Rotation, Slerp
 
     robot = pk.load("hexapod")
-    start, end = robot.home + [0, 0, 0, 0.2, -0.1, 0.3], robot.home + [10, 0, 0, -0.1, 0.15, -0.2]
+    start = np.add(robot.home, [0, 0, 0, 0.2, -0.1, 0.3])
+    end = np.add(robot.home, [10, 0, 0, -0.1, 0.15, -0.2])
     at = pk.trajectory.move(robot, start, end, duration=1.0).sample(np.linspace(0, 1, 11))
     share = pk.trajectory.quintic(0, 1, 1.0).sample(at.time)[0]
     turned = Rotation.from_euler("xyz", [start[3:], end[3:]])
@@ -212,7 +214,7 @@ def test_motion_of_a_pose_agrees_with_differences() -> None:
     np.testing.assert_allclose(found[2], (at(h) - 2 * at(0) + at(-h)) / h**2, atol=1e-5)
 
 
-# --- the fastest move ------------------------------------------------------------------------------
+# --- the fastest move ----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("space", ["pose", "joint"])
@@ -244,7 +246,7 @@ def test_the_fastest_quintic_in_joint_space_is_known() -> None:
     assert by_force.duration == pytest.approx(np.sqrt(10 / np.sqrt(3) * way / 500), rel=1e-10)
 
 
-# --- limits and singularities on the way -----------------------------------------------------------
+# --- limits and singularities on the way ---------------------------------------------------------
 
 
 def test_a_broken_stroke_is_reported_with_its_times() -> None:
@@ -268,7 +270,7 @@ def test_a_singularity_on_the_way_is_reported_where_the_determinant_changes_sign
     free = pk.Robot(replace(robot.model, limbs=tuple(
         replace(limb, stroke=None) for limb in robot.model.limbs
     )))  # fmt: skip
-    end = free.home + [0, 0, 0, 0, 0, np.radians(120)]
+    end = np.add(free.home, [0, 0, 0, 0, 0, np.radians(120)])
     move = pk.trajectory.move(free, free.home, end, duration=2.0)
     (event,) = move.events()
     assert event.what == "singularity"
@@ -284,7 +286,7 @@ def test_a_move_within_limits_has_no_events() -> None:
 def test_wrong_moves_are_refused() -> None:
     robot = pk.load("rbt-6t03p")
     move, home = pk.trajectory.move, robot.home
-    up = home + [0, 0, 10, 0, 0, 0]
+    up = np.add(home, [0, 0, 10, 0, 0, 0])
     for words, arguments in (
         ("give a duration, or limits", {}),
         ("duration must be positive", {"duration": -1.0}),
@@ -302,7 +304,7 @@ def test_wrong_moves_are_refused() -> None:
         move(robot, home, home, velocity=1.0)
 
 
-# --- limited jerk ----------------------------------------------------------------------------------
+# --- limited jerk --------------------------------------------------------------------------------
 
 
 def test_jerk_limited_moves_keep_every_limit() -> None:
@@ -321,7 +323,7 @@ def test_jerk_limited_moves_keep_every_limit() -> None:
     np.testing.assert_allclose(at.accelerations[[0, -1]], 0.0, atol=1e-9)  # no jump
 
 
-# --- pictures --------------------------------------------------------------------------------------
+# --- pictures ------------------------------------------------------------------------------------
 
 
 def test_limbs_drawn_have_their_lengths() -> None:
