@@ -156,7 +156,7 @@ class Move:
             f"{self.robot.name}: straight in {self.space} space, {self.duration:.4g} s,"
             f" conditioning {np.min(self.conditioning(at.time)):.3g} at least"
         )
-        head = ["actuator", "from", "to", "speed [1/s]", "acceleration [1/s²]"]
+        head = ["actuator", "from", "to", "top speed [/s]", "top acceleration [/s²]"]
         lines = [title, digits.table(head, rows, left=1)]
         for event in self.events():
             limb = "" if event.limb is None else f"limb {event.limb}: "

@@ -7,6 +7,11 @@ wrong a test states the misprint and how much it is off.
 
 from __future__ import annotations
 
+import doctest
+import re
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -17,6 +22,7 @@ import pkmcal as pk
 
 Array = NDArray[np.float64]
 
+FOLDER = Path(__file__).resolve().parents[2] / "examples" / "rbt-6t03p"
 # Table 1: x = y of the upper and of the lower joints; the upper ones stand at 208.897 mm.
 UPPER = (77.92, 102.08, -162.08, -137.92, -42.08, -17.92)
 LOWER = (50.1, 129.9, 170.1, -110.1, -69.9, 9.9)
@@ -275,3 +281,34 @@ def test_the_cubic_jumps_in_acceleration_which_the_paper_set_out_to_avoid() -> N
         smooth = pk.trajectory.quintic(c, end, 2.0).sample(np.array([0.0, 2.0]))
         np.testing.assert_allclose(smooth[1:], 0.0, atol=1e-12)
         assert a != 0
+
+
+# --- the example ---------------------------------------------------------------------------------
+
+
+def test_example_walks_through_the_eight_steps(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runpy.run_path(str(FOLDER / "eight_steps.py"))["main"](tmp_path)
+    said = capsys.readouterr().out
+    for step in range(1, 9):
+        assert len(re.findall(rf"^{step} ", said, re.MULTILINE)) >= 2
+    rods = re.search(r"as polar angles: rods of \[(.*?)\] mm; stated are 223", said)
+    assert rods and {f"{float(rod):.3f}" for rod in rods[1].split()} == {"223.000"}
+    assert {path.name for path in tmp_path.iterdir()} == {"listing.png", "move.png", "space.png"}
+
+
+def test_the_examples_of_the_document_are_run() -> None:
+    found = doctest.testfile(
+        str(FOLDER.parents[1] / "docs" / "rbt-6t03p.md"), module_relative=False
+    )
+    assert found.attempted > 8 and found.failed == 0
+
+
+def test_numbers_of_the_examples_readme(printed: pk.Robot, robot: pk.Robot) -> None:
+    text = (FOLDER / "README.md").read_text(encoding="utf-8")
+    poses = [[0, 0, height, 0, 0, 0] for height in (0.0, 50.0, -20.0)]
+    legs, sliders = printed.inverse(poses), robot.inverse(poses)
+    for k, start in enumerate(("4, pose 0", "7, (0, 0, 50)", "7, (0, 0, −20)")):
+        row = next(line for line in text.splitlines() if line.startswith(f"| {start}"))
+        assert f"| {legs[k, 0]:.4f}; leg 3: {legs[k, 2]:.4f} | {sliders[k, 0]:.4f} |" in row
