@@ -149,19 +149,26 @@ def swapped(robot: Robot) -> Iterator[Finding]:
 def opposite_order(robot: Robot) -> Iterator[Finding]:
     """Base joints counted one way round and platform joints another."""
     base, platform = joints(robot)
-    words = {1: "counter-clockwise", -1: "clockwise", 0: "neither way round"}
-    if base.sense == platform.sense or platform.radii.min() <= ALIKE * float(base.radii.max()):
+    if platform.radii.min() <= ALIKE * float(base.radii.max()):
         return
-    mirrored = base.sense * platform.sense == -1
+    if base.senses == platform.senses or base.senses & platform.senses:
+        return
+    mirrored = bool(base.senses and platform.senses)
     yield Finding(
         "order",
         (),
-        f"seen from above, the base joints run {words[base.sense]} and the platform joints"
-        f" {words[platform.sense]}",
+        f"seen from above, the base joints run {_way(base)} and the platform joints"
+        f" {_way(platform)}",
         "one of the tables has a left-handed frame: turn the sign of its x or of its y"
         if mirrored
         else "were two joints exchanged? Joint 1 of the base and of the platform belong to limb 1",
     )
+
+
+def _way(side: Joints) -> str:
+    if not side.senses:
+        return "neither way round"
+    return "counter-clockwise" if 1 in side.senses else "clockwise"
 
 
 def off_circle(robot: Robot) -> Iterator[Finding]:

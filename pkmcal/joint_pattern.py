@@ -14,6 +14,7 @@ from pkmcal.robot import Robot
 
 IntArray = NDArray[np.intp]
 
+_SAME_ANGLE = 1e-6  # rad
 ALIKE = 0.03  # of the base's radius: by less, errors of manufacture make limbs differ
 
 
@@ -43,13 +44,18 @@ class Joints:
         return np.arctan2(self.points[:, 1], self.points[:, 0])
 
     @property
-    def sense(self) -> int:
-        """+1 where the joints follow each other counter-clockwise, -1 clockwise, 0 neither."""
-        turned = np.mod(self.angles - self.angles[0], 2 * np.pi)[1:]
-        if len(turned) < 2:
-            return 0
-        steps = np.diff(turned)
-        return 1 if (steps > 0).all() else -1 if (steps < 0).all() else 0
+    def senses(self) -> frozenset[int]:
+        """Ways the joints follow each other in one turn: +1 counter-clockwise, -1 clockwise.
+
+        Joints at the same angle may follow each other either way.
+        """
+        steps = np.roll(self.angles, -1) - self.angles
+        found = set()
+        for way in (1, -1):
+            forward = np.mod(way * steps + _SAME_ANGLE, 2 * np.pi) - _SAME_ANGLE
+            if abs(float(forward.sum()) - 2 * np.pi) < 1e-3:
+                found.add(way)
+        return frozenset(found)
 
     def circle(self, room: float) -> tuple[FloatArray, float, NDArray[np.bool_]] | None:
         """The circle that most joints lie on: centre (2,), radius, and which lie on it.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,17 +15,6 @@ Sample = tuple[FloatArray, FloatArray, FloatArray]
 # s(τ) from 0 to 1 over τ = t/duration, lowest power first
 CUBIC = (0.0, 0.0, 3.0, -2.0)
 QUINTIC = (0.0, 0.0, 0.0, 10.0, -15.0, 6.0)
-
-
-class Law(Protocol):
-    """Anything that is at a place at each time."""
-
-    @property
-    def duration(self) -> float:
-        """How long it takes, s."""
-
-    def sample(self, t: ArrayLike) -> Sample:
-        """Position, velocity and acceleration at times."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -85,6 +85,42 @@ def test_mistakes_are_found(name: str) -> None:
     assert hits == made > 0
 
 
+# What each mistake is called, where it is one thing.
+KIND = {
+    "copied": "double",
+    "exchanged_rows": "order",
+    "swapped": "swapped",
+    "mirrored": "order",
+    "metres": "unit",
+    "inches": "unit",
+    "stroke_in_metres": "unit",
+    "degrees_as_coordinates": "angle",
+    "radians_as_degrees": "angle",
+    "similar": "singular",
+}
+
+
+@pytest.mark.parametrize("name", KIND)
+def test_mistakes_are_called_what_they_are(name: str) -> None:
+    for machine in ("hexapod", "rbt-6t03p", "2tpr2tps", "linear-delta"):
+        wrong = MUTATIONS[name](pk.load(machine), np.random.default_rng(5))
+        if wrong is not None:
+            assert KIND[name] in pk.check_geometry(wrong).kinds
+
+
+@pytest.mark.parametrize("shared", ["platform", "both"])
+def test_hexapods_whose_limbs_share_joints_are_good(shared: str) -> None:
+    """6-3 and 3-3: limbs meet in pairs at the platform, 6 with 1 too; and at the base, shifted."""
+    robot = pk.load("hexapod")
+    slots = robot.geometry.slots.copy()
+    upper = np.radians([0, 120, 120, 240, 240, 0])
+    slots[:, 3:5] = 125.0 * np.column_stack([np.cos(upper), np.sin(upper)])
+    lower = np.radians([60, 60, 180, 180, 300, 300] if shared == "both" else
+                       [50, 70, 170, 190, 290, 310])  # fmt: skip
+    slots[:, 0:2] = 325.0 * np.column_stack([np.cos(lower), np.sin(lower)])
+    assert pk.check_geometry(with_slots(robot, slots)).ok
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MUTATIONS)
 def test_mistakes_are_found_on_all_machines(name: str) -> None:
