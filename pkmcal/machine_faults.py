@@ -46,6 +46,8 @@ def wrong_unit(robot: Robot) -> Iterator[Finding]:
             )
     yield from _stroke_units(robot)
     sizes = _sizes(robot)
+    if not sizes:  # all joints in one point, which `doubled` says
+        return
     largest = max(sizes.values())
     if not _SMALLEST <= largest <= _LARGEST:
         likely = "metres" if largest < _SMALLEST else "micrometres"

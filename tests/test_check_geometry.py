@@ -222,6 +222,22 @@ def test_stated_numbers_name_the_likely_unit(tmp_path: Path) -> None:
         assert words in finding.suggestion
 
 
+@pytest.mark.parametrize("name", MACHINES)
+def test_nonsense_is_checked_without_a_failure(name: str) -> None:
+    robot, rng = pk.load(name), np.random.default_rng(0)
+    points = robot.geometry.slots[:, :6]
+    for nonsense in (
+        np.zeros_like(points),
+        np.ones_like(points),
+        rng.normal(size=points.shape) * 1e-8,
+        rng.normal(size=points.shape) * 1e8,
+    ):
+        slots = robot.geometry.slots.copy()
+        slots[:, :6] = nonsense
+        check = pk.check_geometry(with_slots(robot, slots))
+        assert not check.ok and str(check)
+
+
 def test_an_arm_is_refused() -> None:
     with pytest.raises(TypeError, match="a parallel machine; found SerialArm"):
         pk.check_geometry(pk.load("3r"))  # type: ignore[arg-type]
