@@ -51,8 +51,14 @@ INLINE void rates_rows(const pkm_machine *machine, ptrdiff_t n, const double *ge
             bend[machine->actuator[i]] += of_bend;
         }
         for (int a = 0; a < actuators; a++) {
-            scatter(rate[a] / sharing[a], q1 + a, actuators, row, count);
-            scatter(bend[a] / sharing[a], q2 + a, actuators, row, count);
+            rate[a] /= sharing[a];
+            bend[a] /= sharing[a];
+        }
+        whole_or_nan(rate, actuators);
+        whole_or_nan(bend, actuators);
+        for (int a = 0; a < actuators; a++) {
+            scatter(rate[a], q1 + a, actuators, row, count);
+            scatter(bend[a], q2 + a, actuators, row, count);
         }
     }
 }

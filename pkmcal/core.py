@@ -389,7 +389,7 @@ class Machine:
         n = len(motion)
         velocity, acceleration = np.empty((n, self.actuators)), np.empty((n, self.actuators))
         if n:
-            self._ensure(
+            ensure(
                 lib.pkm_rates(
                     self.struct,
                     self.isa,

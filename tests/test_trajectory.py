@@ -186,6 +186,18 @@ def test_frames_of_base_and_tool_carry_the_motion_along() -> None:
             np.testing.assert_allclose(slope(values, t), expected, atol=2e-8)
 
 
+def test_rates_out_of_reach_are_nan_as_a_row_and_wrong_shapes_are_refused() -> None:
+    robot = pk.load("rbt-6t03p")
+    near, far = robot.home, np.add(robot.home, [150.0, 0, 0, 0, 0, 0])  # some rods reach there
+    still = np.zeros((2, 6))
+    velocity, acceleration = robot.rates(motions.of_pose(np.stack([near, far]), still, still))
+    np.testing.assert_array_equal(velocity[0], 0.0)
+    assert np.isnan(velocity[1]).all() and np.isnan(acceleration[1]).all()
+    assert np.isnan(robot.inverse(far)).all()
+    with pytest.raises(ValueError, match="motion must have shape"):
+        robot.rates(np.eye(4))
+
+
 def test_orientation_turns_about_one_axis() -> None:
     """SLERP, against SciPy's, and an angular velocity of constant direction."""
     from scipy.spatial.transform import Rotation, Slerp
