@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from cffi import FFI
 
 from csrc.build import CSRC, FLAGS, GENERATED, HEADER, declarations
-from pkmcal import core
+from pkmcal import core, core_machine
 from pkmcal.core import ISAS
 
 HERE = Path(__file__).parent
@@ -62,7 +62,7 @@ def fma_peak(folder: Path, isa: str) -> Compiled:
 
 
 class OneLane:
-    """The core of csrc/ compiled with LANES 1, in the place of `pkmcal.core.lib` while entered.
+    """The core of csrc/ compiled with LANES 1, in the place of `core_machine.lib` while entered.
 
     The same source, the same flags and the same three ISAs; only the number of lanes differs. To be
     compared with `flush_denormals` on: bench_denormals says why. In one thread only.
@@ -80,14 +80,14 @@ class OneLane:
         flags = [f"-I{CSRC}", f"-I{GENERATED}", *(f for f in FLAGS if "visibility" not in f)]
         declared = declarations(HEADER) + "void flush_denormals(int on);"
         self._here = compiled(folder, "one_lane", declared, sources, flags)
-        self._lib = core.lib
+        self._lib = core_machine.lib
 
     def __enter__(self) -> OneLane:
-        core.lib = self
+        core_machine.lib = self
         return self
 
     def __exit__(self, *_: object) -> None:
-        core.lib = self._lib
+        core_machine.lib = self._lib
 
     def flush_denormals(self, on: bool) -> None:
         """Count numbers too small for full precision as 0 in this thread, or not."""

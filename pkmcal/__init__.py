@@ -13,11 +13,12 @@ from pkmcal.feasible import Feasibility
 from pkmcal.forward import Forward
 from pkmcal.identification import Identification
 from pkmcal.identify import identify
+from pkmcal.loading import load, machines
 from pkmcal.measurement_csv import read_measurements
 from pkmcal.measurements import Measurements
 from pkmcal.plan import Plan, plan_poses
 from pkmcal.pso import SwarmResult, pso
-from pkmcal.robot import Robot, load, machines
+from pkmcal.robot import Robot
 from pkmcal.sensitivity import Sensitivity, sensitivity
 from pkmcal.serial import SerialArm
 from pkmcal.tolerance import Tolerance, tolerance

@@ -17,9 +17,10 @@ from pkmcal.arm_machine import as_machine
 from pkmcal.cli_output import as_json, folder
 from pkmcal.core import POSE
 from pkmcal.csv_table import UNITS
+from pkmcal.loading import load
 from pkmcal.measurement_csv import read_measurements
 from pkmcal.measurements import Measurements
-from pkmcal.robot import Robot, load
+from pkmcal.robot import Robot
 from pkmcal.tracker import Tracker
 
 _FRAME = dict(zip(POSE, ("mm", "mm", "mm", "rad", "rad", "rad"), strict=True))

@@ -9,8 +9,8 @@ import typer
 
 from pkmcal.check_geometry import check_geometry
 from pkmcal.cli_output import as_json
+from pkmcal.loading import load_parallel
 from pkmcal.measurement_csv import read_measurements
-from pkmcal.robot import load_parallel
 
 
 def check(

@@ -12,8 +12,9 @@ import typer
 from pkmcal.cli_output import as_json, folder
 from pkmcal.core import POSE, FloatArray
 from pkmcal.csv_table import Table
+from pkmcal.loading import load_parallel
 from pkmcal.pose_csv import read_poses, write_poses
-from pkmcal.robot import Robot, load_parallel
+from pkmcal.robot import Robot
 
 _BESIDE = re.compile(r"q\d+|sigma(\..+)?|group")  # in a file of measurements, and not needed here
 

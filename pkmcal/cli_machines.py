@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from pkmcal import digits, robot
+from pkmcal import digits, loading
 from pkmcal.arm_machine import ArmMachine
 from pkmcal.cli_output import as_json
 from pkmcal.core import POSE
@@ -24,8 +24,8 @@ def machines(
     Example: pkmcal machines
     """
     rows: dict[str, dict[str, Sequence[str]]] = {}
-    for name in robot.machines():
-        machine = robot.load(name)
+    for name in loading.machines():
+        machine = loading.load(name)
         if isinstance(machine, SerialArm):
             free = ArmMachine(machine).model.free
             rows[name] = {"limbs": list(machine.kinds), "coordinates": POSE, "free": free}

@@ -12,9 +12,9 @@ import typer
 
 from pkmcal.cli_calibrate import free_names, read_deviations
 from pkmcal.cli_output import as_json, folder
+from pkmcal.loading import load_parallel
 from pkmcal.plan import Plan, plan_poses
 from pkmcal.pose_csv import read_poses, write_poses
-from pkmcal.robot import load_parallel
 from pkmcal.whole_file import write_whole
 from pkmcal.workspace import sample_poses
 

@@ -12,8 +12,8 @@ import typer
 
 from pkmcal.cli_output import as_json, folder
 from pkmcal.core import POSE
+from pkmcal.loading import load_parallel
 from pkmcal.pose_csv import read_poses, write_poses
-from pkmcal.robot import load_parallel
 from pkmcal.sensitivity import STUDIES, Sensitivity, study_cases
 from pkmcal.sensitivity import sensitivity as errors_of
 from pkmcal.whole_file import write_whole

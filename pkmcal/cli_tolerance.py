@@ -15,9 +15,10 @@ from pkmcal.allocation import allocate_tolerance
 from pkmcal.cli_calibrate import read_deviations
 from pkmcal.cli_output import as_json, folder
 from pkmcal.core import FloatArray
+from pkmcal.loading import load_parallel
 from pkmcal.monte_carlo import Progress
 from pkmcal.pose_csv import read_poses, write_poses
-from pkmcal.robot import Robot, load_parallel
+from pkmcal.robot import Robot
 from pkmcal.sensitivity import own_names
 from pkmcal.tolerance import Sigma, Tolerance
 from pkmcal.tolerance import tolerance as spread

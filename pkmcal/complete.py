@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pkmcal.core import MAPS, POSE, FloatArray, Machine
+from pkmcal.core import MAPS, POSE, FloatArray
+from pkmcal.core_machine import Machine
 from pkmcal.geometry import BoolArray
 from pkmcal.suggest import did_you_mean
 

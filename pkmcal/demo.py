@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from pkmcal import digits
 from pkmcal.identification import Identification
 from pkmcal.identify import identify
+from pkmcal.loading import load
 from pkmcal.measurements import Measurements
-from pkmcal.robot import Robot, load
+from pkmcal.robot import Robot
 from pkmcal.virtual import VirtualMachine
 from pkmcal.whole_file import write_whole
 

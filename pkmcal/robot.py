@@ -7,21 +7,21 @@ from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from os import PathLike
-from typing import Any, Literal, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import armfile, robotfile
+from pkmcal import robotfile
 from pkmcal.complete import complete, matched_coordinates
-from pkmcal.core import MAPS, POSE, FloatArray, Machine, as_rows
+from pkmcal.core import MAPS, POSE, FloatArray, as_rows
+from pkmcal.core_machine import Machine
 from pkmcal.feasible import Feasibility, feasibility
 from pkmcal.forward import Forward
 from pkmcal.frames import Frames
 from pkmcal.geometry import Geometry
 from pkmcal.limb_kinds import KINDS
 from pkmcal.model import Limb, Model
-from pkmcal.serial import SerialArm
 
 Match = bool | str | Sequence[str] | None
 
@@ -490,52 +490,3 @@ def _limb(limb: Limb) -> dict[str, Any]:
         "lever": limb.couple,
         "weights": [1.0, *(limb.weights or [1.0] * len(rows))],
     }
-
-
-@overload
-def load(robot: Literal["3r"]) -> SerialArm: ...  # type: ignore[overload-overlap]
-
-
-@overload
-def load(robot: str | PathLike[str]) -> Robot: ...
-
-
-def load(robot: str | PathLike[str]) -> Robot | SerialArm:
-    """A built-in machine by name, or a robot file by path; a serial arm where it has joints.
-
-    Parameters
-    ----------
-    robot : str or path
-        A name of `machines`, or a path to a robot TOML.
-
-    Raises
-    ------
-    ValueError
-        No such machine, or a file with a mistake: the message says where.
-    FileNotFoundError
-        No such file.
-
-    Examples
-    --------
-    >>> import pkmcal as pk
-    >>> pk.load("hexapod").n_actuators
-    6
-    """
-    content, place, file = robotfile.located(robot)
-    data = robotfile.tables(content, place)
-    if armfile.is_arm(data):
-        return armfile.parse(data, place)
-    return Robot(robotfile.parse(content, place, file))
-
-
-def load_parallel(robot: str | PathLike[str]) -> Robot:
-    """Load a machine as `load` does, and refuse serial arms with a ValueError."""
-    machine: Robot | SerialArm = load(robot)
-    if isinstance(machine, SerialArm):
-        raise ValueError(f"{robot}: a serial arm, where a parallel machine is needed")
-    return machine
-
-
-def machines() -> tuple[str, ...]:
-    """Names of the built-in machines, serial arms last."""
-    return robotfile.builtin_names() + robotfile.builtin_names("arms")
