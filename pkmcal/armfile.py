@@ -52,8 +52,8 @@ def parse(data: Mapping[str, Any], place: str) -> SerialArm:
     )
 
 
-def write(arm: SerialArm, path: str | os.PathLike[str]) -> None:
-    """Write an arm's file in mm and rad; it is complete or untouched.
+def write(arm: SerialArm, path: str | os.PathLike[str], comment: str = "") -> None:
+    """Write an arm's file in mm and rad, `comment` at its head; it is complete or untouched.
 
     Raises
     ------
@@ -69,7 +69,7 @@ def write(arm: SerialArm, path: str | os.PathLike[str]) -> None:
         if any(error.values()):
             joint["error"] = error
         blocks.append("[[joint]]\n" + lines(joint))
-    write_whole(path, "\n".join(blocks))
+    write_whole(path, comment + "\n".join(blocks))
 
 
 def _joints(top: Table) -> list[Mapping[str, Any]]:

@@ -20,6 +20,7 @@ from pkmcal.csv_table import UNITS
 from pkmcal.loading import load
 from pkmcal.measurement_csv import read_measurements
 from pkmcal.measurements import Measurements
+from pkmcal.provenance import comment, contents
 from pkmcal.robot import Robot
 from pkmcal.tracker import Tracker
 
@@ -86,6 +87,13 @@ def calibrate(
         Path | None,
         typer.Option(metavar="DIR", help="Write robot.toml, as calibrated, and residuals.png."),
     ] = None,
+    report: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Write report.html, which any browser shows, report.json and robot.toml.",
+        ),
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
 ) -> int:
     """Find the geometry of a machine from measurements of it.
@@ -93,12 +101,16 @@ def calibrate(
     Exit code 1: done, but not to be trusted; the summary says why.
 
     Example: pkmcal calibrate examples/linear-delta/robot.toml examples/linear-delta/probe.csv
+    --report out
     """
     from pkmcal.identify import identify
 
     machine = as_machine(load(robot))
-    if out is not None:
-        _refuse_own_input(out, robot)
+    for option, written in (("--out", out), ("--report", report)):
+        if written is not None:
+            _refuse_own_input(option, written, robot)
+    held = [] if holdout is None or not Path(holdout).is_file() else [Path(holdout)]
+    files = contents(robot, csv, *held)
     measured = read_measurements(csv, machine)
     if tracker is not None:
         measured = _seen_by(read_tracker(tracker), measured)
@@ -117,8 +129,9 @@ def calibrate(
             holdout=None if holdout is None else _read_holdout(holdout, machine),
         )
     if out is not None:
-        found.robot.save(folder(out) / "robot.toml")
+        found.robot.save(folder(out) / "robot.toml", comment(files))
         found.plot(out / "residuals.png")
+    page = None if report is None else found.report(folder(report), files)[0]
     if json:
         typer.echo(as_json(found, "parameters", "correlations"))
     else:
@@ -126,6 +139,8 @@ def calibrate(
         if out is not None:
             typer.echo(f"\ncalibrated robot: {out / 'robot.toml'}")
             typer.echo(f"residuals: {out / 'residuals.png'}")
+        if page is not None:
+            typer.echo(f"\nreport: {page}")
     return 0 if found.converged and not found.warnings else 1
 
 
@@ -256,7 +271,9 @@ def _read_holdout(text: str, robot: Robot) -> float | Measurements:
     return int(number) if number.is_integer() else number
 
 
-def _refuse_own_input(out: Path, robot: str) -> None:
+def _refuse_own_input(option: str, out: Path, robot: str) -> None:
     written = out / "robot.toml"
     if written.exists() and Path(robot).exists() and written.samefile(robot):
-        raise ValueError(f"--out {out}: would replace {robot}, which is read; take another folder")
+        raise ValueError(
+            f"{option} {out}: would replace {robot}, which is read; take another folder"
+        )

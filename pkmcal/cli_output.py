@@ -11,7 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from pkmcal.arm_machine import as_machine
 from pkmcal.robot import Robot
+from pkmcal.serial import SerialArm
 
 
 def as_json(result: Any, *attributes: str) -> str:
@@ -44,8 +46,10 @@ def as_json(result: Any, *attributes: str) -> str:
 
 def _plain(value: Any) -> Any:
     """The same in lists, dicts, numbers and text."""
-    if isinstance(value, Robot):
-        return {"name": value.name, "geometry": dict(value.geometry.items())}
+    if isinstance(value, Robot | SerialArm):
+        geometry = as_machine(value).geometry
+        numbers = zip(geometry.names, geometry.values.tolist(), strict=True)
+        return {"name": value.name, "geometry": dict(numbers)}
     if dataclasses.is_dataclass(value):
         fields = (field.name for field in dataclasses.fields(value))
         return {name: _plain(getattr(value, name)) for name in fields if name[0] != "_"}
@@ -69,6 +73,6 @@ def folder(path: Path) -> Path:
         Something else is in its place.
     """
     if path.exists() and not path.is_dir():
-        raise ValueError(f"--out {path}: this is not a folder")
+        raise ValueError(f"{path}: this is not a folder")
     path.mkdir(parents=True, exist_ok=True)
     return path

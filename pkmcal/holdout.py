@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,22 +16,26 @@ from pkmcal.parameters import Share
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Root mean square distances of points that were held out, mm; NaN where there are none.
+    """How far off points are that were held out, mm; NaN where there are none.
 
     Attributes
     ----------
     rms_before, rms : float
-        With the start's parameters and with the estimate's.
+        Root mean square distances with the start's parameters and with the estimate's.
     expected : float
         What `rms` should be if noise and covariance are right.
     unreached : str
         Rows that were left out because the machine does not reach them, in words.
+    off_before, off : ndarray (N,)
+        The distances themselves.
     """
 
     rms_before: float = float("nan")
     rms: float = float("nan")
     expected: float = float("nan")
     unreached: str = ""
+    off_before: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    off: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
 
 
 def drawn(share: Share, holdout: float) -> tuple[Share, Share]:
@@ -73,6 +77,8 @@ def compare(held: Sequence[tuple[Share, int]], estimator: Estimator, estimate: E
         rms=equations.rms(after),
         expected=float(np.sqrt(np.nanmean(np.concatenate(variances)))),
         unreached=equations.unreached(after),
+        off_before=equations.distances(before),
+        off=equations.distances(after),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -64,6 +65,8 @@ class Identification:
         What `holdout_rms` should be if noise and covariance are right.
     holdout_unreached : str
         Which held-out rows the machine does not reach, and were left out; empty where none.
+    holdout_off, holdout_off_before : ndarray
+        Distance of each held-out point, mm; NaN where it is not reached.
     chi2_per_dof : float
         About 1 if the noise is as stated; NaN where no sigma was given.
     dof : float
@@ -90,6 +93,8 @@ class Identification:
         Whether the least squares did.
     evaluations : int
         How often the machine was solved for all rows.
+    history : tuple of float
+        Misfit rms in mm at the start and after each step of the search.
     warnings : tuple of str
         What looks wrong with measurements or result.
     """
@@ -110,6 +115,8 @@ class Identification:
     holdout_rms_before: float
     holdout_expected: float
     holdout_unreached: str
+    holdout_off: FloatArray
+    holdout_off_before: FloatArray
     chi2_per_dof: float
     dof: float
     noise: tuple[float, ...]
@@ -123,6 +130,7 @@ class Identification:
     at_bounds: tuple[str, ...]
     converged: bool
     evaluations: int
+    history: tuple[float, ...]
     warnings: tuple[str, ...]
     _told: FloatArray  # covariance of what is determined, (n, n)
     _equations: Equations
@@ -207,6 +215,34 @@ class Identification:
         from pkmcal import residual_figure
 
         residual_figure.write(self, Path(path))
+
+    def report(
+        self, folder: str | PathLike[str], files: Mapping[str, bytes] | None = None
+    ) -> list[Path]:
+        """Write the whole calibration as ``report.html``, one file that needs nothing else.
+
+        Beside it the same as data, ``report.json``, and the calibrated robot, ``robot.toml``.
+
+        Parameters
+        ----------
+        folder : str or path
+            It is there.
+        files : mapping of str to bytes, optional
+            What the calibration was made from, by name; their checksums are stated.
+
+        Returns
+        -------
+        list of Path
+            What was written.
+
+        Raises
+        ------
+        OSError
+            The folder cannot be written.
+        """
+        from pkmcal import report
+
+        return report.write(self, Path(folder), files or {})
 
     def summary(self) -> str:
         """Everything a person should know, on one screen."""

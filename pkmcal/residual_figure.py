@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pkmcal.digits import displayed
+from pkmcal.provenance import printable
 from pkmcal.whole_file import write_whole
 
 if TYPE_CHECKING:
@@ -48,7 +49,9 @@ def write(found: Identification, path: Path) -> None:
     if ending not in _FORMATS:
         raise ValueError(f"path must end in {' or '.join(_FORMATS)}, found {str(path)!r}")
     picture = io.BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": "pkmcal", "svg.fonttype": "none"}):
+    with matplotlib.rc_context(
+        {"svg.hashsalt": "pkmcal", "svg.fonttype": "none", "text.parse_math": False}
+    ):
         residuals(found).savefig(picture, format=ending[1:], dpi=110, metadata=_FORMATS[ending])
     write_whole(path, picture.getvalue())
 
@@ -65,7 +68,7 @@ def residuals(found: Identification) -> Figure:
         _by_row(figure.add_subplot(grid[k, :]), found, unit)
     _over_the_workspace(figure.add_subplot(grid[-1, 0]), found)
     _quantiles(figure.add_subplot(grid[-1, 1]), found)
-    figure.suptitle(f"{found.robot.name}: what the identified geometry leaves over")
+    figure.suptitle(f"{printable(found.robot.name)}: what the identified geometry leaves over")
     return figure
 
 

@@ -429,9 +429,17 @@ class Robot:
         nudged._slots = np.ascontiguousarray(nudged.model.geometry.slots)
         return nudged
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the robot file; `load` reads it back to the last bit."""
-        robotfile.write(self.model, path)
+    def save(self, path: str | PathLike[str], comment: str = "") -> None:
+        """Write the robot file; `load` reads it back to the last bit.
+
+        Parameters
+        ----------
+        path : str or path
+            Where to write; an existing file is replaced, whole or not at all.
+        comment : str, optional
+            Lines for its head, each with its ``#``.
+        """
+        robotfile.write(self.model, path, comment)
 
     # --------------------------------------------------------------------------------------------
 

@@ -103,7 +103,7 @@ def located(robot: str | os.PathLike[str]) -> tuple[bytes, str, str | None]:
     raise FileNotFoundError(f"{path}: no such file{did_you_mean(path.name, near, listed=0)}")
 
 
-def write(model: Model, path: str | os.PathLike[str]) -> None:
+def write(model: Model, path: str | os.PathLike[str], comment: str = "") -> None:
     """Write a robot file in mm and rad, which `read` reads back to the last bit.
 
     The file is complete or untouched.
@@ -114,13 +114,15 @@ def write(model: Model, path: str | os.PathLike[str]) -> None:
         The robot.
     path : str or path
         Where to write; an existing file is replaced.
+    comment : str
+        Lines for its head, each with its ``#``.
 
     Raises
     ------
     OSError
         The folder does not exist or cannot be written.
     """
-    write_whole(path, text_of(model))
+    write_whole(path, comment + text_of(model))
 
 
 def parse(content: bytes, place: str, file: str | None) -> Model:

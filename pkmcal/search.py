@@ -32,6 +32,8 @@ class Search:
         How often the machine was solved for all rows.
     converged : bool
         Whether the last search did.
+    history : list of float
+        Misfit of the rows that were reached at the start and after every step taken, rms in mm.
     """
 
     def __init__(self, equations: Equations, start: Point) -> None:
@@ -49,6 +51,7 @@ class Search:
         self._refused = np.zeros(len(equations.rows), dtype=bool)
         self.evaluations = 0
         self.converged = False
+        self.history: list[float] = []
 
     def at(self, u: FloatArray) -> Point:
         """The equations at scaled parameters (n,)."""
@@ -143,6 +146,7 @@ class Search:
         def jacobian(u: FloatArray) -> FloatArray:
             point = self.at(u)
             equations.go_on_from(point)  # the step to it was taken
+            self.history.append(equations.rms(point))
             by_u = self.jacobian(point, noise, aside)
             return np.vstack([loss.jacobian(data(point), by_u), extra])
 

@@ -366,11 +366,11 @@ class SerialArm:
         """The motions E by its joint errors, in the base (eq. 10 and 18), (n, 4, 4)."""
         return screw.at_points(self._errors, self._points)
 
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write the arm's file; `load` reads it back to the last bit."""
+    def save(self, path: str | PathLike[str], comment: str = "") -> None:
+        """Write the arm's file, `comment` at its head; `load` reads it back to the last bit."""
         from pkmcal import armfile
 
-        armfile.write(self, path)
+        armfile.write(self, path, comment)
 
     def save_urdf(
         self,

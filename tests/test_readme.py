@@ -108,8 +108,8 @@ def test_calibration_from_the_file_of_the_demo_finds_the_same(beside_the_example
     match = re.search(r"`pkmcal (calibrate [^`]*measured[^`]*)`", README)
     assert match
     assert run([*shlex.split(match[1]), "--out", "again"]).exit_code == 0
-    again, first = (Path(f, "robot.toml").read_text() for f in ("again", "pkmcal-demo"))
-    assert again == first
+    again, first = (pk.load(f"{folder}/robot.toml") for folder in ("again", "pkmcal-demo"))
+    np.testing.assert_array_equal(again.geometry.values, first.geometry.values)
 
 
 def test_python_examples_give_what_they_show() -> None:
