@@ -16,7 +16,9 @@ from pkmcal.cli_calibrate import calibrate
 from pkmcal.cli_check import check
 from pkmcal.cli_compensate import compensate
 from pkmcal.cli_demo import demo
+from pkmcal.cli_kinematics import forward, inverse
 from pkmcal.cli_machines import machines
+from pkmcal.cli_new import new
 from pkmcal.cli_plan import plan
 from pkmcal.cli_sensitivity import sensitivity
 from pkmcal.cli_tolerance import tolerance
@@ -43,8 +45,11 @@ class _Verbs(TyperGroup):
 
 
 app = typer.Typer(cls=_Verbs, pretty_exceptions_enable=False)
-for verb in (demo, machines, check, sensitivity, tolerance, plan, calibrate, compensate):
+for verb in (demo, machines, new, check, sensitivity, tolerance, plan, calibrate, compensate):
     app.command()(verb)
+_SIGNED = {"ignore_unknown_options": True}  # an argument may be -330,-330,-330
+app.command(context_settings=_SIGNED)(inverse)
+app.command(context_settings=_SIGNED)(forward)
 
 
 def _version(wanted: bool) -> None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from pathlib import Path
 from typing import Annotated
 
@@ -12,10 +10,11 @@ import typer
 
 from pkmcal.cli_calibrate import free_names, read_deviations
 from pkmcal.cli_output import as_json, folder
+from pkmcal.command_csv import write_commands
 from pkmcal.loading import load_parallel
 from pkmcal.plan import Plan, plan_poses
 from pkmcal.pose_csv import read_poses, write_poses
-from pkmcal.whole_file import write_whole
+from pkmcal.provenance import comment, contents
 from pkmcal.workspace import sample_poses
 
 _DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach
@@ -98,7 +97,8 @@ def plan(
         prior=read_deviations("--prior", prior or [], machine, chosen),
         unknown=unknown or (),
     )
-    written = [] if out is None else _write(made, folder(out))
+    read = comment(contents(robot, *(path for path in (poses, targets) if path is not None)))
+    written = [] if out is None else _write(made, folder(out), read)
     if json:
         typer.echo(as_json(made))
     else:
@@ -106,12 +106,8 @@ def plan(
     return 0 if np.isfinite(made.predicted) else 1
 
 
-def _write(made: Plan, out: Path) -> list[Path]:
+def _write(made: Plan, out: Path, head: str) -> list[Path]:
     poses, commands = out / "poses.csv", out / "commands.csv"
-    write_poses(poses, made.poses)
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(f"q{i + 1} [{unit}]" for i, unit in enumerate(made.robot.actuator_units))
-    writer.writerows(map(repr, row) for row in made.actuators.tolist())
-    write_whole(commands, text.getvalue())
+    write_poses(poses, made.poses, comment=head)
+    write_commands(commands, made.robot.actuator_units, made.actuators, head)
     return [poses, commands]

@@ -49,7 +49,10 @@ def read_poses(path: str | PathLike[str], robot: Robot) -> FloatArray:
 
 
 def write_poses(
-    path: str | PathLike[str], poses: FloatArray, columns: dict[str, FloatArray] | None = None
+    path: str | PathLike[str],
+    poses: FloatArray,
+    columns: dict[str, FloatArray] | None = None,
+    comment: str = "",
 ) -> None:
     """Write poses (N, 6), angles in degrees, and other columns beside them.
 
@@ -61,8 +64,11 @@ def write_poses(
         mm and rad.
     columns : dict of str to ndarray (N,), optional
         By heading, which says the unit.
+    comment : str, optional
+        Lines for its head, each with its ``#``.
     """
     text = io.StringIO()
+    text.write(comment)
     writer = csv.writer(text, lineterminator="\n")
     units = ["mm" if k < 3 else "deg" for k in range(6)]
     others = columns or {}

@@ -13,6 +13,8 @@ from typer.testing import CliRunner
 import pkmcal as pk
 from pkmcal import cli
 from pkmcal.cli_calibrate import read_tracker
+from pkmcal.command_csv import read_commands
+from pkmcal.pose_csv import read_poses
 
 from .simulated import hexapod_poses
 
@@ -32,18 +34,17 @@ def test_plan_prints_and_writes_what_plan_poses_finds(tmp_path: Path) -> None:
     robot = pk.load("hexapod")
     expected = pk.plan_poses(robot, pk.sample_poses(robot, 500, share=0.9), 12, kind="pose")
     assert result.stdout.startswith(str(expected))
-    from pkmcal.pose_csv import read_poses
-
     poses = read_poses(tmp_path / "plan" / "poses.csv", robot)
     np.testing.assert_allclose(poses, expected.poses, atol=1e-6)
-    commands = np.genfromtxt(tmp_path / "plan" / "commands.csv", delimiter=",", skip_header=1)
+    commands = read_commands(tmp_path / "plan" / "commands.csv", robot.actuator_units)
     np.testing.assert_array_equal(commands, expected.actuators)
 
 
 def test_commands_with_what_was_measured_beside_them_can_be_calibrated(tmp_path: Path) -> None:
     assert run("plan", "2tpr2tps", "--count", "12", "--prior", "0.5", "--out", ".").exit_code == 0
     robot = pk.load("2tpr2tps")
-    lines = (tmp_path / "commands.csv").read_text().splitlines()
+    written = (tmp_path / "commands.csv").read_text().splitlines()
+    lines = [line for line in written if not line.startswith("#")]
     q = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
     points = robot.replace({"offset1": 0.3}).forward(q).pose[:, :3]
     seen = [",".join(map(repr, point)) for point in points.tolist()]
