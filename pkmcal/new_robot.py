@@ -10,7 +10,7 @@ from pkmcal.limb_kinds import ALIASES, KINDS
 from pkmcal.suggest import did_you_mean
 
 _HEAD = """\
-# Made by `pkmcal new {name}`: change what differs on your machine, then measure it and run
+# Made by `pkmcal new {name}`. Change what differs on your machine, measure it, run
 #     pkmcal calibrate {name}.toml measured.csv --report report
 #
 """
@@ -38,7 +38,7 @@ _KEYS = {
     "zero": "where the crank points at 0",
     "crank": "length of the crank",
     "rod": "length from carriage or crank to the platform joint",
-    "offset, gain": "the drive is at gain · q + offset, q as the controller counts; 0 and 1 if left out",
+    "offset, gain": "the drive is at gain · q + offset; 0 and 1 if left out",
     "branch": "which of the two places that a rod can lead to: 1 or -1",
     "stroke": "least and most of gain · q + offset",
     "base_cone": "{{ axis = …, angle = … }}: how far its joint on the base swings",
@@ -75,7 +75,7 @@ def template(machine: str) -> str:
     Examples
     --------
     >>> print(template("hexapod").splitlines()[0])
-    # Made by `pkmcal new hexapod`: change what differs on your machine, then measure it and run
+    # Made by `pkmcal new hexapod`. Change what differs on your machine, measure it, run
     """
     known = [*robotfile.builtin_names(), *robotfile.builtin_names("arms")]
     if machine not in known:
@@ -90,8 +90,8 @@ def _limb_keys(limbs: Iterable[dict[str, object]]) -> Iterable[str]:
     """A line for each key that limbs of these kinds may have."""
     named = dict.fromkeys(str(limb["kind"]) for limb in limbs)
     kinds = {kind: ALIASES.get(kind, kind) for kind in named}
-    used = {key for kind in kinds.values() for key in KINDS[kind].keys()}  # noqa: SIM118 - no dict
-    told = "; ".join(f"{name}, {_KINDS[kind]}" for name, kind in kinds.items())
+    used = {key for kind in kinds.values() for key in KINDS[kind].keys()}  # noqa: SIM118
+    told = ("\n#" + 18 * " ").join(f"{name}: {_KINDS[kind]}" for name, kind in kinds.items())
     for names, words in _KEYS.items():
         if names.split(",")[0] in used:
             yield f"#   {names:13}  {words.format(kinds=told)}\n"
