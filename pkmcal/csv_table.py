@@ -2,10 +2,13 @@
 
 Any of comma, semicolon and tab separates; with the latter two, numbers may have a decimal comma.
 Lines that start with ``#`` and empty lines are skipped; units are converted here and nowhere else.
+A column is headed ``x [mm]``, or as instruments write it: ``x (mm)``, ``x_mm``, ``x/mm``, ``x mm``.
+The first sheet of an Excel workbook is read likewise.
 """
 
 from __future__ import annotations
 
+import codecs
 import csv
 import math
 import re
@@ -36,12 +39,25 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
         "°": (math.pi, 180.0),
     },
 }
+# Other spellings of units; a unit may also be in capitals.
+_SPELLINGS = {
+    "millimeter": "mm", "millimeters": "mm", "millimetre": "mm", "millimetres": "mm",
+    "meter": "m", "meters": "m", "metre": "m", "metres": "m", "inch": "in", "inches": "in",
+    "micron": "um", "microns": "um", "degree": "deg", "degrees": "deg", "radians": "rad",
+}  # fmt: skip
+_UNIT = "|".join(
+    sorted((*UNITS["mm"], "\u03bcm", *UNITS["rad"], *_SPELLINGS), key=len, reverse=True)
+)
+_LOOSE = re.compile(
+    rf"(?P<name>.*[^\s_/])\s*(?:\(\s*(?P<in>{_UNIT})\s*\)|[_/ ]\s*(?P<after>{_UNIT}))",
+    re.IGNORECASE,
+)
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column: its name, its unit as written (None: no brackets), and its cells."""
+    """One column: its name and unit as written (None: no unit), and its cells."""
 
     name: str
     unit: str | None
@@ -54,7 +70,8 @@ class Table:
     Parameters
     ----------
     path : str or path
-        A file in UTF-8, with or without a byte-order mark, with any line ends.
+        A file in UTF-8, with or without a byte-order mark, or UTF-16 with one, with any line
+        ends; or an Excel workbook, ``.xlsx``.
 
     Raises
     ------
@@ -67,17 +84,23 @@ class Table:
 
     def __init__(self, path: str | PathLike[str]) -> None:
         self.path = Path(path)
-        lines = _content(self.path)
-        if not lines:
+        self._separator = ""
+        if self.path.suffix.lower() in (".xlsx", ".xlsm", ".xls"):
+            from pkmcal.xlsx_rows import xlsx_rows
+
+            every = xlsx_rows(self.path)
+        else:
+            lines = _content(self.path)
+            self._separator = max(",;\t", key=lines[0][1].count) if lines else ","
+            every = [(line, self._cells(line, text)) for line, text in lines]
+        if not every:
             raise ValueError(f"{self.path}: the file is empty: expected a line of column names")
-        header_line, header = lines[0]
-        self._header_line = header_line
-        self._separator = max(",;\t", key=header.count)
-        headings = self._cells(header_line, header)
-        rows = [(line, self._cells(line, text)) for line, text in lines[1:]]
-        rows = [(line, cells) for line, cells in rows if any(cells)]
+        self._header_line, headings = every[0]
+        rows = [(line, cells) for line, cells in every[1:] if any(cells)]
         if not rows:
-            raise ValueError(f"{self.path}: no rows below the column names of line {header_line}")
+            raise ValueError(
+                f"{self.path}: no rows below the column names of line {self._header_line}"
+            )
         for line, cells in rows:
             if len(cells) != len(headings):
                 hint = ""
@@ -106,9 +129,12 @@ class Table:
 
     def _add(self, i: int, heading: str, cells: tuple[str, ...]) -> None:
         match = _HEADING.fullmatch(heading)
+        loose = _LOOSE.fullmatch(heading)
         if match is None or not match["name"]:
             raise self.header_error(f"column {i + 1} is headed {heading!r}: expected 'name [unit]'")
         name, unit = match["name"], match["unit"]
+        if unit is None and loose is not None:
+            name, unit = loose["name"], loose["in"] or loose["after"]
         if name in self.columns:
             first = list(self.columns).index(name) + 1
             raise self.header_error(f"column {name!r} appears twice (columns {first} and {i + 1})")
@@ -120,7 +146,25 @@ class Table:
 
     def cell_error(self, name: str, row: int, message: str) -> ValueError:
         """An error in one cell; rows count from 0."""
-        return ValueError(f"{self.path}, line {self.lines[row]}, column {name!r}: {message}")
+        written = self.columns[name].name if name in self.columns else name
+        return ValueError(f"{self.path}, line {self.lines[row]}, column {written!r}: {message}")
+
+    def rename(self, known_as: Callable[[str], str]) -> None:
+        """Call columns by other names; messages go on naming them as they are written.
+
+        Raises
+        ------
+        ValueError
+            Two columns by one name.
+        """
+        renamed: dict[str, Column] = {}
+        for name, column in self.columns.items():
+            other = renamed.setdefault(known_as(name), column)
+            if other is not column:
+                raise self.header_error(
+                    f"columns {other.name!r} and {column.name!r} are both {known_as(name)!r}"
+                )
+        self.columns = renamed
 
     def refuse_unknown(self, known: Callable[[str], bool], names: Collection[str]) -> None:
         """Raise for the first column that is not known, saying which of `names` is near."""
@@ -170,7 +214,7 @@ class Table:
                 f"column {column.name!r} has no unit: expected '{column.name} [{quantities[0]}]'"
                 f" (or another of {usual})"
             )
-        unit = column.unit.replace("\u03bc", "\u00b5")  # the Greek mu for the micro sign
+        unit = _plain(column.unit, units)
         if unit not in units:
             raise self.header_error(
                 f"column {column.name!r} has unit [{column.unit}]: expected one of {usual}"
@@ -214,11 +258,20 @@ def _factors(quantity: str) -> dict[str, tuple[float, float]]:
     return UNITS.get(quantity, {quantity: (1.0, 1.0)})
 
 
+def _plain(unit: str, known: Collection[str]) -> str:
+    """A unit as it is known here."""
+    unit = unit.replace("\u03bc", "\u00b5")  # the Greek mu for the micro sign
+    lower = _SPELLINGS.get(unit.lower(), unit.lower())
+    return lower if unit not in known and lower in known else unit
+
+
 def _content(path: Path) -> list[tuple[int, str]]:
     """Lines that are neither empty nor comments, with their numbers counted from 1."""
+    content = path.read_bytes()
+    utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = content.decode("utf-16" if utf16 else "utf-8-sig")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: not a UTF-8 text file ({error.reason})") from None
-    numbered = enumerate(text.split("\n"), start=1)
+    numbered = enumerate(re.split("\r\n|\r|\n", text), start=1)
     return [(i, line) for i, line in numbered if line.strip() and not line.lstrip().startswith("#")]

@@ -17,8 +17,12 @@ columns                               meaning
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
 ====================================  =============================================================
 
-Lengths are in mm, cm, m, um or in; angles in rad, mrad or deg; covariances in products of mm and
-rad. What separates the columns and which lines are skipped: `pkmcal.csv_table`.
+Names are also taken as instruments and controllers write them: capitals, ``Joint 1``, ``J1``,
+``Axis 1``, ``Leg 1`` for q1, ``Height`` for z, ``Roll``, ``Pitch``, ``Yaw`` for alpha, beta, gamma,
+``Std`` for sigma, ``Reflector`` or ``SMR`` for target, ``Pose`` for group. ``Index``, ``Time``,
+``Date`` and ``Comment`` are left out. ``Rx`` and the like are not taken: makers differ in what
+they mean. Lengths are in mm, cm, m, um or in; angles in rad, mrad or deg; covariances in products
+of mm and rad. What separates the columns and which lines are skipped: `pkmcal.csv_table`.
 """
 
 from __future__ import annotations
@@ -42,6 +46,19 @@ _AXES = ("x", "y", "z")
 _ANGLES = ("alpha", "beta", "gamma")
 _ACTUATOR = re.compile(r"q[1-9][0-9]*")
 _OF_A_TARGET = re.compile(r"(?P<target>[^.]+)\.[xyz]")
+_DRIVEN = re.compile(r"(?:q|j|joint|axis|leg|actuator)[ _]?([1-9][0-9]*)", re.IGNORECASE)
+_ALIASES = {
+    "height": "z",
+    "roll": "alpha",
+    "pitch": "beta",
+    "yaw": "gamma",
+    "dist": "distance",
+    "std": "sigma",
+    "reflector": "target",
+    "smr": "target",
+    "pose": "group",
+}
+_BESIDE = ("index", "time", "timestamp", "date", "comment")  # not looked at
 _RESERVED = ("sigma", "cov", "target", "attachment")
 
 
@@ -83,6 +100,8 @@ def read_measurements(path: str | PathLike[str], robot: Any = None) -> Measureme
     ('height', ('rad', 'rad'), array([1.5]))
     """
     table = Table(path)
+    table.rename(_known_as)
+    table.columns = {name: c for name, c in table.columns.items() if name not in _BESIDE}
     several = _several_targets(table)
     _refuse_unknown(table, several)
     actuators, units = _read_actuators(table)
@@ -130,6 +149,21 @@ def write_measurements(measurements: Measurements, path: str | PathLike[str]) ->
 
 
 # --- reading -----------------------------------------------------------------------------------
+
+
+def _known_as(name: str) -> str:
+    """The name of a column here, for what instruments and controllers call it."""
+    if driven := _DRIVEN.fullmatch(name):
+        return f"q{driven[1]}"
+    plain = name.lower()
+    if plain in _ALIASES:
+        return _ALIASES[plain]
+    target, dot, axis = name.rpartition(".")
+    if dot and axis.lower() in _AXES and target.lower() not in _RESERVED:
+        return f"{target}.{axis.lower()}"
+    known = (*_AXES, *_ANGLES, "distance", "sigma", "group", "target", *_BESIDE)
+    prefixed = plain.partition(".")[0] in _RESERVED
+    return plain if plain in known or prefixed else name
 
 
 def _several_targets(table: Table) -> tuple[str, ...]:

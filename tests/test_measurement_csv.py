@@ -259,7 +259,7 @@ ERRORS = [
     ("q1 [mm],z [mm],q1 [mm]\n1,2,3\n", "line 1: column 'q1' appears twice (columns 1 and 3)"),
     ("q1 [mm],z [mm],\n1,2,3\n", "line 1: column 3 is headed ''"),
     ("q1 [mm],z mm]\n1,2\n", "line 1: column 2 is headed 'z mm]'"),
-    ("Q1 [mm],z [mm]\n1,2\n", "line 1: unknown column 'Q1'"),
+    ("qq1 [mm],z [mm]\n1,2\n", "line 1: unknown column 'qq1'"),
     ("q1 [mm],z [mm],sigmas [mm]\n1,2,3\n", "unknown column 'sigmas'; did you mean 'sigma'?"),
     ("q1 [mm],hight [mm]\n1,2\n", "line 1: unknown column 'hight'"),
     ("q1 [mm],z [mm],distance [mm]\n1,2,3\n", "more than one thing measured"),
