@@ -15,6 +15,7 @@ from pkmcal.identification import Identification
 from pkmcal.identify import identify
 from pkmcal.loading import load
 from pkmcal.measurements import Measurements
+from pkmcal.provenance import contents
 from pkmcal.robot import Robot
 from pkmcal.virtual import VirtualMachine
 from pkmcal.whole_file import write_whole
@@ -44,6 +45,8 @@ class Demonstration:
         The machine with its errors, which the identification does not know.
     measured : Measurements
         What the tracker read.
+    checked : Measurements
+        What it reads at `poses`, which are held out.
     identification : Identification
         What was found from it.
     poses : ndarray (M, 6)
@@ -61,6 +64,7 @@ class Demonstration:
     seed: int
     true_robot: Robot
     measured: Measurements
+    checked: Measurements
     identification: Identification
     poses: FloatArray
     ideal: FloatArray
@@ -112,15 +116,19 @@ class Demonstration:
         figure = _figure(self)
         files = {
             folder / "measured.csv": "what the tracker read",
-            folder / "robot.toml": "the calibrated machine",
-            folder / "corrected.csv": f"corrected leg lengths for the {len(self.poses)} poses",
+            folder / "checked.csv": f"what it read at the {len(self.poses)} other poses",
+            folder / "corrected.csv": "corrected leg lengths for these poses",
             folder / "error.png": "the error of each pose before and after",
+            folder / "robot.toml": "the calibrated machine",
+            folder / "report.json": "all results as data",
+            folder / "report.html": "the report: open it in a browser",
         }
-        measured, robot, corrected, picture = files
+        measured, checked, corrected, picture, *_ = files
         self.measured.write(measured)
-        self.identification.robot.save(robot)
+        self.checked.write(checked)
         write_whole(corrected, _commands(self))
         write_whole(picture, figure)
+        self.identification.report(folder, contents(MACHINE, measured, checked))
         return files
 
 
@@ -151,9 +159,10 @@ def demonstrate(seed: int = 1) -> Demonstration:
 
     machine = VirtualMachine(true, noise=NOISE, seed=int(random.integers(2**32)))
     measured = machine.measure(nominal.inverse(_poses(random, nominal, MEASURED)))
-    found = identify(nominal, measured, prior=SIGMA)
-
     poses = _poses(random, nominal, CHECKED)
+    checked = machine.measure(nominal.inverse(poses))
+    found = identify(nominal, measured, prior=SIGMA, holdout=checked)
+
     ideal, corrected = nominal.inverse(poses), found.robot.inverse(poses)
     off = [true.forward(q).pose - poses for q in (ideal, corrected)]
     before, after = (np.linalg.norm(error[:, :3], axis=1) for error in off)
@@ -162,6 +171,7 @@ def demonstrate(seed: int = 1) -> Demonstration:
         seed=seed,
         true_robot=true,
         measured=measured,
+        checked=checked,
         identification=found,
         poses=poses,
         ideal=ideal,
