@@ -19,7 +19,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-all check regenerate bench lint sanitize clean
+.PHONY: help demo test test-all check regenerate bench docs lint sanitize clean
 
 help:
 	@echo "make demo        calibrate a simulated machine from beginning to end"
@@ -28,6 +28,7 @@ help:
 	@echo "make regenerate  derive the formulas again and write generated/"
 	@echo "make check       fail if 'make regenerate' would change anything"
 	@echo "make bench       run the benchmarks"
+	@echo "make docs        write the reference of all names to build/docs"
 	@echo "make lint        run ruff and mypy"
 	@echo "make sanitize    run the tests on a core built with the address and UB sanitizers"
 	@echo "make clean       remove what was built, $(VENV) too"
@@ -56,6 +57,11 @@ bench: $(TESTS)
 lint: $(TESTS)
 	$(BIN)/ruff check
 	$(BIN)/mypy
+
+# the reference of all public names, from their docstrings
+docs: $(TESTS)
+	$(BIN)/pdoc -d numpy -o build/docs pkmcal
+	@echo "build/docs/pkmcal.html"
 
 # A copy of the package in a folder of its own, found before the one in $(VENV). Without the preloaded
 # runtime and Python's plain malloc the sanitizer misses overflows of arrays; without the C++ runtime

@@ -19,6 +19,7 @@ from pkmcal.whole_file import write_whole
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_SMALL = 1e-3  # below which numbers are written with a power of ten
 _TEMPLATE = "report.html.jinja"
 
 
@@ -147,4 +148,7 @@ def _figures(facts: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _short(value: float) -> str:
-    return f"{value:.3g}" if np.isfinite(value) else "–"
+    """Three digits that mean something."""
+    if not np.isfinite(value):
+        return "–"
+    return f"{value:.3g}" if abs(value) < _SMALL else digits.fixed(value, digits.decimals(value, 3))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import os
 import re
 import shutil
 import subprocess
@@ -93,6 +94,24 @@ def test_help_shows_the_units_of_columns(verb: str) -> None:
     words = " ".join(run(verb, "--help").stdout.replace("│", " ").split())
     for column in re.findall(r"'(?:x|y|z|alpha) [^']*'", words):
         assert "[" in column, column
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_explains_itself_and_speaks_json(verb: str) -> None:
+    words = " ".join(run(verb, "--help").stdout.split())
+    assert f"Example: pkmcal {verb}" in words and "--json" in words
+
+
+def test_shell_completion_knows_the_verbs() -> None:
+    asked = {"_PKMCAL_COMPLETE": "complete_bash", "COMP_WORDS": "pkmcal cal", "COMP_CWORD": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", "from pkmcal.cli import main; main()"],
+        env=os.environ | asked,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout.split() == ["calibrate"]
 
 
 def test_process_refuses_in_one_line_and_with_exit_code_2(tmp_path: Path) -> None:
