@@ -14,6 +14,7 @@ from pkmcal.core import POSE, FloatArray
 from pkmcal.csv_table import Table
 from pkmcal.loading import load_parallel
 from pkmcal.pose_csv import read_poses, write_poses
+from pkmcal.provenance import comment, contents
 from pkmcal.robot import Robot
 
 _BESIDE = re.compile(r"q\d+|sigma(\..+)?|group")  # in a file of measurements, and not needed here
@@ -91,7 +92,8 @@ def compensate(
             for word, values in (("q", found.actuators), ("dq", found.correction))
             for i, unit in enumerate(units)
         }
-        write_poses(folder(out) / "corrected.csv", poses, columns)
+        read = contents(robot, desired, measured)
+        write_poses(folder(out) / "corrected.csv", poses, columns, comment(read))
     if json:
         typer.echo(as_json(found))
     else:

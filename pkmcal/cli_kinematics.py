@@ -14,9 +14,9 @@ from pkmcal.arm_machine import as_machine
 from pkmcal.cli_output import as_json, folder
 from pkmcal.command_csv import read_commands, write_commands
 from pkmcal.core import POSE, STATUS, FloatArray
+from pkmcal.loading import load, load_parallel
 from pkmcal.pose_csv import read_poses, write_poses
 from pkmcal.provenance import comment, contents
-from pkmcal.robot import load, load_parallel
 
 _ROBOT = typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
 _RAD = typer.Option("--rad", help="Angles on the line are in radians.")

@@ -9,6 +9,7 @@ from os import PathLike
 
 import numpy as np
 
+from pkmcal.column_names import known_as
 from pkmcal.core import FloatArray
 from pkmcal.csv_table import Table
 from pkmcal.whole_file import write_whole
@@ -37,6 +38,7 @@ def read_commands(path: str | PathLike[str], units: Sequence[str]) -> FloatArray
         The file cannot be read.
     """
     table = Table(path)
+    table.rename(known_as)
     names = [f"q{i + 1}" for i in range(len(units))]
     table.require(names)
     columns = [table.numbers(name, unit)[0] for name, unit in zip(names, units, strict=True)]

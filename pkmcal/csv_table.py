@@ -140,6 +140,10 @@ class Table:
             raise self.header_error(f"column {name!r} appears twice (columns {first} and {i + 1})")
         self.columns[name] = Column(name, unit, cells)
 
+    def leave_out(self, names: Collection[str]) -> None:
+        """Forget columns that are not looked at."""
+        self.columns = {n: column for n, column in self.columns.items() if n not in names}
+
     def header_error(self, message: str) -> ValueError:
         """An error in the line of column names."""
         return ValueError(f"{self.path}, line {self._header_line}: {message}")

@@ -38,6 +38,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal.column_names import BESIDE, RESERVED, known_as
 from pkmcal.csv_table import Table
 from pkmcal.measurements import COMPONENTS, Measurements
 from pkmcal.whole_file import write_whole
@@ -46,20 +47,6 @@ _AXES = ("x", "y", "z")
 _ANGLES = ("alpha", "beta", "gamma")
 _ACTUATOR = re.compile(r"q[1-9][0-9]*")
 _OF_A_TARGET = re.compile(r"(?P<target>[^.]+)\.[xyz]")
-_DRIVEN = re.compile(r"(?:q|j|joint|axis|leg|actuator)[ _]?([1-9][0-9]*)", re.IGNORECASE)
-_ALIASES = {
-    "height": "z",
-    "roll": "alpha",
-    "pitch": "beta",
-    "yaw": "gamma",
-    "dist": "distance",
-    "std": "sigma",
-    "reflector": "target",
-    "smr": "target",
-    "pose": "group",
-}
-_BESIDE = ("index", "time", "timestamp", "date", "comment")  # not looked at
-_RESERVED = ("sigma", "cov", "target", "attachment")
 
 
 def read_measurements(path: str | PathLike[str], robot: Any = None) -> Measurements:
@@ -100,8 +87,8 @@ def read_measurements(path: str | PathLike[str], robot: Any = None) -> Measureme
     ('height', ('rad', 'rad'), array([1.5]))
     """
     table = Table(path)
-    table.rename(_known_as)
-    table.columns = {name: c for name, c in table.columns.items() if name not in _BESIDE}
+    table.rename(known_as)
+    table.leave_out(BESIDE)
     several = _several_targets(table)
     _refuse_unknown(table, several)
     actuators, units = _read_actuators(table)
@@ -151,26 +138,11 @@ def write_measurements(measurements: Measurements, path: str | PathLike[str]) ->
 # --- reading -----------------------------------------------------------------------------------
 
 
-def _known_as(name: str) -> str:
-    """The name of a column here, for what instruments and controllers call it."""
-    if driven := _DRIVEN.fullmatch(name):
-        return f"q{driven[1]}"
-    plain = name.lower()
-    if plain in _ALIASES:
-        return _ALIASES[plain]
-    target, dot, axis = name.rpartition(".")
-    if dot and axis.lower() in _AXES and target.lower() not in _RESERVED:
-        return f"{target}.{axis.lower()}"
-    known = (*_AXES, *_ANGLES, "distance", "sigma", "group", "target", *_BESIDE)
-    prefixed = plain.partition(".")[0] in _RESERVED
-    return plain if plain in known or prefixed else name
-
-
 def _several_targets(table: Table) -> tuple[str, ...]:
     """Names of the targets that have columns of their own, in the order of the columns."""
     matches = (_OF_A_TARGET.fullmatch(name) for name in table.columns)
     found = dict.fromkeys(match["target"] for match in matches if match)
-    return tuple(name for name in found if name not in _RESERVED)
+    return tuple(name for name in found if name not in RESERVED)
 
 
 def _refuse_unknown(table: Table, several: tuple[str, ...]) -> None:

@@ -9,6 +9,7 @@ from os import PathLike
 import numpy as np
 
 from pkmcal import digits
+from pkmcal.column_names import BESIDE, known_as
 from pkmcal.core import POSE, FloatArray
 from pkmcal.csv_table import Table
 from pkmcal.robot import Robot
@@ -23,7 +24,8 @@ def read_poses(path: str | PathLike[str], robot: Robot) -> FloatArray:
     Parameters
     ----------
     path : str or path
-        A CSV with columns ``x [mm]`` … ``gamma [deg]``, or other units of length and angle.
+        A file with columns ``x [mm]`` … ``gamma [deg]``, or other units of length and angle;
+        other spellings as in `read_measurements`.
     robot : Robot
         Whose home pose stands for columns that are not there.
 
@@ -40,6 +42,8 @@ def read_poses(path: str | PathLike[str], robot: Robot) -> FloatArray:
         The file cannot be read.
     """
     table = Table(path)
+    table.rename(known_as)
+    table.leave_out(BESIDE)
     table.refuse_unknown(POSE.__contains__, POSE)
     poses = np.repeat(robot.home[None], len(table), axis=0)
     for k, name in enumerate(POSE):

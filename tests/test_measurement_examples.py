@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.command_csv import read_commands
 from pkmcal.csv_table import Table
 from pkmcal.measurement_csv import read_measurements
+from pkmcal.pose_csv import read_poses
 from pkmcal.xlsx_rows import xlsx_rows
 
 DATA = Path(__file__).parent / "data"
@@ -53,6 +55,15 @@ def test_targets_keep_their_names_and_axes_may_be_capitals(tmp_path: Path) -> No
     path = tmp_path / "targets.csv"
     path.write_text("q1 [mm],SMR 1.X (mm),SMR 1.Y (mm),SMR 1.Z (mm)\n1,2,3,4\n")
     assert read_measurements(path).target_names == ("SMR 1",)
+
+
+def test_poses_and_commands_are_headed_likewise(tmp_path: Path) -> None:
+    robot = pk.load("2tpr2tps")
+    (tmp_path / "p.csv").write_text("Time;X (mm);Y (mm);Z (m);Roll (deg)\n1;0;5,5;0,4;90\n")
+    pose = read_poses(tmp_path / "p.csv", robot)
+    np.testing.assert_allclose(pose, [[0, 5.5, 400, np.pi / 2, 0, 0]])
+    (tmp_path / "q.csv").write_text("Leg 1 (mm),Leg 2 (mm)\n1,2\n")
+    np.testing.assert_array_equal(read_commands(tmp_path / "q.csv", ("mm", "mm")), [[1, 2]])
 
 
 # --- Excel ---------------------------------------------------------------------------------------
