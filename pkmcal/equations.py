@@ -67,6 +67,7 @@ class Equations:
     """
 
     def __init__(self, shares: Sequence[Share], parameters: Parameters) -> None:
+        self.shares = tuple(shares)
         self.sets = tuple(share.measured for share in shares)
         self.rows = np.concatenate([share.rows for share in shares])
         self.parameters = parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pkmcal import digits
 from pkmcal.arm_machine import ArmMachine, as_machine
 from pkmcal.core import POSE
-from pkmcal.equations import Point
+from pkmcal.equations import Equations, Point
 from pkmcal.identification import Identification
 from pkmcal.iso9283 import performance
 from pkmcal.provenance import printable
@@ -26,6 +26,7 @@ _GAIN = 0.9  # of the misfit that must not be left for a calibration to be worth
 _CELLS, _DRAWN = 30, 500  # of the map of the workspace along an axis; of poses for its quantiles
 _SHARE = 0.9  # of the way from home to the ends of the workspace
 _TOLD, _ALONE = 0.5, 0.99  # of the prior's deviation: to what measurements narrow it down
+_ELSEWHERE = 1.0  # mm
 _NOTHING = 1e-3  # share of a parameter in what cannot be told that does not count
 
 
@@ -229,6 +230,33 @@ def iso9283(found: Identification, before: Point) -> list[dict[str, Any]]:
     return scores
 
 
+def _expected(found: Identification, places: FloatArray) -> FloatArray:
+    """Standard deviation of the tool, mm (N,), at poses (N, 6), of an arm at joints (N, n).
+
+    Where the instrument's frame or targets were sought, that of the first target as the
+    instrument sees it: in the base frame it holds what nobody can know of where the base is.
+    """
+    if not instrument_sought(found):
+        return found.accuracy(places)
+    machine, known = as_machine(found.robot), found._equations
+    arm = isinstance(machine, ArmMachine)
+    q = places if arm else machine.inverse(places)
+    like = known.shares[0]
+    rows = np.zeros(len(q), dtype=np.intp)
+    measured = replace(like.measured.select(rows), actuators=q, group=np.arange(len(q)))
+    equations = Equations([replace(like, measured=measured, rows=rows)], known.parameters)
+    point = equations.at(found.values)
+    jacobian = equations.jacobian(point)[0][:, :3]
+    variance = np.einsum("nij,jk,nik->n", jacobian, found._told, jacobian, optimize=True)
+    scale = known.parameters.scale[:, None]
+    untold = jacobian @ (found._untold_here() * scale)
+    sure = np.linalg.norm(untold, axis=(1, 2)) < _NOTHING
+    if not arm:  # another assembly mode is another place
+        off = np.abs(point.pose[equations.pose_of[0]] - places)[:, :3].max(axis=1)
+        sure &= off < _ELSEWHERE
+    return np.where(sure, np.sqrt(variance), np.inf)
+
+
 def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice | None] | str:
     """The accuracy that the covariance predicts over the workspace, or why there is none."""
     machine = as_machine(found.robot)
@@ -238,21 +266,21 @@ def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice 
         random = np.random.default_rng(0).uniform(q.min(axis=0), q.max(axis=0), shape)
         positions = machine.forward(random).pose[:, :3]
         where = f"{_DRAWN} joint positions drawn within the range that was measured"
-        return WorkspaceAccuracy(random, positions, found.accuracy(random), where), None
+        return WorkspaceAccuracy(random, positions, _expected(found, random), where), None
     try:
         poses = sample_poses(machine, _DRAWN, share=_SHARE)
         ends = reach(machine)
     except ValueError as error:
         return str(error)
     where = f"{_DRAWN} poses drawn in the workspace, {100 * _SHARE:.0f} % of the way to its ends"
-    sampled = WorkspaceAccuracy(poses, poses[:, :3], found.accuracy(poses), where)
+    sampled = WorkspaceAccuracy(poses, poses[:, :3], _expected(found, poses), where)
     axes = [name for name in ends if name in "xyz" and ends[name][0] < ends[name][1]][:2]
     if len(axes) < 2:
         return sampled, None
     grid = workspace(machine, {name: (*ends[name], _CELLS) for name in axes})
     inside = grid.inside
     accuracy = np.full(inside.shape, np.nan)
-    accuracy[inside] = found.accuracy(grid.poses[inside])
+    accuracy[inside] = _expected(found, grid.poses[inside])
     accuracy[~np.isfinite(accuracy)] = np.nan
     return sampled, Slice((axes[0], axes[1]), (grid.values[0], grid.values[1]), accuracy)
 
