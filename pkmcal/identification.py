@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pkmcal import digits
 from pkmcal.arm_machine import as_machine
 from pkmcal.core import as_rows
-from pkmcal.equations import Equations
+from pkmcal.equations import Equations, Point
 from pkmcal.estimate import Estimate
 from pkmcal.identifiability import decompose
 from pkmcal.predict import predict
@@ -134,6 +134,7 @@ class Identification:
     warnings: tuple[str, ...]
     _told: FloatArray  # covariance of what is determined, (n, n)
     _equations: Equations
+    _start: Point
     _estimate: Estimate
 
     @property

@@ -309,5 +309,6 @@ def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Iden
         warnings=(),
         _told=covariance,
         _equations=equations,
+        _start=estimator.start,
         _estimate=estimate,
     )

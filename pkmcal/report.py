@@ -50,9 +50,8 @@ def write(found: Identification, folder: Path, files: Mapping[str, bytes]) -> li
 
 def gather(found: Identification, files: Mapping[str, bytes]) -> dict[str, Any]:
     """Everything that the report says; the calibration itself is ``found``."""
-    before = data.start_of(found)
     state, sentence = data.verdict(found)
-    points = data.points(found, before)
+    points = data.points(found)
     predicted = data.over_the_workspace(found)
     return {
         "state": state,
@@ -61,10 +60,10 @@ def gather(found: Identification, files: Mapping[str, bytes]) -> dict[str, Any]:
         "points": points,
         "worst": data.worst(points),
         "moved": data.moved(points),
-        "directions": data.directions(found, before),
+        "directions": data.directions(found),
         "parameters": data.parameters(found),
         "correlation": data.correlation(found),
-        "iso9283": data.iso9283(found, before),
+        "iso9283": data.iso9283(found),
         "accuracy": None if isinstance(predicted, str) else predicted[0],
         "slice": None if isinstance(predicted, str) else predicted[1],
         "no_accuracy": predicted if isinstance(predicted, str) else "",

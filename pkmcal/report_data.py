@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pkmcal import digits
 from pkmcal.arm_machine import ArmMachine, as_machine
 from pkmcal.core import POSE
-from pkmcal.equations import Equations, Point
+from pkmcal.equations import Equations
 from pkmcal.identification import Identification
 from pkmcal.iso9283 import performance
 from pkmcal.provenance import printable
@@ -87,10 +87,8 @@ def verdict(found: Identification) -> tuple[str, str]:
 
 
 def _falls(found: Identification, name: str) -> str:
-    """What a misfit does; without "before" where that was for want of the instrument's place."""
+    """What a misfit does."""
     before, after = getattr(found, f"{name}_before"), getattr(found, name)
-    if instrument_sought(found):
-        return f"is {_mm(after)} rms"
     return f"{'falls' if after < before else 'goes'} from {_mm(before)} to {_mm(after)} rms"
 
 
@@ -99,15 +97,10 @@ def instrument_sought(found: Identification) -> bool:
     return len(found.free) > len(found._equations.parameters.places)
 
 
-def start_of(found: Identification) -> Point:
-    """The equations before the calibration."""
-    return found._equations.at(found.start)
-
-
-def directions(found: Identification, before: Point) -> list[dict[str, Any]]:
+def directions(found: Identification) -> list[dict[str, Any]]:
     """Residuals of each measured component: mean, rms and largest, before and after; mm and rad."""
     names: dict[str, tuple[str, list[FloatArray], list[FloatArray]]] = {}
-    parts = zip(found._equations.sets, before.residuals, found.residuals, strict=True)
+    parts = zip(found._equations.sets, found._start.residuals, found.residuals, strict=True)
     for measured, first, last in parts:
         pairs = zip(measured.components, measured.units, strict=True)
         for k, (name, unit) in enumerate(pairs):
@@ -125,10 +118,10 @@ def directions(found: Identification, before: Point) -> list[dict[str, Any]]:
     return rows
 
 
-def points(found: Identification, before: Point) -> list[dict[str, Any]]:
+def points(found: Identification) -> list[dict[str, Any]]:
     """Every fitted row: its number, where the machine is, how far off before and after, mm."""
     equations = found._equations
-    off_before = equations.distances(before)
+    off_before = equations.distances(found._start)
     off = equations.distances(found._estimate.point)
     place = np.concatenate(equations.pose_of)
     at = found._estimate.point.pose[place]
@@ -202,7 +195,7 @@ def correlation(found: Identification) -> FloatArray:
     return matrix
 
 
-def iso9283(found: Identification, before: Point) -> list[dict[str, Any]]:
+def iso9283(found: Identification) -> list[dict[str, Any]]:
     """AP, RP and AD of every set of positions or poses, before and after the calibration."""
     equations = found._equations
     scores = []
@@ -210,7 +203,7 @@ def iso9283(found: Identification, before: Point) -> list[dict[str, Any]]:
         if measured.kind not in ("position", "pose"):
             continue
         group, values = groups(measured), measured.values[:, :3]
-        first = performance(values, before.predicted[i].values[:, :3], group)
+        first = performance(values, found._start.predicted[i].values[:, :3], group)
         last = performance(values, values - found.residuals[i][:, :3], group)
         scores.append({
             "set": i + 1,
@@ -238,22 +231,21 @@ def _expected(found: Identification, places: FloatArray) -> FloatArray:
     """
     if not instrument_sought(found):
         return found.accuracy(places)
-    machine, known = as_machine(found.robot), found._equations
-    arm = isinstance(machine, ArmMachine)
-    q = places if arm else machine.inverse(places)
+    known = found._equations
+    at, q, _ = as_machine(found.robot).visited(places)
     like = known.shares[0]
     rows = np.zeros(len(q), dtype=np.intp)
     measured = replace(like.measured.select(rows), actuators=q, group=np.arange(len(q)))
     equations = Equations([replace(like, measured=measured, rows=rows)], known.parameters)
-    point = equations.at(found.values)
+    point = equations.at(found._estimate.point.theta)
     jacobian = equations.jacobian(point)[0][:, :3]
-    variance = np.einsum("nij,jk,nik->n", jacobian, found._told, jacobian, optimize=True)
-    scale = known.parameters.scale[:, None]
-    untold = jacobian @ (found._untold_here() * scale)
+    jacobian *= known.parameters.scale
+    covariance = found._estimate.covariance
+    variance = np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian, optimize=True)
+    untold = jacobian @ found._untold_here()
     sure = np.linalg.norm(untold, axis=(1, 2)) < _NOTHING
-    if not arm:  # another assembly mode is another place
-        off = np.abs(point.pose[equations.pose_of[0]] - places)[:, :3].max(axis=1)
-        sure &= off < _ELSEWHERE
+    off = np.abs(point.pose[equations.pose_of[0]] - at)[:, :3].max(axis=1)
+    sure &= off < _ELSEWHERE  # another assembly mode is another place
     return np.where(sure, np.sqrt(variance), np.inf)
 
 

@@ -55,17 +55,18 @@ def machine(found: Identification) -> Figure | None:
     equations = found._equations
     middle = len(equations.actuators) // 2
     q, pose = equations.actuators[middle], found._estimate.point.pose[middle]
-    drawn = exaggerated(equations.parameters, found.start, found.values, q, pose)
+    before, after = found._start.theta, found._estimate.point.theta
+    drawn = exaggerated(equations.parameters, before, after, q, pose)
     if drawn is None:
         return None
     figure = _figure(4.8)
-    before, after, times = drawn
+    assumed, calibrated, times = drawn
     panels = [figure.add_subplot(1, 2, k + 1, projection="3d", proj_type="ortho") for k in range(2)]
     for panel, (elevation, turn), title in zip(
         panels, ((22, -60), (90, -90)), ("from the side", "from above"), strict=True
     ):
-        _lines(panel, before, FAINT, "as assumed")
-        _lines(panel, after, BLUE, f"as calibrated, change × {times}")
+        _lines(panel, assumed, FAINT, "as assumed")
+        _lines(panel, calibrated, BLUE, f"as calibrated, change × {times}")
         panel.set_title(title, fontsize="medium")
         panel.view_init(elevation, turn)
         panel.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="" if elevation == 90 else "z [mm]")

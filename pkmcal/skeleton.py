@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pkmcal.arm_machine import ArmMachine, as_given, as_machine
-from pkmcal.core import points
+from pkmcal.core_readings import seen_points
 from pkmcal.limb_kinds import KINDS
 from pkmcal.parameters import Parameters
 from pkmcal.robot import Robot
@@ -65,7 +65,7 @@ def skeleton(robot: Robot | SerialArm, q: FloatArray, guess: FloatArray) -> Skel
     slots = machine._slots
     _, towards, _ = machine._machine.limbs(slots, own)
     base, platform = np.ascontiguousarray(slots[:, :3]), np.ascontiguousarray(slots[:, 3:6])
-    ends = points(own[0], platform)[0]
+    ends = seen_points(own[0], platform)[0]
     lines = []
     for i, limb in enumerate(machine.model.limbs):
         kind = KINDS[limb.kind]
@@ -149,4 +149,4 @@ def _around(joints: FloatArray) -> NDArray[np.intp]:
 
 def _in_frame(frame: FloatArray, line: FloatArray) -> FloatArray:
     """Points of the machine's own frame in the robot's base frame."""
-    return points(np.ascontiguousarray(frame), np.ascontiguousarray(line))[0]
+    return seen_points(np.ascontiguousarray(frame), np.ascontiguousarray(line))[0]
