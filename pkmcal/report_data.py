@@ -223,14 +223,17 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
     return scores
 
 
-def _expected(found: Identification, places: FloatArray) -> FloatArray:
+def expected(found: Identification, places: FloatArray) -> FloatArray:
     """Standard deviation of the tool, mm (N,), at poses (N, 6), of an arm at joints (N, n).
 
     Where the instrument's frame or targets were sought, that of the first target as the
     instrument sees it: in the base frame it holds what nobody can know of where the base is.
     """
-    if not instrument_sought(found):
-        return found.accuracy(places)
+    return as_seen(found, places) if instrument_sought(found) else found.accuracy(places)
+
+
+def as_seen(found: Identification, places: FloatArray) -> FloatArray:
+    """Standard deviation of the first row's target in the instrument's frame, as `expected`."""
     known = found._equations
     at, q, _ = as_machine(found.robot).visited(places)
     like = known.shares[0]
@@ -258,21 +261,21 @@ def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice 
         random = np.random.default_rng(0).uniform(q.min(axis=0), q.max(axis=0), shape)
         positions = machine.forward(random).pose[:, :3]
         where = f"{_DRAWN} joint positions drawn within the range that was measured"
-        return WorkspaceAccuracy(random, positions, _expected(found, random), where), None
+        return WorkspaceAccuracy(random, positions, expected(found, random), where), None
     try:
         poses = sample_poses(machine, _DRAWN, share=_SHARE)
         ends = reach(machine)
     except ValueError as error:
         return str(error)
     where = f"{_DRAWN} poses drawn in the workspace, {100 * _SHARE:.0f} % of the way to its ends"
-    sampled = WorkspaceAccuracy(poses, poses[:, :3], _expected(found, poses), where)
+    sampled = WorkspaceAccuracy(poses, poses[:, :3], expected(found, poses), where)
     axes = [name for name in ends if name in "xyz" and ends[name][0] < ends[name][1]][:2]
     if len(axes) < 2:
         return sampled, None
     grid = workspace(machine, {name: (*ends[name], _CELLS) for name in axes})
     inside = grid.inside
     accuracy = np.full(inside.shape, np.nan)
-    accuracy[inside] = _expected(found, grid.poses[inside])
+    accuracy[inside] = expected(found, grid.poses[inside])
     accuracy[~np.isfinite(accuracy)] = np.nan
     return sampled, Slice((axes[0], axes[1]), (grid.values[0], grid.values[1]), accuracy)
 
