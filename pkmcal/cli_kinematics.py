@@ -30,7 +30,7 @@ def inverse(
         str,
         typer.Argument(
             metavar="X,Y,Z,A,B,C|CSV",
-            help="One pose in mm and deg, or a file of poses: 'x [mm]' … 'gamma [deg]'.",
+            help="One pose in mm and deg, or a file of poses: 'x \\[mm]' … 'gamma \\[deg]'.",
         ),
     ],
     rad: Annotated[bool, _RAD] = False,
@@ -80,7 +80,7 @@ def forward(
         str,
         typer.Argument(
             metavar="Q1,Q2,…|CSV",
-            help="One row of actuator coordinates in mm and deg, or a file: 'q1 [mm]' ….",
+            help="One row of actuator coordinates in mm and deg, or a file: 'q1 \\[mm]' ….",
         ),
     ],
     rad: Annotated[bool, _RAD] = False,
