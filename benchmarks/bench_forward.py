@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -104,7 +105,27 @@ def bench_hexapod(report: Report, folder: Path) -> None:
             f"{isa}: {times(lanes)} one lane (wanted {at_least}x)"
             + (f", {times(text)} the scalar Newton (wanted {scalars}x)" if scalars else "")
         )
+    bench_units(report, folder)
     bench_peak(report, folder, {isa: took[f"core, {isa}"] / ROWS for isa in solvers}, best)
+
+
+def bench_units(report: Report, folder: Path) -> None:
+    """What more lanes can gain at most: what the processor's units gain."""
+    steps, rows = 50_000, []
+    for isa in native.available():
+        lib = native.lane_units(folder, isa).lib
+        gain = {}
+        for what in ("multiply_add", "divide"):
+            one, every = (getattr(lib, f"{what}_{many}") for many in ("one", "all"))
+            took = medians(
+                {"one": lambda one=one: one(steps, 1.5), "all": lambda every=every: every(steps, 1.5)},
+                41,
+                time.thread_time,
+            )
+            gain[what] = took["one"] / took["all"] * native.BYTES[isa] / 8
+        rows.append([isa, native.BYTES[isa] // 8, *(times(each) for each in gain.values())])
+    report.text("What a register full of doubles gains on one double, nothing else in the way:")
+    report.table(["ISA", "lanes", "multiplications with additions", "divisions"], rows)
 
 
 def bench_peak(report: Report, folder: Path, took: dict[str, float], found: pk.Forward) -> None:

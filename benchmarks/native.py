@@ -61,6 +61,15 @@ def fma_peak(folder: Path, isa: str) -> Compiled:
     return compiled(folder, f"peak_{isa}", declared, [HERE / "fma_peak.c"], flags)
 
 
+def lane_units(folder: Path, isa: str) -> Compiled:
+    """Loops of one number at a time and of a register full, unfused as in the core."""
+    calls = [f"{what}_{many}" for what in ("multiply_add", "divide") for many in ("one", "all")]
+    declared = "".join(f"double {name}(ptrdiff_t steps, double start);" for name in calls)
+    flags = ["-O3", "-fno-tree-vectorize", "-ffp-contract=off", f"-DBYTES={BYTES[isa]}"]
+    sources = [HERE / "lane_units.c"]
+    return compiled(folder, f"units_{isa}", declared, sources, [*flags, *TARGETS[isa]])
+
+
 class OneLane:
     """The core of csrc/ compiled with LANES 1, in the place of `core_machine.lib` while entered.
 

@@ -44,14 +44,15 @@ def hexapod_forward(iterations: int) -> Operations:
     of, m, limbs = counts(), 6, 6
     steps = iterations - 2
     frame, retract = of["map_spatial_frame"], of["map_spatial_retract"]
-    system = frame + limbs * (of["sphere_row"] + of["map_spatial_pull"]) + factoring(m)
+    row = 1 + of["sphere_row"] + of["map_spatial_pull"]  # 1: the length squared
+    system = frame + limbs * row + factoring(m)
     prediction = 2 * m * limbs + m + retract
     step = substituting(m) + retract
-    # R b + p - c as in limb_joint, then half of its square less the length's
-    residual = frame + limbs * (of["limb_joint"] + 7)
-    loading = limbs * (of["limb_drive"] + 1 + 1)
+    # R b + p - c as in limb_joint, then half of its square less the length's square
+    residual = frame + limbs * (of["limb_joint"] + 8)
+    loading = limbs * of["limb_drive"]
     unloading = frame + of["map_spatial_angles"]
     return Operations(
-        prediction + (steps + 1) * system + steps * step,
-        loading + 3 * residual + 2 * substituting(m) + 3 * retract + unloading,
+        prediction + (steps + 1) * system + steps * step + 2 * substituting(m) + 2 * limbs,
+        loading + of["map_spatial_tidy"] + 3 * residual + 2 * retract + unloading,
     )
