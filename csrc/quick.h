@@ -1,8 +1,9 @@
 /* The quick way of forward kinematics: the same steps for every row, so no lane waits for another.
  *
- * From the guess a linear prediction, Newton steps and one factorisation in floats, then two steps
- * in doubles with those factors. The last residual and the contraction of the two steps decide
- * whether a row is solved; so do small pivots, and a determinant of another sign than at the guess.
+ * From the guess a linear prediction, Newton steps and one factorisation in floats; then two steps of
+ * the state in doubles, whose closures are found in doubles and solved with those factors. The last
+ * residual and the contraction of the two steps decide whether a row is solved; so do small pivots,
+ * and a determinant of another sign than at the guess.
  * Every stage runs over all blocks of a batch before the next begins: the processor overlaps them.
  */
 #ifndef QUICK_H
