@@ -171,6 +171,25 @@ int pkm_rates(const pkm_machine *machine, int isa, ptrdiff_t n, const double *ge
     return 0;
 }
 
+int pkm_spheres(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                const double *q, double *sphere)
+{
+    CHECKED_MACHINE(machine, isa);
+    chosen->spheres(machine, n, geometry, q, sphere);
+    return 0;
+}
+
+int pkm_state_size(void) { return MAX_STATE; }
+
+int pkm_paths(const pkm_machine *machine, ptrdiff_t n, const double *start, const double *target,
+              double *state, double accuracy, double *frame, int32_t *status, int32_t *steps,
+              double *reached)
+{
+    if (closure_count(machine) != free_coordinates(machine)) return PKM_BAD_MACHINE;
+    paths_follow(machine, n, start, target, state, accuracy, frame, status, steps, reached);
+    return 0;
+}
+
 int pkm_compose(int isa, ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
                 ptrdiff_t b_stride, double *out)
 {

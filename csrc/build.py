@@ -12,13 +12,15 @@ GENERATED = CSRC.parent / "generated"
 HEADER = CSRC / "pkmcal.h"
 BEGIN, END = "/* cffi begin */", "/* cffi end */"
 
-# Contraction off: every ISA gives the same bits.
+# Contraction off: every ISA gives the same bits. Complex products and quotients are written out:
+# without limited range each is a library call.
 FLAGS = [
     "-std=c11",
     "-O3",
     "-fno-math-errno",
     "-fno-trapping-math",
     "-ffp-contract=off",
+    "-fcx-limited-range",
     "-fvisibility=hidden",
     "-Werror=implicit-function-declaration",
 ]

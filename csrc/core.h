@@ -136,6 +136,12 @@ static void core_limbs(const pkm_machine *machine, ptrdiff_t n, const double *ge
     limb_rows(machine, n, geometry, pose, drive, on_base, on_platform);
 }
 
+static void core_spheres(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                         const double *q, double *sphere)
+{
+    sphere_rows(machine, n, geometry, q, sphere);
+}
+
 static void core_compose(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
                          ptrdiff_t b_stride, double *out)
 {
@@ -279,6 +285,7 @@ const pkm_core CORE = {
     .home = core_home,
     .closure = core_closure,
     .limbs = core_limbs,
+    .spheres = core_spheres,
     .compose = core_compose,
     .invert = core_invert,
     .compose_rates = core_compose_rates,

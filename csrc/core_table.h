@@ -23,6 +23,8 @@ typedef struct {
                     double *by_q);
     void (*limbs)(const pkm_machine *, ptrdiff_t n, const double *geometry, const double *pose,
                   double *drive, double *on_base, double *on_platform);
+    void (*spheres)(const pkm_machine *, ptrdiff_t n, const double *geometry, const double *q,
+                    double *sphere);
     void (*compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
                     ptrdiff_t b_stride, double *out);
     void (*invert)(ptrdiff_t n, const double *a, double *out);
@@ -64,6 +66,11 @@ typedef struct {
     void (*rates)(const pkm_machine *, ptrdiff_t n, const double *geometry, const double *motion,
                   double *q1, double *q2);
 } pkm_core;
+
+/* pkm_paths, the arguments already checked: scalar, so the same for every ISA. */
+void paths_follow(const pkm_machine *machine, ptrdiff_t n, const double *start,
+                  const double *target, double *state, double accuracy, double *frame,
+                  int32_t *status, int32_t *steps, double *reached);
 
 extern const pkm_core pkm_base, pkm_v3, pkm_v4;
 

@@ -85,4 +85,33 @@ INLINE void limb_rows(const pkm_machine *machine, ptrdiff_t n, const double *geo
     }
 }
 
+/* The limbs (n, limbs, PKM_SPHERE) at actuator coordinates. */
+INLINE void sphere_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                        const double *q, double *out)
+{
+    limb_numbers limb[PKM_MAX_LIMBS];
+    FN(limb_sphere) sphere[PKM_MAX_LIMBS];
+    const int width = machine->limbs * PKM_SPHERE;
+    memset(limb, 0, sizeof limb);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_q[PKM_MAX_LIMBS];
+        const int count = block_rows(first, n, row);
+        if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
+        for (int a = 0; a < machine->actuators; a++) lane_q[a] = gather(q + a, machine->actuators, row);
+        const mask reachable = spheres_at(machine, limb, lane_q, sphere);
+        for (int i = 0; i < machine->limbs; i++) {
+            const FN(limb_sphere) *one = &sphere[i];
+            double *to = out + i * PKM_SPHERE;
+            for (int k = 0; k < 3; k++) {
+                scatter(one->b[k], to + k, width, row, count);
+                scatter(one->c[k], to + 3 + k, width, row, count);
+                scatter(one->base_axis[k], to + 7 + k, width, row, count);
+                scatter(one->platform_axis[k], to + 10 + k, width, row, count);
+            }
+            scatter(select(reachable, one->rho * one->rho, fill(NAN)), to + 6, width, row, count);
+        }
+    }
+}
+
 #endif

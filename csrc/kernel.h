@@ -1,13 +1,16 @@
 /* What runs in either precision: lane arithmetic, the generated formulas, the closure rows of a
- * machine, and elimination in a fixed order. Included by lanes.h for `narrow` and for `wide`. */
+ * machine, and elimination in a fixed order. Included by lanes.h for `narrow` and for `wide`, and by
+ * paths.c for complex numbers. */
 
 INLINE real FN(fill)(NUMBER x) { return (real){0} + x; }
 
+#ifndef COMPLEX
 INLINE real FN(absolute)(real x)
 {
     const mask sign = (mask)(-FN(fill)(0));
     return (real)((mask)x & ~sign);
 }
+#endif
 
 #ifndef NARROW
 #include "trigonometry.h"
@@ -64,6 +67,15 @@ INLINE void FN(map_tidy)(int map, const real *state, real *tidy)
 {
     switch (map) {
 #define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_tidy)(state, tidy); break;
+    EACH_MAP(CASE)
+#undef CASE
+    }
+}
+
+INLINE void FN(map_velocity)(int map, const real *state, const real *delta, real *rate)
+{
+    switch (map) {
+#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_velocity)(state, delta, rate); break;
     EACH_MAP(CASE)
 #undef CASE
     }

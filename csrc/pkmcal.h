@@ -88,6 +88,28 @@ int pkm_closure(const pkm_machine *machine, int isa, ptrdiff_t n, const double *
                 const double *pose, const double *q, double *residual, double *by_step,
                 double *by_free, double *by_q);
 
+/* What a limb is at given actuators, for homotopies: its joint b, its anchor c, the square of its
+ * length and its axes at the base and at the platform, in that order. Zero where it has no axis. */
+enum { PKM_SPHERE = 13 };
+
+/* q (n, actuators) -> the limbs (n, limbs, PKM_SPHERE); squares are NaN where a length is not
+ * positive. */
+int pkm_spheres(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+                const double *q, double *sphere);
+
+/* What became of a path. */
+enum { PKM_ARRIVED, PKM_LOST, PKM_FAR };
+
+/* Solutions of closures at `start`, as many as there are free coordinates, followed to `target`, while the limbs go there in a straight
+ * line. Complex numbers are pairs: limbs (limbs, PKM_SPHERE), states of the pose map at the start
+ * (n, pkm_state_size), which become those at the end. Steps are so small that predictions are within
+ * `accuracy`. -> the frames (n, 12), R row by row and p, how each path ended, after how many steps, and
+ * where on the line (1: target). */
+int pkm_state_size(void);
+int pkm_paths(const pkm_machine *machine, ptrdiff_t n, const double *start, const double *target,
+              double *state, double accuracy, double *frame, int32_t *status, int32_t *steps,
+              double *reached);
+
 /* pose (n, 6) as given -> of each limb its drive coordinate (n, limbs), NaN out of reach, and the
  * unit vector from its anchor to the platform joint in base and platform axes (n, limbs, 3). */
 int pkm_limbs(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,

@@ -343,6 +343,29 @@ def _constraint(row: Constraint, known_axes: bool) -> Function:
     return f
 
 
+def _moving(row: Constraint | None) -> Function:
+    """The rate of a row while the limb's sphere and axes change at a held pose: for homotopies."""
+    f = LimbFunction(f"{row.name if row else 'sphere'}_rate", "rate of the row as the limb changes",
+                     f"{row.formula if row else 'Φ = (d·d - ρ²)/2'},  d = p + R b - c")  # fmt: skip
+    s = f.perturbation("s", 1)[0]
+
+    def moving(name: str, doc: str) -> sp.Matrix:
+        return f.vector(name, 3, doc) + s * f.vector(f"{name}_rate", 3, "its rate")
+
+    f.pose()
+    d = f.p + f.R * moving("b", "platform joint") - moving("c", "anchor")
+    if row is None:
+        rho2 = f.scalar("rho2", "ρ²") + s * f.scalar("rho2_rate", "its rate")
+        phi = _half_square(f, f.let("d", d), rho2)
+    else:
+        n = moving("n", "base-side axis") if row.on_base else sp.zeros(3, 1)
+        a = f.R * moving("a", "platform-side axis") if row.on_platform else sp.zeros(3, 1)
+        lever = f.scalar("lever", "λ") if row.name == "couple" else sp.S.One
+        phi = row.phi(f.let("d", d), n, a, lever)
+    f.output("rate", f.gradient(phi, [s])[0], "Φ's rate")
+    return f
+
+
 def _axis(name: str, where: str) -> Function:
     """The third axis of a tilted frame: once per geometry."""
     f = LimbFunction(f"{name}_axis", f"{name}-side axis of a limb", "frame Rx(tilt1) Ry(tilt2) ez")
@@ -359,4 +382,5 @@ def functions() -> list[Function]:
     for step in (_prepare, _anchor, _inverse, _rates, _derivatives):
         made += [step(driver) for driver in DRIVERS]
     made += [_constraint(row, known) for row in CONSTRAINTS for known in (True, False)]
+    made += [_moving(row) for row in (None, *CONSTRAINTS)]
     return [f for f in made if f is not None]

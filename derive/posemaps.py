@@ -12,6 +12,7 @@ definition: the state's frame, its retraction, and the pose it reports.
 * ``pull``       covector of a twist at the state -> covector of delta
 * ``rates``      delta -> rates of the pose x y z α β γ
 * ``twist``      delta -> (ω, v) of the frame
+* ``velocity``   delta -> rates of the state
 * ``free``       covector of delta -> covector of the reported free coordinates
 """
 
@@ -259,11 +260,16 @@ def _functions(pose_map: PoseMap) -> list[Function]:
     delta = twist.vector("delta", m, "step [mm, rad]")
     twist.output("twist", sp.Matrix([*(d_omega * delta), *(d_p * delta)]), "(ω, v), base axes")
 
+    velocity = new("velocity", "rates of the state for a step", "∂state/∂delta delta")
+    s = velocity.vector("state", size, "of the map")
+    delta = velocity.vector("delta", m, "step [mm, rad]")
+    velocity.output("rate", _tangent(pose_map, s)[2] * delta, "rates of the state")
+
     free = new("free", "covector of a step to one of the free coordinates", "∂/∂free")
     s = free.vector("state", size, "of the map")
     row = free.vector("row", m, "covector of the step")
     free.output("out", _free(free, pose_map, s, row), "by " + " ".join(pose_map.free))
-    return [from_pose, frame, retract, tidy, angles, pull, rates, twist, free]
+    return [from_pose, frame, retract, tidy, angles, pull, rates, twist, velocity, free]
 
 
 def _euler(f: Function, pose_map: PoseMap, s: sp.Matrix) -> tuple[sp.Expr, ...]:

@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation 5da15b9d8f96602a
+ * derivation 37b33614de9704ce
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*
@@ -863,3 +863,111 @@ INLINE void FN(couple_derivatives)(const real R[9], const real p[3], const real 
         R[5]*t21)*t17 + (R[6]*t19 + R[7]*t20 + R[8]*t21)*t18;
 }
 #endif
+
+/*
+ * rate of the row as the limb changes
+ *     Φ = (d·d - ρ²)/2,  d = p + R b - c
+ * in  R[9]           platform to base, row by row
+ * in  p[3]           platform origin [mm]
+ * in  b[3]           platform joint
+ * in  b_rate[3]      its rate
+ * in  c[3]           anchor
+ * in  c_rate[3]      its rate
+ * in  rho2           ρ²
+ * in  rho2_rate      its rate
+ * out rate           Φ's rate
+ * operations: 24 +, 22 *, 0 /, 0 sqrt
+ */
+INLINE void FN(sphere_rate)(const real R[9], const real p[3], const real b[3],
+        const real b_rate[3], const real c[3], const real c_rate[3], real rho2, real rho2_rate,
+        real *rate)
+{
+    const real d0 = R[0]*b[0] + R[1]*b[1] + R[2]*b[2] + p[0] - c[0];
+    const real d1 = R[3]*b[0] + R[4]*b[1] + R[5]*b[2] + p[1] - c[1];
+    const real d2 = R[6]*b[0] + R[7]*b[1] + R[8]*b[2] + p[2] - c[2];
+    *rate = (R[0]*b_rate[0] + R[1]*b_rate[1] + R[2]*b_rate[2] - c_rate[0])*d0 + (R[3]*b_rate[0] +
+        R[4]*b_rate[1] + R[5]*b_rate[2] - c_rate[1])*d1 + (R[6]*b_rate[0] + R[7]*b_rate[1] +
+        R[8]*b_rate[2] - c_rate[2])*d2 - 0.5f*rho2_rate;
+}
+
+/*
+ * rate of the row as the limb changes
+ *     Φ = n·d,  d = p + R b - c
+ * in  R[9]           platform to base, row by row
+ * in  p[3]           platform origin [mm]
+ * in  b[3]           platform joint
+ * in  b_rate[3]      its rate
+ * in  c[3]           anchor
+ * in  c_rate[3]      its rate
+ * in  n[3]           base-side axis
+ * in  n_rate[3]      its rate
+ * out rate           Φ's rate
+ * operations: 26 +, 24 *, 0 /, 0 sqrt
+ */
+INLINE void FN(base_plane_rate)(const real R[9], const real p[3], const real b[3],
+        const real b_rate[3], const real c[3], const real c_rate[3], const real n[3],
+        const real n_rate[3], real *rate)
+{
+    const real d0 = R[0]*b[0] + R[1]*b[1] + R[2]*b[2] + p[0] - c[0];
+    const real d1 = R[3]*b[0] + R[4]*b[1] + R[5]*b[2] + p[1] - c[1];
+    const real d2 = R[6]*b[0] + R[7]*b[1] + R[8]*b[2] + p[2] - c[2];
+    *rate = (R[0]*b_rate[0] + R[1]*b_rate[1] + R[2]*b_rate[2] - c_rate[0])*n[0] + (R[3]*b_rate[0] +
+        R[4]*b_rate[1] + R[5]*b_rate[2] - c_rate[1])*n[1] + (R[6]*b_rate[0] + R[7]*b_rate[1] +
+        R[8]*b_rate[2] - c_rate[2])*n[2] + n_rate[0]*d0 + n_rate[1]*d1 + n_rate[2]*d2;
+}
+
+/*
+ * rate of the row as the limb changes
+ *     Φ = (R a)·d,  d = p + R b - c
+ * in  R[9]           platform to base, row by row
+ * in  p[3]           platform origin [mm]
+ * in  b[3]           platform joint
+ * in  b_rate[3]      its rate
+ * in  c[3]           anchor
+ * in  c_rate[3]      its rate
+ * in  a[3]           platform-side axis
+ * in  a_rate[3]      its rate
+ * out rate           Φ's rate
+ * operations: 38 +, 42 *, 0 /, 0 sqrt
+ */
+INLINE void FN(platform_plane_rate)(const real R[9], const real p[3], const real b[3],
+        const real b_rate[3], const real c[3], const real c_rate[3], const real a[3],
+        const real a_rate[3], real *rate)
+{
+    const real d0 = R[0]*b[0] + R[1]*b[1] + R[2]*b[2] + p[0] - c[0];
+    const real d1 = R[3]*b[0] + R[4]*b[1] + R[5]*b[2] + p[1] - c[1];
+    const real d2 = R[6]*b[0] + R[7]*b[1] + R[8]*b[2] + p[2] - c[2];
+    *rate = (R[0]*b_rate[0] + R[1]*b_rate[1] + R[2]*b_rate[2] - c_rate[0])*(R[0]*a[0] + R[1]*a[1] +
+        R[2]*a[2]) + (R[0]*a_rate[0] + R[1]*a_rate[1] + R[2]*a_rate[2])*d0 + (R[3]*b_rate[0] +
+        R[4]*b_rate[1] + R[5]*b_rate[2] - c_rate[1])*(R[3]*a[0] + R[4]*a[1] + R[5]*a[2]) +
+        (R[3]*a_rate[0] + R[4]*a_rate[1] + R[5]*a_rate[2])*d1 + (R[6]*b_rate[0] + R[7]*b_rate[1] +
+        R[8]*b_rate[2] - c_rate[2])*(R[6]*a[0] + R[7]*a[1] + R[8]*a[2]) + (R[6]*a_rate[0] +
+        R[7]*a_rate[1] + R[8]*a_rate[2])*d2;
+}
+
+/*
+ * rate of the row as the limb changes
+ *     Φ = λ (R a)·n,  d = p + R b - c
+ * in  R[9]           platform to base, row by row
+ * in  p[3]           platform origin [mm]
+ * in  b[3]           platform joint
+ * in  b_rate[3]      its rate
+ * in  c[3]           anchor
+ * in  c_rate[3]      its rate
+ * in  n[3]           base-side axis
+ * in  n_rate[3]      its rate
+ * in  a[3]           platform-side axis
+ * in  a_rate[3]      its rate
+ * in  lever          λ
+ * out rate           Φ's rate
+ * operations: 17 +, 25 *, 0 /, 0 sqrt
+ */
+INLINE void FN(couple_rate)(const real R[9], const real p[3], const real b[3],
+        const real b_rate[3], const real c[3], const real c_rate[3], const real n[3],
+        const real n_rate[3], const real a[3], const real a_rate[3], real lever, real *rate)
+{
+    *rate = ((R[0]*a_rate[0] + R[1]*a_rate[1] + R[2]*a_rate[2])*n[0] + (R[0]*a[0] + R[1]*a[1] +
+        R[2]*a[2])*n_rate[0] + (R[3]*a_rate[0] + R[4]*a_rate[1] + R[5]*a_rate[2])*n[1] + (R[3]*a[0]
+        + R[4]*a[1] + R[5]*a[2])*n_rate[1] + (R[6]*a_rate[0] + R[7]*a_rate[1] +
+        R[8]*a_rate[2])*n[2] + (R[6]*a[0] + R[7]*a[1] + R[8]*a[2])*n_rate[2])*lever;
+}

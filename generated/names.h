@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation 5da15b9d8f96602a
+ * derivation 37b33614de9704ce
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* the numbers of one limb, in the order of the core */

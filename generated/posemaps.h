@@ -1,5 +1,5 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation 21a577ea22c96497
+ * derivation 1f7a0952424f3d7a
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -245,6 +245,28 @@ INLINE void FN(map_spatial_twist)(const real state[7], const real delta[6], real
 }
 
 /*
+ * spatial: rates of the state for a step
+ *     ∂state/∂delta delta
+ * in  state[7]       of the map
+ * in  delta[6]       step [mm, rad]
+ * out rate[7]        rates of the state
+ * operations: 8 +, 15 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_spatial_velocity)(const real state[7], const real delta[6], real rate[7])
+{
+    rate[0] = delta[0];
+    rate[1] = delta[1];
+    rate[2] = delta[2];
+    const real t0 = 0.5f*delta[3];
+    const real t1 = 0.5f*delta[4];
+    const real t2 = 0.5f*delta[5];
+    rate[3] = -state[4]*t0 - state[5]*t1 - state[6]*t2;
+    rate[4] = state[3]*t0 + state[6]*t1 - state[5]*t2;
+    rate[5] = state[3]*t1 + state[4]*t2 - state[6]*t0;
+    rate[6] = state[3]*t2 + state[5]*t0 - state[4]*t1;
+}
+
+/*
  * spatial: covector of a step to one of the free coordinates
  *     ∂/∂free
  * in  state[7]       of the map
@@ -408,6 +430,21 @@ INLINE void FN(map_translation_twist)(const real state[3], const real delta[3], 
     twist[3] = delta[0];
     twist[4] = delta[1];
     twist[5] = delta[2];
+}
+
+/*
+ * translation: rates of the state for a step
+ *     ∂state/∂delta delta
+ * in  state[3]       of the map
+ * in  delta[3]       step [mm, rad]
+ * out rate[3]        rates of the state
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_translation_velocity)(const real state[3], const real delta[3], real rate[3])
+{
+    rate[0] = delta[0];
+    rate[1] = delta[1];
+    rate[2] = delta[2];
 }
 
 /*
@@ -576,6 +613,22 @@ INLINE void FN(map_planar_twist)(const real state[4], const real delta[3], real 
     twist[3] = delta[0];
     twist[4] = delta[1];
     twist[5] = FN(fill)(0.0f);
+}
+
+/*
+ * planar: rates of the state for a step
+ *     ∂state/∂delta delta
+ * in  state[4]       of the map
+ * in  delta[3]       step [mm, rad]
+ * out rate[4]        rates of the state
+ * operations: 0 +, 2 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_planar_velocity)(const real state[4], const real delta[3], real rate[4])
+{
+    rate[0] = delta[0];
+    rate[1] = delta[1];
+    rate[2] = -state[3]*delta[2];
+    rate[3] = state[2]*delta[2];
 }
 
 /*
@@ -763,6 +816,24 @@ INLINE void FN(map_2tpr2tps_twist)(const real state[6], const real delta[4], rea
     twist[3] = state[4]*t0 + state[5]*delta[1];
     twist[4] = delta[0];
     twist[5] = state[4]*delta[1] - state[5]*t0;
+}
+
+/*
+ * 2tpr2tps: rates of the state for a step
+ *     ∂state/∂delta delta
+ * in  state[6]       of the map
+ * in  delta[4]       step [mm, rad]
+ * out rate[6]        rates of the state
+ * operations: 0 +, 4 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_2tpr2tps_velocity)(const real state[6], const real delta[4], real rate[6])
+{
+    rate[0] = delta[0];
+    rate[1] = delta[1];
+    rate[2] = -state[3]*delta[2];
+    rate[3] = state[2]*delta[2];
+    rate[4] = -state[5]*delta[3];
+    rate[5] = state[4]*delta[3];
 }
 
 /*

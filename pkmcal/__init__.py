@@ -6,6 +6,7 @@ from typing import Any
 
 from pkmcal import screw, trajectory
 from pkmcal.allocation import Allocation, allocate_tolerance
+from pkmcal.assemblies import Assemblies
 from pkmcal.bootstrap import Bootstrap, bootstrap
 from pkmcal.check_geometry import GeometryCheck, check_geometry
 from pkmcal.compensate import Compensation, compensate
@@ -28,6 +29,7 @@ from pkmcal.workspace import Dexterity, Workspace, dexterity, sample_poses, work
 
 __all__ = [
     "Allocation",
+    "Assemblies",
     "Bootstrap",
     "Compensation",
     "Dexterity",

@@ -249,6 +249,21 @@ class Machine:
             )
         return out
 
+    def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """What the limbs are at coordinates (N, n): (N, limbs, 13).
+
+        Platform joint (3), anchor (3), length squared, axis at the base (3), axis at the platform
+        (3), in mm; lengths squared are NaN in rows where a limb has no positive length.
+        """
+        out = np.empty((len(q), self.struct.limbs, lib.PKM_SPHERE))
+        if len(q):
+            ensure(
+                lib.pkm_spheres(
+                    self.struct, self.isa, len(q), pointer(slots), pointer(q), pointer(out)
+                )
+            )
+        return out
+
     def limbs(
         self, slots: FloatArray, pose: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:

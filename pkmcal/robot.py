@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import robotfile
+from pkmcal import modes, robotfile
+from pkmcal.assemblies import Assemblies
 from pkmcal.complete import complete, matched_coordinates
 from pkmcal.core import MAPS, POSE, FloatArray, as_rows
 from pkmcal.core_machine import Machine
@@ -196,6 +197,70 @@ class Robot:
             lambda: self._steps(
                 np.ascontiguousarray(np.broadcast_to(start, own.shape)), rows
             ).reshape(*system),
+            lambda: modes.proofs(self._subject(rows), own).reshape(shape),
+        )
+
+    def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
+        """Every assembly mode at given actuator coordinates, with proof.
+
+        Every complex solution of the closures is followed from a start system where all are known
+        (parameter homotopy), each real one is certified by the theorem of Newton and Kantorovich.
+        Machines without a start system, and doubts, are given random starts, which prove nothing.
+
+        Parameters
+        ----------
+        q : array_like (n,)
+            Actuator coordinates, mm or rad.
+        starts : int, optional
+            Random starts of Newton's method. By default none where the paths prove that no mode is
+            missing, otherwise 2000.
+
+        Returns
+        -------
+        Assemblies
+            ``.poses`` (k, 6), nearest to home first, ``.certified`` (k,), ``.complete``.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A wrong shape, or no numbers.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> modes = pk.load("2tpr2tps").forward_all([450.0, 452.0, 400.0, 405.0])
+        >>> len(modes), bool(modes.certified.all()), modes.complete
+        (8, True, True)
+        """
+        rows, shape = as_rows("q", q, self.n_actuators)
+        if shape != ():
+            raise ValueError(f"q must have shape ({self.n_actuators},), found {np.shape(q)}")
+        if starts is not None and (isinstance(starts, bool) or starts < 0):
+            raise ValueError(f"starts must be a whole number from 0 or None, found {starts!r}")
+        subject = self._subject(rows[0])
+        found = modes.find(subject, starts)
+        apart = modes.distance(found.poses, self._own_home[None], self.length)
+        own = np.ascontiguousarray(found.poses[np.argsort(apart)])
+        poses = self._frames.outward(own)
+
+        def led(pose: FloatArray, actuators: ArrayLike | None, steps: int) -> FloatArray:
+            own = self._frames.inward(pose[None])
+            if actuators is None:
+                begin = self._machine.inverse(self._slots, own)
+            else:
+                begin = as_rows("actuators", actuators, self.n_actuators)[0]
+            end = modes.led(subject, own, begin, steps)
+            outward: FloatArray = self._frames.outward(end)[0]
+            return outward
+
+        return modes.assemblies(
+            subject,
+            found,
+            poses,
+            np.argsort(apart),
+            _apart=lambda pose: modes.distance(own, self._frames.inward(pose), self.length),
+            _feasible=lambda: self.feasible(poses).ok,
+            _led=led,
         )
 
     def jacobian(self, pose: ArrayLike) -> FloatArray:
@@ -479,6 +544,19 @@ class Robot:
             raise ValueError("match must be True or names of coordinates, found None")
         places = matched_coordinates(match, self.model.match, self.coordinates)
         return complete(self._machine, self.model.map, self._slots, rows, places)
+
+    def _subject(self, q: FloatArray) -> modes.Subject:
+        """What certificates and searches for modes need, at coordinates (n,) or (N, n)."""
+        limbs = self.model.limbs
+        return modes.Subject(
+            self._machine,
+            self.model.map,
+            [KINDS[limb.kind].all_rows(limb.couple > 0) for limb in limbs],
+            [limb.couple for limb in limbs],
+            self.length,
+            self._slots,
+            q,
+        )
 
     def _steps(self, own: FloatArray, q: FloatArray) -> FloatArray:
         """Closure rows by a scaled twist, (N, rows, m)."""

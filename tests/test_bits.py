@@ -77,6 +77,17 @@ def closure_cost(isa: int, part: slice) -> list[np.ndarray]:
     return [cost(values[part])]
 
 
+def spheres(isa: int, part: slice) -> list[np.ndarray]:
+    """Of cranks, and of legs whose lengths are not all positive."""
+    found = []
+    for name, size in (("rotary-delta", 1.0), ("3rps", 900.0)):
+        robot = pk.load(name)
+        robot._machine.isa = isa
+        q = size * np.random.default_rng(23).normal(1.0, 1.0, (ROWS, robot.n_actuators))
+        found.append(robot._machine.spheres(robot._slots, q[part]))
+    return found
+
+
 def arm(isa: int, part: slice, call: str) -> list[np.ndarray]:
     """With links that all rows share, and with links of each row."""
     made = Arm(*ARM._arm.arrays, isa)
@@ -108,6 +119,7 @@ CASES: dict[str, Case] = {
     "tpr2tps_lengths": lambda isa, part: closed_forms(isa, part, core.tpr2tps_lengths, (4,)),
     "tpr2tps_jacobian": lambda isa, part: closed_forms(isa, part, core.tpr2tps_jacobian, (4, 4)),
     "closure_cost": closure_cost,
+    "spheres": spheres,
     "exp": by_rows(core_serial.exp, TWISTS),
     "log": by_rows(core_serial.log, MOTIONS),
     "adjoint": by_rows(core_serial.adjoint, MOTIONS),

@@ -188,3 +188,14 @@ def test_rates_keep_the_closure_to_second_order(driver: str) -> None:
         phi = (joint - carried).dot(joint - carried)
     for order in (1, 2):
         assert abs(sp.diff(phi, t, order).subs(t, 0).subs(numbers).n(30)) < 1e-20
+
+
+@pytest.mark.parametrize("row", ["sphere", "base_plane", "platform_plane", "couple"])
+def test_rate_of_a_row_is_its_derivative_while_the_limb_changes(row: str) -> None:
+    still = dict.fromkeys([*omega, *v], 0)
+    phi = closures()[f"{row}_row"].subs(still)
+    changing = {sp.Symbol("rho2", real=True): sp.Symbol("rho2_rate", real=True)}
+    for name in "bcna":
+        changing.update(zip(symbols(name, 3), symbols(f"{name}_rate", 3), strict=True))
+    expected = sum(sp.diff(phi, x) * rate for x, rate in changing.items())
+    assert_equal(FUNCTIONS[f"{row}_rate"].result("rate"), column([expected]))

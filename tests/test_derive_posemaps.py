@@ -149,3 +149,13 @@ def test_free_after_pull_differentiates_by_the_free_coordinates(name: str) -> No
 
         spin, slide = twist(name, state_at)
         assert_close([found], [dot(WORDS, [*spin, *slide])])
+
+
+@pytest.mark.usefixtures("digits")
+@pytest.mark.parametrize("name", MAPS)
+def test_velocity_is_that_of_the_state_along_a_step(name: str) -> None:
+    state = call(f"map_{name}_from_pose", "state", pose_of(name))
+    step = WORDS[: len(free_indices(name))]
+    later, earlier = (moved(name, state, t * step) for t in (STEP, -STEP))
+    expected = (later - earlier) / (2 * STEP)
+    assert_close(call(f"map_{name}_velocity", "rate", state, step), expected)
