@@ -109,7 +109,7 @@ INLINE void sphere_rows(const pkm_machine *machine, ptrdiff_t n, const double *g
                 scatter(one->base_axis[k], to + 7 + k, width, row, count);
                 scatter(one->platform_axis[k], to + 10 + k, width, row, count);
             }
-            scatter(select(reachable, one->rho * one->rho, fill(NAN)), to + 6, width, row, count);
+            scatter(select(reachable, one->rho, fill(NAN)), to + 6, width, row, count);
         }
     }
 }

@@ -64,7 +64,7 @@ static void limbs_at(const homotopy *path, double t, FN(limb_sphere) *limb)
         }
         memcpy(limb[i].b, at, sizeof limb[i].b);
         memcpy(limb[i].c, at + 3, sizeof limb[i].c);
-        limb[i].rho = csqrt(at[6]); /* either root: only its square counts */
+        limb[i].rho = at[6];
         memcpy(limb[i].base_axis, at + 7, sizeof limb[i].base_axis);
         memcpy(limb[i].platform_axis, at + 10, sizeof limb[i].platform_axis);
     }
@@ -82,7 +82,8 @@ INLINE void row_rates(int map, const homotopy *path, const FN(limb_sphere) *limb
         const FN(limb_sphere) *one = &limb[i];
         for (int k = 0; k < PKM_SPHERE; k++)
             by[k] = path->target[i * PKM_SPHERE + k] - path->start[i * PKM_SPHERE + k];
-        FN(sphere_rate)(R, p, one->b, by, one->c, by + 3, one->rho * one->rho, by[6], &rate[machine->order[r++]]);
+        FN(sphere_rate)(R, p, one->b, by, one->c, by + 3, one->rho * one->rho,
+                        2.0 * one->rho * by[6], &rate[machine->order[r++]]);
         if (machine->rows[i] & ROW_BASE_PLANE)
             FN(base_plane_rate)(R, p, one->b, by, one->c, by + 3, one->base_axis, by + 7,
                                 &rate[machine->order[r++]]);

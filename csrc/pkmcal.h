@@ -88,11 +88,11 @@ int pkm_closure(const pkm_machine *machine, int isa, ptrdiff_t n, const double *
                 const double *pose, const double *q, double *residual, double *by_step,
                 double *by_free, double *by_q);
 
-/* What a limb is at given actuators, for homotopies: its joint b, its anchor c, the square of its
- * length and its axes at the base and at the platform, in that order. Zero where it has no axis. */
+/* What a limb is at given actuators, for homotopies: its joint b, its anchor c, its length and its axes
+ * at the base and at the platform, in that order. Zero where it has no axis. */
 enum { PKM_SPHERE = 13 };
 
-/* q (n, actuators) -> the limbs (n, limbs, PKM_SPHERE); squares are NaN where a length is not
+/* q (n, actuators) -> the limbs (n, limbs, PKM_SPHERE); lengths are NaN where one of them is not
  * positive. */
 int pkm_spheres(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
                 const double *q, double *sphere);

@@ -26,7 +26,7 @@ from . import limbs, posemaps
 ROOT = Path(__file__).parent.parent
 FILE = (ROOT / "pkmcal" if (ROOT / "pkmcal").is_dir() else ROOT) / "modes.json"
 Array = Any  # of complex numbers
-SPHERE = 13  # numbers of a limb: joint b, anchor c, length squared, axis at base, axis at platform
+SPHERE = 13  # numbers of a limb: joint b, anchor c, length, axis at base, axis at platform
 UNIT = {"spatial": ([3, 4, 5, 6],), "planar": ([2, 3],), "2tpr2tps": ([2, 3], [4, 5])}
 QUIET = 12  # loops without a new solution that end the search
 
@@ -70,7 +70,7 @@ class System:
             b, c = numbers[i, 0:3].T, numbers[i, 3:6].T
             n, a = numbers[i, 7:10].T, numbers[i, 10:13].T
             d = p + R * b - c
-            rows.append(d.dot(d) - numbers[i, 6])
+            rows.append(d.dot(d) - numbers[i, 6] ** 2)
             for constraint in limbs.CONSTRAINTS:
                 if constraint.name in kinds:
                     rows.append(constraint.phi(d, n, R * a, sp.S.One))
@@ -186,7 +186,7 @@ def solved_at_random(
     R, p = frame[:9].reshape(3, 3), frame[9:]
     for i, kinds in enumerate(family.rows):
         d = p + R @ g[i, 0:3] - g[i, 3:6]
-        g[i, 6] = d @ d
+        g[i, 6] = np.sqrt(d @ d)
         for kind, axis, along in (("base_plane", slice(7, 10), d),
                                   ("platform_plane", slice(10, 13), R.T @ d)):  # fmt: skip
             if kind in kinds:

@@ -86,7 +86,7 @@ class Closures:
         self.map, self.rows, self.length, self.size = map, rows, length, size
         one = spheres.reshape(-1, *spheres.shape[-2:])[0]  # actuators change anchors and lengths
         self.b, self.n, self.a, self.levers = one[:, 0:3], one[:, 7:10], one[:, 10:13], levers
-        self.c, self.rho2 = spheres[..., 3:6], spheres[..., 6]
+        self.c, self.rho = spheres[..., 3:6], spheres[..., 6]
 
     def __call__(self, u: Array) -> tuple[Array, Array, FloatArray, FloatArray, FloatArray]:
         """At u (N, 12).
@@ -99,11 +99,11 @@ class Closures:
         spread = np.abs(turn)
         for i, kinds in enumerate(self.rows):
             b, reach = self.b[i], np.abs(self.b[i]).sum() + self.length
-            c, rho2 = self.c[..., i, :], self.rho2[..., i]
+            c, rho = self.c[..., i, :], self.rho[..., i]
             d = p + turn @ b - c
             far = np.abs(p) + spread @ np.abs(b) + np.abs(c) + self.size
-            f.append((np.sum(d * d, axis=1) - rho2) / 2.0)
-            f_abs.append(np.sum(far * far, axis=1) + (np.sqrt(rho2) + self.size) ** 2)
+            f.append((np.sum(d * d, axis=1) - rho * rho) / 2.0)
+            f_abs.append(np.sum(far * far, axis=1) + (rho + self.size) ** 2)
             df.append(self._row(d, b))
             df_abs.append(self._row(far, np.abs(b)))
             change.append(3.0 * reach**2)

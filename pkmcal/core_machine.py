@@ -252,8 +252,8 @@ class Machine:
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """What the limbs are at coordinates (N, n): (N, limbs, 13).
 
-        Platform joint (3), anchor (3), length squared, axis at the base (3), axis at the platform
-        (3), in mm; lengths squared are NaN in rows where a limb has no positive length.
+        Platform joint (3), anchor (3), length, axis at the base (3), axis at the platform (3), in
+        mm; lengths are NaN in rows where a limb has no positive one.
         """
         out = np.empty((len(q), self.struct.limbs, lib.PKM_SPHERE))
         if len(q):

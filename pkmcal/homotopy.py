@@ -193,8 +193,6 @@ def _brought_to_scale(
         middle_b, middle_c = np.zeros(3), np.zeros(3)
     scaled[:, 0:3] -= middle_b
     scaled[:, 3:6] -= middle_c
-    squares = (scaled[:, :6] ** 2).sum(axis=1) + scaled[:, 6]
-    scale = float(np.sqrt(squares.mean() / 9.0))
-    scaled[:, :6] /= scale
-    scaled[:, 6] /= scale**2
+    scale = float(np.sqrt((scaled[:, :7] ** 2).sum(axis=1).mean() / 9.0))
+    scaled[:, :7] /= scale
     return scaled, scale, middle_b, middle_c

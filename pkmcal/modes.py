@@ -178,7 +178,7 @@ def _from_starts(subject: Subject, spheres: FloatArray, starts: int) -> FloatArr
     turned = frames_of(guess)[:, :9].reshape(-1, 3, 3)
     limb = rng.integers(len(spheres), size=starts)
     way = rng.normal(size=(starts, 3))
-    way *= np.sqrt(spheres[limb, 6, None]) / np.linalg.norm(way, axis=1, keepdims=True)
+    way *= spheres[limb, 6, None] / np.linalg.norm(way, axis=1, keepdims=True)
     guess[:, :3] = spheres[limb, 3:6] + way - np.einsum("nij,nj->ni", turned, spheres[limb, 0:3])
     q = np.ascontiguousarray(np.broadcast_to(subject.q, (starts, len(subject.q))))
     poses, status, _, _ = subject.machine.forward(subject.slots, q, guess, threads=None)

@@ -74,7 +74,7 @@ def test_forty_digits_lie_within_the_error():
         limbs = [[mpmath.mpf(float(v)) for v in limb] for limb in spheres]
 
         def closures(*p: mpmath.mpf) -> list[mpmath.mpf]:
-            return [sum((p[k] + g[k] - g[3 + k]) ** 2 for k in range(3)) - g[6] for g in limbs]
+            return [sum((p[k] + g[k] - g[3 + k]) ** 2 for k in range(3)) - g[6] ** 2 for g in limbs]
 
         for pose, error in zip(found.poses, found.error, strict=True):
             exact = mpmath.findroot(closures, [mpmath.mpf(float(v)) for v in pose[:3]])

@@ -62,7 +62,7 @@ def count(map: str, rows: Sequence[Sequence[str]], spheres: Sequence[Sequence[in
     for kinds, g in zip(rows, spheres, strict=True):
         turned = ["+".join(f"{g[j]}*{R[k][j]}" for j in range(3)) for k in range(3)]
         d = [f"({P[k]}+{turned[k]}-{g[3 + k]})" for k in range(3)]
-        equations.append("+".join(f"{each}*{each}" for each in d) + f"-{g[6]}")
+        equations.append("+".join(f"{each}*{each}" for each in d) + f"-{g[6]}*{g[6]}")
         if "base_plane" in kinds:
             equations.append("+".join(f"{g[7 + k]}*{d[k]}" for k in range(3)))
         if "platform_plane" in kinds:
