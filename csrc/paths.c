@@ -203,6 +203,7 @@ INLINE int follow(int map, const homotopy *path, double accuracy, real *x, int32
     int row[6];
     double t = 0.0, h = FIRST_STEP, before = 0.0;
     *steps = 0;
+    *reached = 0.0;
     limbs_at(path, t, limb);
     if (correct(map, path, limb, CORRECTIONS, CORRECTED, x, A, row) > accuracy) return PKM_LOST;
     velocity_at(map, path, limb, x, A, row, v);
@@ -216,7 +217,7 @@ INLINE int follow(int map, const homotopy *path, double accuracy, real *x, int32
         else
             for (int s = 0; s < MAX_STATE; s++) trial[s] = x[s] + step * v[s];
         limbs_at(path, next, limb);
-        const double noise = 10.0 * NOISE * reach(map, x);
+        const double noise = 10.0 * NOISE * reach(map, x); /* no shorter step lowers it */
         const double off = correct(map, path, limb, CORRECTIONS, CORRECTED, trial, A, row) - noise;
         if (!(off <= 2.0 * accuracy)) {
             h = 0.5 * step;

@@ -133,7 +133,7 @@ def find(subject: Subject, starts: int | None) -> Found:
     if ends and complete:
         reason = f"all {ends.paths} complex solutions followed"
         if ends.far:
-            reason += f", {ends.far} of them to infinity"
+            reason += f", {ends.far} of them to infinity or nearly"
         elif all_proven:
             reason = f"all {ends.paths} complex solutions certified, and there are no more"
     return Found(poses, proof, complete, reason, ends)
