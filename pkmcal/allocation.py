@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from pkmcal import digits
 from pkmcal.core import POSE, FloatArray
 from pkmcal.geometries import ideal
-from pkmcal.robot import Robot
+from pkmcal.robot import Robot, require_parallel
 from pkmcal.suggest import did_you_mean
 from pkmcal.tolerance import Tolerance, tolerance
 
@@ -85,7 +85,7 @@ def allocate_tolerance(
     robot: Robot,
     poses: ArrayLike,
     allowed: Allowed,
-    joints: Sequence[str] | None = None,
+    joints: str | Sequence[str] | None = None,
     cost: float | Mapping[str, float] | None = None,
     samples: int = 100_000,
     seed: int = 0,
@@ -103,7 +103,7 @@ def allocate_tolerance(
         What 99.7 % of the machines must not exceed at any of the poses: a number is the distance of
         the position, mm; a mapping limits ``"distance"`` and coordinates ``"x"`` … ``"gamma"``, mm
         and rad.
-    joints : sequence of str, optional
+    joints : str or sequence of str, optional
         Names or wildcards; all numbers that one matches get the same sigma. By default every joint
         and every other length: ``base1.*``, ``platform1.*``, ``offset1`` …
     cost : float or mapping, optional
@@ -121,8 +121,8 @@ def allocate_tolerance(
     Raises
     ------
     ValueError, TypeError
-        No limit above 0, an unknown or tied name, a number named by two joints, a cost that is not
-        above 0.
+        No limit above 0, one so wide that machines with such errors have no pose, an unknown or
+        tied name, no name at all, a number named by two joints, a cost that is not above 0.
 
     Notes
     -----
@@ -137,6 +137,7 @@ def allocate_tolerance(
     >>> found.contribution.round(1)
     array([33.3, 33.3, 33.3])
     """
+    require_parallel(robot)
     limits = _limits(allowed)
     groups = _groups(robot, joints)
     weights = None if cost is None else _weights(cost, groups)
@@ -244,7 +245,13 @@ def _simulate(
     deviations = np.zeros(len(robot.geometry))
     for places, each in zip(groups.values(), sigma, strict=True):
         deviations[places] = each if np.isfinite(each) else 0.0
-    return tolerance(robot, poses, deviations, samples, seed, executor)
+    found = tolerance(robot, poses, deviations, samples, seed, executor)
+    if lost := int(found.failed.max()):
+        raise ValueError(
+            f"allowed: errors that use it up leave {lost} of {samples} machines without a pose;"
+            " allow less"
+        )
+    return found
 
 
 def _reached(found: Tolerance, name: str) -> float:
@@ -266,7 +273,7 @@ def _limits(allowed: Allowed) -> dict[str, float]:
     return {name: float(limit) for name, limit in given.items()}
 
 
-def _groups(robot: Robot, joints: Sequence[str] | None) -> dict[str, list[int]]:
+def _groups(robot: Robot, joints: str | Sequence[str] | None) -> dict[str, list[int]]:
     """Places in ``geometry.names`` of the numbers of each joint."""
     geometry = robot.geometry
     if joints is None:
@@ -278,6 +285,9 @@ def _groups(robot: Robot, joints: Sequence[str] | None) -> dict[str, list[int]]:
         joints = list(dict.fromkeys(_JOINT.sub(r"\1.*", name) for name in lengths))
     groups: dict[str, list[int]] = {}
     owner: dict[str, str] = {}
+    joints = [joints] if isinstance(joints, str) else list(joints)
+    if not joints:
+        raise ValueError("joints: name at least one")
     for joint in joints:
         names = geometry.match(joint)
         places = [geometry.names.index(name) for name in names]

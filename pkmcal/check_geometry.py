@@ -15,7 +15,7 @@ from pkmcal.joint_faults import (
     unlike,
 )
 from pkmcal.machine_faults import singular, unreachable, wrong_unit
-from pkmcal.robot import Robot
+from pkmcal.robot import Robot, require_parallel
 from pkmcal.stated_faults import contradicted
 
 CHECKS = (
@@ -113,7 +113,6 @@ def check_geometry(robot: Robot) -> GeometryCheck:
     >>> pk.check_geometry(pk.load("rbt-6t03p-printed")).findings[0].kind
     'angle'
     """
-    if not isinstance(robot, Robot):
-        raise TypeError(f"robot must be a Robot, a parallel machine; found {type(robot).__name__}")
+    require_parallel(robot)
     found: Iterable[Finding] = (finding for check in CHECKS for finding in check(robot))
     return GeometryCheck(robot, tuple(found))

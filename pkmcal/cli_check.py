@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from pkmcal.check_geometry import check_geometry
@@ -27,7 +28,8 @@ def check(
 
     Limbs that are not alike, joints off their circle, angles used as lengths, other wrong units,
     strokes that cannot be used, singular machines, contradictions to what the file states; each
-    with its numbers and a suggestion. Exit code 1: something was found.
+    with its numbers and a suggestion; rows of measurements at which the machine has no pose. Exit
+    code 1: something was found.
 
     Example: pkmcal check hexapod
     """
@@ -41,4 +43,14 @@ def check(
         if measured is not None:
             rows = f"{len(measured)} row{'s' * (len(measured) > 1)} of kind {measured.kind}"
             typer.echo(f"{measurements}: {rows}, readable")
-    return 0 if found.ok else 1
+    lost: list[int] = []
+    if measured is not None:
+        lost = np.flatnonzero(~machine.forward(measured.actuators).ok).tolist()
+    if lost:
+        first = ", ".join(map(str, lost[:10])) + (", …" if len(lost) > 10 else "")
+        typer.echo(
+            f"{measurements}: {machine.name} has no pose at the actuators of {len(lost)} of them"
+            f" (rows {first});\ncheck their units, signs and columns",
+            err=json,
+        )
+    return 0 if found.ok and not lost else 1

@@ -62,7 +62,7 @@ def compensate(
 ) -> int:
     """Correct the commands of a machine by where it went (eq. 18 of the 2TPR&2TPS paper).
 
-    Exit code 1: a limb cannot reach some of the poses.
+    Exit code 1: a limb cannot reach some of the poses, or some were measured too far off.
 
     Example: pkmcal compensate 2tpr2tps examples/2tpr2tps-compensation/desired.csv
     examples/2tpr2tps-compensation/measured.csv
@@ -100,7 +100,7 @@ def compensate(
         typer.echo(found)
         if out is not None:
             typer.echo(f"\ncommands: {out / 'corrected.csv'}")
-    return 0 if np.isfinite(found.actuators).all() else 1
+    return 0 if np.isfinite(found.actuators).all() and not found.gross.any() else 1
 
 
 def read_reached(path: Path) -> FloatArray:

@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
 from pkmcal.core import as_rows
-from pkmcal.robot import Match, Robot
-from pkmcal.swarm import PAPER, SwarmSettings, checked_seed, minimise_eq18
+from pkmcal.robot import Match, Robot, require_parallel
+from pkmcal.seed import checked_seed
+from pkmcal.swarm import PAPER, SwarmSettings, minimise_eq18
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 Measured = ArrayLike | Callable[[FloatArray], ArrayLike]
 
 METHODS = ("exact", "pso")
@@ -44,6 +46,9 @@ class Compensation:
         the actuators' readings were, as the ideal machine sees them. Of a swarm: its lowest E
         before the first and after every iteration, pass by pass; with one correction for all
         poses, the root mean square of E over them.
+    gross : ndarray of bool (N,)
+        The position was off by more than ``robot.length``: no error of a geometry but
+        of units, of the frame of the measurements, or of the order of their rows.
     method, orientation : str
         As asked for.
     units : tuple of str, n
@@ -54,11 +59,14 @@ class Compensation:
     correction: FloatArray
     objective: FloatArray
     history: FloatArray
+    gross: BoolArray
     method: str
     orientation: str
     units: tuple[str, ...]
 
     def __str__(self) -> str:
+        count = len(self.actuators)
+        title = f"{count} pose{'s' * (count != 1)}"
         heads = ["row"]
         heads += [f"{q}{i} [{u}]" for q in ("q", "dq") for i, u in enumerate(self.units, 1)]
         rows = [
@@ -67,15 +75,23 @@ class Compensation:
         ]
         if len(rows) > _LISTED:
             rows[_LISTED - 4 : -3] = [["⋮"] * len(heads)]
-        each = np.sqrt(np.nanmean(self.history**2, axis=0))
+        known = self.history[np.isfinite(self.history).all(axis=1)]
+        if not len(known):
+            return f"{title}; no pose that was both asked for and measured is within reach"
+        each = np.sqrt((known**2).mean(axis=0))
         unit = " and ".join(sorted(set(self.units)))
         if self.method == "exact":
             off = ", ".join(f"{value:.3g}" for value in each)
             story = f"off by {off} {unit} (rms of the actuators, pass by pass)"
         else:
             story = f"swarm from {each[0]:.3g} to {each[-1]:.3g} {unit} (rms of E)"
-        title = f"{len(self.actuators)} poses; {story}; {_ASSUMED[self.orientation]}"
-        return title + "\n" + digits.table(heads, rows)
+        lines = [f"{title}; {story}", _ASSUMED[self.orientation], digits.table(heads, rows)]
+        if self.gross.any():
+            lines.append(
+                f"{self.gross.sum()} of {count} were off by more than errors of a machine: check"
+                " units, frame and order of the rows"
+            )
+        return "\n".join(lines)
 
 
 def compensate(
@@ -153,6 +169,7 @@ def compensate(
     >>> found.correction.round(6) + 0.0
     array([[-0.2,  0. ,  0. ,  0. ,  0. ,  0. ]])
     """
+    require_parallel(robot)
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}; found {method!r}")
     if orientation not in ORIENTATIONS:
@@ -169,20 +186,23 @@ def compensate(
     if passes > 1 and not callable(measured):
         raise ValueError("passes: more than one needs measured to be a function of the commands")
     poses, shape = as_rows("desired", desired, 6)
-    if len(shape) != 1:
+    if len(shape) != 1 or not len(poses):
         raise ValueError(f"desired must have shape (N, 6), found {(*shape, 6)}")
     ideal = robot.inverse(poses, match)
     seed = checked_seed(seed)
     half_width = None if bounds is None else _half_width(bounds, ideal.shape[1])
     correction = np.zeros_like(ideal)
+    gross = np.zeros(len(poses), dtype=bool)
     history = []
     for _ in range(passes):
         reached = measured(ideal + correction) if callable(measured) else measured
-        off = ideal - robot.inverse(_pose_of(reached, poses, orientation), match)
+        at = _pose_of(reached, poses, orientation)
+        gross |= np.linalg.norm((at - poses)[:, :3], axis=1) > robot.length
+        off = ideal - robot.inverse(at, match)
         if method == "pso":
             step, of_pass = _by_swarm(off, common, half_width, seed, swarm)
         else:
-            step = np.broadcast_to(np.nanmean(off, axis=0), off.shape) if common else off
+            step = np.broadcast_to(_mean(off), off.shape) if common else off
             of_pass = np.linalg.norm(off, axis=1)[:, None]
         history.append(of_pass)
         correction = correction + step
@@ -191,10 +211,18 @@ def compensate(
         correction=correction,
         objective=np.linalg.norm(off - step, axis=1),
         history=np.concatenate(history, axis=1),
+        gross=gross,
         method=method,
         orientation=orientation,
         units=robot.actuator_units,
     )
+
+
+def _mean(off: FloatArray) -> FloatArray:
+    """Of the rows that were reached (n,); NaN where there is none."""
+    reached = off[np.isfinite(off).all(axis=1)]
+    mean: FloatArray = reached.mean(axis=0) if len(reached) else np.full(off.shape[1], np.nan)
+    return mean
 
 
 def _half_width(bounds: ArrayLike, n: int) -> FloatArray:

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 from pkmcal import digits
 from pkmcal.core import POSE, FloatArray, as_rows
 from pkmcal.geometries import ideal
-from pkmcal.robot import Match, Robot
-from pkmcal.suggest import did_you_mean
+from pkmcal.robot import Match, Robot, require_parallel
 from pkmcal.whole_file import write_whole
+from pkmcal.workspace import require_moved
 
 METHODS = {"linear": 2, "cubic": 4}  # nodes an axis needs
 
@@ -144,7 +144,8 @@ def correction_grid(
     calibrated : Robot
         The machine as identified.
     axes : mapping of str to array_like
-        Nodes along the coordinates that span the grid, "x" … "gamma", mm or rad, increasing.
+        Nodes along the coordinates that span the grid, mm or rad, increasing: those that the
+        robot moves by itself, as for `workspace`.
     method : {"linear", "cubic"}
         How to interpolate.
     origin : array_like (6,), optional
@@ -161,7 +162,8 @@ def correction_grid(
     Raises
     ------
     ValueError, TypeError
-        An unknown coordinate, nodes that do not increase, too few of them.
+        A coordinate that the robot does not move by itself, nodes that do not increase, too few
+        of them, none that both machines reach, a machine of other actuators.
 
     Examples
     --------
@@ -177,11 +179,14 @@ def correction_grid(
     """
     if method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}; found {method!r}")
-    if not axes:
-        raise ValueError("axes names no coordinate")
-    for name in axes:
-        if name not in POSE:
-            raise ValueError(f"axes: no coordinate {name!r}{did_you_mean(name, POSE)}")
+    require_parallel(robot)
+    require_parallel(calibrated, "calibrated")
+    if calibrated.actuator_units != robot.actuator_units:
+        raise ValueError(
+            f"calibrated must have the actuators of {robot.name}, {len(robot.actuator_units)};"
+            f" {calibrated.name} has {len(calibrated.actuator_units)}"
+        )
+    require_moved(robot, axes)
     names = tuple(sorted(axes, key=POSE.index))
     nodes = tuple(_nodes(name, axes[name], METHODS[method]) for name in names)
     base, shape = as_rows("origin", robot.home if origin is None else origin, 6)
@@ -201,6 +206,8 @@ def correction_grid(
     poses, commands, exact, places = (each[halfway] for each in (poses, commands, exact, places))
     found = np.asarray(_interpolator(nodes, corrections, method)(places))
     known = np.asarray(np.isfinite(found - exact).all(axis=1))
+    if not known.any():
+        raise ValueError("axes: the machines cannot take the poses half-way between the nodes")
     off = np.abs(found - exact)[known]
     reached, aimed = (
         calibrated.forward(commands[known] + dq[known], guess=poses[known]).pose
@@ -213,9 +220,9 @@ def correction_grid(
         origin=base[0],
         corrections=corrections,
         method=method,
-        error=off.max(axis=0, initial=0.0),
-        position_error=float(missed.max(initial=0.0)),
-        position_error_rms=float(np.sqrt((missed**2).mean())) if len(missed) else 0.0,
+        error=off.max(axis=0),
+        position_error=float(missed.max()),
+        position_error_rms=float(np.sqrt((missed**2).mean())),
         checked=len(known),
         reached=int(known.sum()),
         actuator_units=tuple(robot.actuator_units),

@@ -129,7 +129,7 @@ def _groups(found: Sensitivity) -> list[tuple[list[int], str, float]]:
         seen = [k for k in range(first, first + 3) if sizes[k] > _SEEN]
         if seen:
             groups.append((seen, unit, factor))
-    return groups
+    return groups or [([0, 1, 2], "mm", 1.0)]  # nothing was solved: empty panels
 
 
 def tolerance_map(found: Tolerance, grid: Workspace, levels: int = 12) -> Figure:

@@ -49,9 +49,11 @@ def ideal(robot: Robot, poses: ArrayLike) -> Ideal:
     Raises
     ------
     ValueError, TypeError
-        A wrong shape, or no numbers.
+        A wrong shape, no pose at all, or no numbers.
     """
     given, shape = as_rows("poses", poses, 6)
+    if not len(given):
+        raise ValueError("poses must be at least one, found none")
     rows = completed(robot, given)
     actuators = robot.inverse(rows)
     return Ideal(robot.forward(actuators, guess=rows).pose, actuators, shape)

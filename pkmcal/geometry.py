@@ -293,8 +293,8 @@ class Geometry:
 
         Raises
         ------
-        ValueError
-            A pattern that matches nothing, or tied numbers only.
+        ValueError, TypeError
+            A pattern that matches nothing, or tied numbers only; no string.
 
         Examples
         --------
@@ -304,6 +304,8 @@ class Geometry:
         """
         found: dict[str, None] = {}
         for pattern in [patterns] if isinstance(patterns, str) else patterns:
+            if not isinstance(pattern, str):
+                raise TypeError(f"numbers of the geometry go by name, found {pattern!r}")
             if pattern in self:
                 self.require_own(pattern)
                 found[pattern] = None

@@ -233,6 +233,8 @@ def _check(robot: Robot, measured: Measurements, argument: str) -> None:
 
 
 def _words(argument: str, given: str | Sequence[str], count: int) -> list[bool]:
+    if not isinstance(given, str | Sequence):
+        raise TypeError(f"{argument} must be 'known' or 'unknown', found {given!r}")
     words = [given] * count if isinstance(given, str) else list(given)
     if len(words) != count:
         raise ValueError(f"{argument}: one word for each of {count} sets, found {len(words)}")

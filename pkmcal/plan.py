@@ -15,8 +15,7 @@ from pkmcal.exchange import CRITERIA, Design
 from pkmcal.geometries import ideal
 from pkmcal.identifiability import in_words, plain_basis
 from pkmcal.parameters import Parameters, Prior, Share, parameters
-from pkmcal.robot import Robot
-from pkmcal.suggest import did_you_mean
+from pkmcal.robot import Robot, require_parallel
 from pkmcal.tracker import Tracker
 from pkmcal.virtual import VirtualMachine
 
@@ -81,9 +80,9 @@ class Plan:
             for index, pose in zip(self.indices, shown, strict=True)
         ]
         return "\n".join([
-            f"{self.robot.name}: measure {len(self)} poses for {len(self.parameters)} parameters"
+            f"{self.robot.name}: measure {_poses(len(self))} for {len(self.parameters)} parameters"
             f"{left_out}",
-            f"predicted error {self.predicted:.3g} mm rms; {len(self)} poses at random"
+            f"predicted error {self.predicted:.3g} mm rms; {_poses(len(self))} at random"
             f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g}",
             *([] if np.isfinite(self.predicted) else ["too few: not all of them would be told"]),
             digits.table(heads, rows),
@@ -163,9 +162,11 @@ def plan_poses(
     >>> len(plan), plan.predicted < plan.at_random
     (20, True)
     """
+    require_parallel(robot)
     if criterion not in CRITERIA:
-        known = did_you_mean(str(criterion), CRITERIA)
-        raise ValueError(f"criterion must be one of {', '.join(CRITERIA)}{known}")
+        raise ValueError(
+            f"criterion must be one of {', '.join(CRITERIA)}; found {criterion!r}"
+        )
     if (count is None) == (accuracy is None):
         raise ValueError("give either count, how many poses, or accuracy, the error wanted in mm")
     given, _ = as_rows("candidates", candidates, 6)
@@ -191,6 +192,10 @@ def plan_poses(
         left_out=len(given) - len(inside),
         parameters=equations.parameters.names,
     )
+
+
+def _poses(count: int) -> str:
+    return f"{count} pose{'s' * (count != 1)}"
 
 
 def _completed(robot: Robot, poses: FloatArray) -> FloatArray:
@@ -289,6 +294,8 @@ def _design(
 def _accuracy(accuracy: object, best: float, candidates: int) -> float:
     if isinstance(accuracy, bool) or not isinstance(accuracy, int | float | np.floating):
         raise TypeError(f"accuracy must be a number, in mm; found {accuracy!r}")
+    if not 0 < accuracy < np.inf:
+        raise ValueError(f"accuracy must be above 0, in mm; found {accuracy:g}")
     if not accuracy > best:
         raise ValueError(
             f"accuracy: all {candidates} candidates together predict {best:.3g} mm, found"

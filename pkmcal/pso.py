@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.core import FloatArray
-from pkmcal.swarm import Swarm, SwarmSettings, checked_seed
+from pkmcal.seed import checked_seed
+from pkmcal.swarm import Swarm, SwarmSettings
+
+_WIDEST = 1e150  # of a bound, so that no step of the swarm overflows
 
 Objective = Callable[[FloatArray], ArrayLike]
 
@@ -150,6 +153,8 @@ def _bounds(lower: ArrayLike, upper: ArrayLike) -> tuple[FloatArray, FloatArray]
     if (low > high).any():
         place = int(np.flatnonzero(low > high)[0])
         raise ValueError(f"lower[{place}] = {low[place]} is above upper[{place}] = {high[place]}")
+    if max(-low.min(), high.max()) > _WIDEST:
+        raise ValueError(f"lower and upper must be within ±{_WIDEST:g}, or the swarm overflows")
     return low, high
 
 

@@ -576,3 +576,10 @@ def _limb(limb: Limb) -> dict[str, Any]:
         "lever": limb.couple,
         "weights": [1.0, *(limb.weights or [1.0] * len(rows))],
     }
+
+
+def require_parallel(robot: object, name: str = "robot") -> None:
+    """Refuse what is no parallel machine with a TypeError that names the argument."""
+    if not isinstance(robot, Robot):
+        found = type(robot).__name__
+        raise TypeError(f"{name} must be a Robot, a parallel machine; found {found}")

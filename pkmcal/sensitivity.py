@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pkmcal import digits
 from pkmcal.core import POSE, FloatArray
 from pkmcal.geometries import ideal, off
-from pkmcal.robot import Robot
+from pkmcal.robot import Robot, require_parallel
 
 PER_STEP = {"mm": 1.0, "rad": 1e-3, "1": 1e-3}  # what a step of 1 is: 1 mm, 1 mrad, a ratio's 0.001
 STUDIES = ("limb1", "offsets", "all-limbs")
@@ -82,14 +82,16 @@ class Sensitivity:
         if self.failed.any():
             heading.append("not solved")
         return "\n".join([
-            f"{self.robot.name}: mean size of the pose error over {count} poses, for an error of"
-            f" {self.step:g} mm (angles {self.step:g} mrad, ratios {self.step / 1000:g})",
+            f"{self.robot.name}: mean size of the pose error over {count}"
+            f" pose{'s' * (count != 1)},",
+            f"for an error of {self.step:g} mm (angles {self.step:g} mrad, ratios"
+            f" {self.step / 1000:g})",
             digits.table(heading, rows, left=1),
         ])  # fmt: skip
 
 
 def sensitivity(
-    robot: Robot, poses: ArrayLike, step: float = 1.0, cases: Sequence[str] | None = None
+    robot: Robot, poses: ArrayLike, step: float = 1.0, cases: str | Sequence[str] | None = None
 ) -> Sensitivity:
     """Give each number of the geometry an error and see where the machine goes.
 
@@ -102,7 +104,7 @@ def sensitivity(
         (`Robot.complete`); ``.poses`` says to what.
     step : float
         The error: mm for lengths, mrad for angles, thousandths for ratios.
-    cases : sequence of str, optional
+    cases : str or sequence of str, optional
         Names; a wildcard puts all that match in error together: ``"base*.x"``. By default every
         number that can be replaced, one by one.
 
@@ -114,7 +116,8 @@ def sensitivity(
     Raises
     ------
     ValueError, TypeError
-        An unknown or tied name, a step that is not a finite number or 0, a wrong shape.
+        An unknown or tied name, no name at all, a step that is not a finite number or 0, a wrong
+        shape.
 
     Notes
     -----
@@ -129,8 +132,14 @@ def sensitivity(
     >>> found.mean[1].round(6)
     array([0., 1., 0., 0., 0., 0.])
     """
+    require_parallel(robot)
     size = step_size(step)
-    names = own_names(robot) if cases is None else list(cases)
+    if cases is None:
+        names = own_names(robot)
+    else:
+        names = [cases] if isinstance(cases, str) else list(cases)
+    if not names:
+        raise ValueError("cases: name at least one number of the geometry")
     at = ideal(robot, poses)
     jacobian = robot.error_jacobian(at.poses, at.actuators)
     geometry = robot.geometry

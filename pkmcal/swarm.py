@@ -200,19 +200,6 @@ def minimise_eq18(
     return correction, history
 
 
-def checked_seed(seed: int) -> int:
-    """A seed that the core takes.
-
-    Raises
-    ------
-    ValueError
-        It does not.
-    """
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed < 2**64:
-        raise ValueError(f"seed must be a whole number from 0 to 2**64 - 1, found {seed!r}")
-    return int(seed)
-
-
 def _struct(settings: SwarmSettings, dims: int) -> Any:
     struct = ffi.new("pkm_swarm *")
     struct.particles, struct.dims = settings.particles, dims

@@ -13,7 +13,8 @@ from pkmcal import digits
 from pkmcal.core import POSE, FloatArray
 from pkmcal.geometries import ideal
 from pkmcal.monte_carlo import Draw, Progress, simulate
-from pkmcal.robot import Robot
+from pkmcal.robot import Robot, require_parallel
+from pkmcal.seed import checked_seed
 
 WORST = 3.0  # standard deviations by which every number is off in the worst case
 SHARES = {"interval95": (0.025, 0.975), "interval997": (0.0015, 0.9985)}
@@ -194,12 +195,12 @@ def tolerance(
     >>> bool((abs(found.std - found.linear_std) <= 0.03 * found.linear_std).all())
     True
     """
+    require_parallel(robot)
+    seed = checked_seed(seed)
     places, deviations = sigma_of(robot, sigma)
     if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 2:
         raise ValueError(f"samples must be a whole number from 2, found {samples!r}")
     at = ideal(robot, poses)
-    if not len(at.poses):
-        raise ValueError("poses must be at least one, found none")
     effect = robot.error_jacobian(at.poses, at.actuators)[:, :, places] * deviations
     variance = effect**2
     total = variance.sum(axis=-1, keepdims=True)

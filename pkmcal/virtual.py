@@ -12,6 +12,7 @@ from pkmcal.arm_machine import ArmMachine
 from pkmcal.measurement_fields import numbers
 from pkmcal.measurements import COMPONENTS, Measurements
 from pkmcal.predict import predict
+from pkmcal.seed import checked_seed
 from pkmcal.serial import SerialArm
 from pkmcal.tracker import Tracker
 
@@ -68,7 +69,7 @@ class VirtualMachine:
         if angle_noise is None:
             angle_noise = 0.0 if isinstance(noise, Tracker) else noise / _ARM
         self.angle_noise = _deviation("angle_noise", angle_noise)
-        self._random = np.random.default_rng(seed)
+        self._random = np.random.default_rng(checked_seed(seed))
 
     def measure(
         self,

@@ -13,7 +13,8 @@ from pkmcal.core import POSE, FloatArray, as_rows
 from pkmcal.feasible import Feasibility
 from pkmcal.geometries import completed
 from pkmcal.limb_kinds import KINDS
-from pkmcal.robot import Robot
+from pkmcal.robot import Robot, require_parallel
+from pkmcal.seed import checked_seed
 from pkmcal.suggest import did_you_mean
 
 BoolArray = NDArray[np.bool_]
@@ -83,6 +84,7 @@ def dexterity(robot: Robot, poses: ArrayLike) -> Dexterity:
     >>> round(float(found.conditioning), 3), round(float(found.transmission), 3)
     (0.104, 1.0)
     """
+    require_parallel(robot)
     rows, shape = as_rows("poses", poses, 6)
     found = [_dexterity(robot, rows[i : i + _BLOCK]) for i in range(0, len(rows), _BLOCK)]
     joined = np.concatenate(found, axis=1) if found else np.empty((5, 0))
@@ -208,8 +210,8 @@ def workspace(
     Raises
     ------
     ValueError
-        An unknown coordinate, or one that the machine does not move by itself; ends in the wrong
-        order; fewer than two cells.
+        No coordinate, an unknown one, or one that the machine does not move by itself; ends in
+        the wrong order; fewer than two cells.
 
     Examples
     --------
@@ -218,12 +220,9 @@ def workspace(
     >>> found.inside.shape, bool(found.inside[15, 20])
     ((30, 40), True)
     """
-    moved = _moved(robot)
-    for name in axes:
-        if name not in moved:
-            known = did_you_mean(name, moved)
-            raise ValueError(f"axes: {name!r} is no coordinate that {robot.name} moves{known}")
-    values = tuple(_middles(name, *ends) for name, ends in axes.items())
+    require_parallel(robot)
+    require_moved(robot, axes)
+    values = tuple(_middles(name, ends) for name, ends in axes.items())
     start, _ = as_rows("at", robot.home if at is None else at, 6)
     shape = tuple(len(axis) for axis in values)
     rows = np.repeat(start[:1], int(np.prod(shape)), axis=0)
@@ -259,7 +258,7 @@ def sample_poses(robot: Robot, count: int = 30, seed: int = 0, share: float = 0.
     Raises
     ------
     ValueError
-        The machine has too few such poses.
+        The machine has too few such poses; a count, seed or share that does not fit.
 
     Examples
     --------
@@ -269,7 +268,12 @@ def sample_poses(robot: Robot, count: int = 30, seed: int = 0, share: float = 0.
     >>> poses.shape, bool(robot.feasible(poses).ok.all())
     ((5, 6), True)
     """
-    random = np.random.default_rng(seed)
+    require_parallel(robot)
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 0:
+        raise ValueError(f"count must be a whole number from 0, found {count!r}")
+    if not 0 <= share <= 1:
+        raise ValueError(f"share must be from 0 to 1, found {share!r}")
+    random = np.random.default_rng(checked_seed(seed))
     box = reach(robot)
     columns = [POSE.index(name) for name in box]
     home = robot.home[columns]
@@ -322,6 +326,25 @@ def _moved(robot: Robot) -> tuple[str, ...]:
     return tuple(robot.model.match or robot.coordinates)
 
 
+def require_moved(robot: Robot, axes: Mapping[str, object]) -> None:
+    """Refuse axes that span nothing, or along which the machine does not move by itself.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Naming the coordinate.
+    """
+    if not isinstance(axes, Mapping):
+        raise TypeError(f"axes must map coordinates to numbers, found {type(axes).__name__}")
+    if not axes:
+        raise ValueError("axes names no coordinate")
+    moved = _moved(robot)
+    for name in axes:
+        if name not in moved:
+            known = did_you_mean(str(name), moved)
+            raise ValueError(f"axes: {name!r} is no coordinate that {robot.name} moves{known}")
+
+
 def _inside(robot: Robot, feasible: Feasibility, dexterity_there: Dexterity) -> BoolArray:
     home = dexterity(robot, robot.home)
     side = np.sign(dexterity_there.determinant) * np.sign(home.determinant)
@@ -335,8 +358,15 @@ def _good(robot: Robot, poses: FloatArray) -> BoolArray:
     return _inside(robot, robot.feasible(poses), there) & (there.conditioning > max(least, 1e-9))
 
 
-def _middles(name: str, low: float, high: float, count: int) -> FloatArray:
-    if not low < high:
+def _middles(name: str, ends: tuple[float, float, int]) -> FloatArray:
+    given = np.asarray(ends)
+    if given.dtype.kind not in "iuf" or given.shape != (3,):
+        raise ValueError(f"axes: {name} must be (low, high, cells), found {ends!r}")
+    low, high, cells = given.tolist()
+    count = int(cells) if np.isfinite(cells) else 0
+    if count != cells:
+        raise ValueError(f"axes: {name} must have a whole number of cells, found {cells}")
+    if not -np.inf < low < high < np.inf:
         raise ValueError(f"axes: {name} must run from low to high, found {low} to {high}")
     if count < 2:
         raise ValueError(f"axes: {name} must have two cells at least, found {count}")
