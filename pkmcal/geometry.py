@@ -7,7 +7,7 @@ follows from named parameters (``radius``); it can be read but not replaced.
 from __future__ import annotations
 
 import math
-from collections.abc import ItemsView, Iterator, Mapping, Sequence
+from collections.abc import ItemsView, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import cached_property
 from typing import Any, TypeVar
@@ -303,7 +303,8 @@ class Geometry:
         ['rod1']
         """
         found: dict[str, None] = {}
-        for pattern in [patterns] if isinstance(patterns, str) else patterns:
+        one = isinstance(patterns, str) or not isinstance(patterns, Iterable)
+        for pattern in [patterns] if one else patterns:
             if not isinstance(pattern, str):
                 raise TypeError(f"numbers of the geometry go by name, found {pattern!r}")
             if pattern in self:

@@ -16,7 +16,7 @@ from pkmcal.feasible import Feasibility
 from pkmcal.geometries import ON_THE_MANIFOLD
 from pkmcal.law import CUBIC, QUINTIC, JerkLimited, Polynomial, jerk_limited, limit
 from pkmcal.limb_kinds import KINDS
-from pkmcal.robot import Robot
+from pkmcal.robot import Robot, require_parallel
 from pkmcal.screw import to_pose
 from pkmcal.workspace import dexterity
 
@@ -268,6 +268,7 @@ def move(
     >>> bool(abs(way.sample(way.duration / 2).velocities).max() <= 50.0)
     True
     """
+    require_parallel(robot)
     ends = [_pose(robot, "start", start), _pose(robot, "end", end)]
     if space not in ("pose", "joint"):
         raise ValueError(f"space must be 'pose' or 'joint', found {space!r}")

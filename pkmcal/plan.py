@@ -16,6 +16,7 @@ from pkmcal.geometries import ideal
 from pkmcal.identifiability import in_words, plain_basis
 from pkmcal.parameters import Parameters, Prior, Share, parameters
 from pkmcal.robot import Robot, require_parallel
+from pkmcal.suggest import did_you_mean
 from pkmcal.tracker import Tracker
 from pkmcal.virtual import VirtualMachine
 
@@ -164,8 +165,9 @@ def plan_poses(
     """
     require_parallel(robot)
     if criterion not in CRITERIA:
+        near = did_you_mean(str(criterion), CRITERIA, listed=0)
         raise ValueError(
-            f"criterion must be one of {', '.join(CRITERIA)}; found {criterion!r}"
+            f"criterion must be one of {', '.join(CRITERIA)}; found {criterion!r}{near}"
         )
     if (count is None) == (accuracy is None):
         raise ValueError("give either count, how many poses, or accuracy, the error wanted in mm")

@@ -144,3 +144,21 @@ def test_what_is_wrong_is_named(arguments: dict[str, Any], error: type, words: s
     given = {"poses": robot.home, "allowed": 0.3, "samples": 10} | arguments
     with pytest.raises(error, match=words):
         pk.allocate_tolerance(robot, **given)
+
+
+def test_a_limit_so_wide_that_machines_have_no_pose_is_refused() -> None:
+    robot = pk.load("2tpr2tps")
+    with pytest.raises(ValueError, match=r"leave \d+ of 500 machines without a pose; allow less"):
+        pk.allocate_tolerance(robot, robot.home, 1e6, samples=500)
+
+
+def test_joints_are_one_name_or_several_but_not_none() -> None:
+    robot = pk.load("2tpr2tps")
+    one, listed = (
+        pk.allocate_tolerance(robot, robot.home, 0.5, joints, samples=500)
+        for joints in ("offset*", ["offset*"])
+    )
+    assert one.joints == listed.joints == ("offset*",)
+    assert one.sigma == listed.sigma
+    with pytest.raises(ValueError, match="joints: name at least one"):
+        pk.allocate_tolerance(robot, robot.home, 0.5, [])

@@ -411,3 +411,11 @@ def test_demo_as_json() -> None:
     assert found["seed"] == 1
     assert len(found["after"]) == 100
     assert found["identification"]["rank"] == 25
+
+
+def test_check_says_at_which_rows_the_machine_has_no_pose(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("q1 [mm],q2 [mm],q3 [mm],z [mm]\n-330,-330,-330,0\n9000,-330,-330,0\n")
+    result = run("check", ROBOT, log)
+    assert result.exit_code == 1
+    assert "no pose at the actuators of 1 of them (rows 1)" in result.stdout

@@ -112,3 +112,12 @@ def test_the_example_runs_on_the_command_line(tmp_path: Path) -> None:
     assert result.exit_code == 0
     assert "30 poses" in result.stdout
     assert "beta from the position" in result.stdout
+
+
+def test_rows_measured_grossly_off_are_done_but_not_trusted(tmp_path: Path) -> None:
+    far = pk.load("2tpr2tps").home[None] + np.array([[0, 0, 9000, 0, 0, 0]])
+    write_poses(tmp_path / "desired.csv", pk.load("2tpr2tps").home[None])
+    write_poses(tmp_path / "far.csv", far)
+    result = run("2tpr2tps", tmp_path / "desired.csv", tmp_path / "far.csv")
+    assert result.exit_code == 1
+    assert "check units, frame and order of the rows" in result.stdout

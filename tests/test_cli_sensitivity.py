@@ -216,3 +216,10 @@ def test_a_column_that_is_missing_is_that_of_home(tmp_path: Path) -> None:
     np.testing.assert_allclose(found[:, 2], [800, 850])
     np.testing.assert_allclose(found[:, 3], np.radians([10, -5]))
     assert (found[:, [0, 1, 4, 5]] == 0).all()
+
+
+def test_an_error_at_which_nothing_is_solved_leaves_empty_figures() -> None:
+    result = run("sensitivity", "2tpr2tps", "--step", "500")
+    assert result.exit_code == 1
+    assert "not solved" in result.stdout
+    assert Path("pkmcal-sensitivity/limb1-mean.png").exists()

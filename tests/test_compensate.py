@@ -258,3 +258,25 @@ def test_shapes_are_checked(paper: Robot) -> None:
         compensate(paper, desired, desired[:, :3])
     with pytest.raises(ValueError, match="from-position"):
         compensate(pk.load("hexapod"), desired, desired, orientation="from-position")
+
+
+@pytest.mark.parametrize("method", ["exact", "pso"])
+@pytest.mark.parametrize("common", [False, True])
+def test_poses_none_of_which_is_reached_are_nan_and_said(
+    paper: Robot, method: str, common: bool
+) -> None:
+    desired = np.tile(paper.home, (3, 1))
+    found = compensate(paper, desired, np.full((3, 6), np.nan), method, common=common)
+    assert np.isnan(found.actuators).all()
+    assert str(found) == "3 poses; no pose that was both asked for and measured is within reach"
+
+
+def test_measurements_in_another_unit_or_frame_are_called_gross(paper: Robot) -> None:
+    desired = paper.complete(paper.home + np.array([[0, 0, 0, 0, 0, 0], [0, 10, 5, 0.1, 0, 0]]))
+    assert not compensate(paper, desired, desired + 0.5 * np.eye(6)[2]).gross.any()
+    shifted = desired.copy()
+    shifted[1, :3] *= 1e-3
+    found = compensate(paper, desired, shifted)
+    assert found.gross.tolist() == [False, True]
+    assert "1 of 2 were off by more than errors of a machine" in str(found)
+    assert max(map(len, str(found).splitlines())) <= 100

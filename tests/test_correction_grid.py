@@ -120,3 +120,13 @@ def test_bad_arguments_are_named(
 ) -> None:
     with pytest.raises(error, match=message):
         correction_grid(**{"robot": robot, "calibrated": robot, "axes": AXES, **changes})
+
+
+def test_a_grid_that_the_machines_cannot_span_is_refused(robot: Robot) -> None:
+    with pytest.raises(ValueError, match="'x' is no coordinate that 2TPR&2TPS moves"):
+        correction_grid(robot, robot, {"x": [0.0, 1.0, 2.0]})
+    with pytest.raises(ValueError, match="must have the actuators of 2TPR&2TPS, 4; hexapod has 6"):
+        correction_grid(robot, pk.load("hexapod"), AXES)
+    delta = pk.load("linear-delta")
+    with pytest.raises(ValueError, match="cannot take the poses half-way"):
+        correction_grid(delta, delta, {"x": [-9000.0, 9000.0, 9001.0]})

@@ -389,3 +389,10 @@ def test_the_examples_of_the_document_are_run() -> None:
     document = Path(__file__).resolve().parent.parent / "docs" / "calibration.md"
     found = doctest.testfile(str(document), module_relative=False)
     assert found.attempted >= 7 and found.failed == 0
+
+
+@pytest.mark.parametrize("word", ["frame", "target", "attachment"])
+def test_what_is_no_word_is_named(paper: Robot, word: str) -> None:
+    measured = VirtualMachine(paper).measure(paper.inverse(paper.home[None]))
+    with pytest.raises(TypeError, match=f"{word} must be 'known' or 'unknown', found None"):
+        identify(paper, measured, **{word: None})  # type: ignore[arg-type]

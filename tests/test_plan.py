@@ -206,3 +206,18 @@ def test_no_candidate_within_limits_is_an_error(hexapod: Robot) -> None:
         pk.plan_poses(hexapod, hexapod.home[None], accuracy="fine")  # type: ignore[arg-type]
     with pytest.raises(TypeError, match=r"count must be a whole number, found 2\.5"):
         pk.plan_poses(hexapod, hexapod.home[None], 2.5)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("odd", "message"),
+    [
+        ({"count": 8, "criterion": "E"}, "one of prediction, D, A; found 'E'$"),
+        ({"accuracy": -1.0}, "accuracy must be above 0, in mm; found -1"),
+        ({"accuracy": np.nan}, "accuracy must be above 0, in mm; found nan"),
+    ],
+)
+def test_odd_wishes_say_what_was_found(
+    hexapod: Robot, candidates: np.ndarray, odd: Any, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        pk.plan_poses(hexapod, candidates, **odd)

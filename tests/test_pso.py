@@ -392,3 +392,8 @@ def test_limb_residual_names_what_does_not_fit() -> None:
         LimbResidual(robot, poses, q, ["bsae1.x"])
     with pytest.raises(ValueError, match="values must have shape"):
         LimbResidual(robot, poses, q)(np.zeros((2, 3)))
+
+
+def test_bounds_that_would_overflow_are_refused() -> None:
+    with pytest.raises(ValueError, match=r"within ±1e\+150"):
+        pso(distance, np.full(4, -1e308), np.full(4, 1e308))

@@ -148,8 +148,9 @@ def test_studies_of_the_paper() -> None:
 def test_the_table_has_a_line_for_each_case() -> None:
     robot = pk.load("2tpr2tps")
     lines = str(pk.sensitivity(robot, robot.home, cases=["offset1", "base*.y"])).splitlines()
-    assert [line.split()[0] for line in lines[2:]] == ["offset1", "base*.y"]
-    assert lines[3].split()[1:] == ["0.0000", "1.0000", "0.0000", "0.0000", "0.0000", "0.0000"]
+    assert [line.split()[0] for line in lines[3:]] == ["offset1", "base*.y"]
+    assert lines[4].split()[1:] == ["0.0000", "1.0000", "0.0000", "0.0000", "0.0000", "0.0000"]
+    assert max(map(len, lines)) <= 100
 
 
 @pytest.mark.parametrize(
@@ -187,3 +188,14 @@ def test_unknown_case_of_a_result_is_a_key_error() -> None:
 def test_unknown_study_is_refused() -> None:
     with pytest.raises(ValueError, match="study must be one of"):
         study_cases(pk.load("hexapod"), "limb2")
+
+
+def test_cases_are_one_name_or_several_but_not_none() -> None:
+    robot = pk.load("2tpr2tps")
+    assert pk.sensitivity(robot, robot.home, cases="offset*").cases == ("offset*",)
+    with pytest.raises(ValueError, match="cases: name at least one number"):
+        pk.sensitivity(robot, robot.home, cases=[])
+    with pytest.raises(TypeError, match="go by name, found 1"):
+        pk.sensitivity(robot, robot.home, cases=[1])  # type: ignore[list-item]
+    with pytest.raises(ValueError, match="poses must be at least one"):
+        pk.sensitivity(robot, np.zeros((0, 6)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -260,3 +261,60 @@ def test_the_report_says_how_much_is_inside() -> None:
 def test_wrong_axes_are_named(axes: dict[str, tuple[float, float, int]], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         pk.workspace(pk.load("2tpr2tps"), axes)
+
+
+@pytest.mark.parametrize(
+    ("axes", "message"),
+    [
+        ({}, "axes names no coordinate"),
+        ([1, 2], "axes must map coordinates to numbers, found list"),
+        ({"y": (0, 1, 2.5)}, "y must have a whole number of cells, found 2.5"),
+        ({"y": (0, 1, np.nan)}, "y must have a whole number of cells, found nan"),
+        ({"y": (0, 1)}, r"y must be \(low, high, cells\), found \(0, 1\)"),
+        ({"y": "abc"}, r"y must be \(low, high, cells\), found 'abc'"),
+        ({"y": (0, np.inf, 3)}, "y must run from low to high, found 0.0 to inf"),
+    ],
+)
+def test_axes_that_span_no_grid_are_refused(axes: Any, message: str) -> None:
+    with pytest.raises((TypeError, ValueError), match=message):
+        pk.workspace(pk.load("2tpr2tps"), axes)
+
+
+@pytest.mark.parametrize(
+    "odd", [{"count": -1}, {"count": 1.5}, {"share": 2.0}, {"share": np.nan}, {"seed": -1}]
+)
+def test_odd_draws_of_poses_name_the_argument(odd: Any) -> None:
+    with pytest.raises(ValueError, match=f"{next(iter(odd))} must be"):
+        pk.sample_poses(pk.load("hexapod"), **odd)
+
+
+def test_an_arm_is_no_parallel_machine_wherever_one_is_needed() -> None:
+    arm: Any = pk.load("3r")
+    pose = np.zeros((1, 6))
+    calls = {
+        "tolerance": lambda: pk.tolerance(arm, pose, 0.1),
+        "sensitivity": lambda: pk.sensitivity(arm, pose),
+        "allocate_tolerance": lambda: pk.allocate_tolerance(arm, pose, 0.1),
+        "workspace": lambda: pk.workspace(arm, {"y": (0, 1, 3)}),
+        "dexterity": lambda: pk.dexterity(arm, pose),
+        "sample_poses": lambda: pk.sample_poses(arm),
+        "compensate": lambda: pk.compensate(arm, pose, pose),
+        "plan_poses": lambda: pk.plan_poses(arm, pose, count=1),
+        "check_geometry": lambda: pk.check_geometry(arm),
+        "move": lambda: pk.trajectory.move(arm, pose[0], pose[0], duration=1.0),
+    }
+    for call in calls.values():
+        with pytest.raises(TypeError, match="robot must be a Robot, a parallel machine; found Ser"):
+            call()
+
+
+def test_a_pose_of_another_assembly_mode_has_the_same_actuators() -> None:
+    robot = pk.load("3rrr-planar")
+    wanted = pk.sample_poses(robot, 200)
+    q = robot.inverse(wanted)
+    cold = robot.forward(q)
+    assert cold.ok.all()
+    other = np.abs(cold.pose - wanted).max(axis=1) > 1e-6
+    assert 0 < other.sum() <= 20
+    assert np.abs(robot.inverse(cold.pose) - q).max() < 1e-9
+    assert np.abs(robot.forward(q, guess=wanted).pose - wanted).max() < 1e-9
