@@ -276,7 +276,8 @@ class Robot:
         ndarray (..., n, m)
             mm or rad of the actuator per mm or rad of the coordinate, in the order of
             `coordinates`. NaN where a limb does not reach, and at a type-1 singularity: a rod at
-            right angles to its slider, or in line with its crank.
+            right angles to its slider, or in line with its crank. The coordinates are those of the
+            machine's own frames, without the base and tool frames that its file may state.
         """
         rows, shape = self._own_rows(pose)
         n, m = self.n_actuators, len(self.coordinates)
@@ -293,7 +294,8 @@ class Robot:
         Returns
         -------
         ndarray (..., m, n)
-            NaN at a type-2 singularity.
+            NaN at a type-2 singularity. The coordinates are those of the machine's own frames,
+            without the base and tool frames that its file may state.
         """
         rows, shape = self._own_rows(pose)
         q = self._machine.inverse(self._slots, rows)
