@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
+from pkmcal.arm_machine import ArmMachine, as_machine
 from pkmcal.core import POSE, as_rows
 from pkmcal.equations import Equations
 from pkmcal.exchange import CRITERIA, Design
 from pkmcal.geometries import ideal
 from pkmcal.identifiability import in_words, plain_basis
 from pkmcal.parameters import Parameters, Prior, Share, parameters
-from pkmcal.robot import Robot, require_parallel
+from pkmcal.robot import Robot
+from pkmcal.serial import SerialArm
 from pkmcal.suggest import did_you_mean
 from pkmcal.tracker import Tracker
 from pkmcal.virtual import VirtualMachine
@@ -36,7 +38,7 @@ class Plan:
 
     Attributes
     ----------
-    robot : Robot
+    robot : Robot or SerialArm
         The machine they are for.
     indices : ndarray of int (count,)
         Which of the candidates, in their order.
@@ -58,7 +60,7 @@ class Plan:
         What the calibration is to find.
     """
 
-    robot: Robot
+    robot: Robot | SerialArm
     indices: IntArray
     poses: FloatArray
     actuators: FloatArray
@@ -73,12 +75,19 @@ class Plan:
 
     def __str__(self) -> str:
         left_out = f"; {self.left_out} candidates left out" if self.left_out else ""
-        units = ["mm"] * 3 + ["deg"] * 3
-        heads = ["candidate", *(f"{name} [{unit}]" for name, unit in zip(POSE, units, strict=True))]
-        shown = np.concatenate([self.poses[:, :3], np.degrees(self.poses[:, 3:])], axis=1)
+        if isinstance(self.robot, SerialArm):  # several postures have one pose
+            names: Sequence[str] = [f"q{i + 1}" for i in range(self.robot.n_joints)]
+            given, units = self.actuators, self.robot.actuator_units
+        else:
+            names, given, units = POSE, self.poses, ("mm",) * 3 + ("rad",) * 3
+        turning = np.array([unit == "rad" for unit in units])
+        heads = ["candidate"]
+        heads += [f"{n} [{'deg' if t else 'mm'}]" for n, t in zip(names, turning, strict=True)]
         rows = [
-            [str(index), *(digits.fixed(float(value), 3) for value in pose)]
-            for index, pose in zip(self.indices, shown, strict=True)
+            [str(index), *(digits.fixed(float(value), 3) for value in row)]
+            for index, row in zip(
+                self.indices, np.where(turning, np.degrees(given), given), strict=True
+            )
         ]
         return "\n".join([
             f"{self.robot.name}: measure {_poses(len(self))} for {len(self.parameters)} parameters"
@@ -91,7 +100,7 @@ class Plan:
 
 
 def plan_poses(
-    robot: Robot,
+    robot: Robot | SerialArm,
     candidates: ArrayLike,
     count: int | None = None,
     accuracy: float | None = None,
@@ -111,18 +120,20 @@ def plan_poses(
 
     Parameters
     ----------
-    robot : Robot
+    robot : Robot or SerialArm
         The machine as drawn, or as last calibrated.
-    candidates : array_like (N, 6)
-        Poses that could be measured, mm and rad. Those that break the machine's limits are left
-        out, and those that machines with twice the errors of the prior (0.5 mm without one) do
-        not reach. A pose that its closures do not allow is completed (`Robot.complete`).
+    candidates : array_like (N, 6), for a serial arm (N, n)
+        Poses that could be measured, mm and rad; of an arm its joint coordinates. Those that break
+        the machine's limits are left out, and those that machines with twice the errors of the
+        prior (0.5 mm without one) do not reach. A pose that its closures do not allow is completed
+        (`Robot.complete`). An arm's file has no limits: offer what it may take.
     count : int, optional
         How many to choose.
     accuracy : float, optional
         Instead of `count`: as few as predict this error at the targets, mm.
-    targets : array_like (T, 6), optional
-        The poses where the machine is to be accurate; by default the candidates.
+    targets : array_like (T, 6), for a serial arm (T, n), optional
+        The poses where the machine is to be accurate; by default the candidates. Accurate at the
+        origin of its platform or tool, wherever `target` is measured.
     criterion : {"prediction", "D", "A"}
         What is made least: the predicted error at the targets, the volume of the parameters'
         confidence region (largest det of the information), or the sum of their variances, scaled
@@ -163,7 +174,6 @@ def plan_poses(
     >>> len(plan), plan.predicted < plan.at_random
     (20, True)
     """
-    require_parallel(robot)
     if criterion not in CRITERIA:
         near = did_you_mean(str(criterion), CRITERIA, listed=0)
         raise ValueError(
@@ -171,12 +181,12 @@ def plan_poses(
         )
     if (count is None) == (accuracy is None):
         raise ValueError("give either count, how many poses, or accuracy, the error wanted in mm")
-    given, _ = as_rows("candidates", candidates, 6)
-    poses, q, inside = _within_limits(robot, given)
-    aims = poses if targets is None else _completed(robot, as_rows("targets", targets, 6)[0])
-    equations = _equations(robot, q, kind, target, noise, free, prior, unknown)
+    machine = as_machine(robot)
+    poses, q, inside, offered = _within_limits(machine, candidates)
+    aims = (poses, q) if targets is None else _aims(machine, targets)
+    equations = _equations(machine, q, kind, target, noise, free, prior, unknown)
     safe = _safe(equations.parameters, poses, q)
-    design = _design(equations, safe, aims, criterion)
+    design = _design(equations, safe, *aims, criterion)
     poses, q, inside = poses[safe], q[safe], inside[safe]
     everything = design.predicted(np.arange(len(q)))
     if count is not None:
@@ -191,7 +201,7 @@ def plan_poses(
         predicted=design.predicted(chosen),
         at_random=design.at_random(len(chosen), _DRAWS),
         all_candidates=everything,
-        left_out=len(given) - len(inside),
+        left_out=offered - len(inside),
         parameters=equations.parameters.names,
     )
 
@@ -200,25 +210,37 @@ def _poses(count: int) -> str:
     return f"{count} pose{'s' * (count != 1)}"
 
 
-def _completed(robot: Robot, poses: FloatArray) -> FloatArray:
-    there = ideal(robot, poses).poses
+def _commanded(name: str, robot: Robot, places: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Poses and actuators of poses, or of an arm's joint coordinates; NaN where there are none."""
+    if isinstance(robot, ArmMachine):
+        there, q, _ = robot.visited(as_rows(name, places, robot.n_actuators)[0])
+    else:
+        there, q, _ = ideal(robot, as_rows(name, places, 6)[0])
+    return there, q
+
+
+def _aims(robot: Robot, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    there, q = _commanded("targets", robot, targets)
     lost = np.flatnonzero(~np.isfinite(there).all(axis=1))
     if len(lost):
         raise ValueError(f"targets: {robot.name} has no such pose (row {lost[0]})")
-    return there
+    return there, q
 
 
-def _within_limits(robot: Robot, given: FloatArray) -> tuple[FloatArray, FloatArray, IntArray]:
-    """Poses and actuators of the candidates that can be measured, and which ones they are."""
-    there, q, _ = ideal(robot, given)
+def _within_limits(
+    robot: Robot, candidates: ArrayLike
+) -> tuple[FloatArray, FloatArray, IntArray, int]:
+    """Poses and actuators of the candidates that can be measured, which ones, and of how many."""
+    there, q = _commanded("candidates", robot, candidates)
     good = np.asarray(np.isfinite(there).all(axis=1))
-    good[good] = robot.feasible(there[good]).ok
+    if not isinstance(robot, ArmMachine):  # whose file has no limits
+        good[good] = robot.feasible(there[good]).ok
     # `identify` starts from home, too, and must find them
     good[good] = np.abs(robot.forward(q[good]).pose - there[good]).max(axis=1) < _FOUND
     inside = np.flatnonzero(good)
     if not len(inside):
-        raise ValueError(f"candidates: none of {len(given)} is within the limits of {robot.name}")
-    return there[inside], q[inside], inside
+        raise ValueError(f"candidates: none of {len(there)} is within the limits of {robot.name}")
+    return there[inside], q[inside], inside, len(there)
 
 
 def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> NDArray[np.bool_]:
@@ -269,7 +291,11 @@ def _equations(
 
 
 def _design(
-    equations: Equations, safe: NDArray[np.bool_], aims: FloatArray, criterion: str
+    equations: Equations,
+    safe: NDArray[np.bool_],
+    aims: FloatArray,
+    aims_at: FloatArray,
+    criterion: str,
 ) -> Design:
     chosen = equations.parameters
     point = equations.start()
@@ -277,7 +303,8 @@ def _design(
     stated = np.isfinite(chosen.prior)
     prior = np.diag(chosen.scale / chosen.prior)[stated]
     k = len(chosen.places)
-    by_geometry = chosen.robot.error_jacobian(aims)[:, :3, chosen.places] * chosen.scale[:k]
+    twists = chosen.robot.error_twists(aims, aims_at)
+    by_geometry = twists[:, 3:, chosen.places] * chosen.scale[:k]
     aimed = np.concatenate([by_geometry, np.zeros((len(aims), 3, len(chosen) - k))], axis=2)
     if not np.isfinite(rows).all() or not np.isfinite(aimed).all():
         raise ValueError("candidates or targets: one is singular, where nothing holds the platform")

@@ -7,6 +7,7 @@ those of the paper on joint structure errors, DOI 10.3969/j.issn.1673-9833.2020.
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,7 +60,9 @@ def exp(twist: ArrayLike, angle: ArrayLike = 1.0) -> FloatArray:
         raise ValueError(
             f"angle has shape {factor.shape}, which does not go with twists {shape}"
         ) from None
-    rows, shape = as_rows("twist", np.asarray(twist) * factor[..., None], 6)
+    given = np.asarray(twist, dtype=np.float64)  # before the product: small integers overflow
+    with np.errstate(over="ignore", invalid="ignore"):  # such a row is NaN
+        rows, shape = as_rows("twist", given * factor[..., None].astype(np.float64), 6)
     return core_serial.exp(rows).reshape(*shape, 4, 4)
 
 
@@ -253,11 +256,13 @@ class JointError:
         Raises
         ------
         ValueError, TypeError
-            No rigid motion.
+            No rigid motion, or one that is not finite.
         """
         rows, _ = as_motions("frame", frame)
         if len(rows) != 1:
             raise ValueError(f"frame must have shape (4, 4), found {np.shape(frame)}")
+        if not np.isfinite(rows).all():
+            raise ValueError("frame must be finite")
         return replace(self, twist=core_serial.adjoint(rows).reshape(6, 6) @ self.twist)
 
     def __str__(self) -> str:
@@ -309,8 +314,8 @@ def joint_error(
     for name, value in given.items():
         if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
             raise TypeError(f"{name} must be a number, found {value!r}")
-        if not math.isfinite(value):
-            raise ValueError(f"{name} must be finite, found {value!r}")
+        if not abs(value) <= sys.float_info.max:
+            raise ValueError(f"{name} must be finite, found {value!r:.60}")
     twist = log(from_pose(list(given.values())))
     angle, way = math.hypot(*twist[:3]), math.hypot(*twist[3:])
     if angle == 0.0:

@@ -65,16 +65,18 @@ class SerialArm:
         name: str = "serial arm",
         joint_errors: ArrayLike | None = None,
     ) -> None:
-        self.name = name
+        self._name = name
         self._axes, self._points = checked.axes_and_points(axes, points)
-        self.kinds = checked.kinds_of(kinds, len(self._axes))
+        self._kinds = checked.kinds_of(kinds, len(self._axes))
         self._home = checked.motion("home", home)
-        prismatic = np.array([kind == "prismatic" for kind in self.kinds], dtype=np.int32)
+        prismatic = np.array([kind == "prismatic" for kind in self._kinds], dtype=np.int32)
         self._arm = Arm(prismatic, checked.joint_frames(self._axes), self._points, self._home)
         self._errors = np.zeros((self.n_joints, 6))
         if joint_errors is not None:
             self._errors += checked.joint_errors(joint_errors, self.n_joints, ())
         self._links = self._arm.links(self._errors)
+        if not np.isfinite(self._links.numbers).all():
+            raise ValueError("points, home or joint_errors are too large to be computed with")
 
     @classmethod
     def from_dh(
@@ -152,6 +154,16 @@ class SerialArm:
     # what it is ---------------------------------------------------------------------------------
 
     @property
+    def name(self) -> str:
+        """The arm's name."""
+        return self._name
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """Kind of each joint, "revolute" or "prismatic"."""
+        return self._kinds
+
+    @property
     def n_joints(self) -> int:
         """Number of joints, n."""
         return len(self.kinds)
@@ -191,8 +203,8 @@ class SerialArm:
 
         The root mean square distance of the joints' points from the tool at zero.
         """
-        reach = np.linalg.norm(self._points - self._home[:3, 3], axis=1)
-        return float(np.sqrt(np.mean(reach**2))) or 1.0
+        reach = self._points - self._home[:3, 3]
+        return float(np.hypot.reduce(reach, axis=None) / np.sqrt(self.n_joints)) or 1.0
 
     @property
     def screws(self) -> FloatArray:
@@ -314,7 +326,7 @@ class SerialArm:
             Where the tool shall be, mm.
         guess : array_like (n,) or (..., n), optional
             Where to start, which decides between several solutions; 0 by default.
-        joint_errors : array_like (n, 6), optional
+        joint_errors : array_like (n, 6) or (..., n, 6), optional
             As in `forward`: coordinates that undo these errors.
         parts : {"pose", "position"}
             What shall be met: position and orientation, or the position alone.

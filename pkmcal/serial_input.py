@@ -61,6 +61,8 @@ def kinds_of(given: str | Sequence[str] | None, joints: int) -> tuple[str, ...]:
     """A kind for each joint."""
     one = "revolute" if given is None else given
     words = [one] * joints if isinstance(one, str) else one
+    if not isinstance(words, Sequence):
+        raise TypeError(f"kinds must be a word or a sequence of words, found {given!r}")
     if len(words) != joints:
         raise ValueError(f"kinds: one word for each of {joints} joints, found {len(words)}")
     for word in words:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import screw
+from pkmcal import serial_input as checked
 from pkmcal.core import STATUS, FloatArray, IntArray, as_rows
 from pkmcal.suggest import did_you_mean
 
@@ -29,7 +30,8 @@ class ArmInverse:
     Attributes
     ----------
     theta : ndarray (..., n)
-        Joint coordinates, rad and mm; NaN where `status` is not 0.
+        Joint coordinates, rad and mm; NaN where `status` is not 0. Revolute ones are within half
+        a turn of the guess.
     status : ndarray of int (...)
         0 ok, 1 not converged (out of reach, or another guess is needed), 4 invalid input.
     iterations : ndarray of int (...)
@@ -52,7 +54,7 @@ class ArmInverse:
     def __str__(self) -> str:
         codes, counts = np.unique(self.status, return_counts=True)
         parts = [f"{n} {STATUS[int(code)]}" for code, n in zip(codes, counts, strict=True)]
-        return f"{self.status.size} rows: " + ", ".join(parts)
+        return ": ".join([f"{self.status.size} rows", *([", ".join(parts)] if parts else [])])
 
 
 def damped_least_squares(
@@ -67,7 +69,7 @@ def damped_least_squares(
     Steps δ = Jᵀ (J Jᵀ + λ)⁻¹ e with the twist e that is left, each row with a damping λ of its
     own: a tenth after a step that helped, fivefold after one that did not.
     """
-    if parts not in PARTS:
+    if not isinstance(parts, str) or parts not in PARTS:
         raise ValueError(f"parts: {parts!r} is unknown{did_you_mean(str(parts), PARTS)}")
     rows, shape = screw.as_motions("target", target)
     goal = rows.reshape(-1, 4, 4)
@@ -80,8 +82,15 @@ def damped_least_squares(
                 f"guess must have shape ({n},) or {(*shape, n)}, found {np.shape(guess)}"
             )
         theta += start
-    search = _Search(arm, goal, joint_errors, PARTS[parts])
+    errors = None
+    if joint_errors is not None:
+        errors = checked.joint_errors(joint_errors, n, shape)
+    search = _Search(arm, goal, errors, PARTS[parts])
+    begun = theta.copy()
     status, iterations, residual = search.run(theta)
+    turning = [unit == "rad" for unit in arm.actuator_units]
+    whole_turns = np.rint((theta - begun)[:, turning] / (2 * np.pi))
+    theta[:, turning] -= 2 * np.pi * whole_turns
     theta[status != _OK] = np.nan
     return ArmInverse(
         theta.reshape(*shape, n),
@@ -93,16 +102,23 @@ def damped_least_squares(
 
 class _Search:
     def __init__(
-        self, arm: SerialArm, goal: FloatArray, errors: ArrayLike | None, parts: slice
+        self, arm: SerialArm, goal: FloatArray, errors: FloatArray | None, parts: slice
     ) -> None:
         self.arm, self.goal, self.errors, self.parts = arm, goal, errors, parts
         self.length = arm.length
         by_unit = [self.length if unit == "rad" else 1.0 for unit in arm.actuator_units]
         self.travel = np.array(by_unit)  # mm of each coordinate, so that λ fits all
 
+    def errors_of(self, rows: np.ndarray) -> FloatArray | None:
+        """Joint errors shared by all rows, or those of these."""
+        if self.errors is None or self.errors.ndim == 2:
+            return self.errors
+        own: FloatArray = self.errors[rows]
+        return own
+
     def left(self, theta: FloatArray, rows: np.ndarray) -> FloatArray:
         """What is left to the target, in base axes: rotation as arc, position, mm (N, k)."""
-        tool = self.arm.forward(theta, self.errors)
+        tool = self.arm.forward(theta, self.errors_of(rows))
         turn = np.zeros_like(tool)
         turn[:, :3, :3] = self.goal[rows, :3, :3] @ tool[:, :3, :3].transpose(0, 2, 1)
         turn[:, 3, 3] = 1.0
@@ -132,7 +148,7 @@ class _Search:
             rows = everyone[(status == _NOT_CONVERGED) & (damping < _LARGEST)]
             if not rows.size:
                 break
-            jacobian = self.arm.jacobian(theta[rows], self.errors, frame="tip")
+            jacobian = self.arm.jacobian(theta[rows], self.errors_of(rows), frame="tip")
             jacobian[:, :3] *= self.length
             J = jacobian[:, self.parts] / self.travel
             k = J.shape[1]

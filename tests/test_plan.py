@@ -167,6 +167,59 @@ def test_a_plan_pickles(twenty: Plan) -> None:
     )
 
 
+ARM = pk.SerialArm.from_dh(
+    a=[312, 1075, 225, 0, 0, 0],
+    alpha=np.radians([-90, 0, -90, 90, -90, 0]),
+    d=[670, 0, 0, 1280, 0, 215],
+    theta=np.radians([0, -90, 0, 0, 0, 0]),
+    name="six joints",
+)
+
+
+def test_a_plan_of_an_arm_is_of_joint_coordinates_and_calibrates_as_predicted() -> None:
+    rng = np.random.default_rng(0)
+    offered, aims = rng.uniform(-2, 2, (200, 6)), rng.uniform(-2, 2, (100, 6))
+    plan = pk.plan_poses(ARM, offered, 25, targets=aims)
+    assert plan.robot is ARM and plan.left_out == 0
+    np.testing.assert_array_equal(plan.actuators, offered[plan.indices])
+    np.testing.assert_allclose(plan.poses, pk.screw.to_pose(ARM.forward(plan.actuators)))
+    assert plan.all_candidates < plan.predicted < plan.at_random
+    off = []
+    for seed in range(30):
+        errors = np.random.default_rng(seed).normal(size=(6, 6))
+        true = ARM.replace(errors * [0.5, 0.5, 0.5, 5e-4, 5e-4, 5e-4])
+        found = pk.identify(ARM, pk.VirtualMachine(true, seed=seed).measure(plan.actuators))
+        assert isinstance(found.robot, pk.SerialArm)
+        off.append((found.robot.forward(aims) - true.forward(aims))[:, :3, 3])
+    rms = np.sqrt(np.mean(np.sum(np.square(off), axis=2)))
+    assert rms == pytest.approx(plan.predicted, rel=0.15)
+
+
+def test_a_plan_of_an_arm_shows_what_to_command() -> None:
+    arm = pk.SerialArm(
+        [[0, 0, 1], [1, 0, 0], [0, 0, 1]],
+        [[0, 0, 0], [300, 0, 0], [400, 0, 0]],
+        [450, 0, 0, 0, 0, 0],
+        ["revolute", "prismatic", "revolute"],
+    )
+    offered = np.random.default_rng(0).uniform(-1, 1, (30, 3)) * [2, 100, 2]
+    lines = str(pk.plan_poses(arm, offered, 1, free="joint1.dx", kind="pose")).splitlines()
+    assert lines[2].split() == "candidate q1 [deg] q2 [mm] q3 [deg]".split()
+    index, *shown = lines[3].split()
+    q = offered[int(index)] * [180 / np.pi, 1, 180 / np.pi]
+    np.testing.assert_allclose([float(cell) for cell in shown], q, atol=5.1e-4)
+
+
+@pytest.mark.parametrize("name", ["candidates", "targets"])
+def test_mistakes_in_a_plan_of_an_arm_are_named(name: str) -> None:
+    given = {"candidates": np.zeros((5, 6)), "targets": np.zeros((5, 6))}
+    with pytest.raises(ValueError, match=rf"{name} must have shape \(..., 6\)"):
+        pk.plan_poses(ARM, count=3, **{**given, name: np.zeros((5, 7))})
+    far = np.full((1, 6), 1e9)  # more than can be reduced to a turn
+    with pytest.raises(ValueError, match=f"{name}: "):
+        pk.plan_poses(ARM, count=3, **{**given, name: far})
+
+
 def test_plan_is_read_by_a_person(twenty: Plan) -> None:
     lines = str(twenty).splitlines()
     assert lines[0].startswith("hexapod: measure 20 poses for 42 parameters")

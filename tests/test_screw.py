@@ -160,6 +160,18 @@ def test_angles_and_twists_broadcast() -> None:
     assert (motions[3, 2] == screw.exp(given[2], angles[3, 0])).all()
 
 
+@pytest.mark.parametrize("dtype", ["i1", "u1", "f2", "f4"])
+def test_short_numbers_do_not_overflow_in_the_product(dtype: str) -> None:
+    found = screw.exp(np.array([0, 0, 1, 0, 0, 120], dtype), np.array(100, dtype))
+    assert (found == screw.exp([0.0, 0.0, 100.0, 0.0, 0.0, 12000.0])).all()
+
+
+@pytest.mark.parametrize("angle", [math.inf, -math.inf, 1e300, math.nan])
+def test_an_angle_that_is_too_large_makes_its_row_nan(angle: float) -> None:
+    found = screw.exp([[0, 0, 1e300, 0, 0, 0], [0, 0, 1, 0, 0, 0]], [angle, 0.5])
+    assert np.isnan(found[0]).all() and np.isfinite(found[1]).all()
+
+
 def test_one_parameter_groups_add_up() -> None:
     given = twists(1.0)
     both = screw.exp(given, 0.4) @ screw.exp(given, 0.9)
@@ -360,7 +372,13 @@ def _stretched(factor: float) -> np.ndarray:
         (lambda: screw.log(_stretched(-1.0)), ValueError, "a reflection"),
         (lambda: screw.adjoint([np.eye(4), 2 * np.eye(4)]), ValueError, "in row 1"),
         (lambda: screw.joint_error(dx=math.nan), ValueError, "dx must be finite"),
+        (lambda: screw.joint_error(dx=10**400), ValueError, "dx must be finite"),
         (lambda: screw.joint_error(dpsi="1"), TypeError, "dpsi must be a number"),
+        (
+            lambda: screw.joint_error().seen_from(np.eye(4) * np.nan),
+            ValueError,
+            "frame must be fin",
+        ),
         (lambda: screw.joint_error().seen_from([np.eye(4)] * 2), ValueError, "frame must have"),
     ],
 )

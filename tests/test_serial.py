@@ -211,6 +211,30 @@ def test_inverse_comes_back_to_the_tool() -> None:
     assert np.isnan(found.theta[~found.ok]).all()
 
 
+def test_inverse_takes_errors_of_each_row() -> None:
+    arm = mixed()
+    theta, errors = coordinates(arm, 40), errors_of(arm, rows=(40,))
+    target = arm.forward(theta, errors)
+    found = arm.inverse(target, theta + 0.02, errors)
+    assert found.ok.all()
+    again = arm.forward(found.theta, errors)
+    assert np.abs(again - target)[:, :3, 3].max() < 2e-9
+
+
+def test_inverse_stays_within_half_a_turn_of_its_guess() -> None:
+    arm = ARMS["six joints"]
+    theta = coordinates(arm, 200)
+    rng = np.random.default_rng(3)
+    for guess in (np.zeros(6), rng.uniform(-20, 20, theta.shape)):
+        found = arm.inverse(arm.forward(theta), guess)
+        assert found.ok.mean() > 0.8
+        turning = np.array(arm.kinds) == "revolute"
+        away = (found.theta - guess)[found.ok][:, turning]
+        assert np.abs(away).max() <= math.pi * (1 + 1e-15)
+        off = arm.forward(found.theta[found.ok]) - arm.forward(theta[found.ok])
+        assert np.abs(off)[:, :3, 3].max() < 2e-9
+
+
 def test_inverse_of_the_position_alone_needs_no_orientation() -> None:
     arm = pk.load("3r")
     target = arm.forward(coordinates(arm))
@@ -398,6 +422,19 @@ def _arm() -> pk.SerialArm:
             "did you mean 'revolute'",
         ),
         (lambda: pk.SerialArm(AXES, POINTS, HOME, ["revolute"]), ValueError, "each of 2 joints"),
+        (lambda: pk.SerialArm(AXES, POINTS, HOME, 1), TypeError, "kinds must be a word"),
+        (
+            lambda: pk.SerialArm(AXES, np.array([[1e308], [-1e308]]) * np.ones(3), HOME),
+            ValueError,
+            "points, home or joint_errors are too large",
+        ),
+        (lambda: _arm().replace(np.full((2, 6), 1e6)), ValueError, "joint_errors are too large"),
+        (lambda: _arm().inverse(HOME, parts=["pose"]), ValueError, "parts: .* is unknown"),
+        (
+            lambda: _arm().inverse([HOME] * 3, joint_errors=np.zeros((2, 2, 6))),
+            ValueError,
+            r"joint_errors must have shape \(2, 6\) or \(3, 2, 6\)",
+        ),
         (lambda: _arm().forward([1, 2, 3]), ValueError, r"theta must have shape \(..., 2\)"),
         (
             lambda: _arm().forward([0, 0], np.zeros((3, 6))),
@@ -418,6 +455,18 @@ def _arm() -> pk.SerialArm:
 def test_mistakes_are_named(call: Callable[[], object], error: type, message: str) -> None:
     with pytest.raises(error, match=message):
         call()
+
+
+@pytest.mark.parametrize("name", ["name", "kinds", "axes", "points", "home", "joint_errors"])
+def test_an_arm_cannot_be_changed(name: str) -> None:
+    with pytest.raises(AttributeError):
+        setattr(_arm(), name, getattr(_arm(), name))
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e160, 1e300])
+def test_the_characteristic_length_has_any_size(size: float) -> None:
+    arm = pk.SerialArm(AXES, [[0, 0, 3 * size], [0, 4 * size, 0]], np.eye(4))
+    assert arm.length == pytest.approx(size * math.sqrt(25 / 2), rel=1e-15)
 
 
 def test_what_is_given_and_returned_is_not_shared() -> None:

@@ -43,8 +43,8 @@ def draw(errors: np.ndarray, path: str | Path) -> None:
     figure = Figure(figsize=(7, 4), layout="constrained")
     axes = figure.subplots()
     for label, curve in zip("xyz", errors.T, strict=True):
-        axes.plot(np.degrees(-PATH[:, 0]), curve, label=f"Δ{label}")
-    axes.set(xlabel="each joint turned by [-deg]", ylabel="tool error [mm]")
+        axes.plot(np.degrees(PATH[:, 0]), curve, label=f"Δ{label}")
+    axes.set(xlabel="angle of each joint [deg]", ylabel="tool error [mm]", xlim=(0.0, -30.0))
     axes.set_title("3R arm: tool error by the joint errors of Table 3")
     axes.legend()
     axes.grid(alpha=0.3)
