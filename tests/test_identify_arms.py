@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 import re
 from collections.abc import Callable
@@ -230,3 +231,7 @@ def test_the_command_calibrates_an_arm_too(tmp_path: Path) -> None:
     assert done.exit_code == 0, done.output
     found = pk.load(tmp_path / "found" / "robot.toml")
     assert off(found, erring(ARM), TARGET).max() < 0.1
+    printed = json.loads(CliRunner().invoke(app, ["calibrate", *files, "--json"]).stdout)
+    numbers = dict(zip(printed["free"], found.joint_errors.ravel(), strict=True))
+    assert printed["robot"] == {"name": "six joints", "geometry": pytest.approx(numbers)}
+    assert printed["parameters"]["joint2.dtheta"]["value"] == numbers["joint2.dtheta"]

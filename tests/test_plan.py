@@ -204,7 +204,7 @@ def test_a_plan_of_an_arm_shows_what_to_command() -> None:
     )
     offered = np.random.default_rng(0).uniform(-1, 1, (30, 3)) * [2, 100, 2]
     lines = str(pk.plan_poses(arm, offered, 1, free="joint1.dx", kind="pose")).splitlines()
-    assert lines[2].split() == "candidate q1 [deg] q2 [mm] q3 [deg]".split()
+    assert lines[2].split() == ["candidate", "q1", "[deg]", "q2", "[mm]", "q3", "[deg]"]
     index, *shown = lines[3].split()
     q = offered[int(index)] * [180 / np.pi, 1, 180 / np.pi]
     np.testing.assert_allclose([float(cell) for cell in shown], q, atol=5.1e-4)
