@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,6 +95,8 @@ def _chain(
 ) -> tuple[str, list[Joint], FloatArray]:
     """The robot's name, its moving joints from base to tip at zero, and the tip, mm."""
     robot = _parsed(path)
+    _check_once(path, (joint.name for joint in robot.joints), "several joints are named {!r}")
+    _check_once(path, (joint.child for joint in robot.joints), "{!r} is the child of several joints")
     above = {joint.child: joint for joint in robot.joints}
     links = [link.name for link in robot.links]
     for argument, link in (("tip", tip), ("base", base)):
@@ -114,16 +117,27 @@ def _chain(
     for joint in chain:
         parent = place
         place = parent @ _origin(joint)
+        if not np.isfinite(place).all():
+            raise ValueError(f"{path}: joint {joint.name!r}: origin must be finite")
         if joint.type == "fixed":
             continue
         if joint.type not in _KINDS or joint.mimic is not None:
             what = "mimic" if joint.mimic is not None else joint.type
             raise ValueError(f"{path}: joint {joint.name!r} is {what}, which a serial arm has not")
         axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.asarray(joint.axis)
+        if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
+            found = " ".join(f"{number:g}" for number in axis)
+            raise ValueError(f"{path}: joint {joint.name!r}: axis must be a direction, found {found}")
         joints.append(Joint(joint.name, _KINDS[joint.type], parent, place, axis))
     if not joints:
         raise ValueError(f"{path}: no moving joint above the link {tip!r}")
     return robot.name, joints, place
+
+
+def _check_once(path: str | os.PathLike[str], names: Iterable[str], fault: str) -> None:
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise ValueError(f"{path}: {fault.format(twice[0])}")
 
 
 def _parsed(path: str | os.PathLike[str]) -> Any:
