@@ -42,14 +42,18 @@ def parse(data: Mapping[str, Any], place: str) -> SerialArm:
     joints = [Table(each, place, f"[[joint]] {i}", units) for i, each in enumerate(_joints(top), 1)]
     for joint in joints:
         joint.only(("kind", "axis", "point", "error"))
-    return SerialArm(
-        axes=[joint.vector("axis") for joint in joints],
-        points=[_point(joint) for joint in joints],
-        home=_home(tool),
-        kinds=[joint.choice("kind", KINDS, "kind of joint") for joint in joints],
-        name=top.text("name"),
-        joint_errors=[_error(joint) for joint in joints],
-    )
+    given: dict[str, Any] = {
+        "axes": [joint.vector("axis") for joint in joints],
+        "points": [_point(joint) for joint in joints],
+        "home": _home(tool),
+        "kinds": [joint.choice("kind", KINDS, "kind of joint") for joint in joints],
+        "name": top.text("name"),
+        "joint_errors": [_error(joint) for joint in joints],
+    }
+    try:
+        return SerialArm(**given)
+    except ValueError as error:  # numbers that are each right, and too large together
+        raise ValueError(f"{place}: {error}") from None
 
 
 def write(arm: SerialArm, path: str | os.PathLike[str], comment: str = "") -> None:

@@ -96,7 +96,9 @@ def _chain(
     """The robot's name, its moving joints from base to tip at zero, and the tip, mm."""
     robot = _parsed(path)
     _check_once(path, (joint.name for joint in robot.joints), "several joints are named {!r}")
-    _check_once(path, (joint.child for joint in robot.joints), "{!r} is the child of several joints")
+    _check_once(
+        path, (joint.child for joint in robot.joints), "{!r} is the child of several joints"
+    )
     above = {joint.child: joint for joint in robot.joints}
     links = [link.name for link in robot.links]
     for argument, link in (("tip", tip), ("base", base)):
@@ -127,7 +129,9 @@ def _chain(
         axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.asarray(joint.axis)
         if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
             found = " ".join(f"{number:g}" for number in axis)
-            raise ValueError(f"{path}: joint {joint.name!r}: axis must be a direction, found {found}")
+            raise ValueError(
+                f"{path}: joint {joint.name!r}: axis must be a direction, found {found}"
+            )
         joints.append(Joint(joint.name, _KINDS[joint.type], parent, place, axis))
     if not joints:
         raise ValueError(f"{path}: no moving joint above the link {tip!r}")

@@ -349,6 +349,7 @@ def test_files_are_in_the_units_they_state(tmp_path: Path) -> None:
         ("[0.1, 0.0, 0.0]", "[0.1, 0.0]", "point: must be three coordinates"),
         ('"prismatic"', '"prismatc"', "kind: 'prismatc' is no kind of joint; did you mean"),
         ("dpsi", "dpsy", "unknown key 'dpsy'; did you mean 'dpsi'"),
+        ("dpsi = 180.0", "dpsi = 1e9", "arm.toml: .* joint_errors are too large"),
         ("gamma", "gama", "unknown key 'gama'; did you mean 'gamma'"),
         ("{ x = 1.5, gamma = 90.0 }", "[[1, 0, 0, 1]]", "home: must be a pose, or three rows"),
         (
