@@ -36,6 +36,55 @@ TARGET = [30.0, 40.0, 50.0]
 THREE = np.array([[30.0, 40.0, 50.0], [-60.0, 20.0, 30.0], [10.0, -80.0, 45.0]])
 
 
+# published Denavit-Hartenberg numbers, and a gantry with two turning axes
+OTHERS = {
+    "SCARA": SCARA,
+    "six joints": ARM,
+    "UR10": pk.SerialArm.from_dh(
+        a=[0, -612, -572.3, 0, 0, 0],
+        alpha=np.radians([90, 0, 0, 90, -90, 0]),
+        d=[127.3, 0, 0, 163.9, 115.7, 92.2],
+    ),
+    "LBR iiwa 7": pk.SerialArm.from_dh(
+        a=0, alpha=np.radians([-90, 90, 90, -90, -90, 90, 0]), d=[340, 0, 400, 0, 400, 0, 126]
+    ),
+    "PUMA 560": pk.SerialArm.from_dh(
+        a=[0, 431.8, 20.3, 0, 0, 0],
+        alpha=np.radians([90, 0, -90, 90, -90, 0]),
+        d=[0, 0, 150.05, 431.8, 0, 56],
+    ),
+    "Stanford": pk.SerialArm.from_dh(
+        a=0,
+        alpha=np.radians([-90, 90, 0, -90, 90, 0]),
+        d=[400, 150, 500, 0, 0, 60],
+        theta=np.radians([0, 0, -90, 0, 0, 0]),
+        kinds=["revolute"] * 2 + ["prismatic"] + ["revolute"] * 3,
+    ),
+    "gantry": pk.SerialArm(
+        [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 1], [1, 0, 0]],
+        [[0, 0, 0]] * 4 + [[0, 0, -150]],
+        [0, 0, -250, 0, 0, 0],
+        ["prismatic"] * 3 + ["revolute"] * 2,
+    ),
+}
+
+
+def tracked(
+    arm: pk.SerialArm, theta: np.ndarray, frame: np.ndarray, points: np.ndarray, noise: float
+) -> Measurements:
+    """Points of the tool (k, 3) at coordinates (N, n), as a tracker in a frame sees them."""
+    k = len(points)
+    seen = (frame @ arm.forward(theta) @ np.vstack([points.T, np.ones(k)]))[:, :3]
+    values = seen.transpose(0, 2, 1).reshape(-1, 3)
+    values += np.random.default_rng(len(theta)).normal(0.0, noise, values.shape)
+    return Measurements(
+        np.repeat(theta, k, axis=0),
+        values,
+        sigma=noise or None,
+        target_index=np.tile(np.arange(k), len(theta)),
+    )
+
+
 def erring(arm: pk.SerialArm, seed: int = 0) -> pk.SerialArm:
     """The arm with errors of 0.5 mm and 1 mrad."""
     drawn = np.random.default_rng(seed).normal(size=(arm.n_joints, 6))
@@ -91,11 +140,7 @@ def test_with_noise_the_uncertainty_is_what_is_off() -> None:
 def test_a_frame_and_targets_are_found_along() -> None:
     true = erring(ARM)
     frame = pk.screw.from_pose([1500.0, -800.0, 300.0, 0.2, -0.3, 2.0])
-    theta = coordinates(ARM, 60)
-    points = frame @ true.forward(theta) @ np.vstack([THREE.T, np.ones(3)])
-    index = np.tile([0, 1, 2], 60)
-    values = points[:, :3].transpose(0, 2, 1).reshape(-1, 3)
-    measured = Measurements(np.repeat(theta, 3, axis=0), values, target_index=index)
+    measured = tracked(true, coordinates(ARM, 60), frame, THREE, noise=0.0)
     found = identify(ARM, measured, frame="unknown", target="unknown")
     assert found.rms_before > 1.0
     assert found.rms < 1e-6
@@ -129,6 +174,21 @@ def test_rank_of_six_joints_with_unknown_frame_and_targets(
     assert (found.rank, len(found.free)) == (rank, columns)
     assert len(found.unidentifiable) == columns - rank
     assert found.gap > 1e6
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_arms_of_all_sorts_are_as_good_elsewhere_as_the_tracker(name: str) -> None:
+    arm, noise = OTHERS[name], 0.05
+    true = erring(arm)
+    frame = pk.screw.from_pose([1500.0, -800.0, 300.0, 0.2, -0.3, 2.0])
+    fitted = tracked(true, coordinates(arm, 40), frame, THREE, noise)
+    elsewhere = tracked(true, coordinates(arm, 41, seed=2), frame, THREE, noise)
+    found = identify(arm, fitted, frame="unknown", target="unknown", holdout=elsewhere)
+    assert found.chi2_per_dof == pytest.approx(1.0, abs=0.2)
+    assert found.holdout_rms < 1.15 * noise * np.sqrt(3)  # what is left of a point is its noise
+    # four of a revolute joint, two of a prismatic one, base and tool, the targets' triangle
+    revolute = arm.kinds.count("revolute")
+    assert found.rank == 4 * revolute + 2 * (arm.n_joints - revolute) + 6 + 3
 
 
 def test_rank_of_the_3r_arm_is_14_of_18_and_says_what_goes_together() -> None:
