@@ -8,13 +8,16 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from pkmcal.arm_machine import ArmMachine, as_given, as_machine
 from pkmcal.cli_calibrate import free_names, read_deviations
 from pkmcal.cli_output import as_json, folder
-from pkmcal.command_csv import write_commands
-from pkmcal.loading import load_parallel
+from pkmcal.command_csv import read_commands, write_commands
+from pkmcal.core import FloatArray
+from pkmcal.loading import load
 from pkmcal.plan import Plan, plan_poses
 from pkmcal.pose_csv import read_poses, write_poses
 from pkmcal.provenance import comment, contents
+from pkmcal.robot import Robot
 from pkmcal.workspace import sample_poses
 
 _DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach
@@ -36,7 +39,7 @@ def plan(
         typer.Option(
             metavar="CSV",
             help="Candidates, with columns such as 'y \\[mm]' and 'alpha \\[deg]'; by default"
-            f" {_DRAWN} are drawn in the workspace.",
+            f" {_DRAWN} are drawn in the workspace. Of an arm 'q1 \\[deg]' ….",
         ),
     ] = None,
     targets: Annotated[
@@ -78,18 +81,14 @@ def plan(
 
     Example: pkmcal plan hexapod --kind pose --count 20 --out plan
     """
-    machine = load_parallel(robot)
+    machine = as_machine(load(robot))
     chosen = free_names(machine, free)
-    if poses is None:
-        candidates = sample_poses(machine, _DRAWN, seed, _SHARE)
-    else:
-        candidates = read_poses(poses, machine)
     made = plan_poses(
-        machine,
-        candidates,
+        as_given(machine),
+        _drawn(machine, seed) if poses is None else _places(machine, poses),
         count=30 if count is None and accuracy is None else count,
         accuracy=accuracy,
-        targets=None if targets is None else read_poses(targets, machine),
+        targets=None if targets is None else _places(machine, targets),
         criterion=criterion,
         kind=kind,
         noise=noise,
@@ -104,6 +103,22 @@ def plan(
     else:
         typer.echo("\n".join([str(made), *([""] if written else []), *map(str, written)]))
     return 0 if np.isfinite(made.predicted) else 1
+
+
+def _drawn(machine: Robot, seed: int) -> FloatArray:
+    if isinstance(machine, ArmMachine):
+        raise ValueError(
+            f"--poses: {machine.name} is a serial arm, whose limits are not known: a file of joint"
+            " coordinates to choose from is needed, with columns such as 'q1 [deg]'"
+        )
+    return sample_poses(machine, _DRAWN, seed, _SHARE)
+
+
+def _places(machine: Robot, path: Path) -> FloatArray:
+    """Poses of a file, or an arm's joint coordinates."""
+    if isinstance(machine, ArmMachine):
+        return read_commands(path, machine.actuator_units)
+    return read_poses(path, machine)
 
 
 def _write(made: Plan, out: Path, head: str) -> list[Path]:

@@ -75,12 +75,29 @@ def test_candidates_and_targets_come_from_files(tmp_path: Path) -> None:
     assert set(json.loads(result.stdout)["indices"]) < set(range(5))
 
 
+def test_postures_of_an_arm_are_chosen_from_a_file_of_joint_coordinates(tmp_path: Path) -> None:
+    arm, degrees = pk.load("3r"), np.random.default_rng(0).uniform(-100, 100, (40, 3))
+    rows = [",".join(map(repr, row)) for row in degrees.tolist()]
+    (tmp_path / "c.csv").write_text("\n".join(["q1 [deg],q2 [deg],q3 [deg]", *rows]))
+    arguments = ["3r", "--poses", "c.csv", "--targets", "c.csv", "--count", "8", "--kind", "pose"]
+    result = run("plan", *arguments, "--out", "plan")
+    assert (result.exit_code, result.stderr) == (0, "")
+    expected = pk.plan_poses(arm, np.radians(degrees), 8, kind="pose")
+    assert result.stdout.startswith(str(expected))
+    from pkmcal.command_csv import read_commands
+
+    commands = read_commands(tmp_path / "plan" / "commands.csv", arm.actuator_units)
+    np.testing.assert_allclose(commands, expected.actuators, rtol=1e-15)
+    assert json.loads(run("plan", *arguments, "--json").stdout)["robot"]["name"] == "3R arm"
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
         (["hexapod", "--count", "0"], "count must be from 1 to"),
         (["hexapod", "--accuracy", "1e-9"], "accuracy: all"),
         (["hexapd"], "did you mean 'hexapod'"),
+        (["3r"], "--poses: 3R arm is a serial arm"),
         (["hexapod", "--criterion", "E"], "criterion must be one of prediction, D, A"),
         (["hexapod", "--free", "ofset1"], "did you mean 'offset1'"),
         (["hexapod", "--poses", "none.csv"], "none.csv: No such file"),
