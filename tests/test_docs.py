@@ -112,6 +112,20 @@ def test_links_lead_to_files(page: Path) -> None:
             assert (DOCS / link).exists(), link
 
 
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_tests_that_are_named_exist(page: Path) -> None:
+    sources = list((ROOT / "tests").rglob("test_*.py"))
+    defined = {
+        name
+        for path in sources
+        for name in re.findall(r"^def (test_\w+)\(", path.read_text(encoding="utf-8"), re.MULTILINE)
+    }
+    text = page.read_text(encoding="utf-8")
+    files = {path.name for path in sources}
+    assert set(re.findall(r"`(test_\w+)`", text)) <= defined
+    assert set(re.findall(r"(test_\w+\.py)`", text)) <= files
+
+
 def test_readme_leads_to_every_page() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     for page in PAGES:
