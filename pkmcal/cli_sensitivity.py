@@ -14,6 +14,7 @@ from pkmcal.cli_output import as_json, folder
 from pkmcal.core import POSE
 from pkmcal.loading import load_parallel
 from pkmcal.pose_csv import read_poses, write_poses
+from pkmcal.provenance import comment, contents
 from pkmcal.sensitivity import STUDIES, Sensitivity, study_cases
 from pkmcal.sensitivity import sensitivity as errors_of
 from pkmcal.whole_file import write_whole
@@ -64,7 +65,8 @@ def sensitivity(
     }
     if not found:
         raise ValueError(f"{robot}: no number of its geometry can be in error")
-    written = _write(found, folder(out))
+    read = contents(robot, *([] if poses is None else [poses]))
+    written = _write(found, folder(out), comment(read))
     if json:
         typer.echo(as_json({name: _as_mapping(result) for name, result in found.items()}))
     else:
@@ -79,14 +81,14 @@ def _as_mapping(found: Sensitivity) -> dict[str, object]:
     return {name: getattr(found, name) for name in names}
 
 
-def _write(found: dict[str, Sensitivity], out: Path) -> list[Path]:
+def _write(found: dict[str, Sensitivity], out: Path, head: str) -> list[Path]:
     """The table, the poses, and two figures of each study."""
     from pkmcal import figures
 
     first = next(iter(found.values()))
     table, poses = out / "sensitivity.csv", out / "poses.csv"
-    write_whole(table, _table(found))
-    write_poses(poses, first.poses)
+    write_whole(table, head + _table(found))
+    write_poses(poses, first.poses, comment=head)
     written = [table, poses]
     for name, result in found.items():
         title = f"{result.robot.name}: {_TITLES[name]}, {result.step:g} mm"

@@ -18,6 +18,7 @@ from pkmcal.core import FloatArray
 from pkmcal.loading import load_parallel
 from pkmcal.monte_carlo import Progress
 from pkmcal.pose_csv import read_poses, write_poses
+from pkmcal.provenance import comment, contents
 from pkmcal.robot import Robot
 from pkmcal.sensitivity import own_names
 from pkmcal.tolerance import Sigma, Tolerance
@@ -95,7 +96,9 @@ def tolerance(
             if map is not None and out is not None:
                 _draw_map(machine, map, deviations, seed, executor, folder(out))
     if out is not None:
-        write_poses(folder(out) / "tolerance.csv", found.poses, _columns(found))
+        read = contents(robot, *([] if poses is None else [poses]))
+        table = folder(out) / "tolerance.csv"
+        write_poses(table, found.poses, _columns(found), comment(read))
     typer.echo(told)
     return 1 if found.failed.any() else 0
 

@@ -15,7 +15,7 @@ from pkmcal.identification import Identification
 from pkmcal.identify import identify
 from pkmcal.loading import load
 from pkmcal.measurements import Measurements
-from pkmcal.provenance import contents
+from pkmcal.provenance import comment, contents
 from pkmcal.robot import Robot
 from pkmcal.virtual import VirtualMachine
 from pkmcal.whole_file import write_whole
@@ -124,11 +124,12 @@ class Demonstration:
             folder / "report.html": "the report: open it in a browser",
         }
         measured, checked, corrected, picture, *_ = files
-        self.measured.write(measured)
-        self.checked.write(checked)
-        write_whole(corrected, _commands(self))
+        for readings, file in ((self.measured, measured), (self.checked, checked)):
+            readings.write(file, comment(contents(MACHINE)))
+        read = contents(MACHINE, measured, checked)
+        write_whole(corrected, comment(read) + _commands(self))
         write_whole(picture, figure)
-        self.identification.report(folder, contents(MACHINE, measured, checked))
+        self.identification.report(folder, read)
         return files
 
 

@@ -109,7 +109,9 @@ def read_measurements(path: str | PathLike[str], robot: Any = None) -> Measureme
         raise ValueError(f"{table.path}: {error}") from None
 
 
-def write_measurements(measurements: Measurements, path: str | PathLike[str]) -> None:
+def write_measurements(
+    measurements: Measurements, path: str | PathLike[str], comment: str = ""
+) -> None:
     """Write measurements in mm and rad, one row each, so that they are read back to the last bit.
 
     Several targets are written as the columns ``target`` and ``target.x`` …; of the targets, those
@@ -121,6 +123,8 @@ def write_measurements(measurements: Measurements, path: str | PathLike[str]) ->
         What to write.
     path : str or path
         The file; replaced as a whole or not at all.
+    comment : str, optional
+        Lines for its head, each with its ``#``.
 
     Raises
     ------
@@ -129,6 +133,7 @@ def write_measurements(measurements: Measurements, path: str | PathLike[str]) ->
     """
     headings, columns = zip(*_columns(measurements), strict=True)
     text = io.StringIO()
+    text.write(comment)
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(headings)
     writer.writerows(zip(*columns, strict=True))

@@ -257,8 +257,15 @@ class Measurements:
         held = np.isin(pose, drawn)
         return self.select(~held), self.select(held)
 
-    def write(self, path: str | PathLike[str]) -> None:
+    def write(self, path: str | PathLike[str], comment: str = "") -> None:
         """Write a CSV file that `read_measurements` reads back to the last bit, or nothing.
+
+        Parameters
+        ----------
+        path : str or path
+            The file; replaced as a whole or not at all.
+        comment : str, optional
+            Lines for its head, each with its ``#``.
 
         Raises
         ------
@@ -267,7 +274,7 @@ class Measurements:
         """
         from pkmcal.measurement_csv import write_measurements
 
-        write_measurements(self, path)
+        write_measurements(self, path, comment)
 
     def __repr__(self) -> str:
         return f"<Measurements: {self._title()}>"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
 import re
 from pathlib import Path
@@ -57,6 +58,31 @@ def test_help_shows_an_example_that_runs(verb: str) -> None:
     assert run(*arguments).exit_code == 0
 
 
+def _rows(table: Path) -> list[dict[str, str]]:
+    """Rows of a table below its comments."""
+    lines = table.read_text(encoding="utf-8").splitlines()
+    return list(csv.DictReader(line for line in lines if not line.startswith("#")))
+
+
+@pytest.mark.usefixtures("without_figures")
+@pytest.mark.parametrize(
+    ("verb", "files"),
+    [
+        (["sensitivity"], ["sensitivity.csv", "poses.csv"]),
+        (["tolerance", "--sigma", "0.1", "--samples", "100"], ["tolerance.csv"]),
+    ],
+)
+def test_tables_say_what_they_were_made_of(verb: list[str], files: list[str]) -> None:
+    write_poses("at.csv", pk.sample_poses(pk.load("2tpr2tps"), 3))
+    assert run(verb[0], "2tpr2tps", "--poses", "at.csv", *verb[1:], "--out", "out").exit_code == 0
+    digest = hashlib.sha256(Path("at.csv").read_bytes()).hexdigest()
+    for name in files:
+        head = Path("out", name).read_text(encoding="utf-8").split("\n")[:3]
+        assert head[0] == f"# Written by pkmcal {pk.__version__} from"
+        assert head[1].startswith("#   built-in machine 2tpr2tps, sha256 ")
+        assert head[2] == f"#   at.csv, sha256 {digest}"
+
+
 # --- sensitivity -----------------------------------------------------------------------------
 
 
@@ -74,8 +100,8 @@ def test_one_command_draws_the_six_figures_and_writes_the_table(tmp_path: Path) 
     robot = pk.load("2tpr2tps")
     found = pk.sensitivity(robot, pk.sample_poses(robot), 1.0, study_cases(robot, "offsets"))
     assert str(found) in result.stdout
-    with (tmp_path / "errors" / "sensitivity.csv").open(encoding="utf-8") as file:
-        rows = {row["error of"]: row for row in csv.DictReader(file) if row["study"] == "offsets"}
+    table = _rows(tmp_path / "errors" / "sensitivity.csv")
+    rows = {row["error of"]: row for row in table if row["study"] == "offsets"}
     assert list(rows) == list(found.cases)
     for case, mean, linear in zip(found.cases, found.mean, found.mean_linear, strict=True):
         assert float(rows[case]["mean dy [mm]"]) == pytest.approx(mean[1], rel=1e-5)
@@ -132,8 +158,7 @@ def test_tolerance_prints_what_the_library_finds(tmp_path: Path) -> None:
     )
     assert (result.exit_code, result.stderr) == (0, "")
     assert result.stdout == f"{found}\n"
-    with (tmp_path / "t" / "tolerance.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
+    rows = _rows(tmp_path / "t" / "tolerance.csv")
     assert len(rows) == 30
     assert float(rows[4]["std dz [mm]"]) == pytest.approx(found.std[4, 2], rel=1e-6)
     assert float(rows[4]["distance 95 % [mm]"]) == pytest.approx(found.distance95[4], rel=1e-6)

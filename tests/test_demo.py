@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import struct
 import time
 from pathlib import Path
@@ -125,6 +126,14 @@ def test_leg_lengths_written_are_the_corrected_ones(result: Demonstration, files
         np.testing.assert_allclose(q - dq, result.ideal[:, i], rtol=0, atol=1.01e-4)
     tilt = np.radians([[float(row["alpha [deg]"]), float(row["beta [deg]"])] for row in rows])
     np.testing.assert_allclose(tilt, result.poses[:, 3:5], rtol=0, atol=1e-12)
+
+
+def test_tables_say_what_they_were_made_of(files: Path) -> None:
+    head = f"# Written by pkmcal {pk.__version__} from\n#   built-in machine 2tpr2tps, sha256 "
+    for name in ("measured.csv", "checked.csv", "corrected.csv"):
+        assert (files / name).read_text(encoding="utf-8").startswith(head)
+    digest = hashlib.sha256((files / "measured.csv").read_bytes()).hexdigest()
+    assert f"#   measured.csv, sha256 {digest}\n" in (files / "corrected.csv").read_text("utf-8")
 
 
 def test_figure_is_a_picture_of_a_size_to_read(files: Path) -> None:

@@ -212,6 +212,13 @@ def test_several_targets_keep_their_names_and_places(tmp_path: Path, target: Any
     same(m, read_measurements(tmp_path / "m.csv"))
 
 
+def test_a_comment_stands_at_the_head_and_is_not_read(tmp_path: Path) -> None:
+    m = Measurements([[1.0]], [[1.0, 2, 3]])
+    m.write(tmp_path / "m.csv", "# made of nothing\n")
+    assert (tmp_path / "m.csv").read_text().startswith("# made of nothing\nq1 [mm],")
+    same(m, read_measurements(tmp_path / "m.csv"))
+
+
 def test_a_failed_write_leaves_the_old_file_and_nothing_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
