@@ -15,6 +15,7 @@ import typer
 
 from pkmcal.arm_machine import as_machine
 from pkmcal.cli_output import as_json, folder
+from pkmcal.cli_progress import progress
 from pkmcal.core import POSE
 from pkmcal.csv_table import UNITS
 from pkmcal.loading import load
@@ -115,7 +116,7 @@ def calibrate(
     if tracker is not None:
         measured = _seen_by(read_tracker(tracker), measured)
     chosen = free_names(machine, free)
-    with warnings.catch_warnings():
+    with progress("identifying"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
         found = identify(
             machine,
@@ -130,8 +131,12 @@ def calibrate(
         )
     if out is not None:
         found.robot.save(folder(out) / "robot.toml", comment(files))
-        found.plot(out / "residuals.png")
-    page = None if report is None else found.report(folder(report), files)[0]
+        with progress("picture"):
+            found.plot(out / "residuals.png")
+    page = None
+    if report is not None:
+        with progress("report"):
+            page = found.report(folder(report), files)[0]
     if json:
         typer.echo(as_json(found, "parameters", "correlations"))
     else:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from pkmcal.cli_output import as_json, folder
+from pkmcal.cli_progress import progress
 
 
 def demo(
@@ -26,8 +27,9 @@ def demo(
     """
     from pkmcal.demo import demonstrate
 
-    result = demonstrate(seed)
-    files = result.write(folder(out))
+    with progress("demonstration"):
+        result = demonstrate(seed)
+        files = result.write(folder(out))
     if json:
         typer.echo(as_json(result))
     else:

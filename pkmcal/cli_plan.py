@@ -11,6 +11,7 @@ import typer
 from pkmcal.arm_machine import ArmMachine, as_given, as_machine
 from pkmcal.cli_calibrate import free_names, read_deviations
 from pkmcal.cli_output import as_json, folder
+from pkmcal.cli_progress import progress
 from pkmcal.command_csv import read_commands, write_commands
 from pkmcal.core import FloatArray
 from pkmcal.loading import load
@@ -83,19 +84,20 @@ def plan(
     """
     machine = as_machine(load(robot))
     chosen = free_names(machine, free)
-    made = plan_poses(
-        as_given(machine),
-        _drawn(machine, seed) if poses is None else _places(machine, poses),
-        count=30 if count is None and accuracy is None else count,
-        accuracy=accuracy,
-        targets=None if targets is None else _places(machine, targets),
-        criterion=criterion,
-        kind=kind,
-        noise=noise,
-        free=chosen or None,
-        prior=read_deviations("--prior", prior or [], machine, chosen),
-        unknown=unknown or (),
-    )
+    with progress("choosing poses"):
+        made = plan_poses(
+            as_given(machine),
+            _drawn(machine, seed) if poses is None else _places(machine, poses),
+            count=30 if count is None and accuracy is None else count,
+            accuracy=accuracy,
+            targets=None if targets is None else _places(machine, targets),
+            criterion=criterion,
+            kind=kind,
+            noise=noise,
+            free=chosen or None,
+            prior=read_deviations("--prior", prior or [], machine, chosen),
+            unknown=unknown or (),
+        )
     read = comment(contents(robot, *(path for path in (poses, targets) if path is not None)))
     written = [] if out is None else _write(made, folder(out), read)
     if json:

@@ -11,6 +11,7 @@ import numpy as np
 import typer
 
 from pkmcal.cli_output import as_json, folder
+from pkmcal.cli_progress import progress
 from pkmcal.core import POSE
 from pkmcal.loading import load_parallel
 from pkmcal.pose_csv import read_poses, write_poses
@@ -90,10 +91,12 @@ def _write(found: dict[str, Sensitivity], out: Path, head: str) -> list[Path]:
     write_whole(table, head + _table(found))
     write_poses(poses, first.poses, comment=head)
     written = [table, poses]
-    for name, result in found.items():
-        title = f"{result.robot.name}: {_TITLES[name]}, {result.step:g} mm"
-        written += figures.save(figures.errors_by_pose(result, title), out / f"{name}-poses")
-        written += figures.save(figures.mean_errors(result, title), out / f"{name}-mean")
+    with progress("figures") as moved:
+        for k, (name, result) in enumerate(found.items()):
+            moved(k, len(found))
+            title = f"{result.robot.name}: {_TITLES[name]}, {result.step:g} mm"
+            written += figures.save(figures.errors_by_pose(result, title), out / f"{name}-poses")
+            written += figures.save(figures.mean_errors(result, title), out / f"{name}-mean")
     return written
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -14,9 +12,9 @@ import typer
 from pkmcal.allocation import allocate_tolerance
 from pkmcal.cli_calibrate import read_deviations
 from pkmcal.cli_output import as_json, folder
+from pkmcal.cli_progress import progress
 from pkmcal.core import FloatArray
 from pkmcal.loading import load_parallel
-from pkmcal.monte_carlo import Progress
 from pkmcal.pose_csv import read_poses, write_poses
 from pkmcal.provenance import comment, contents
 from pkmcal.robot import Robot
@@ -83,15 +81,16 @@ def tolerance(
     at = sample_poses(machine, seed=seed) if poses is None else read_poses(poses, machine)
     with ThreadPoolExecutor() as executor:
         if allowed is not None:
-            shared = allocate_tolerance(
-                machine, at, allowed, samples=samples, seed=seed, executor=executor
-            )
+            with progress("tolerances"):
+                shared = allocate_tolerance(
+                    machine, at, allowed, samples=samples, seed=seed, executor=executor
+                )
             found, told = shared.check, as_json(shared) if json else str(shared)
         else:
             deviations = read_deviations("--sigma", sigma or [], machine, own_names(machine))
             assert deviations is not None
-            with _progress() as progress:
-                found = spread(machine, at, deviations, samples, seed, executor, progress)
+            with progress("machines x poses") as moved:
+                found = spread(machine, at, deviations, samples, seed, executor, moved)
             told = as_json(found, "position_share") if json else str(found)
             if map is not None and out is not None:
                 _draw_map(machine, map, deviations, seed, executor, folder(out))
@@ -101,18 +100,6 @@ def tolerance(
         write_poses(table, found.poses, _columns(found), comment(read))
     typer.echo(told)
     return 1 if found.failed.any() else 0
-
-
-@contextmanager
-def _progress() -> Iterator[Progress]:
-    """A bar on the terminal, and nothing elsewhere."""
-    from rich.console import Console
-    from rich.progress import Progress as Bar
-
-    console = Console(stderr=True)
-    with Bar(console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task("machines x poses")
-        yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
 def _columns(found: Tolerance) -> dict[str, FloatArray]:
@@ -149,5 +136,6 @@ def _draw_map(
     if unknown:
         raise ValueError(f"--map {axes}: {unknown[0]!r} is not one of {', '.join(ends)}")
     grid = workspace(robot, {name: (*ends[name], _CELLS) for name in names})
-    found = spread(robot, grid.poses, sigma, _MACHINES, seed, executor)
+    with progress("map") as moved:
+        found = spread(robot, grid.poses, sigma, _MACHINES, seed, executor, moved)
     figures.save(figures.tolerance_map(found, grid), out / "map")
