@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import builtins
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import pkmcal as pk
+from pkmcal import cli
 from pkmcal.command_csv import read_commands
 from pkmcal.csv_table import Table
 from pkmcal.measurement_csv import read_measurements
 from pkmcal.pose_csv import read_poses
 from pkmcal.xlsx_rows import xlsx_rows
 
-DATA = Path(__file__).parent / "data"
+ROOT = Path(__file__).resolve().parents[1]
+DATA = ROOT / "tests" / "data"
 SAME = sorted((DATA / "same").iterdir())
 WRONG = sorted((DATA / "wrong").iterdir())
 LOG = np.array([
@@ -41,6 +45,37 @@ def test_what_is_wrong_is_said_in_the_words_of_the_file(path: Path) -> None:
     with pytest.raises(ValueError) as caught:
         read_measurements(path)
     assert str(path) in str(caught.value) and expected in str(caught.value)
+
+
+def machine_with(actuators: int, folder: Path) -> Path:
+    """A delta whose carriages share so many drives."""
+    text = (ROOT / "examples" / "linear-delta" / "robot.toml").read_text(encoding="utf-8")
+    parts = text.split('kind = "PUS"\n')
+    drives = (min(k + 1, actuators) for k in range(3))
+    limbs = (
+        f'kind = "PUS"\nactuator = {drive}\n{part}'
+        for drive, part in zip(drives, parts[1:], strict=True)
+    )
+    robot = folder / "robot.toml"
+    robot.write_text(parts[0] + "".join(limbs), encoding="utf-8")
+    return robot
+
+
+@pytest.mark.parametrize("path", WRONG, ids=lambda path: path.name)
+def test_check_says_in_one_line_what_is_wrong_with_a_file(path: Path, tmp_path: Path) -> None:
+    said, names, *_ = path.read_text(encoding="utf-8").splitlines()
+    robot = machine_with(len(re.findall(r"\bq[0-9]", names)), tmp_path)
+    result = CliRunner().invoke(cli.app, ["check", str(robot), str(path)])
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.startswith(f"pkmcal: {path}")
+    assert said.removeprefix("# says: ") in result.stderr and result.stderr.count("\n") == 1
+
+
+def test_check_reads_a_log_in_any_spelling() -> None:
+    for path in SAME:
+        if path.suffix != ".xlsx":
+            result = CliRunner().invoke(cli.app, ["check", "2tpr2tps", str(path)])
+            assert f"{path}: 3 rows of kind position, readable\n" in result.stdout
 
 
 def test_angles_of_a_pose_by_their_usual_names(tmp_path: Path) -> None:
