@@ -16,6 +16,7 @@ import typer
 from pkmcal.arm_machine import as_machine
 from pkmcal.cli_output import as_json, folder
 from pkmcal.cli_progress import progress
+from pkmcal.cli_robot import ROBOT_OR_ARM
 from pkmcal.core import POSE
 from pkmcal.csv_table import UNITS
 from pkmcal.loading import load
@@ -33,9 +34,7 @@ _DEVIATION = re.compile(
 
 
 def calibrate(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
-    ],
+    robot: Annotated[str, ROBOT_OR_ARM],
     csv: Annotated[Path, typer.Argument(metavar="CSV", help="What was measured, with units.")],
     free: Annotated[
         list[str] | None,

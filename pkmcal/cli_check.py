@@ -10,14 +10,13 @@ import typer
 
 from pkmcal.check_geometry import check_geometry
 from pkmcal.cli_output import as_json
+from pkmcal.cli_robot import ROBOT
 from pkmcal.loading import load_parallel
 from pkmcal.measurement_csv import read_measurements
 
 
 def check(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
-    ],
+    robot: Annotated[str, ROBOT],
     measurements: Annotated[
         Path | None,
         typer.Argument(metavar="CSV", help="Measurements of it: columns, units, numbers."),

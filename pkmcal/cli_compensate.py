@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from pkmcal.cli_output import as_json, folder
+from pkmcal.cli_robot import ROBOT
 from pkmcal.core import POSE, FloatArray
 from pkmcal.csv_table import Table
 from pkmcal.loading import load_parallel
@@ -21,9 +22,7 @@ _BESIDE = re.compile(r"q\d+|sigma(\..+)?|group")  # in a file of measurements, a
 
 
 def compensate(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
-    ],
+    robot: Annotated[str, ROBOT],
     desired: Annotated[Path, typer.Argument(metavar="DESIRED.csv", help="Poses asked for.")],
     measured: Annotated[
         Path,

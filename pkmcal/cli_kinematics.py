@@ -12,20 +12,20 @@ import typer
 from pkmcal import digits
 from pkmcal.arm_machine import as_machine
 from pkmcal.cli_output import as_json, folder
+from pkmcal.cli_robot import ROBOT, ROBOT_OR_ARM
 from pkmcal.command_csv import read_commands, write_commands
 from pkmcal.core import POSE, STATUS, FloatArray
 from pkmcal.loading import load, load_parallel
 from pkmcal.pose_csv import read_poses, write_poses
 from pkmcal.provenance import comment, contents
 
-_ROBOT = typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
 _RAD = typer.Option("--rad", help="Angles on the line are in radians.")
 _JSON = typer.Option("--json", help="Print JSON alone; mm and rad.")
 _POSE_UNITS = ("mm", "mm", "mm", "rad", "rad", "rad")
 
 
 def inverse(
-    robot: Annotated[str, _ROBOT],
+    robot: Annotated[str, ROBOT],
     poses: Annotated[
         str,
         typer.Argument(
@@ -75,7 +75,7 @@ def inverse(
 
 
 def forward(
-    robot: Annotated[str, _ROBOT],
+    robot: Annotated[str, ROBOT_OR_ARM],
     actuators: Annotated[
         str,
         typer.Argument(

@@ -8,14 +8,13 @@ from typing import Annotated
 import typer
 
 from pkmcal.cli_output import as_json
+from pkmcal.cli_robot import MACHINE
 from pkmcal.new_robot import template
 from pkmcal.whole_file import write_whole
 
 
 def new(
-    machine: Annotated[
-        str, typer.Argument(metavar="MACHINE", help="A built-in machine that is like yours.")
-    ],
+    machine: Annotated[str, MACHINE],
     file: Annotated[
         Path | None, typer.Argument(metavar="FILE", help="MACHINE.toml by default.")
     ] = None,

@@ -12,6 +12,7 @@ from pkmcal.arm_machine import ArmMachine, as_given, as_machine
 from pkmcal.cli_calibrate import free_names, read_deviations
 from pkmcal.cli_output import as_json, folder
 from pkmcal.cli_progress import progress
+from pkmcal.cli_robot import ROBOT_OR_ARM
 from pkmcal.command_csv import read_commands, write_commands
 from pkmcal.core import FloatArray
 from pkmcal.loading import load
@@ -25,9 +26,7 @@ _DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out th
 
 
 def plan(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
-    ],
+    robot: Annotated[str, ROBOT_OR_ARM],
     count: Annotated[
         int | None, typer.Option(metavar="N", help="How many poses; 30 by default.")
     ] = None,

@@ -12,6 +12,7 @@ import typer
 
 from pkmcal.cli_output import as_json, folder
 from pkmcal.cli_progress import progress
+from pkmcal.cli_robot import ROBOT
 from pkmcal.core import POSE
 from pkmcal.loading import load_parallel
 from pkmcal.pose_csv import read_poses, write_poses
@@ -29,9 +30,7 @@ _TITLES = {
 
 
 def sensitivity(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
-    ],
+    robot: Annotated[str, ROBOT],
     poses: Annotated[
         Path | None,
         typer.Option(

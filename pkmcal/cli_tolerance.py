@@ -13,6 +13,7 @@ from pkmcal.allocation import allocate_tolerance
 from pkmcal.cli_calibrate import read_deviations
 from pkmcal.cli_output import as_json, folder
 from pkmcal.cli_progress import progress
+from pkmcal.cli_robot import ROBOT
 from pkmcal.core import FloatArray
 from pkmcal.loading import load_parallel
 from pkmcal.pose_csv import read_poses, write_poses
@@ -28,9 +29,7 @@ _MACHINES = 2_000  # of a map: its colours are good to 3 %
 
 
 def tolerance(
-    robot: Annotated[
-        str, typer.Argument(metavar="ROBOT", help="A built-in machine or a robot file.")
-    ],
+    robot: Annotated[str, ROBOT],
     sigma: Annotated[
         list[str] | None,
         typer.Option(

@@ -419,3 +419,24 @@ def test_check_says_at_which_rows_the_machine_has_no_pose(tmp_path: Path) -> Non
     result = run("check", ROBOT, log)
     assert result.exit_code == 1
     assert "no pose at the actuators of 1 of them (rows 1)" in result.stdout
+
+
+# --- completion ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("line", "names"),
+    [
+        ("check lin", ["linear-delta", "linear-delta-6"]),
+        ("new 6", ["6-rus"]),
+        ("forward 3r", ["3rps", "3rrr-planar", "3r"]),
+        ("inverse 3r", ["3rps", "3rrr-planar"]),  # which takes no arm
+        ("check my-", []),  # then the shell goes on with files
+    ],
+)
+def test_shells_complete_the_names_of_machines(line: str, names: list[str]) -> None:
+    typed = {"COMP_WORDS": f"pkmcal {line}", "COMP_CWORD": "2"}
+    result = CliRunner().invoke(
+        cli.app, [], prog_name="pkmcal", env={"_PKMCAL_COMPLETE": "complete_bash", **typed}
+    )
+    assert result.stdout.split() == names
