@@ -190,6 +190,15 @@ int pkm_paths(const pkm_machine *machine, ptrdiff_t n, const double *start, cons
     return 0;
 }
 
+int pkm_motion(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+               const double *pose, const double *q, const double *q1, const double *q2,
+               double *motion, double *pose_rates)
+{
+    CHECKED_MACHINE(machine, isa);
+    chosen->motion(machine, n, geometry, pose, q, q1, q2, motion, pose_rates);
+    return 0;
+}
+
 int pkm_compose(int isa, ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
                 ptrdiff_t b_stride, double *out)
 {

@@ -41,6 +41,20 @@ static void core_rates(const pkm_machine *machine, ptrdiff_t n, const double *ge
     rates_rows(machine, n, geometry, motion, q1, q2);
 }
 
+static void core_motion(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                        const double *pose, const double *q, const double *q1, const double *q2,
+                        double *motion, double *pose_rates)
+{
+    switch (machine->map) {
+#define CASE(NAME, name, M)                                                                       \
+    case MAP_##NAME:                                                                              \
+        motion_map(MAP_##NAME, machine, n, geometry, pose, q, q1, q2, motion, pose_rates);        \
+        break;
+        EACH_MAP(CASE)
+#undef CASE
+    }
+}
+
 static void core_jacobian(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                    ptrdiff_t geometry_stride, const double *pose, double *jacobian)
 {
@@ -311,4 +325,5 @@ const pkm_core CORE = {
     .arm_jacobian = core_arm_jacobian,
     .arm_error_jacobian = core_arm_error_jacobian,
     .rates = core_rates,
+    .motion = core_motion,
 };

@@ -65,6 +65,9 @@ typedef struct {
                                ptrdiff_t n, const double *theta, double *jacobian);
     void (*rates)(const pkm_machine *, ptrdiff_t n, const double *geometry, const double *motion,
                   double *q1, double *q2);
+    void (*motion)(const pkm_machine *, ptrdiff_t n, const double *geometry, const double *pose,
+                   const double *q, const double *q1, const double *q2, double *motion,
+                   double *pose_rates);
 } pkm_core;
 
 /* pkm_paths, the arguments already checked: scalar, so the same for every ISA. */

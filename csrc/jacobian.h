@@ -65,21 +65,36 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
     whole_or_nan(out, machine->actuators * m);
 }
 
-/* How the pose, or where `twists` the platform, answers a residual in each row: -M Φ⁻¹ (6 x rows),
- * per unit of the scaled rows. */
+/* How the map's step answers a residual in each row, -Φ⁻¹ (m x rows), per unit of the scaled rows;
+ * NaN where they are singular. */
+INLINE int step_response(int map, const pkm_machine *machine, const FN(limb_sphere) *sphere,
+                         const real *state, real *response)
+{
+    const int m = map_m(map);
+    real residual[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6], A[36], pivot;
+    const int rows = FN(closure_rows)(map, SCALED, machine, sphere, state, residual, jacobian);
+    normal_system(m, rows, rows == m ? m : rows, jacobian, residual, A, response);
+    solve(m, rows, A, response, &pivot);
+    const mask known = pivot > fill(1e-14);
+    for (int j = 0; j < m; j++) {
+        const double scale = map_is_angle(map, j) ? -1.0 / machine->length : -1.0;
+        for (int r = 0; r < rows; r++)
+            response[j * rows + r] = select(known, response[j * rows + r] * scale, fill(NAN));
+    }
+    return rows;
+}
+
+/* The same of the pose, or where `twists` of the platform: -M Φ⁻¹ (6 x rows). */
 INLINE int pose_response(int map, const pkm_machine *machine, const FN(limb_sphere) *sphere,
                          const real *state, int twists, real *response)
 {
     const int m = map_m(map);
-    real residual[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6], A[36], X[6 * PKM_MAX_ROWS], pivot;
-    const int rows = FN(closure_rows)(map, SCALED, machine, sphere, state, residual, jacobian);
-    normal_system(m, rows, rows == m ? m : rows, jacobian, residual, A, X);
-    solve(m, rows, A, X, &pivot);
-    const mask known = pivot > fill(1e-14);
+    real X[6 * PKM_MAX_ROWS];
+    const int rows = step_response(map, machine, sphere, state, X);
+    const mask known = finite(X[0]);
     for (int r = 0; r < rows; r++) {
         real step[6], rates[6];
-        for (int j = 0; j < m; j++)
-            step[j] = X[j * rows + r] * (map_is_angle(map, j) ? -1.0 / machine->length : -1.0);
+        for (int j = 0; j < m; j++) step[j] = X[j * rows + r];
         if (twists) map_twist(map, state, step, rates);
         else map_rates(map, state, step, rates);
         for (int k = 0; k < 6; k++)

@@ -1,22 +1,30 @@
-/* Actuators along a path: velocity and acceleration from those of the platform, limb by limb. */
+/* Along a path: velocity and acceleration of the actuators from those of the platform, limb by limb,
+ * and of the platform from those of the actuators. */
 #ifndef MOTION_H
 #define MOTION_H
 
-#include "inverse.h"
+#include "jacobian.h"
+#include "rates.h"
 
-/* A limb's dq/dt and d²q/dt². T holds the platform's homogeneous matrix, row by row, and its first and
- * second derivative by time: the joint's path is linear in each of them. */
-INLINE void limb_rates(const pkm_machine *machine, int i, const limb_numbers *limb,
-                       const real T[3][12], real *rate, real *bend)
+/* A point b of the platform, seen from `origin`, with its first and second derivative by time. T holds
+ * the platform's homogeneous matrix, row by row, and its derivatives: the path is linear in each. */
+INLINE void point_path(const real T[3][12], const real *b, const real *origin, real path[3][3])
 {
     const real nowhere[3] = {fill(0.0), fill(0.0), fill(0.0)};
-    real h[3][3], qt1, qt2;
     for (int k = 0; k < 3; k++) {
         const real R[9] = {T[k][0], T[k][1], T[k][2], T[k][4], T[k][5], T[k][6],
                            T[k][8], T[k][9], T[k][10]};
         const real p[3] = {T[k][3], T[k][7], T[k][11]};
-        FN(limb_joint)(R, p, limb->g + PLATFORM_X, k == 0 ? limb->g + BASE_X : nowhere, h[k]);
+        FN(limb_joint)(R, p, b, k == 0 ? origin : nowhere, path[k]);
     }
+}
+
+/* A limb's dq/dt and d²q/dt². */
+INLINE void limb_rates(const pkm_machine *machine, int i, const limb_numbers *limb,
+                       const real T[3][12], real *rate, real *bend)
+{
+    real h[3][3], qt1, qt2;
+    point_path(T, limb->g + PLATFORM_X, limb->g + BASE_X, h);
     const real qt = limb_drive_at(machine, i, limb, h[0]);
     if (machine->driver[i] == DRIVER_LENGTH)
         FN(length_rates)(qt, h[0], h[1], h[2], &qt1, &qt2);
@@ -60,6 +68,127 @@ INLINE void rates_rows(const pkm_machine *machine, ptrdiff_t n, const double *ge
             scatter(rate[a], q1 + a, actuators, row, count);
             scatter(bend[a], q2 + a, actuators, row, count);
         }
+    }
+}
+
+/* d²Φ/dt² of a limb's rows where the platform moves as T says and the actuator with q1 and q2; each in
+ * the size of the scaled rows. Returns how many rows it has. */
+INLINE int limb_bends(const pkm_machine *machine, int i, const limb_numbers *limb,
+                      const FN(limb_sphere) *sphere, const double *weight, const real T[3][12],
+                      real q, real q1, real q2, real *bend)
+{
+    real h[3][3], axis[3][3], turning[3][12], qt;
+    int r = 0;
+    point_path(T, limb->g + PLATFORM_X, limb->g + BASE_X, h);
+    FN(limb_drive)(q, limb->g, &qt);
+    const real qt1 = q1 * limb->g[GAIN], qt2 = q2 * limb->g[GAIN];
+    if (machine->driver[i] == DRIVER_LENGTH)
+        FN(length_bend)(qt, qt1, qt2, h[0], h[1], h[2], &bend[r]);
+    else if (machine->driver[i] == DRIVER_SLIDER)
+        FN(slider_bend)(qt, qt1, qt2, h[0], h[1], h[2], limb->first, &bend[r]);
+    else
+        FN(crank_bend)(qt, qt1, qt2, h[0], h[1], h[2], limb->first, limb->second, &bend[r]);
+    bend[r] *= rough_reciprocal(sphere->rho) * weight[r];
+    r++;
+    if (machine->rows[i] & (ROW_PLATFORM_PLANE | ROW_COUPLE)) {
+        const real nowhere[3] = {fill(0.0), fill(0.0), fill(0.0)};
+        memcpy(turning, T, sizeof turning);
+        for (int k = 0; k < 3; k++) /* an axis has no place */
+            turning[k][3] = turning[k][7] = turning[k][11] = fill(0.0);
+        point_path(turning, limb->platform_axis, nowhere, axis);
+    }
+    for (int kind = ROW_BASE_PLANE; kind <= ROW_COUPLE; kind *= 2) {
+        if (!(machine->rows[i] & kind)) continue;
+        if (kind == ROW_BASE_PLANE)
+            FN(base_plane_bend)(h[0], h[1], h[2], limb->base_axis, &bend[r]);
+        else if (kind == ROW_PLATFORM_PLANE)
+            FN(platform_plane_bend)(h[0], h[1], h[2], axis[0], axis[1], axis[2], &bend[r]);
+        else
+            FN(couple_bend)(limb->base_axis, axis[0], axis[1], axis[2], fill(machine->lever[i]),
+                            &bend[r]);
+        bend[r] *= weight[r];
+        r++;
+    }
+    return r;
+}
+
+INLINE void map_bend(int map, const real *state, const real *delta, real *twist_rate)
+{
+    switch (map) {
+#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_bend)(state, delta, twist_rate); break;
+    EACH_MAP(CASE)
+#undef CASE
+    }
+}
+
+/* The platform's motion T and the pose's two derivatives, from those of the actuators. The closures
+ * hold along the path: Φ_u δ1 = -Φ_q q1 gives the step's speed; with it and no more, Φ bends by what
+ * the second step makes up for. Exact where all closures hold. */
+INLINE void motion_at(int map, const pkm_machine *machine, const limb_numbers *limb,
+                      const real *pose, const real *q, const real *q1, const real *q2,
+                      real T[3][12], real *pose_rates)
+{
+    const int m = map_m(map);
+    FN(limb_sphere) sphere[PKM_MAX_LIMBS];
+    real state[MAX_STATE], R[9], p[3], response[6 * PKM_MAX_ROWS], step[6], bend[PKM_MAX_ROWS];
+    real twist[6], twist_rate[6], rest[6];
+    map_from_pose(map, pose, state);
+    FN(map_frame)(map, state, R, p);
+    spheres_at(machine, limb, q, sphere);
+    const int rows = step_response(map, machine, sphere, state, response);
+    for (int j = 0; j < m; j++) step[j] = fill(0.0);
+    for (int i = 0, r = 0; i < machine->limbs; i++) {
+        real by_q, by_g[SLOTS];
+        sphere_derivatives(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
+        by_q *= rough_reciprocal(sphere[i].rho) * machine->weight[r];
+        for (int j = 0; j < m; j++)
+            step[j] += response[j * rows + machine->order[r]] * by_q * q1[machine->actuator[i]];
+        r += 1 + __builtin_popcount((unsigned)machine->rows[i]);
+    }
+    map_twist(map, state, step, twist);
+    map_bend(map, state, step, twist_rate);
+    FN(frame_motion)(R, p, twist, twist_rate, T[0], T[1], T[2]);
+    for (int i = 0, r = 0; i < machine->limbs; i++) {
+        const int a = machine->actuator[i];
+        r += limb_bends(machine, i, &limb[i], &sphere[i], machine->weight + r, T, q[a], q1[a], q2[a],
+                        bend + r);
+    }
+    for (int j = 0; j < m; j++) {
+        step[j] = fill(0.0);
+        for (int r = 0; r < rows; r++) step[j] += response[j * rows + machine->order[r]] * bend[r];
+    }
+    map_twist(map, state, step, rest);
+    for (int k = 0; k < 6; k++) twist_rate[k] += rest[k];
+    FN(frame_motion)(R, p, twist, twist_rate, T[0], T[1], T[2]);
+    FN(pose_rates)(pose, twist, twist_rate, pose_rates, pose_rates + 6);
+    whole_or_nan(T[0], 36);
+    whole_or_nan(pose_rates, 12);
+}
+
+INLINE void motion_map(int map, const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                       const double *pose, const double *q, const double *q1, const double *q2,
+                       double *motion, double *pose_rates)
+{
+    const int actuators = machine->actuators;
+    limb_numbers limb[PKM_MAX_LIMBS];
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], lane_q[3][PKM_MAX_LIMBS], T[3][12], rates[12];
+        const int count = block_rows(first, n, row);
+        if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
+        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
+        for (int a = 0; a < actuators; a++) {
+            lane_q[0][a] = gather(q + a, actuators, row);
+            lane_q[1][a] = gather(q1 + a, actuators, row);
+            lane_q[2][a] = gather(q2 + a, actuators, row);
+        }
+        motion_at(map, machine, limb, lane_pose, lane_q[0], lane_q[1], lane_q[2], T, rates);
+        for (int k = 0; k < 3; k++) {
+            for (int j = 0; j < 12; j++) scatter(T[k][j], motion + 16 * k + j, 48, row, count);
+            for (int j = 12; j < 16; j++)
+                scatter(fill(k == 0 && j == 15 ? 1.0 : 0.0), motion + 16 * k + j, 48, row, count);
+        }
+        for (int k = 0; k < 12; k++) scatter(rates[k], pose_rates + k, 12, row, count);
     }
 }
 

@@ -120,6 +120,12 @@ int pkm_limbs(const pkm_machine *machine, int isa, ptrdiff_t n, const double *ge
 int pkm_rates(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
               const double *motion, double *q1, double *q2);
 
+/* pose (n, 6), q and its first and second derivative by time (n, actuators) -> motion (n, 3, 4, 4) as
+ * above, and the first and second derivative of the pose (n, 2, 6); NaN where singular. */
+int pkm_motion(const pkm_machine *machine, int isa, ptrdiff_t n, const double *geometry,
+               const double *pose, const double *q, const double *q1, const double *q2,
+               double *motion, double *pose_rates);
+
 /* Poses as frames: out = A B (strides 0 or 6), out = A^-1, and the rates (n, 6, 6) of A T C by those
  * of T, or its twists by those of T: A and C are (6,) there, T (n, 6). */
 int pkm_compose(int isa, ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,

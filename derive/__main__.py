@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from . import elementary, frames, limbs, measured, posemaps, screws, tpr2tps
+from . import elementary, frames, limbs, measured, posemaps, rates, screws, tpr2tps
 from .emit import Function
 
 HERE = Path(__file__).parent
@@ -26,6 +26,7 @@ def headers() -> dict[str, str]:
         "limbs.h": _header("limbs", _functions(limbs.functions())),
         "measured.h": _header("measured", _functions(measured.functions())),
         "posemaps.h": _header("posemaps", _functions(posemaps.functions())),
+        "rates.h": _header("rates", _functions(rates.functions())),
         "screws.h": _header("screws", screws.constants() + _functions(screws.functions())),
         "tpr2tps.h": _header("tpr2tps", _functions(tpr2tps.functions())),
     }

@@ -222,48 +222,6 @@ def _inverse(driver: Driver) -> Function:
     return f
 
 
-def _rates(driver: Driver) -> Function:
-    """q̃'s velocity and acceleration: the closure, differentiated twice along a path h(t)."""
-    f = LimbFunction(
-        f"{driver.name}_rates",
-        f"{driver.name}: velocity and acceleration of q̃ as the joint moves",
-        "Φ(h(t), q̃(t)) = 0 differentiated twice by t, solved for dq̃/dt and d²q̃/dt²",
-    )
-    qt = f.scalar("qt", "q̃ [mm or rad]")
-    path = [f.vector(name, 3, doc) for name, doc in (
-        ("h", "p + R b - base [mm]"), ("h1", "its velocity [mm/s]"),
-        ("h2", "its acceleration [mm/s²]"),
-    )]  # fmt: skip
-    t, speed = sp.symbols("t speed", real=True)
-    h = path[0] + path[1] * t + path[2] * t**2 / 2
-    drive = qt + speed * t
-    anchor, rho = sp.zeros(3, 1), drive
-    if driver is not LENGTH:
-        first, rho = f.vector("first", 3, "s, or crank e"), sp.S.Zero  # a rod's length stays
-        anchor = drive * first
-        if driver is CRANK:
-            second = f.vector("second", 3, "crank axis × e")
-            f.sincos("q", qt)
-            anchor = sp.cos(drive) * first + sp.sin(drive) * second
-
-    def rate(value: sp.Expr, order: int) -> sp.Expr:
-        return sp.diff(value, t, order).subs(t, 0).doit().xreplace(f.known)
-
-    # Φ = (d·d - ρ²)/2, its derivatives by t with dq̃/dt as it turns out and no d²q̃/dt²
-    d = f.let("d", (h - anchor).subs(t, 0).xreplace(f.known), "from the anchor to the joint")
-    slope = d.dot((h - anchor).applyfunc(lambda e: rate(e, 1))) - qt * rate(rho, 1)
-    by_q = f.let("by_q", sp.diff(slope, speed), "∂Φ/∂q̃")
-    qt1 = f.let("speed", -slope.subs(speed, 0) / by_q, "dq̃/dt")
-    d1, d2 = (
-        f.let(name, (h - anchor).applyfunc(lambda e, k=k: rate(e, k)).subs(speed, qt1), doc)
-        for k, name, doc in ((1, "velocity", "of d"), (2, "bend", "d̈ without d²q̃/dt²"))
-    )
-    left = d1.dot(d1) + d.dot(d2) - rate(rho, 1).subs(speed, qt1) ** 2
-    f.output("qt1", qt1, "dq̃/dt [mm/s or rad/s]")
-    f.output("qt2", -left / by_q, "d²q̃/dt² [mm/s² or rad/s²]")
-    return f
-
-
 def _derivatives(driver: Driver) -> Function:
     """The sphere row's derivatives by q and by the limb's numbers (by twist: `sphere_row`)."""
     f = LimbFunction(
@@ -379,7 +337,7 @@ def functions() -> list[Function]:
     """The emitted functions of every driver and row."""
     made: list[Function | None] = [*_basics(), _sphere()]
     made += [_axis("base", "in the base"), _axis("platform", "in the platform")]
-    for step in (_prepare, _anchor, _inverse, _rates, _derivatives):
+    for step in (_prepare, _anchor, _inverse, _derivatives):
         made += [step(driver) for driver in DRIVERS]
     made += [_constraint(row, known) for row in CONSTRAINTS for known in (True, False)]
     made += [_moving(row) for row in (None, *CONSTRAINTS)]

@@ -168,7 +168,7 @@ TPR2TPS = PoseMap(
 MAPS = (SPATIAL, TRANSLATION, PLANAR, TPR2TPS)
 
 
-def _tangent(pose_map: PoseMap, s: sp.Matrix) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
+def tangent(pose_map: PoseMap, s: sp.Matrix) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
     """∂p/∂delta (3 x m), angular velocity per delta (3 x m), ∂state/∂delta, at delta = 0."""
     f = Function("tangent", "", "")
     delta = sp.Matrix(sp.symbols(f"delta0:{pose_map.m}", real=True))
@@ -246,13 +246,13 @@ def _functions(pose_map: PoseMap) -> list[Function]:
     s = pull.vector("state", size, "of the map")
     w = pull.vector("omega", 3, "rotation part of the covector")
     v = pull.vector("v", 3, "translation part of the covector")
-    d_p, d_omega, _ = _tangent(pose_map, s)
+    d_p, d_omega, _ = tangent(pose_map, s)
     pull.output("row", d_omega.T * w + d_p.T * v, "covector of the step")
 
     rates = new("rates", "rates of the pose for a step", "d(x y z α β γ) = M delta")
     s = rates.vector("state", size, "of the map")
     delta = rates.vector("delta", m, "step [mm, rad]")
-    d_p, d_omega, d_state = _tangent(pose_map, s)
+    d_p, d_omega, d_state = tangent(pose_map, s)
     rates.output("pose", _pose_rates(rates, pose_map, s, d_p, d_omega, d_state, delta), "rates")
 
     twist = new("twist", "twist of the frame for a step", "ω = ∂ω/∂δ δ, v = ∂p/∂δ δ")
@@ -263,7 +263,7 @@ def _functions(pose_map: PoseMap) -> list[Function]:
     velocity = new("velocity", "rates of the state for a step", "∂state/∂delta delta")
     s = velocity.vector("state", size, "of the map")
     delta = velocity.vector("delta", m, "step [mm, rad]")
-    velocity.output("rate", _tangent(pose_map, s)[2] * delta, "rates of the state")
+    velocity.output("rate", tangent(pose_map, s)[2] * delta, "rates of the state")
 
     free = new("free", "covector of a step to one of the free coordinates", "∂/∂free")
     s = free.vector("state", size, "of the map")

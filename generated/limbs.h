@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation 37b33614de9704ce
+ * derivation fb7930544e8ece11
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*
@@ -275,113 +275,6 @@ INLINE void FN(crank_inverse)(const real g[14], const real h[3], const real firs
     sine[0] = y*kappa - x*side;
     cosine[0] = x*kappa + y*side;
 }
-
-/*
- * length: velocity and acceleration of q̃ as the joint moves
- *     Φ(h(t), q̃(t)) = 0 differentiated twice by t, solved for dq̃/dt and d²q̃/dt²
- * in  qt             q̃ [mm or rad]
- * in  h[3]           p + R b - base [mm]
- * in  h1[3]          its velocity [mm/s]
- * in  h2[3]          its acceleration [mm/s²]
- * out qt1            dq̃/dt [mm/s or rad/s]
- * out qt2            d²q̃/dt² [mm/s² or rad/s²]
- * operations: 8 +, 12 *, 1 /, 0 sqrt
- */
-INLINE void FN(length_rates)(real qt, const real h[3], const real h1[3], const real h2[3],
-        real *qt1, real *qt2)
-{
-    /* dq̃/dt */
-    const real t0 = 1.0f/qt;
-    const real speed = -(-h[0]*h1[0] - h[1]*h1[1] - h[2]*h1[2])*t0;
-    *qt1 = speed;
-    *qt2 = -(speed*speed - h[0]*h2[0] - h[1]*h2[1] - h[2]*h2[2] - h1[0]*h1[0] - h1[1]*h1[1] -
-        h1[2]*h1[2])*t0;
-}
-
-/*
- * slider: velocity and acceleration of q̃ as the joint moves
- *     Φ(h(t), q̃(t)) = 0 differentiated twice by t, solved for dq̃/dt and d²q̃/dt²
- * in  qt             q̃ [mm or rad]
- * in  h[3]           p + R b - base [mm]
- * in  h1[3]          its velocity [mm/s]
- * in  h2[3]          its acceleration [mm/s²]
- * in  first[3]       s, or crank e
- * out qt1            dq̃/dt [mm/s or rad/s]
- * out qt2            d²q̃/dt² [mm/s² or rad/s²]
- * operations: 15 +, 20 *, 1 /, 0 sqrt
- */
-INLINE void FN(slider_rates)(real qt, const real h[3], const real h1[3], const real h2[3],
-        const real first[3], real *qt1, real *qt2)
-{
-    /* from the anchor to the joint */
-    const real d0 = h[0] - qt*first[0];
-    const real d1 = h[1] - qt*first[1];
-    const real d2 = h[2] - qt*first[2];
-    /* ∂Φ/∂q̃ */
-    const real by_q = -first[0]*d0 - first[1]*d1 - first[2]*d2;
-    /* dq̃/dt */
-    const real t0 = 1.0f/by_q;
-    const real speed = (-h1[0]*d0 - h1[1]*d1 - h1[2]*d2)*t0;
-    /* of d */
-    const real velocity0 = h1[0] - first[0]*speed;
-    const real velocity1 = h1[1] - first[1]*speed;
-    const real velocity2 = h1[2] - first[2]*speed;
-    *qt1 = speed;
-    *qt2 = (-h2[0]*d0 - h2[1]*d1 - h2[2]*d2 - velocity0*velocity0 - velocity1*velocity1 -
-        velocity2*velocity2)*t0;
-}
-
-#ifndef NARROW
-/*
- * crank: velocity and acceleration of q̃ as the joint moves
- *     Φ(h(t), q̃(t)) = 0 differentiated twice by t, solved for dq̃/dt and d²q̃/dt²
- * in  qt             q̃ [mm or rad]
- * in  h[3]           p + R b - base [mm]
- * in  h1[3]          its velocity [mm/s]
- * in  h2[3]          its acceleration [mm/s²]
- * in  first[3]       s, or crank e
- * in  second[3]      crank axis × e
- * out qt1            dq̃/dt [mm/s or rad/s]
- * out qt2            d²q̃/dt² [mm/s² or rad/s²]
- * operations: 30 +, 42 *, 1 /, 0 sqrt
- */
-INLINE void FN(crank_rates)(real qt, const real h[3], const real h1[3], const real h2[3],
-        const real first[3], const real second[3], real *qt1, real *qt2)
-{
-    real sq, cq;
-    FN(sincos)(qt, &sq, &cq);
-    /* from the anchor to the joint */
-    const real t0 = first[0]*cq;
-    const real t1 = second[0]*sq;
-    const real d0 = h[0] - t0 - t1;
-    const real t2 = first[1]*cq;
-    const real t3 = second[1]*sq;
-    const real d1 = h[1] - t2 - t3;
-    const real t4 = first[2]*cq;
-    const real t5 = second[2]*sq;
-    const real d2 = h[2] - t4 - t5;
-    /* ∂Φ/∂q̃ */
-    const real t6 = second[0]*cq;
-    const real t7 = second[1]*cq;
-    const real t8 = second[2]*cq;
-    const real by_q = (first[0]*sq - t6)*d0 + (first[1]*sq - t7)*d1 + (first[2]*sq - t8)*d2;
-    /* dq̃/dt */
-    const real t9 = 1.0f/by_q;
-    const real speed = (-h1[0]*d0 - h1[1]*d1 - h1[2]*d2)*t9;
-    /* of d */
-    const real velocity0 = h1[0] + first[0]*sq*speed - speed*t6;
-    const real velocity1 = h1[1] + first[1]*sq*speed - speed*t7;
-    const real velocity2 = h1[2] + first[2]*sq*speed - speed*t8;
-    /* d̈ without d²q̃/dt² */
-    const real t10 = speed*speed;
-    const real bend0 = h2[0] + t0*t10 + t1*t10;
-    const real bend1 = h2[1] + t2*t10 + t3*t10;
-    const real bend2 = h2[2] + t4*t10 + t5*t10;
-    *qt1 = speed;
-    *qt2 = (-d0*bend0 - d1*bend1 - d2*bend2 - velocity0*velocity0 - velocity1*velocity1 -
-        velocity2*velocity2)*t9;
-}
-#endif
 
 /*
  * length: the sphere row by q and numbers

@@ -1,5 +1,5 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation 1f7a0952424f3d7a
+ * derivation b0b2e0d4feca6ec4
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.core import MAPS, POSE, FloatArray
-from pkmcal.core_machine import Machine
+from pkmcal.core_machine import Closure, Machine
 from pkmcal.geometry import BoolArray
 from pkmcal.suggest import did_you_mean
 
@@ -78,8 +78,6 @@ def complete(
     freedom = len(free) + machine.actuators - machine.rows
     if len(matched) != freedom and machine.rows <= len(free):
         raise ValueError(f"match must name {freedom} coordinates here, found {len(matched)}")
-    keep = np.zeros((len(matched), len(free) + machine.actuators))
-    keep[np.arange(len(matched)), [free.index(i) for i in matched]] = 1.0
     own = pose.copy()
     wanted = own[:, matched]
     q = machine.inverse(slots, own)
@@ -91,8 +89,7 @@ def complete(
         if not rows.size:
             break
         closure = machine.closure(slots, own[rows], q[rows])
-        left = np.concatenate([closure.by_free, closure.by_q], axis=-1)
-        left = np.concatenate([left, np.broadcast_to(keep, (len(rows), *keep.shape))], axis=1)
+        left = _system(closure, free, matched)
         missing = own[rows][:, matched] - wanted[rows]
         right = np.concatenate([closure.residual, missing], axis=1)
         good = np.isfinite(left).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
@@ -107,6 +104,48 @@ def complete(
     if machine.rows > len(free):
         own, q = _led_to(machine, slots, own, q, matched, wanted)
     return own, q
+
+
+def _system(closure: Closure, free: list[int], matched: Sequence[int]) -> FloatArray:
+    """Closures and matched coordinates by free and actuator coordinates, (N, rows, m + n)."""
+    by_all = np.concatenate([closure.by_free, closure.by_q], axis=-1)
+    keep = np.zeros((len(matched), by_all.shape[-1]))
+    keep[np.arange(len(matched)), [free.index(i) for i in matched]] = 1.0
+    system: FloatArray = np.concatenate(
+        [by_all, np.broadcast_to(keep, (len(by_all), *keep.shape))], axis=1
+    )
+    return system
+
+
+def completed_rates(
+    machine: Machine,
+    map: str,
+    slots: FloatArray,
+    pose: FloatArray,
+    q: FloatArray,
+    matched: Sequence[int],
+    rates: tuple[FloatArray, FloatArray],
+) -> tuple[FloatArray, FloatArray]:
+    """Velocity and acceleration of the actuators, (N, n), that move the matched coordinates.
+
+    Parameters
+    ----------
+    machine, map, slots, matched
+        As for `complete`.
+    pose, q : ndarray (N, 6), (N, n)
+        What `complete` found.
+    rates : two ndarray (N, matched)
+        Velocity and acceleration of the matched coordinates, by time.
+    """
+    left = _system(
+        machine.closure(slots, pose, q), [POSE.index(name) for name in MAPS[map]], matched
+    )
+    good = np.isfinite(left).all(axis=(1, 2))
+    inverse = np.full((len(pose), machine.actuators, len(matched)), np.nan)
+    inverse[good] = np.linalg.pinv(left[good])[:, -machine.actuators :, machine.rows :]
+    velocity = np.einsum("nij,nj->ni", inverse, rates[0])
+    carried = machine.motion(slots, pose, q, velocity, np.zeros_like(velocity))[2][:, matched]
+    return velocity, np.einsum("nij,nj->ni", inverse, rates[1] - carried)
 
 
 def _led_to(

@@ -223,6 +223,33 @@ class Machine:
             )
         return velocity, acceleration
 
+    def motion(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, q1: FloatArray, q2: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The platform's motion at poses (N, 6) as the actuators move with q1 and q2 (N, n).
+
+        The homogeneous matrix with its first and second derivative by time (N, 3, 4, 4), and
+        velocity and acceleration of the pose (N, 6) each. NaN where singular.
+        """
+        n = len(pose)
+        motion, rates = np.empty((n, 3, 4, 4)), np.empty((n, 2, 6))
+        if n:
+            ensure(
+                lib.pkm_motion(
+                    self.struct,
+                    self.isa,
+                    n,
+                    pointer(slots),
+                    pointer(pose),
+                    pointer(q),
+                    pointer(q1),
+                    pointer(q2),
+                    pointer(motion),
+                    pointer(rates),
+                )
+            )
+        return motion, rates[:, 0], rates[:, 1]
+
     def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
         """The closure rows and their derivatives at poses (N, 6) and coordinates (N, n)."""
         n, m = len(pose), self.m

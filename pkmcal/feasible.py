@@ -27,6 +27,9 @@ class Feasibility:
         The joint's cone is kept; True where the limb states none.
     drive : ndarray
         q̃ of each limb, mm or rad; NaN out of reach.
+    stroke_margin, base_cone_margin, platform_cone_margin : ndarray
+        How far inside its limit each is, mm or rad; below 0 where it is broken, infinite where the
+        limb states none.
     """
 
     reach: BoolArray
@@ -34,6 +37,9 @@ class Feasibility:
     base_cone: BoolArray
     platform_cone: BoolArray
     drive: FloatArray
+    stroke_margin: FloatArray
+    base_cone_margin: FloatArray
+    platform_cone_margin: FloatArray
 
     LIMITS = ("reach", "stroke", "base_cone", "platform_cone")
 
@@ -75,21 +81,27 @@ def feasibility(
     on_base, on_platform : ndarray (N, limbs, 3)
         Unit vectors from anchor to platform joint, in base and platform axes.
     """
-    stroke = np.ones(drive.shape, dtype=bool)
-    base_cone, platform_cone = stroke.copy(), stroke.copy()
+    stroke, base_cone, platform_cone = (np.full(drive.shape, np.inf) for _ in range(3))
+    room = np.zeros((3, drive.shape[1]))
     for i, limb in enumerate(limbs):
         if limb.stroke is not None:
             low, high = limb.stroke
-            room = ROUNDING * (abs(low) + abs(high))
-            stroke[:, i] = (drive[:, i] >= low - room) & (drive[:, i] <= high + room)
-        base_cone[:, i] = _within(limb.base_cone, on_base[:, i])
-        platform_cone[:, i] = _within(limb.platform_cone, on_platform[:, i])
-    return Feasibility(np.isfinite(drive), stroke, base_cone, platform_cone, drive)
+            room[0, i] = abs(low) + abs(high)
+            stroke[:, i] = np.minimum(drive[:, i] - low, high - drive[:, i])
+        for k, cone, margin, direction in (
+            (1, limb.base_cone, base_cone, on_base),
+            (2, limb.platform_cone, platform_cone, on_platform),
+        ):
+            if cone is not None:
+                room[k, i] = cone.angle
+                margin[:, i] = _inside(cone, direction[:, i])
+    margins = (stroke, base_cone, platform_cone)
+    kept = [margin >= -ROUNDING * size for margin, size in zip(margins, room, strict=True)]
+    return Feasibility(
+        np.isfinite(drive), kept[0], kept[1], kept[2], drive, stroke, base_cone, platform_cone
+    )
 
 
-def _within(cone: Cone | None, direction: FloatArray) -> BoolArray:
-    if cone is None:
-        return np.ones(len(direction), dtype=bool)
+def _inside(cone: Cone, direction: FloatArray) -> FloatArray:
     across = np.linalg.norm(np.cross(cone.axis, direction), axis=-1)
-    angle = np.arctan2(across, direction @ cone.axis)
-    return np.asarray(angle <= cone.angle * (1.0 + ROUNDING))
+    return np.asarray(cone.angle - np.arctan2(across, direction @ cone.axis))

@@ -11,8 +11,6 @@ import numpy as np
 from pkmcal import screw
 from pkmcal.core import FloatArray
 
-_AXES = {3: (1.0, 0.0, 0.0), 4: (0.0, 1.0, 0.0), 5: (0.0, 0.0, 1.0)}  # of α β γ
-
 
 def cross_matrix(vector: FloatArray) -> FloatArray:
     """[v] of vectors (..., 3): the matrix of v × (.)."""
@@ -56,27 +54,6 @@ def straight(
         R @ spin @ spin
     )
     out[:, 2, :3, 3] = bend[:, None] * way
-    return out
-
-
-def of_pose(pose: FloatArray, rate: FloatArray, bend: FloatArray) -> FloatArray:
-    """The motion (N, 3, 4, 4) of poses (N, 6) and their first and second derivatives by time."""
-    out = np.zeros((len(pose), 3, 4, 4))
-    factors = []
-    for k in (5, 4, 3):  # R = Rz(γ) Ry(β) Rx(α)
-        axis = np.array(_AXES[k])
-        spin = cross_matrix(axis)
-        R = screw.exp(np.concatenate([axis, np.zeros(3)]), pose[:, k])[:, :3, :3]
-        first, second = rate[:, k, None, None], bend[:, k, None, None]
-        factors.append((R, first * (R @ spin), second * (R @ spin) + first**2 * (R @ spin @ spin)))
-    z, y, x = factors
-    zy = (z[0] @ y[0], z[1] @ y[0] + z[0] @ y[1], z[2] @ y[0] + 2 * z[1] @ y[1] + z[0] @ y[2])
-    out[:, 0, :3, :3] = zy[0] @ x[0]
-    out[:, 1, :3, :3] = zy[1] @ x[0] + zy[0] @ x[1]
-    out[:, 2, :3, :3] = zy[2] @ x[0] + 2 * zy[1] @ x[1] + zy[0] @ x[2]
-    for order, numbers in enumerate((pose, rate, bend)):
-        out[:, order, :3, 3] = numbers[:, :3]
-    out[:, 0, 3, 3] = 1.0
     return out
 
 

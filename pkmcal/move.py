@@ -11,20 +11,19 @@ from numpy.typing import ArrayLike
 
 from pkmcal import digits
 from pkmcal import motion as motions
-from pkmcal.core import FloatArray, as_rows
-from pkmcal.feasible import Feasibility
+from pkmcal.complete import complete, completed_rates
+from pkmcal.core import POSE, FloatArray, as_rows
+from pkmcal.events import Event, events
 from pkmcal.geometries import ON_THE_MANIFOLD
 from pkmcal.law import CUBIC, QUINTIC, JerkLimited, Polynomial, jerk_limited, limit
-from pkmcal.limb_kinds import KINDS
 from pkmcal.robot import Robot, require_parallel
-from pkmcal.screw import to_pose
-from pkmcal.workspace import dexterity
+from pkmcal.screw import from_pose, to_pose
+from pkmcal.workspace import dexterity, moved_coordinates
 
 _LAWS = {"cubic": CUBIC, "quintic": QUINTIC}
-_STEPS = 2000  # along a move, in search of peaks and of limits
-_HALVINGS = 50  # of a step, to the time a limit is met
+_STEPS = 2000  # along a move, in search of peaks
 
-Space = Literal["pose", "joint"]
+Space = Literal["pose", "coordinates", "joint"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +39,7 @@ class MoveSample:
     twist : ndarray (..., 6)
         (ω, v) in rad/s and mm/s, v that of the platform's origin; base axes.
     twist_rate : ndarray (..., 6)
-        Its derivative by time. NaN in a move straight in the actuators of a machine whose limbs
-        constrain the pose.
+        Its derivative by time.
     actuators, velocities, accelerations : ndarray (..., n)
         mm or rad, and s.
     """
@@ -55,28 +53,6 @@ class MoveSample:
     accelerations: FloatArray
 
 
-@dataclass(frozen=True)
-class Event:
-    """A limit that a move meets.
-
-    Attributes
-    ----------
-    time : float
-        s; when it is first broken.
-    until : float
-        s; when it is kept again, or the end of the move.
-    what : str
-        The limit: "reach", "stroke", "base_cone", "platform_cone" or "singularity".
-    limb : int or None
-        Which limb, counted from 1; None for the machine as a whole.
-    """
-
-    time: float
-    until: float
-    what: str
-    limb: int | None
-
-
 @dataclass(frozen=True, eq=False)
 class Move:
     """A move of a machine from rest to rest, made by `move`.
@@ -88,9 +64,9 @@ class Move:
     start, end : ndarray (6,)
         Poses.
     space : str
-        What is straight: "pose" or "joint".
+        What is straight: "pose", "coordinates" or "joint".
     law : Polynomial or JerkLimited
-        Of the share of the way in pose space, of the actuators in joint space.
+        Of the actuators in joint space, else of the share of the way.
     """
 
     robot: Robot
@@ -113,32 +89,19 @@ class Move:
             s.
         """
         times = np.asarray(t, dtype=np.float64)
-        made = self._in_pose if self.space == "pose" else self._in_joint
-        motion, actuators = made(times.reshape(-1))
+        made = {
+            "pose": self._in_pose,
+            "coordinates": self._in_coordinates,
+            "joint": self._in_joint,
+        }
+        motion, actuators = made[self.space](times.reshape(-1))
         twist, twist_rate = motions.twists(motion)
         found = (to_pose(motion[:, 0]), twist, twist_rate, *actuators)
         return MoveSample(times, *(each.reshape(*times.shape, -1) for each in found))
 
     def events(self) -> list[Event]:
-        """Limits that are broken and singularities that are met, with their times, in order.
-
-        Strokes, joint cones and reach of every limb; a singularity is met where the determinant of
-        the closures changes its sign, and from there the machine is on its other side.
-        """
-        times = np.linspace(0.0, self.duration, _STEPS + 1)
-        states = self._states(times)
-        found = []
-        for column, (what, limb) in enumerate(self._names()):
-            broken = states[:, column]
-            edges = np.flatnonzero(broken[1:] != broken[:-1]).tolist()
-            turns = [self._turn(times[k], times[k + 1], column, bool(broken[k])) for k in edges]
-            if broken[0]:
-                turns.insert(0, 0.0)
-            if len(turns) % 2:
-                turns.append(self.duration)
-            pairs = zip(turns[::2], turns[1::2], strict=True)
-            found += [Event(first, last, what, limb) for first, last in pairs]
-        return sorted(found, key=lambda event: event.time)
+        """Limits that are broken and singularities that are met, in order of time (`events`)."""
+        return events(self)
 
     def conditioning(self, t: ArrayLike) -> FloatArray:
         """How well the pose is held at times (...): 1 best, 0 at a singularity."""
@@ -153,7 +116,7 @@ class Move:
                        np.abs(at.accelerations[:, i]).max())  # fmt: skip
             rows.append([f"q{i + 1} [{unit}]", *(f"{number * factor:.4g}" for number in numbers)])
         title = (
-            f"{self.robot.name}: straight in {self.space} space, {self.duration:.4g} s,"
+            f"{self.robot.name}: straight in {self._straight}, {self.duration:.4g} s,"
             f" conditioning {np.min(self.conditioning(at.time)):.3g} at least"
         )
         head = ["actuator", "from", "to", "top speed [/s]", "top acceleration [/s²]"]
@@ -183,41 +146,30 @@ class Move:
         still = np.zeros_like(share)
         guess = to_pose(motions.straight(self.start, self.end, (share, still, still))[:, 0])
         own = np.ascontiguousarray(frames.inward(robot.forward(q, guess=guess).pose))
-        by_q = robot._machine.forward_jacobian(slots, own, np.ascontiguousarray(q))
-        rate = np.einsum("nij,nj->ni", by_q, velocity)
-        none = np.zeros_like(rate)
-        carried = robot._machine.rates(slots, motions.of_pose(own, rate, none))[1]
-        bend = np.einsum("nij,nj->ni", by_q, acceleration - carried)
-        if not _limbs_alone_determine(robot):
-            bend[:] = np.nan
-        motion = frames.motion_outward(motions.of_pose(own, rate, bend))
-        return motion, (q, velocity, acceleration)
+        actuators = (q, velocity, acceleration)
+        motion = robot._machine.motion(slots, own, *map(np.ascontiguousarray, actuators))[0]
+        return frames.motion_outward(motion), actuators
 
-    def _names(self) -> list[tuple[str, int | None]]:
-        limbs = range(1, len(self.robot.model.limbs) + 1)
-        names: list[tuple[str, int | None]] = [
-            (what, limb) for what in Feasibility.LIMITS for limb in limbs
-        ]
-        return [*names, ("singularity", None)]
+    def _in_coordinates(self, times: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+        robot, frames, slots = self.robot, self.robot._frames, self.robot._slots
+        share, speed, bend = (each[:, None] for each in self.law.sample(times))
+        first, last = frames.inward(np.stack([self.start, self.end]))
+        matched = [POSE.index(name) for name in moved_coordinates(robot)]
+        way = (last - first)[matched]
+        own, q = complete(
+            robot._machine, robot.model.map, slots, first + share * (last - first), matched
+        )
+        velocity, acceleration = completed_rates(
+            robot._machine, robot.model.map, slots, own, q, matched, (speed * way, bend * way)
+        )
+        motion = robot._machine.motion(slots, own, q, velocity, acceleration)[0]
+        return frames.motion_outward(motion), (q, velocity, acceleration)
 
-    def _states(self, times: FloatArray) -> FloatArray:
-        """Which limits are broken at times, (N, limits)."""
-        pose = self.sample(times).pose
-        feasible = self.robot.feasible(pose)
-        side = dexterity(self.robot, np.vstack([self.start, pose])).determinant
-        crossed = np.where(np.isfinite(side[1:]), side[1:] * side[0] <= 0, False)
-        kept = [getattr(feasible, what) for what in Feasibility.LIMITS]
-        return np.hstack([*(~each for each in kept), crossed[:, None]])
-
-    def _turn(self, low: float, high: float, column: int, before: bool) -> float:
-        """When a limit changes between two times."""
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            if bool(self._states(np.array([middle]))[0, column]) == before:
-                low = middle
-            else:
-                high = middle
-        return (low + high) / 2
+    @property
+    def _straight(self) -> str:
+        if self.space == "coordinates":
+            return " ".join(moved_coordinates(self.robot))
+        return f"{self.space} space"
 
 
 def move(
@@ -245,6 +197,8 @@ def move(
         "quintic", "cubic", or in joint space "jerk-limited".
     space : str
         "pose": the platform's origin goes straight and the platform turns about one axis (SLERP);
+        "coordinates": those that the robot file declares to match, or else its free coordinates,
+        go straight, and the machine determines the others, as by `Robot.complete`;
         "joint": the actuators go straight.
     velocity, acceleration, jerk : array_like () or (n,), optional
         Limits of the actuators, mm or rad, and s; without `duration` at least one is needed.
@@ -270,8 +224,8 @@ def move(
     """
     require_parallel(robot)
     ends = [_pose(robot, "start", start), _pose(robot, "end", end)]
-    if space not in ("pose", "joint"):
-        raise ValueError(f"space must be 'pose' or 'joint', found {space!r}")
+    if space not in ("pose", "coordinates", "joint"):
+        raise ValueError(f"space must be 'pose', 'coordinates' or 'joint', found {space!r}")
     if duration is not None and not (np.isfinite(duration) and duration > 0):
         raise ValueError(f"duration must be positive, in s; found {duration}")
     n = robot.n_actuators
@@ -282,7 +236,7 @@ def move(
     }
     q = robot.inverse(np.stack(ends))
     if law == "jerk-limited":
-        if space == "pose" or duration is not None or len(limits) < 3:
+        if space != "joint" or duration is not None or len(limits) < 3:
             raise ValueError(
                 "a jerk-limited move is straight in joint space and takes velocity, acceleration"
                 " and jerk, no duration"
@@ -326,16 +280,25 @@ def _followed(made: Move) -> Move:
         if worst > ON_THE_MANIFOLD:
             raise ValueError(
                 f"{made.robot.name} cannot follow the straight path: its closures miss by"
-                f" {worst:.3g} mm on the way; use space='joint'"
+                f" {worst:.3g} mm on the way; use space='coordinates' or 'joint'"
+            )
+    if made.space == "coordinates":
+        names = " ".join(moved_coordinates(made.robot))
+        t = np.linspace(0.0, made.duration, 101)
+        pose = made.sample(t).pose
+        lost = np.flatnonzero(~np.isfinite(pose).all(axis=1))
+        if lost.size:
+            raise ValueError(
+                f"{made.robot.name} cannot follow the path: no pose has its {names}"
+                f" {t[lost[0]]:.4g} s after the start"
+            )
+        off = np.abs(from_pose(pose[[0, -1]]) - from_pose(np.stack([made.start, made.end]))).max()
+        if off > ON_THE_MANIFOLD:
+            raise ValueError(
+                f"{made.robot.name}: the path of {names} does not"
+                f" lead from start to end but to another assembly mode"
             )
     return made
-
-
-def _limbs_alone_determine(robot: Robot) -> bool:
-    """Whether a limb an actuator holds the pose, whose other coordinates rest."""
-    plain = not any(KINDS[limb.kind].all_rows(limb.couple > 0) for limb in robot.model.limbs)
-    count = robot.n_actuators == len(robot.model.limbs) == len(robot.coordinates)
-    return plain and count and robot.model.map in ("spatial", "translation", "planar")
 
 
 def _fastest(unit: Move, limits: dict[str, FloatArray]) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cached_property
 from os import PathLike
 from typing import Any
@@ -464,8 +464,8 @@ class Robot:
         found = feasibility(self.model.limbs, drive, on_base, on_platform)
         return Feasibility(
             *(
-                getattr(found, name).reshape(*shape, len(self.model.limbs))
-                for name in (*Feasibility.LIMITS, "drive")
+                getattr(found, field.name).reshape(*shape, len(self.model.limbs))
+                for field in fields(Feasibility)
             )
         )
 

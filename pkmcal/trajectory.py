@@ -1,7 +1,8 @@
 """Trajectories: laws in time, and moves of a machine along them."""
 
+from pkmcal.events import Event
 from pkmcal.law import JerkLimited, Polynomial, cubic, jerk_limited, quintic
-from pkmcal.move import Event, Move, MoveSample, move
+from pkmcal.move import Move, MoveSample, move
 
 __all__ = [
     "Event",

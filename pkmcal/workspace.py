@@ -308,7 +308,7 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
     joints = np.abs(robot.geometry.slots[:, :6]).sum(axis=1)
     size = float(joints.max() + np.abs(robot.home[:3]).sum())
     found = {}
-    for name in _moved(robot):
+    for name in moved_coordinates(robot):
         step = np.radians(90.0) / _STEPS if name in POSE[3:] else 2 * size / _STEPS
         ends = []
         for sign in (-1.0, 1.0):
@@ -321,7 +321,7 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
     return found
 
 
-def _moved(robot: Robot) -> tuple[str, ...]:
+def moved_coordinates(robot: Robot) -> tuple[str, ...]:
     """The coordinates that determine a pose."""
     return tuple(robot.model.match or robot.coordinates)
 
@@ -338,7 +338,7 @@ def require_moved(robot: Robot, axes: Mapping[str, object]) -> None:
         raise TypeError(f"axes must map coordinates to numbers, found {type(axes).__name__}")
     if not axes:
         raise ValueError("axes names no coordinate")
-    moved = _moved(robot)
+    moved = moved_coordinates(robot)
     for name in axes:
         if name not in moved:
             known = did_you_mean(str(name), moved)

@@ -16,7 +16,6 @@ import pytest
 import pkmcal as pk
 from pkmcal import core
 from pkmcal.core import ISAS, lib
-from pkmcal.motion import of_pose
 
 from .workspaces import WORKSPACE, poses
 
@@ -74,8 +73,8 @@ def test_forward_gives_the_same_bits_on_every_isa_and_in_every_lane_and_tail(
 def test_the_other_calls_give_the_same_bits_on_every_isa_and_in_every_tail(name: str) -> None:
     at = poses(name, 203, seed=9)
     q = on(0, name).inverse(at)
-    rate, bend = np.random.default_rng(9).normal(size=(2, 203, 6))
-    motion = of_pose(at, rate, bend)
+    speed, bend = np.random.default_rng(9).normal(size=(2, *q.shape))
+    motion = on(0, name)._machine.motion(on(0, name)._slots, at, q, speed, bend)[0]
     expected: dict[str, np.ndarray] = {}
     for isa in AVAILABLE:
         robot = on(isa, name)
@@ -89,6 +88,9 @@ def test_the_other_calls_give_the_same_bits_on_every_isa_and_in_every_tail(name:
             "closure": lambda part, m=machine, s=slots: m.closure(s, at[part], q[part]),
             "limbs": lambda part, m=machine, s=slots: m.limbs(s, at[part]),
             "rates": lambda part, m=machine, s=slots: m.rates(s, motion[part]),
+            "motion": lambda part, m=machine, s=slots: m.motion(
+                s, at[part], q[part], speed[part], bend[part]
+            ),
         }
         for call, run in calls.items():
             for part in [slice(0, 203), *(slice(0, n) for n in range(1, 18)), slice(3, 203)]:

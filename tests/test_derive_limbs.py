@@ -12,9 +12,9 @@ from functools import cache
 
 import pytest
 import sympy as sp
-from pkmcal.derive import limbs
+from pkmcal.derive import limbs, rates
 
-FUNCTIONS = {f.name: f for f in limbs.functions()}
+FUNCTIONS = {f.name: f for module in (limbs, rates) for f in module.functions()}
 
 
 def symbols(name: str, size: int) -> sp.Matrix:
@@ -199,3 +199,18 @@ def test_rate_of_a_row_is_its_derivative_while_the_limb_changes(row: str) -> Non
         changing.update(zip(symbols(name, 3), symbols(f"{name}_rate", 3), strict=True))
     expected = sum(sp.diff(phi, x) * rate for x, rate in changing.items())
     assert_equal(FUNCTIONS[f"{row}_rate"].result("rate"), column([expected]))
+
+
+@pytest.mark.parametrize("driver", ["length", "slider", "crank"])
+def test_a_closure_does_not_bend_where_the_actuator_follows_the_joint(driver: str) -> None:
+    """`*_bend`, which takes any path, vanishes on the one that `*_rates` gives, and only there."""
+    first, second, h1, h2 = (symbols(name, 3) for name in ("first", "second", "h1", "h2"))
+    numbers = rational_point(column([*h, *h1, *h2, *first, *second, qt]), seed=7)
+    at = {}
+    for name in ("qt1", "qt2"):
+        value = FUNCTIONS[f"{driver}_rates"].result(name)[0].subs(numbers)
+        at[sp.Symbol(name, real=True)] = value.n(40)
+    bend = FUNCTIONS[f"{driver}_bend"].result("phi2")[0].subs(numbers)
+    assert abs(bend.subs(at).n(30)) < 1e-20
+    at[sp.Symbol("qt2", real=True)] += 1
+    assert abs(bend.subs(at).n(30)) > 1e-3

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import mpmath as mp
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import pkmcal as pk
 from pkmcal import motion as motions
@@ -15,15 +17,20 @@ from pkmcal.core import POSE
 
 from . import twin
 
-MOVED = ("rbt-6t03p", "hexapod", "6-rus", "linear-delta", "rotary-delta", "3rrr-planar")
+STRAIGHT = ("rbt-6t03p", "hexapod", "6-rus", "linear-delta", "rotary-delta", "3rrr-planar")
 CONSTRAINED = ("2tpr2tps", "2tpr2tps-spatial", "3rps")
+SHARED = ("linear-delta-6",)  # keeps its orientation, so that a straight path can be followed
+EIGHT_ROWS = Path(__file__).parents[1] / "examples" / "2tpr2tps-eight-rows.toml"
+EVERY = (*STRAIGHT, *CONSTRAINED, *SHARED)
+MOVED = [(name, space) for name in EVERY for space in ("pose", "coordinates", "joint")
+         if space != "pose" or name not in CONSTRAINED]  # fmt: skip
 
 
 def ends(robot: pk.Robot) -> np.ndarray:
     return pk.sample_poses(robot, 2, seed=1, share=0.4)
 
 
-def slope(values: Any, t: np.ndarray, h: float = 1e-3) -> np.ndarray:
+def slope(values: Any, t: np.ndarray, h: float = 4e-3) -> np.ndarray:
     """Derivative of `values(t)` by central differences of sixth order."""
     f = {k: values(t + k * h) for k in (-3, -2, -1, 1, 2, 3)}
     return np.asarray((f[3] - f[-3] - 9 * (f[2] - f[-2]) + 45 * (f[1] - f[-1])) / (60 * h))
@@ -76,8 +83,7 @@ def test_wrong_laws_are_refused(arguments: Any, words: str) -> None:
 # --- platform and actuators along a move ---------------------------------------------------------
 
 
-@pytest.mark.parametrize("space", ["pose", "joint"])
-@pytest.mark.parametrize("name", MOVED)
+@pytest.mark.parametrize(("name", "space"), MOVED)
 def test_velocities_and_accelerations_are_those_of_the_positions(name: str, space: Any) -> None:
     robot = pk.load(name)
     move = pk.trajectory.move(robot, *ends(robot), duration=2.0, space=space)
@@ -92,9 +98,10 @@ def test_velocities_and_accelerations_are_those_of_the_positions(name: str, spac
     for values, expected in pairs:
         np.testing.assert_allclose(slope(values, t), expected, atol=2e-8)
     np.testing.assert_allclose(robot.inverse(at.pose), at.actuators, atol=1e-9)
+    assert robot.violation(at.pose).max() < 1e-8
 
 
-@pytest.mark.parametrize("name", MOVED)
+@pytest.mark.parametrize("name", STRAIGHT)
 def test_velocities_are_the_jacobian_times_the_rates_of_the_pose(name: str) -> None:
     robot = pk.load(name)
     move = pk.trajectory.move(robot, *ends(robot), duration=2.0)
@@ -106,18 +113,86 @@ def test_velocities_are_the_jacobian_times_the_rates_of_the_pose(name: str) -> N
 
 
 @pytest.mark.parametrize("name", CONSTRAINED)
-def test_machines_whose_limbs_constrain_the_pose_move_straight_in_their_actuators(
+def test_machines_whose_limbs_constrain_the_pose_go_straight_in_their_own_coordinates(
     name: str,
 ) -> None:
+    """The matched coordinates are those of the law, and the first and last pose the ends."""
     robot = pk.load(name)
+    start, end = ends(robot)
     with pytest.raises(ValueError, match="cannot follow the straight path"):
-        pk.trajectory.move(robot, *ends(robot), duration=2.0)
-    move = pk.trajectory.move(robot, *ends(robot), duration=2.0, space="joint")
+        pk.trajectory.move(robot, start, end, duration=2.0)
+    move = pk.trajectory.move(robot, start, end, duration=2.0, space="coordinates")
     at = move.sample(np.linspace(0.0, 2.0, 9))
-    assert robot.violation(at.pose).max() < 1e-8
-    assert np.isnan(at.twist_rate).all()
-    velocity = slope(lambda s: move.sample(s).pose[:, :3], at.time[1:-1])
-    np.testing.assert_allclose(velocity, at.twist[1:-1, 3:], atol=1e-7)
+    matched = [POSE.index(each) for each in robot.model.match or robot.coordinates]
+    expected = pk.trajectory.quintic(start[matched], end[matched], 2.0).sample(at.time)[0]
+    np.testing.assert_allclose(at.pose[:, matched], expected, atol=1e-10)
+    np.testing.assert_allclose(at.pose[[0, -1]], [start, end], atol=1e-8)
+    assert f"straight in {' '.join(robot.model.match or robot.coordinates)}," in str(move)
+
+
+def test_coordinates_that_no_pose_has_on_the_way_are_refused() -> None:
+    robot = pk.load("2tpr2tps")
+    start, end = robot.complete([[0, 0, 400, 0, 0.2, 0], [0, 0, -400, 0, 0.2, 0]])
+    with pytest.raises(ValueError, match="cannot follow the path: no pose has its y z alpha beta"):
+        pk.trajectory.move(robot, start, end, duration=1.0, space="coordinates")
+
+
+def rotation_in_50_digits(a: Any, b: Any, g: Any) -> Any:
+    Rx = mp.matrix([[1, 0, 0], [0, mp.cos(a), -mp.sin(a)], [0, mp.sin(a), mp.cos(a)]])
+    Ry = mp.matrix([[mp.cos(b), 0, mp.sin(b)], [0, 1, 0], [-mp.sin(b), 0, mp.cos(b)]])
+    Rz = mp.matrix([[mp.cos(g), -mp.sin(g), 0], [mp.sin(g), mp.cos(g), 0], [0, 0, 1]])
+    return Rz * Ry * Rx
+
+
+def closures_in_50_digits(robot: pk.Robot, u: Any, q: Any) -> list[Any]:
+    """Spheres, constraints and pose map from their definitions, at x y z α β γ and actuators."""
+    R, rows = rotation_in_50_digits(*u[3:]), []
+    for limb, n in zip(robot.model.limbs, twin.numbers(robot.model, None), strict=True):
+        drive, base = q[limb.actuator] * n["gain"] + n["offset"], twin.base_point(n).tolist()
+        d = mp.matrix(u[:3]) + R * mp.matrix(twin.platform_point(n).tolist()) - mp.matrix(base)
+        axis = mp.matrix(limb.frame[:, 2].tolist())
+        turned = R * mp.matrix(limb.platform_frame[:, 2].tolist())
+        if limb.kind == "PUS":
+            d, drive = d - drive * axis, mp.mpf(n["rod"])
+        rows.append((mp.fdot(d, d) - drive**2) / (2 * drive))
+        if limb.kind == "RPS":
+            rows.append(mp.fdot(axis, d))
+        if limb.kind == "UPR":
+            rows.append(mp.fdot(turned, d))
+            rows += [limb.couple * mp.fdot(turned, axis)] if limb.couple else []
+    if robot.model.map == "2tpr2tps":  # A eq. 7
+        rows += [u[0] - u[2] * mp.tan(u[4]), u[5]]
+    return rows
+
+
+@pytest.mark.parametrize("name", [*CONSTRAINED, *SHARED, EIGHT_ROWS])
+def test_platforms_held_by_constraints_accelerate_as_derivatives_in_50_digits_say(
+    name: Any,
+) -> None:
+    """Forward kinematics in 50 digits at three times 1e-12 s apart, and their second difference."""
+    robot = pk.load(name)
+    start, end = ends(robot)
+    move = pk.trajectory.move(robot, start, end, duration=2.0, space="joint")
+    at = move.sample(0.7)
+    first, last = (robot.inverse(pose).tolist() for pose in (start, end))
+    frames = []
+    with mp.workdps(50):
+        h = mp.mpf("1e-12")
+        for step in (-1, 0, 1):
+            x = (mp.mpf(0.7) + step * h) / 2
+            share = 10 * x**3 - 15 * x**4 + 6 * x**5
+            q = [a + share * (mp.mpf(b) - a) for a, b in zip(first, last, strict=True)]
+            u = mp.findroot(lambda *u, q=q: closures_in_50_digits(robot, u, q), at.pose.tolist())
+            frames.append([*rotation_in_50_digits(*u[3:]).tolist(), list(u[:3])])
+        before, now, after = (mp.matrix(frame) for frame in frames)
+        velocity = np.array(((after - before) / (2 * h)).tolist(), dtype=float)
+        acceleration = np.array(((after - 2 * now + before) / h**2).tolist(), dtype=float)
+    R = twin.rotation(at.pose)
+    spin, spin_rate = (motions.cross_matrix(each[:3]) for each in (at.twist, at.twist_rate))
+    np.testing.assert_allclose(spin @ R, velocity[:3], atol=1e-12)
+    np.testing.assert_allclose((spin_rate + spin @ spin) @ R, acceleration[:3], atol=1e-11)
+    np.testing.assert_allclose(at.twist[3:], velocity[3], rtol=1e-11, atol=1e-10)
+    np.testing.assert_allclose(at.twist_rate[3:], acceleration[3], rtol=1e-11, atol=1e-10)
 
 
 def inverse_in_50_digits(robot: pk.Robot, start: np.ndarray, end: np.ndarray, limb: int) -> Any:
@@ -174,7 +249,7 @@ def test_frames_of_base_and_tool_carry_the_motion_along() -> None:
     framed = pk.Robot(replace(robot.model, base_frame=base, tool_frame=tool))
     first = framed.home
     end = np.add(first, [30, -20, 25, 0.1, 0.05, -0.1])
-    for space in ("pose", "joint"):
+    for space in ("pose", "coordinates", "joint"):
         move = pk.trajectory.move(framed, first, end, duration=1.5, space=space)  # type: ignore[arg-type]
         t = np.linspace(0.1, 1.4, 6)
         at = move.sample(t)
@@ -189,8 +264,9 @@ def test_frames_of_base_and_tool_carry_the_motion_along() -> None:
 def test_rates_out_of_reach_are_nan_as_a_row_and_wrong_shapes_are_refused() -> None:
     robot = pk.load("rbt-6t03p")
     near, far = robot.home, np.add(robot.home, [150.0, 0, 0, 0, 0, 0])  # some rods reach there
-    still = np.zeros((2, 6))
-    velocity, acceleration = robot.rates(motions.of_pose(np.stack([near, far]), still, still))
+    resting = np.zeros((2, 3, 4, 4))
+    resting[:, 0] = pk.screw.from_pose(np.stack([near, far]))
+    velocity, acceleration = robot.rates(resting)
     np.testing.assert_array_equal(velocity[0], 0.0)
     assert np.isnan(velocity[1]).all() and np.isnan(acceleration[1]).all()
     assert np.isnan(robot.inverse(far)).all()
@@ -213,17 +289,6 @@ def test_orientation_turns_about_one_axis() -> None:
     inside = at.twist[1:-1, :3]
     unit = inside / np.linalg.norm(inside, axis=1, keepdims=True)
     np.testing.assert_allclose(unit, np.broadcast_to(unit[0], unit.shape), atol=1e-12)
-
-
-def test_motion_of_a_pose_agrees_with_differences() -> None:
-    rng = np.random.default_rng(0)
-    pose, rate, bend = rng.uniform(-1, 1, (3, 6))
-    at = lambda t: pk.screw.from_pose(pose + t * rate + t * t / 2 * bend)  # noqa: E731
-    found = motions.of_pose(pose[None], rate[None], bend[None])[0]
-    h = 1e-3
-    np.testing.assert_allclose(found[0], at(0.0), atol=1e-14)
-    np.testing.assert_allclose(found[1], (at(h) - at(-h)) / (2 * h), atol=1e-6)
-    np.testing.assert_allclose(found[2], (at(h) - 2 * at(0) + at(-h)) / h**2, atol=1e-5)
 
 
 # --- the fastest move ----------------------------------------------------------------------------
@@ -288,6 +353,38 @@ def test_a_singularity_on_the_way_is_reported_where_the_determinant_changes_sign
     assert event.what == "singularity"
     assert np.degrees(move.sample(event.time).pose[5]) == pytest.approx(90.0, abs=1e-6)
     assert move.conditioning(event.time) < 1e-9
+
+
+def test_a_stroke_broken_between_two_looks_is_found() -> None:
+    """A slider that turns back 0.1 nm beyond its stroke, for √(8 · 0.1 nm / acceleration)."""
+    from dataclasses import replace
+
+    robot = pk.load("rbt-6t03p")
+    start, end = (np.add(robot.home, [x, 0, 0, 0, 0, 0]) for x in (-25.0, 30.0))
+    move = pk.trajectory.move(robot, start, end, duration=2.0)
+    assert move.events() == []
+    looks = np.linspace(0, 2, 2001)
+    for i in range(6):
+        speed = lambda t, i=i: move.sample(t).velocities[i]  # noqa: E731
+        turns = np.flatnonzero(np.diff(np.sign(move.sample(looks[1:-1]).velocities[:, i])))
+        if turns.size == 0:
+            continue
+        (k,) = turns
+        turn = brentq(speed, looks[k + 1], looks[k + 2], xtol=1e-14)
+        at = move.sample(turn)
+        far, bend = at.actuators[i], at.accelerations[i]
+        stroke = (far + 1e-7, far + 200) if bend > 0 else (far - 200, far - 1e-7)
+        limbs = list(robot.model.limbs)
+        limbs[i] = replace(limbs[i], stroke=stroke)
+        tight = pk.Robot(replace(robot.model, limbs=tuple(limbs)))
+        assert tight.feasible(move.sample(looks).pose).ok.all()
+        (event,) = pk.trajectory.move(tight, start, end, duration=2.0).events()
+        assert (event.what, event.limb) == ("stroke", i + 1)
+        assert (event.time + event.until) / 2 == pytest.approx(turn, abs=1e-7)
+        assert event.until - event.time == pytest.approx(np.sqrt(8e-7 / abs(bend)), rel=0.01)
+        break
+    else:
+        pytest.fail("no slider turns back on this path")
 
 
 def test_a_move_within_limits_has_no_events() -> None:
