@@ -23,7 +23,7 @@ ROWS = 37
 TAILS = [*(slice(0, n) for n in range(1, 18)), slice(3, ROWS), slice(0, ROWS)]
 ELSEWHERE = {
     *("inverse", "forward", "jacobian", "forward_jacobian", "error_jacobian", "closure", "limbs"),
-    *("rates", "compose", "invert", "compose_rates", "compose_twists", "normals"),
+    *("rates", "motion", "compose", "invert", "compose_rates", "compose_twists", "normals"),
     *("swarm_start", "swarm_judge", "swarm_move", "swarm_eq18"),
 }
 
