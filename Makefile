@@ -60,7 +60,7 @@ lint: $(TESTS)
 
 # the reference of all public names, from their docstrings
 docs: $(TESTS)
-	$(BIN)/pdoc -d numpy -o build/docs pkmcal
+	$(BIN)/pdoc -d numpy -o build/docs pkmcal pkmcal.kinematics
 	@echo "build/docs/pkmcal.html"
 
 # A copy of the package in a folder of its own, found before the one in $(VENV). Without the preloaded

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
 from pkmcal.core import as_rows
-from pkmcal.robot import Match, Robot, require_parallel
+from pkmcal.kinematics import Match
+from pkmcal.robot import Robot, require_parallel
 from pkmcal.seed import checked_seed
 from pkmcal.swarm import PAPER, SwarmSettings, minimise_eq18
 

@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike
 from pkmcal import digits
 from pkmcal.core import POSE, FloatArray, as_rows
 from pkmcal.geometries import ideal
-from pkmcal.robot import Match, Robot, require_parallel
+from pkmcal.kinematics import Match
+from pkmcal.robot import Robot, require_parallel
 from pkmcal.whole_file import write_whole
 from pkmcal.workspace import require_moved
 

@@ -1,33 +1,25 @@
-"""`Robot`: a machine with its geometry, its inverse and forward kinematics, their derivatives."""
+"""`Robot`: a machine with its geometry, what an error in it does, its limits and its file."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from copy import copy
 from dataclasses import fields, replace
-from functools import cached_property
 from os import PathLike
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import modes, robotfile
 from pkmcal.assemblies import Assemblies
-from pkmcal.complete import complete, matched_coordinates
-from pkmcal.core import MAPS, POSE, FloatArray, as_rows
-from pkmcal.core_machine import Machine
+from pkmcal.core import FloatArray, as_rows
 from pkmcal.feasible import Feasibility, feasibility
-from pkmcal.forward import Forward
-from pkmcal.frames import Frames
 from pkmcal.geometry import Geometry
-from pkmcal.limb_kinds import KINDS
-from pkmcal.model import Limb, Model
-
-Match = bool | str | Sequence[str] | None
+from pkmcal.kinematics import Kinematics, Match
+from pkmcal.model import Model
 
 
-class Robot:
+class Robot(Kinematics):
     """A parallel machine: immutable; `replace` gives a changed one.
 
     Made by `load`. Poses are x y z in mm and α β γ in rad with R = Rz(γ) Ry(β) Rx(α), platform to
@@ -43,21 +35,7 @@ class Robot:
     array([  0.,   0., 400.,   0.,   0.,   0.])
     """
 
-    def __init__(self, model: Model) -> None:
-        self.model = model
-        self._slots = np.ascontiguousarray(model.geometry.slots)
-        self._frames = Frames(model.base_frame, model.tool_frame)
-        self._own_home = np.ascontiguousarray(model.home, dtype=np.float64)
-        limbs = [_limb(limb) for limb in model.limbs]
-        if sum(len(limb["weights"]) for limb in limbs) == len(self.coordinates):
-            for limb in limbs:  # nothing to weigh: all closures hold
-                limb["weights"] = [1.0] * len(limb["weights"])
-        self._machine = Machine(model.map, limbs, self.length, self._slots, self._own_home)
-
-    def __reduce__(self) -> tuple[type[Robot], tuple[Model]]:
-        return Robot, (self.model,)
-
-    # what it is ---------------------------------------------------------------------------------
+    # what it is -----------------------------------------------------------------------------------
 
     @property
     def name(self) -> str:
@@ -70,336 +48,17 @@ class Robot:
         return self.model.geometry
 
     @property
-    def home(self) -> FloatArray:
-        """Home pose (6,), mm and rad: in the middle of the workspace."""
-        home: FloatArray = self._frames.outward(self._own_home[None])[0].copy()
-        return home
-
-    @property
-    def coordinates(self) -> tuple[str, ...]:
-        """The m free coordinates of its pose, in the machine's own frame."""
-        return MAPS[self.model.map]
-
-    @property
-    def n_actuators(self) -> int:
-        """Number of actuator coordinates, n."""
-        return self._machine.actuators
-
-    @property
     def actuator_units(self) -> tuple[str, ...]:
         """Unit of each actuator coordinate, "mm" or "rad"."""
         return self.model.actuator_units
 
-    @cached_property
-    def length(self) -> float:
-        """Characteristic length, mm: at this radius a rotation counts as its arc.
-
-        The root mean square distance of the platform joints from their centre, or of the base
-        points where the platform joints coincide.
-        """
-        for joints in (self._slots[:, 3:6], self._slots[:, 0:3]):
-            spread = joints - joints.mean(axis=0)
-            radius = float(np.sqrt((spread**2).sum(axis=1).mean()))
-            if radius > 1e-9 * (1.0 + float(np.abs(self._slots[:, :6]).max())):
-                return radius
-        return 1.0
+    def __reduce__(self) -> tuple[type[Robot], tuple[Model]]:
+        return Robot, (self.model,)
 
     def __repr__(self) -> str:
         return f"<Robot {self.name}: {len(self.model.limbs)} limbs, {' '.join(self.coordinates)}>"
 
-    # kinematics ---------------------------------------------------------------------------------
-
-    def inverse(self, pose: ArrayLike, match: Match = None) -> FloatArray:
-        """Actuator coordinates of a pose, limb by limb in closed form.
-
-        Parameters
-        ----------
-        pose : array_like (..., 6)
-            x y z in mm, α β γ in rad.
-        match : bool or names of coordinates, optional
-            By default the six numbers are taken as given. Where limbs constrain the pose, `match`
-            names the coordinates to keep and the machine determines the others (`complete`);
-            True takes those the robot file declares.
-
-        Returns
-        -------
-        ndarray (..., n)
-            mm or rad. A row that a limb cannot reach is NaN. Limbs that share an actuator are
-            averaged.
-
-        Raises
-        ------
-        ValueError, TypeError
-            A wrong shape, no numbers, unknown coordinates to match.
-
-        Notes
-        -----
-        Length limbs: eq. 3 of the 2TPR&2TPS paper, ‖p + R b - base‖.
-        """
-        rows, shape = self._own_rows(pose)
-        if match is None:
-            q = self._machine.inverse(self._slots, rows)
-        else:
-            q = self._completed(rows, match)[1]
-        return q.reshape(*shape, self.n_actuators)
-
-    def forward(
-        self, q: ArrayLike, guess: ArrayLike | None = None, threads: int | None = None
-    ) -> Forward:
-        """Pose at given actuator coordinates, by Newton's method on the closures (eq. 13).
-
-        Parameters
-        ----------
-        q : array_like (..., n)
-            Actuator coordinates, mm or rad.
-        guess : array_like (6,) or (..., 6), optional
-            Where to start; the home pose by default. Which assembly mode is found depends on it.
-        threads : int, optional
-            As many as pay by default.
-
-        Returns
-        -------
-        Forward
-            Pose, status, iterations and residual of each row; conditioning when asked for. A row
-            that cannot be solved is NaN and says why; it does not raise.
-
-        Raises
-        ------
-        ValueError, TypeError
-            A wrong shape, or no numbers.
-        """
-        rows, shape = as_rows("q", q, self.n_actuators)
-        if guess is None:
-            start = self._own_home
-        else:
-            start, guess_shape = self._own_rows(guess, "guess")
-            if guess_shape == ():
-                start = start[0]
-            elif guess_shape != shape:
-                try:
-                    start = np.broadcast_to(start.reshape(*guess_shape, 6), (*shape, 6))
-                except ValueError:
-                    wanted, found = (*shape, 6), (*guess_shape, 6)
-                    raise ValueError(
-                        f"guess must be (6,) or broadcast to {wanted}, found {found}"
-                    ) from None
-                start = np.ascontiguousarray(start).reshape(-1, 6)
-        own, status, iterations, residual = self._machine.forward(
-            self._slots, rows, start, threads
-        )
-        system = (*shape, self._machine.rows, self._machine.m)
-        return Forward(
-            self._frames.outward(own).reshape(*shape, 6),
-            status.reshape(shape),
-            iterations.reshape(shape),
-            residual.reshape(shape),
-            lambda: self._steps(own, rows).reshape(*system),
-            lambda: self._steps(
-                np.ascontiguousarray(np.broadcast_to(start, own.shape)), rows
-            ).reshape(*system),
-            lambda: modes.proofs(self._subject(rows), own).reshape(shape),
-        )
-
-    def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
-        """Every assembly mode at given actuator coordinates, with proof.
-
-        Every complex solution of the closures is followed from a start system where all are known
-        (parameter homotopy), each real one is certified by the theorem of Newton and Kantorovich.
-        Machines without a start system, and doubts, are given random starts, which prove nothing.
-
-        Parameters
-        ----------
-        q : array_like (n,)
-            Actuator coordinates, mm or rad.
-        starts : int, optional
-            Random starts of Newton's method. By default none where the paths prove that no mode is
-            missing, otherwise 2000.
-
-        Returns
-        -------
-        Assemblies
-            ``.poses`` (k, 6), nearest to home first, ``.certified`` (k,), ``.complete``.
-
-        Raises
-        ------
-        ValueError, TypeError
-            A wrong shape, or no numbers.
-
-        Examples
-        --------
-        >>> import pkmcal as pk
-        >>> modes = pk.load("2tpr2tps").forward_all([450.0, 452.0, 400.0, 405.0])
-        >>> len(modes), bool(modes.certified.all()), modes.complete
-        (8, True, True)
-        """
-        rows, shape = as_rows("q", q, self.n_actuators)
-        if shape != ():
-            raise ValueError(f"q must have shape ({self.n_actuators},), found {np.shape(q)}")
-        if starts is not None and (isinstance(starts, bool) or starts < 0):
-            raise ValueError(f"starts must be a whole number from 0 or None, found {starts!r}")
-        subject = self._subject(rows[0])
-        found = modes.find(subject, starts)
-        apart = modes.distance(found.poses, self._own_home[None], self.length)
-        own = np.ascontiguousarray(found.poses[np.argsort(apart)])
-        poses = self._frames.outward(own)
-
-        def led(pose: FloatArray, actuators: ArrayLike | None, steps: int) -> FloatArray:
-            own = self._frames.inward(pose[None])
-            if actuators is None:
-                begin = self._machine.inverse(self._slots, own)
-            else:
-                begin = as_rows("actuators", actuators, self.n_actuators)[0]
-            end = modes.led(subject, own, begin, steps)
-            outward: FloatArray = self._frames.outward(end)[0]
-            return outward
-
-        return modes.assemblies(
-            subject,
-            found,
-            poses,
-            np.argsort(apart),
-            _apart=lambda pose: modes.distance(own, self._frames.inward(pose), self.length),
-            _feasible=lambda: self.feasible(poses).ok,
-            _led=led,
-        )
-
-    def jacobian(self, pose: ArrayLike) -> FloatArray:
-        """∂q/∂(free coordinates), limb by limb (eq. 12 for the 2TPR&2TPS).
-
-        Parameters
-        ----------
-        pose : array_like (..., 6)
-            On the machine's pose map: only the free coordinates are read.
-
-        Returns
-        -------
-        ndarray (..., n, m)
-            mm or rad of the actuator per mm or rad of the coordinate, in the order of
-            `coordinates`. NaN where a limb does not reach, and at a type-1 singularity: a rod at
-            right angles to its slider, or in line with its crank. The coordinates are those of the
-            machine's own frames, without the base and tool frames that its file may state.
-        """
-        rows, shape = self._own_rows(pose)
-        n, m = self.n_actuators, len(self.coordinates)
-        return self._machine.jacobian(self._slots, rows).reshape(*shape, n, m)
-
-    def forward_jacobian(self, pose: ArrayLike) -> FloatArray:
-        """∂(free coordinates)/∂q.
-
-        Parameters
-        ----------
-        pose : array_like (..., 6)
-            x y z in mm, α β γ in rad.
-
-        Returns
-        -------
-        ndarray (..., m, n)
-            NaN at a type-2 singularity. The coordinates are those of the machine's own frames,
-            without the base and tool frames that its file may state.
-        """
-        rows, shape = self._own_rows(pose)
-        q = self._machine.inverse(self._slots, rows)
-        by_q = self._machine.forward_jacobian(self._slots, rows, q)
-        free = [POSE.index(name) for name in self.coordinates]
-        return by_q[:, free].reshape(*shape, len(free), self.n_actuators)
-
-    def rates(self, motion: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Velocity and acceleration of the actuators as the platform moves, limb by limb.
-
-        The closed-form inverse differentiated twice by time: exact, with dJ/dt in it.
-
-        Parameters
-        ----------
-        motion : array_like (..., 3, 4, 4)
-            The platform's homogeneous matrix and its first and second derivative by time; mm, s.
-
-        Returns
-        -------
-        velocity, acceleration : ndarray (..., n)
-            mm or rad, and s. Limbs that share an actuator are averaged, as by `inverse`; NaN out
-            of reach.
-
-        Raises
-        ------
-        ValueError, TypeError
-            A wrong shape, or no numbers.
-
-        Examples
-        --------
-        Straight up at 10 mm/s, which six vertical sliders follow:
-
-        >>> import pkmcal as pk
-        >>> motion = np.zeros((3, 4, 4))
-        >>> motion[0], motion[1, 2, 3] = np.eye(4), 10.0
-        >>> velocity, acceleration = pk.load("rbt-6t03p").rates(motion)
-        >>> bool(abs(velocity - 10).max() < 1e-9), bool(abs(acceleration).max() < 1e-9)
-        (True, True)
-        """
-        given = np.asarray(motion)
-        if given.shape[-3:] != (3, 4, 4):
-            raise ValueError(f"motion must have shape (..., 3, 4, 4), found {given.shape}")
-        rows, _ = as_rows("motion", given, 4)
-        own = self._frames.motion_inward(rows.reshape(-1, 3, 4, 4))
-        velocity, acceleration = self._machine.rates(self._slots, np.ascontiguousarray(own))
-        shape = (*given.shape[:-3], self.n_actuators)
-        return velocity.reshape(shape), acceleration.reshape(shape)
-
-    def error_jacobian(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
-        """∂pose/∂geometry with the actuators held: what a small error of each number does.
-
-        Parameters
-        ----------
-        pose : array_like (..., 6)
-            x y z in mm, α β γ in rad.
-        actuators : array_like (..., n), optional
-            The coordinates that lead to these poses; the inverse of the pose by default.
-
-        Returns
-        -------
-        ndarray (..., 6, p)
-            In the order of ``geometry.names``. The column of a tied number says what that number
-            alone would do; the column of a parameter what it does through all its ties.
-            NaN at a type-2 singularity.
-        """
-        given, own, q, shape = self._visited(pose, actuators)
-        errors = self._by_numbers(own, q, twists=False)
-        errors = self._through_ties(self._frames.rates_outward(own, given, errors))
-        return errors.reshape(*shape, 6, len(self.geometry))
-
-    def error_twists(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
-        """`error_jacobian` with the motion as a twist, which is regular at every orientation.
-
-        Parameters
-        ----------
-        pose, actuators : array_like
-            As for `error_jacobian`.
-
-        Returns
-        -------
-        ndarray (..., 6, p)
-            The platform's turning, then the velocity of its origin, both in base axes, by each
-            number: rad and mm per mm or rad. NaN at a type-2 singularity.
-
-        Examples
-        --------
-        >>> import pkmcal as pk
-        >>> robot = pk.load("hexapod")
-        >>> upright = [0, 0, 850, 0, 0, 0]  # where α β γ turn about the axes
-        >>> twists, rates = robot.error_twists(upright), robot.error_jacobian(upright)
-        >>> bool(abs(twists[[3, 4, 5, 0, 1, 2]] - rates).max() < 1e-12)
-        True
-        """
-        _, own, q, shape = self._visited(pose, actuators)
-        errors = self._by_numbers(own, q, twists=True)
-        errors = self._through_ties(self._frames.twists_outward(own, errors))
-        return errors.reshape(*shape, 6, len(self.geometry))
-
-    def visited(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
-        """Pose, actuator coordinates and batch shape of poses (..., 6)."""
-        rows, _, q, shape = self._visited(places, None)
-        return rows, q, shape
-
-    # poses the machine can take -----------------------------------------------------------------
+    # poses the machine can take -------------------------------------------------------------------
 
     def complete(self, pose: ArrayLike, match: Match = True) -> FloatArray:
         """The pose the machine takes when some coordinates are to be kept.
@@ -469,7 +128,153 @@ class Robot:
             )
         )
 
-    # changing and saving ------------------------------------------------------------------------
+    def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
+        """Every assembly mode at given actuator coordinates, with proof.
+
+        Every complex solution of the closures is followed from a start system where all are known
+        (parameter homotopy), each real one is certified by the theorem of Newton and Kantorovich.
+        Machines without a start system, and doubts, are given random starts, which prove nothing.
+
+        Parameters
+        ----------
+        q : array_like (n,)
+            Actuator coordinates, mm or rad.
+        starts : int, optional
+            Random starts of Newton's method. By default none where the paths prove that no mode is
+            missing, otherwise 2000.
+
+        Returns
+        -------
+        Assemblies
+            ``.poses`` (k, 6), nearest to home first, ``.certified`` (k,), ``.complete``.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A wrong shape, or no numbers.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> modes = pk.load("2tpr2tps").forward_all([450.0, 452.0, 400.0, 405.0])
+        >>> len(modes), bool(modes.certified.all()), modes.complete
+        (8, True, True)
+        """
+        rows, shape = as_rows("q", q, self.n_actuators)
+        if shape != ():
+            raise ValueError(f"q must have shape ({self.n_actuators},), found {np.shape(q)}")
+        if starts is not None and (isinstance(starts, bool) or starts < 0):
+            raise ValueError(f"starts must be a whole number from 0 or None, found {starts!r}")
+        subject = self._subject(rows[0])
+        found = modes.find(subject, starts)
+        apart = modes.distance(found.poses, self._own_home[None], self.length)
+        own = np.ascontiguousarray(found.poses[np.argsort(apart)])
+        poses = self._frames.outward(own)
+
+        def led(pose: FloatArray, actuators: ArrayLike | None, steps: int) -> FloatArray:
+            own = self._frames.inward(pose[None])
+            if actuators is None:
+                begin = self._machine.inverse(self._slots, own)
+            else:
+                begin = as_rows("actuators", actuators, self.n_actuators)[0]
+            end = modes.led(subject, own, begin, steps)
+            outward: FloatArray = self._frames.outward(end)[0]
+            return outward
+
+        return modes.assemblies(
+            subject,
+            found,
+            poses,
+            np.argsort(apart),
+            _apart=lambda pose: modes.distance(own, self._frames.inward(pose), self.length),
+            _feasible=lambda: self.feasible(poses).ok,
+            _led=led,
+        )
+
+    # errors of its geometry -----------------------------------------------------------------------
+
+    def error_jacobian(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
+        """∂pose/∂geometry with the actuators held: what a small error of each number does.
+
+        Parameters
+        ----------
+        pose : array_like (..., 6)
+            x y z in mm, α β γ in rad.
+        actuators : array_like (..., n), optional
+            The coordinates that lead to these poses; the inverse of the pose by default.
+
+        Returns
+        -------
+        ndarray (..., 6, p)
+            In the order of ``geometry.names``. The column of a tied number says what that number
+            alone would do; the column of a parameter what it does through all its ties.
+            NaN at a type-2 singularity.
+        """
+        given, own, q, shape = self._visited(pose, actuators)
+        errors = self._by_numbers(own, q, twists=False)
+        errors = self._through_ties(self._frames.rates_outward(own, given, errors))
+        return errors.reshape(*shape, 6, len(self.geometry))
+
+    def error_twists(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
+        """`error_jacobian` with the motion as a twist, which is regular at every orientation.
+
+        Parameters
+        ----------
+        pose, actuators : array_like
+            As for `error_jacobian`.
+
+        Returns
+        -------
+        ndarray (..., 6, p)
+            The platform's turning, then the velocity of its origin, both in base axes, by each
+            number: rad and mm per mm or rad. NaN at a type-2 singularity.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")
+        >>> upright = [0, 0, 850, 0, 0, 0]  # where α β γ turn about the axes
+        >>> twists, rates = robot.error_twists(upright), robot.error_jacobian(upright)
+        >>> bool(abs(twists[[3, 4, 5, 0, 1, 2]] - rates).max() < 1e-12)
+        True
+        """
+        _, own, q, shape = self._visited(pose, actuators)
+        errors = self._by_numbers(own, q, twists=True)
+        errors = self._through_ties(self._frames.twists_outward(own, errors))
+        return errors.reshape(*shape, 6, len(self.geometry))
+
+    def visited(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+        """Pose, actuator coordinates and batch shape of poses (..., 6)."""
+        rows, _, q, shape = self._visited(places, None)
+        return rows, q, shape
+
+    def _visited(
+        self, pose: ArrayLike, actuators: ArrayLike | None
+    ) -> tuple[FloatArray, FloatArray, FloatArray, tuple[int, ...]]:
+        """Poses as given and the machine's own, their actuators, and the batch's shape."""
+        given, shape = as_rows("pose", pose, 6)
+        own = self._frames.inward(given)
+        if actuators is None:
+            return given, own, self._machine.inverse(self._slots, own), shape
+        q, q_shape = as_rows("actuators", actuators, self.n_actuators)
+        if q_shape != shape:
+            raise ValueError(f"actuators are a batch {q_shape}, poses a batch {shape}")
+        return given, own, q, shape
+
+    def _by_numbers(self, own: FloatArray, q: FloatArray, twists: bool) -> FloatArray:
+        """How the machine's own pose follows each number of each limb, (N, 6, numbers)."""
+        columns = self.geometry.slot_index.astype(np.int32)
+        return self._machine.error_jacobian(self._slots, own, q, columns, twists)
+
+    def _through_ties(self, errors: FloatArray) -> FloatArray:
+        """The same (N, 6, p) with the columns of named parameters after those of the numbers."""
+        count = len(self.geometry) - errors.shape[2]
+        if not count:
+            return errors
+        named = errors @ self.geometry.chain[:, -count:]
+        return np.concatenate([errors, named], axis=-1)
+
+    # changing and saving --------------------------------------------------------------------------
 
     def replace(self, changes: Mapping[str, float] | FloatArray) -> Robot:
         """A robot with some numbers of its geometry changed.
@@ -507,77 +312,6 @@ class Robot:
             Lines for its head, each with its ``#``.
         """
         robotfile.write(self.model, path, comment)
-
-    # --------------------------------------------------------------------------------------------
-
-    def _visited(
-        self, pose: ArrayLike, actuators: ArrayLike | None
-    ) -> tuple[FloatArray, FloatArray, FloatArray, tuple[int, ...]]:
-        """Poses as given and the machine's own, their actuators, and the batch's shape."""
-        given, shape = as_rows("pose", pose, 6)
-        own = self._frames.inward(given)
-        if actuators is None:
-            return given, own, self._machine.inverse(self._slots, own), shape
-        q, q_shape = as_rows("actuators", actuators, self.n_actuators)
-        if q_shape != shape:
-            raise ValueError(f"actuators are a batch {q_shape}, poses a batch {shape}")
-        return given, own, q, shape
-
-    def _by_numbers(self, own: FloatArray, q: FloatArray, twists: bool) -> FloatArray:
-        """How the machine's own pose follows each number of each limb, (N, 6, numbers)."""
-        columns = self.geometry.slot_index.astype(np.int32)
-        return self._machine.error_jacobian(self._slots, own, q, columns, twists)
-
-    def _through_ties(self, errors: FloatArray) -> FloatArray:
-        """The same (N, 6, p) with the columns of named parameters after those of the numbers."""
-        count = len(self.geometry) - errors.shape[2]
-        if not count:
-            return errors
-        named = errors @ self.geometry.chain[:, -count:]
-        return np.concatenate([errors, named], axis=-1)
-
-    def _own_rows(self, pose: ArrayLike, name: str = "pose") -> tuple[FloatArray, tuple[int, ...]]:
-        """Poses of the user as rows of the machine's own, and the batch's shape."""
-        rows, shape = as_rows(name, pose, 6)
-        return self._frames.inward(rows), shape
-
-    def _completed(self, rows: FloatArray, match: Match) -> tuple[FloatArray, FloatArray]:
-        if match is None:
-            raise ValueError("match must be True or names of coordinates, found None")
-        places = matched_coordinates(match, self.model.match, self.coordinates)
-        return complete(self._machine, self.model.map, self._slots, rows, places)
-
-    def _subject(self, q: FloatArray) -> modes.Subject:
-        """What certificates and searches for modes need, at coordinates (n,) or (N, n)."""
-        limbs = self.model.limbs
-        return modes.Subject(
-            self._machine,
-            self.model.map,
-            [KINDS[limb.kind].all_rows(limb.couple > 0) for limb in limbs],
-            [limb.couple for limb in limbs],
-            self.length,
-            self._slots,
-            q,
-        )
-
-    def _steps(self, own: FloatArray, q: FloatArray) -> FloatArray:
-        """Closure rows by a scaled twist, (N, rows, m)."""
-        return self._machine.closure(self._slots, own, q).by_step
-
-
-def _limb(limb: Limb) -> dict[str, Any]:
-    kind = KINDS[limb.kind]
-    rows = kind.all_rows(limb.couple > 0)
-    return {
-        "driver": kind.driver,
-        "rows": rows,
-        "actuator": limb.actuator,
-        "branch": limb.branch,
-        "frame": limb.frame,
-        "platform_frame": limb.platform_frame,
-        "lever": limb.couple,
-        "weights": [1.0, *(limb.weights or [1.0] * len(rows))],
-    }
 
 
 def require_parallel(robot: object, name: str = "robot") -> None:
