@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import digits
+from pkmcal.arguments import number, words
 from pkmcal.core import POSE, FloatArray
 from pkmcal.geometries import ideal
 from pkmcal.robot import Robot, require_parallel
@@ -267,7 +268,7 @@ def _limits(allowed: Allowed) -> dict[str, float]:
     for name, limit in given.items():
         if name not in known:
             raise ValueError(f"allowed: {name!r} is no error of a pose{did_you_mean(name, known)}")
-        _positive(f"allowed {name}", limit)
+        number(f"allowed {name}", limit, above=0)
     if not given:
         raise ValueError("allowed must limit something, found nothing")
     return {name: float(limit) for name, limit in given.items()}
@@ -285,11 +286,11 @@ def _groups(robot: Robot, joints: str | Sequence[str] | None) -> dict[str, list[
         joints = list(dict.fromkeys(_JOINT.sub(r"\1.*", name) for name in lengths))
     groups: dict[str, list[int]] = {}
     owner: dict[str, str] = {}
-    joints = [joints] if isinstance(joints, str) else list(joints)
+    joints = words("joints", joints)
     if not joints:
         raise ValueError("joints: name at least one")
     for joint in joints:
-        names = geometry.match(joint)
+        names = geometry.match(joint, "joints")
         places = [geometry.names.index(name) for name in names]
         if len({geometry.units[place] for place in places}) > 1:
             raise ValueError(f"joints: {joint!r} covers lengths and other numbers; name them apart")
@@ -306,12 +307,5 @@ def _weights(cost: float | Mapping[str, float], groups: Mapping[str, list[int]])
     for name, weight in given.items():
         if name not in groups:
             raise ValueError(f"cost: {name!r} is none of the joints{did_you_mean(name, groups)}")
-        _positive(f"cost of {name}", weight)
+        number(f"cost of {name}", weight, above=0)
     return np.array([float(given.get(name, 1.0)) for name in groups])
-
-
-def _positive(name: str, value: float) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise TypeError(f"{name} must be a number, found {value!r}")
-    if not (np.isfinite(value) and value > 0):
-        raise ValueError(f"{name} must be finite and above 0, found {value}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any, cast
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import core_serial
+from pkmcal.arguments import instance, words
 from pkmcal.core import FloatArray, IntArray, as_rows
 from pkmcal.robot import Robot
 from pkmcal.serial import ERRORS, SerialArm
@@ -34,7 +35,7 @@ class ArmGeometry:
     units: tuple[str, ...]
     values: FloatArray
 
-    def match(self, patterns: str | Sequence[str]) -> list[str]:
+    def match(self, patterns: str | Iterable[str], argument: str = "") -> list[str]:
         """Find names and wildcards, each name once, in the order of the patterns.
 
         Raises
@@ -43,11 +44,12 @@ class ArmGeometry:
             A pattern that matches nothing.
         """
         found: dict[str, None] = {}
-        for pattern in [patterns] if isinstance(patterns, str) else patterns:
+        for pattern in words(argument or "patterns", patterns):
             hits = [name for name in self.names if fnmatchcase(name, pattern)]
             if not hits:
                 known = did_you_mean(pattern, self.names)
-                raise ValueError(f"no joint error matches {pattern!r}{known}")
+                lead = f"{argument}: " if argument else ""
+                raise ValueError(f"{lead}no joint error matches {pattern!r}{known}")
             found.update(dict.fromkeys(hits))
         return list(found)
 
@@ -121,7 +123,11 @@ class ArmMachine:
 
 def as_machine(robot: Robot | SerialArm) -> Robot:
     """The robot itself, or an arm behind the face of one."""
-    return cast(Robot, ArmMachine(robot)) if isinstance(robot, SerialArm) else robot
+    if isinstance(robot, SerialArm):
+        return cast(Robot, ArmMachine(robot))
+    if isinstance(cast(Any, robot), ArmMachine):
+        return robot
+    return instance("robot", robot, Robot, " or SerialArm")
 
 
 def as_given(robot: Robot) -> Robot:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from pkmcal import robotfile, screw
+from pkmcal import arguments, robotfile, screw
 from pkmcal.core import POSE, FloatArray
 from pkmcal.limb_kinds import Unit
 from pkmcal.robotfile_write import lines
@@ -73,7 +73,7 @@ def write(arm: SerialArm, path: str | os.PathLike[str], comment: str = "") -> No
         if any(error.values()):
             joint["error"] = error
         blocks.append("[[joint]]\n" + lines(joint))
-    write_whole(path, comment + "\n".join(blocks))
+    write_whole(path, arguments.comment(comment) + "\n".join(blocks))
 
 
 def _joints(top: Table) -> list[Mapping[str, Any]]:

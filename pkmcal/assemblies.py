@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pkmcal.arguments import whole
 from pkmcal.core import FloatArray, IntArray, as_rows
 from pkmcal.geometry import BoolArray
 
@@ -109,7 +110,7 @@ class Assemblies:
         rows, shape = as_rows("pose", pose, 6)
         if shape != ():
             raise ValueError(f"pose must have shape (6,), found {(*shape, 6)}")
-        end = self._led(rows[0], actuators, steps)
+        end = self._led(rows[0], actuators, whole("steps", steps, 1))
         if not np.isfinite(end).all() or not len(self):
             return None
         apart = self._apart(end[None])

@@ -19,10 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pkmcal import digits
+from pkmcal.arguments import executor as checked_executor
+from pkmcal.arguments import instance, whole
 from pkmcal.equations import Equations, Point
 from pkmcal.estimate import Estimate
 from pkmcal.identification import Identification
 from pkmcal.search import Search
+from pkmcal.seed import checked_seed
 
 FloatArray = NDArray[np.float64]
 
@@ -126,14 +129,15 @@ def bootstrap(
     >>> bool((abs(pk.bootstrap(found, 200).stderr / found.stderr - 1) < 0.5).all())
     True
     """
-    if isinstance(replicates, bool) or not isinstance(replicates, int) or replicates < 2:
-        raise ValueError(f"replicates must be a whole number from 2, found {replicates!r}")
+    instance("found", found, Identification)
+    whole("replicates", replicates, 2)
     if not (found._estimate.freedom > 0).all() or not np.isfinite(found._told).all():
         raise ValueError("found: no equation is left over whose residual could be drawn again")
-    seeds = np.random.SeedSequence(seed).spawn(replicates)
+    seeds = np.random.SeedSequence(checked_seed(seed)).spawn(replicates)
     parts = [seeds[k : k + _TOGETHER] for k in range(0, replicates, _TOGETHER)]
+    workers = checked_executor(executor)
     replicate = Replicate(found._equations, found._estimate)
-    done: Iterable[FloatArray] = (executor.map if executor else map)(replicate, parts)
+    done: Iterable[FloatArray] = (workers.map if workers else map)(replicate, parts)
     values = np.concatenate(list(done))
     good = values[np.isfinite(values).all(axis=1)]
     if len(good) < 2:

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
-from pkmcal.core import as_rows
+from pkmcal.arguments import flag, instance, whole, word
+from pkmcal.core import as_numbers, as_rows
 from pkmcal.kinematics import Match
 from pkmcal.robot import Robot, require_parallel
 from pkmcal.seed import checked_seed
@@ -171,20 +172,16 @@ def compensate(
     array([[-0.2,  0. ,  0. ,  0. ,  0. ,  0. ]])
     """
     require_parallel(robot)
-    if method not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}; found {method!r}")
-    if orientation not in ORIENTATIONS:
-        raise ValueError(
-            f"orientation must be one of {', '.join(ORIENTATIONS)}; found {orientation!r}"
-        )
+    word("method", method, METHODS)
+    word("orientation", orientation, ORIENTATIONS)
+    flag("common", common)
+    instance("swarm", swarm, SwarmSettings)
     if orientation == "from-position" and robot.model.map != "2tpr2tps":
         raise ValueError(
             "orientation='from-position' is for machines whose position tells their orientation,"
             f" those of the pose map 2tpr2tps; {robot.name} has the map {robot.model.map}"
         )
-    if isinstance(passes, bool) or not isinstance(passes, int) or passes < 1:
-        raise ValueError(f"passes must be a whole number from 1, found {passes!r}")
-    if passes > 1 and not callable(measured):
+    if whole("passes", passes, 1) > 1 and not callable(measured):
         raise ValueError("passes: more than one needs measured to be a function of the commands")
     poses, shape = as_rows("desired", desired, 6)
     if len(shape) != 1 or not len(poses):
@@ -227,8 +224,8 @@ def _mean(off: FloatArray) -> FloatArray:
 
 
 def _half_width(bounds: ArrayLike, n: int) -> FloatArray:
-    given = np.asarray(bounds)
-    if given.dtype.kind not in "iuf" or given.shape not in ((), (n,)):
+    given = as_numbers("bounds", bounds, n)
+    if given.shape not in ((), (n,)):
         raise ValueError(f"bounds must be a number or have shape ({n},), found {bounds!r}")
     if not (np.isfinite(given) & (given > 0)).all():
         raise ValueError(f"bounds must be finite and positive, found {bounds!r}")
@@ -257,7 +254,7 @@ def _by_swarm(
 
 def _pose_of(reached: ArrayLike, desired: FloatArray, orientation: str) -> FloatArray:
     """The measured poses, their orientation from where `orientation` says."""
-    given = np.asarray(reached)
+    given = as_numbers("measured", reached, 6)
     width = given.shape[-1] if given.ndim else 0
     if orientation != "measured" and width == 3:
         rows, shape = as_rows("measured", given, 3)

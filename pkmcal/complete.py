@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pkmcal.arguments import words
 from pkmcal.core import MAPS, POSE, FloatArray
 from pkmcal.core_machine import Closure, Machine
 from pkmcal.geometry import BoolArray
@@ -34,10 +35,10 @@ def matched_coordinates(
     elif match is False or match is None:
         raise ValueError(f"match must be True or names of coordinates, found {match!r}")
     else:
-        names = (match,) if isinstance(match, str) else tuple(match)
+        names = words("match", match)
     for name in names:
         if name not in POSE:
-            raise ValueError(f"match: {name!r} is no coordinate{did_you_mean(str(name), POSE)}")
+            raise ValueError(f"match: {name!r} is no coordinate{did_you_mean(name, POSE)}")
     if len(set(names)) != len(names):
         raise ValueError(f"match: a coordinate is named twice in {', '.join(names)}")
     return [POSE.index(name) for name in names]

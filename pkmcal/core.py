@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal._core import ffi, lib
+from pkmcal.arguments import shown, whole
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -73,7 +74,9 @@ def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:
     except ValueError:
         raise ValueError(f"{name} must have shape (..., {last}), found a ragged list") from None
     if given.dtype.kind not in "iuf":
-        raise TypeError(f"{name} must be an array of numbers, found dtype {given.dtype}")
+        alone = not isinstance(array, np.ndarray | list | tuple)
+        found = shown(array) if alone else f"dtype {given.dtype}"
+        raise TypeError(f"{name} must be an array of numbers, found {found}")
     return given
 
 
@@ -125,8 +128,8 @@ def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) 
     if threads is None:
         threads = rows // ROWS_PER_THREAD
         threads = min(threads, len(os.sched_getaffinity(0))) if threads > 1 else 1
-    elif isinstance(threads, bool) or not isinstance(threads, int) or threads < 1:
-        raise ValueError(f"threads must be a whole number from 1 or None, found {threads!r}")
+    else:
+        threads = min(whole("threads", threads, 1, note=" or None"), max(rows, 1))
     if threads == 1:
         return ensure(call(0, rows))
     edges = [rows * k // threads for k in range(threads + 1)]

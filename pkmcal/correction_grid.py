@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import digits
+from pkmcal.arguments import word
 from pkmcal.core import POSE, FloatArray, as_rows
 from pkmcal.geometries import ideal
 from pkmcal.kinematics import Match
@@ -178,8 +179,7 @@ def correction_grid(
     >>> found.at(robot.home).round(6) + 0.0
     array([-0.1,  0. ,  0. ])
     """
-    if method not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}; found {method!r}")
+    word("method", method, METHODS)
     require_parallel(robot)
     require_parallel(calibrated, "calibrated")
     if calibrated.actuator_units != robot.actuator_units:

@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal import arguments
 from pkmcal.suggest import did_you_mean
 
 # What one unit is in mm, in rad: (multiply by, divide by), so that 1 um is 1/1000 mm exactly.
@@ -83,7 +84,7 @@ class Table:
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
-        self.path = Path(path)
+        self.path = arguments.path("path", path)
         self._separator = ""
         if self.path.suffix.lower() in (".xlsx", ".xlsm", ".xls"):
             from pkmcal.xlsx_rows import xlsx_rows

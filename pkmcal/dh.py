@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import screw
-from pkmcal.core import FloatArray
-from pkmcal.suggest import did_you_mean
+from pkmcal.arguments import word
+from pkmcal.core import FloatArray, as_numbers
 
 CONVENTIONS = ("standard", "modified")
 
@@ -19,15 +19,11 @@ def screws_of(
 
     A DH transform is two screws: one along x (a, α), one along the joint's axis z (d, θ).
     """
-    if convention not in CONVENTIONS:
-        known = did_you_mean(str(convention), CONVENTIONS)
-        raise ValueError(f"convention: {convention!r} is unknown{known}")
+    word("convention", convention, CONVENTIONS)
     given = {"a": a, "alpha": alpha, "d": d, "theta": theta}
     columns = {}
     for name, value in given.items():
-        column = np.asarray(value)
-        if column.dtype.kind not in "iuf":
-            raise TypeError(f"{name} must be numbers, found dtype {column.dtype}")
+        column = as_numbers(name, value, "n")
         if column.ndim > 1 or not np.isfinite(column).all():
             raise ValueError(f"{name} must be a number or finite numbers (n,), found {value!r}")
         columns[name] = column

@@ -6,7 +6,6 @@ follows from named parameters (``radius``); it can be read but not replaced.
 
 from __future__ import annotations
 
-import math
 from collections.abc import ItemsView, Iterable, Iterator, Mapping, Sequence
 from fnmatch import fnmatchcase
 from functools import cached_property
@@ -15,7 +14,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pkmcal.core import SLOTS
+from pkmcal.arguments import number, words
+from pkmcal.core import SLOTS, as_numbers
 from pkmcal.limb_kinds import Unit
 from pkmcal.suggest import did_you_mean
 from pkmcal.ties import LimbNumber, Term, Tie
@@ -237,18 +237,16 @@ class Geometry:
             A value that is no number.
         """
         if not isinstance(changes, Mapping):
-            return self._replace_all(np.asarray(changes))
+            return self._replace_all(as_numbers("changes", changes, len(self)))
         values = self._values.copy()
         for name, value in changes.items():
             self.require_own(name)
-            values[self._layout.index[name]] = _number(name, value)
+            values[self._layout.index[name]] = number(name, value)
         return Geometry._make(self._layout, values)
 
     def _replace_all(self, values: NDArray[np.generic]) -> Geometry:
-        if values.dtype.kind not in "iuf":
-            raise TypeError(f"changes: must be numbers, found an array of {values.dtype}")
         if values.shape != (len(self),):
-            raise ValueError(f"changes: must have shape ({len(self)},), found {values.shape}")
+            raise ValueError(f"changes must have shape ({len(self)},), found {values.shape}")
         if not np.isfinite(values).all():
             name = self.names[int(np.flatnonzero(~np.isfinite(values))[0])]
             raise ValueError(f"changes: {name} must be finite, found {values[self._at(name)]}")
@@ -262,7 +260,7 @@ class Geometry:
         try:
             return self._layout.index[name]
         except (KeyError, TypeError):
-            known = did_you_mean(str(name), self.names)
+            known = did_you_mean(name, self.names)
             raise ValueError(f"the geometry has no number {name!r}{known}") from None
 
     def require_own(self, name: str) -> None:
@@ -278,13 +276,15 @@ class Geometry:
                 f"(replace {'that' if one else 'those'} instead)"
             )
 
-    def match(self, patterns: str | Sequence[str]) -> list[str]:
+    def match(self, patterns: str | Iterable[str], argument: str = "") -> list[str]:
         """Find the names that can be replaced and match one of the patterns.
 
         Parameters
         ----------
         patterns : sequence of str
             Names, or wildcards: ``*`` any characters, ``?`` one, ``[12]`` one of these.
+        argument : str, optional
+            What messages call them.
 
         Returns
         -------
@@ -303,10 +303,7 @@ class Geometry:
         ['rod1']
         """
         found: dict[str, None] = {}
-        one = isinstance(patterns, str) or not isinstance(patterns, Iterable)
-        for pattern in [patterns] if one else patterns:
-            if not isinstance(pattern, str):
-                raise TypeError(f"numbers of the geometry go by name, found {pattern!r}")
+        for pattern in words(argument or "patterns", patterns):
             if pattern in self:
                 self.require_own(pattern)
                 found[pattern] = None
@@ -314,19 +311,10 @@ class Geometry:
             hits = [name for name in self.names if fnmatchcase(name, pattern)]
             if not hits:
                 known = did_you_mean(pattern, self.names)
-                raise ValueError(f"no number of the geometry matches {pattern!r}{known}")
+                lead = f"{argument}: " if argument else ""
+                raise ValueError(f"{lead}no number of the geometry matches {pattern!r}{known}")
             own = [name for name in hits if not self.tied[self._layout.index[name]]]
             if not own:
                 self.require_own(hits[0])
             found.update(dict.fromkeys(own))
         return list(found)
-
-
-def _number(name: str, value: object) -> float:
-    if isinstance(value, bool | np.bool_) or not isinstance(
-        value, int | float | np.integer | np.floating
-    ):
-        raise TypeError(f"{name} must be a number, found {value!r}")
-    if not math.isfinite(value):
-        raise ValueError(f"{name} must be finite, found {value}")
-    return float(value)

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pkmcal import digits
+from pkmcal import arguments, digits
 from pkmcal.arm_machine import as_machine
 from pkmcal.core import as_rows
 from pkmcal.equations import Equations, Point
@@ -215,7 +215,7 @@ class Identification:
         """
         from pkmcal import residual_figure
 
-        residual_figure.write(self, Path(path))
+        residual_figure.write(self, arguments.path("path", path))
 
     def report(
         self, folder: str | PathLike[str], files: Mapping[str, bytes] | None = None
@@ -243,7 +243,9 @@ class Identification:
         """
         from pkmcal import report
 
-        return report.write(self, Path(folder), files or {})
+        if files is not None and not isinstance(files, Mapping):
+            raise TypeError(f"files must map names to bytes, found {arguments.shown(files)}")
+        return report.write(self, arguments.path("folder", folder), files or {})
 
     def summary(self) -> str:
         """Everything a person should know, on one screen."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal.arguments import instance, word
 from pkmcal.arm_machine import as_given, as_machine
 from pkmcal.equations import Equations
 from pkmcal.estimate import Estimate, Estimator
@@ -23,7 +24,6 @@ from pkmcal.plausibility import beyond_strokes, meagre, misread, strayed
 from pkmcal.repeats import joined
 from pkmcal.robot import Robot
 from pkmcal.serial import SerialArm
-from pkmcal.suggest import did_you_mean
 
 FloatArray = NDArray[np.float64]
 
@@ -122,8 +122,7 @@ def identify(
         pairs = [drawn(share, holdout) for share in shares]
         shares, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
     chosen = parameters(robot, shares, free, prior, bounds)
-    if loss not in LIMITS:
-        raise ValueError(f"loss must be one of {', '.join(LIMITS)}; found {loss!r}")
+    word("loss", loss, LIMITS)
     equations = Equations(shares, chosen)
     start = equations.start()
     try:
@@ -191,14 +190,15 @@ def _shares(
     target: str | Sequence[str],
     attachment: str | Sequence[str],
 ) -> list[Share]:
-    sets = [measurements] if isinstance(measurements, Measurements) else list(measurements)
+    sets = list(measurements) if isinstance(measurements, Iterable) else [measurements]
+    for measured in sets:
+        _check(robot, measured, "measurements")
     if not sets:
         raise ValueError("measurements: none given")
     shares, first = [], 0
-    words = {"frame": frame, "target": target, "attachment": attachment}
-    unknown = zip(*(_words(name, given, len(sets)) for name, given in words.items()), strict=True)
+    said = {"frame": frame, "target": target, "attachment": attachment}
+    unknown = zip(*(_unknown(name, given, len(sets)) for name, given in said.items()), strict=True)
     for measured, unknowns in zip(sets, unknown, strict=True):
-        _check(robot, measured, "measurements")
         shares.append(Share(measured, np.arange(first, first + len(measured)), *unknowns))
         first += len(measured)
     if any(share.unknown_frame for share in shares) and not any(share.framed for share in shares):
@@ -218,9 +218,7 @@ def _like(robot: Robot, holdout: Measurements, shares: Sequence[Share]) -> tuple
 
 
 def _check(robot: Robot, measured: Measurements, argument: str) -> None:
-    if not isinstance(measured, Measurements):
-        raise TypeError(f"{argument} must be Measurements, found {type(measured).__name__}")
-    n = measured.actuators.shape[1]
+    n = instance(argument, measured, Measurements).actuators.shape[1]
     if n != robot.n_actuators:
         raise ValueError(
             f"{argument}: {robot.name} has {robot.n_actuators} actuators, found {n} per row"
@@ -232,17 +230,12 @@ def _check(robot: Robot, measured: Measurements, argument: str) -> None:
         )
 
 
-def _words(argument: str, given: str | Sequence[str], count: int) -> list[bool]:
-    if not isinstance(given, str | Sequence):
-        raise TypeError(f"{argument} must be 'known' or 'unknown', found {given!r}")
-    words = [given] * count if isinstance(given, str) else list(given)
-    if len(words) != count:
-        raise ValueError(f"{argument}: one word for each of {count} sets, found {len(words)}")
-    for word in words:
-        if word not in ("known", "unknown"):
-            known = did_you_mean(str(word), ("known", "unknown"))
-            raise ValueError(f"{argument} must be 'known' or 'unknown', found {word!r}{known}")
-    return [word == "unknown" for word in words]
+def _unknown(argument: str, given: str | Sequence[str], count: int) -> list[bool]:
+    alone = isinstance(given, str) or not isinstance(given, Iterable)
+    said = [given] * count if alone else list(given)
+    if len(said) != count:
+        raise ValueError(f"{argument}: one word for each of {count} sets, found {len(said)}")
+    return [word(argument, each, ("known", "unknown")) == "unknown" for each in said]
 
 
 def _result(estimator: Estimator, estimate: Estimate, compared: HeldOut) -> Identification:

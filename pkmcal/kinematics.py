@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import modes
+from pkmcal.arguments import instance
 from pkmcal.complete import complete, matched_coordinates
-from pkmcal.core import MAPS, POSE, FloatArray, as_rows
+from pkmcal.core import MAPS, POSE, FloatArray, as_numbers, as_rows
 from pkmcal.core_machine import Machine
 from pkmcal.forward import Forward
 from pkmcal.frames import Frames
@@ -31,7 +32,7 @@ class Kinematics:
     """
 
     def __init__(self, model: Model) -> None:
-        self.model = model
+        self.model = instance("model", model, Model, " (see pkmcal.load)")
         self._slots = np.ascontiguousarray(model.geometry.slots)
         self._frames = Frames(model.base_frame, model.tool_frame)
         self._own_home = np.ascontiguousarray(model.home, dtype=np.float64)
@@ -232,7 +233,7 @@ class Kinematics:
         >>> bool(abs(velocity - 10).max() < 1e-9), bool(abs(acceleration).max() < 1e-9)
         (True, True)
         """
-        given = np.asarray(motion)
+        given = as_numbers("motion", motion, "3, 4, 4")
         if given.shape[-3:] != (3, 4, 4):
             raise ValueError(f"motion must have shape (..., 3, 4, 4), found {given.shape}")
         rows, _ = as_rows("motion", given, 4)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.core import FloatArray
+from pkmcal.arguments import number
+from pkmcal.core import FloatArray, as_numbers
 
 Sample = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -56,8 +57,8 @@ class Polynomial:
         >>> [float(each) for each in law.sample(1.0)]
         [5.0, 7.5, 0.0]
         """
-        times = np.asarray(t, dtype=np.float64)
-        inside = (times >= 0) & (times <= self.duration)
+        times = seconds(t)
+        inside = ~((times < 0) | (times > self.duration))  # NaN stays NaN
         tau = np.clip(times / self.duration, 0.0, 1.0)
         curve = np.polynomial.Polynomial(self.coefficients)
         way = self.end - self.start
@@ -134,14 +135,13 @@ def _polynomial(
     start: ArrayLike, end: ArrayLike, duration: float, coefficients: tuple[float, ...]
 ) -> Polynomial:
     first, last = ends(start, end)
-    if not (np.isfinite(duration) and duration > 0):
-        raise ValueError(f"duration must be positive, in s; found {duration}")
-    return Polynomial(first, last, float(duration), coefficients)
+    return Polynomial(first, last, number("duration", duration, above=0), coefficients)
 
 
 def ends(start: ArrayLike, end: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Both ends as arrays of one shape; raises ValueError where they are not."""
-    first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    first = as_numbers("start", start, "n").astype(np.float64)
+    last = as_numbers("end", end, "n").astype(np.float64)
     if first.shape != last.shape:
         raise ValueError(f"start and end must have one shape, found {first.shape}, {last.shape}")
     for name, place in (("start", first), ("end", last)):
@@ -169,9 +169,11 @@ class JerkLimited:
 
     def sample(self, t: ArrayLike) -> Sample:
         """Position, velocity and acceleration at times (...), each (..., k)."""
-        times = np.asarray(t, dtype=np.float64)
-        rows = [self._trajectory.at_time(each) for each in np.clip(times, 0, self.duration).flat]
-        found = np.array(rows, dtype=np.float64).reshape(-1, 3, len(self.start))
+        times = seconds(t)
+        found = np.full((times.size, 3, len(self.start)), np.nan)
+        for row, each in enumerate(np.clip(times, 0, self.duration).flat):
+            if not np.isnan(each):  # ruckig crashes there
+                found[row] = self._trajectory.at_time(each)
         shape = (*times.shape, len(self.start))
         position, velocity, acceleration = (found[:, k].reshape(shape) for k in range(3))
         return position, velocity, acceleration
@@ -230,9 +232,14 @@ def jerk_limited(
     return JerkLimited(first, last, float(trajectory.duration), trajectory)
 
 
+def seconds(t: ArrayLike) -> FloatArray:
+    """Times as numbers; raises TypeError where they are none."""
+    return np.asarray(as_numbers("t", t, "N"), dtype=np.float64)
+
+
 def limit(name: str, value: ArrayLike, count: int) -> FloatArray:
     """A limit for each of `count` actuators; raises ValueError where it is none."""
-    given = np.asarray(value, dtype=np.float64)
+    given = as_numbers(name, value, count).astype(np.float64)
     if given.shape not in ((), (count,)):
         raise ValueError(f"{name} must be one limit or {count}, found shape {given.shape}")
     if not (given > 0).all():

@@ -68,7 +68,7 @@ class LimbResidual:
                 f" found {(*shape, 6)} and {(*q_shape, robot.n_actuators)}"
             )
         geometry = robot.geometry
-        self.free = tuple(geometry.match(robot.model.free if free is None else free))
+        self.free = tuple(geometry.match(robot.model.free if free is None else free, "free"))
         for name in self.free:
             geometry.require_own(name)
         places = np.array([geometry.names.index(name) for name in self.free], dtype=np.intp)

@@ -38,6 +38,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal import arguments
 from pkmcal.column_names import BESIDE, RESERVED, known_as
 from pkmcal.csv_table import Table
 from pkmcal.measurements import COMPONENTS, Measurements
@@ -133,7 +134,7 @@ def write_measurements(
     """
     headings, columns = zip(*_columns(measurements), strict=True)
     text = io.StringIO()
-    text.write(comment)
+    text.write(arguments.comment(comment))
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(headings)
     writer.writerows(zip(*columns, strict=True))
@@ -174,6 +175,8 @@ def _read_actuators(table: Table) -> tuple[NDArray[np.float64], tuple[str, ...]]
 
 
 def _compare(table: Table, units: tuple[str, ...], robot: Any) -> None:
+    if robot is not None and not hasattr(robot, "actuator_units"):
+        raise TypeError(f"robot must be a Robot or SerialArm, found {arguments.shown(robot)}")
     expected = units if robot is None else tuple(robot.actuator_units)
     if len(expected) != len(units):
         raise table.header_error(

@@ -3,32 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pkmcal.arguments import words
+from pkmcal.core import as_numbers
 from pkmcal.tracker import Tracker
 
 
 def numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:
     """A copy as finite doubles."""
-    try:
-        array = np.asarray(given)
-    except ValueError:
-        raise ValueError(f"{name} must be a full array; found rows of different lengths") from None
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"{name} must be an array of numbers; found {_described(given, array)}")
-    array = np.array(array, dtype=np.float64)
+    array = np.array(as_numbers(name, given, "n"), dtype=np.float64)
     if not np.isfinite(array).all():
         first = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         where = f" at index {', '.join(map(str, first))}" if first else ""
         raise ValueError(f"{name} must be finite; found {array[first]}{where}")
     return array
-
-
-def _described(given: object, array: NDArray[Any]) -> str:
-    return type(given).__name__ if array.dtype.kind == "O" else f"dtype {array.dtype}"
 
 
 def integers(name: str, given: ArrayLike, rows: int) -> NDArray[np.int64]:
@@ -136,9 +127,7 @@ def names_of_targets(
     if given is None:
         count = int(index.max()) + 1 if target is None else len(target)
         return tuple(str(i + 1) for i in range(count))
-    names = tuple(given)
-    if isinstance(given, str) or not all(isinstance(name, str) for name in names):
-        raise TypeError(f"target_names must be a sequence of str; found {given!r}")
+    names = words("target_names", given)
     odd = [name for name in names if name != " ".join(name.split()) or not name]
     if odd or len(set(names)) < len(names):
         raise ValueError(f"target_names must be different names on one line; found {names!r}")
@@ -152,7 +141,8 @@ def units_of_actuators(given: str | Sequence[str] | None, count: int) -> tuple[s
     """One unit per actuator, "mm" or "rad"; None where none is given."""
     if given is None:
         return None
-    units = (given,) * count if isinstance(given, str) else tuple(given)
+    units = words("actuator_units", given)
+    units = units * count if isinstance(given, str) else units
     if len(units) != count or any(unit not in ("mm", "rad") for unit in units):
         raise ValueError(
             f'actuator_units must be "mm" or "rad" for {count} actuators; found {given!r}'

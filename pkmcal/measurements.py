@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
+from pkmcal.arguments import shown, word
 from pkmcal.measurement_fields import (
     attachment_array,
     integers,
@@ -21,6 +22,7 @@ from pkmcal.measurement_fields import (
     target_array,
     units_of_actuators,
 )
+from pkmcal.seed import checked_seed
 from pkmcal.tracker import Tracker
 
 _LENGTHS = (("x", "mm"), ("y", "mm"), ("z", "mm"))
@@ -115,8 +117,7 @@ class Measurements:
         actuator_units: str | Sequence[str] | None = None,
         attachment: ArrayLike | None = None,
     ) -> None:
-        if kind not in COMPONENTS:
-            raise ValueError(f"kind must be one of {', '.join(COMPONENTS)}; found {kind!r}")
+        word("kind", kind, COMPONENTS)
         q = numbers("actuators", actuators)
         if q.ndim != 2 or 0 in q.shape:
             raise ValueError(f"actuators must have shape (N, n), not empty; found {q.shape}")
@@ -205,11 +206,13 @@ class Measurements:
         ValueError
             No row is left, or a row number is out of range.
         """
-        chosen = rows if isinstance(rows, slice) else np.asarray(rows)
         try:
+            chosen = rows if isinstance(rows, slice) else np.asarray(rows)
             picked = np.atleast_1d(np.arange(len(self))[chosen])
-        except IndexError as error:
-            raise ValueError(f"rows do not fit {len(self)} measurements: {error}") from None
+        except (IndexError, ValueError) as error:
+            raise ValueError(
+                f"rows do not fit {len(self)} measurements: found {shown(rows)}, {error}"
+            ) from None
         if picked.ndim != 1 or len(picked) == 0:
             raise ValueError(f"rows must choose at least one of {len(self)} measurements")
         per_row: dict[str, Any] = {
@@ -253,7 +256,7 @@ class Measurements:
                 f"holdout must be a fraction between 0 and 1, or a number of poses below {poses};"
                 f" found {holdout!r}"
             )
-        drawn = np.random.default_rng(seed).permutation(poses)[: int(count)]
+        drawn = np.random.default_rng(checked_seed(seed)).permutation(poses)[: int(count)]
         held = np.isin(pose, drawn)
         return self.select(~held), self.select(held)
 

@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal.arguments import executor as checked_executor
+from pkmcal.arguments import function
 from pkmcal.core import FloatArray
 from pkmcal.geometries import Geometries, forward_of, quantities_off
 from pkmcal.model import Model
@@ -105,6 +107,9 @@ def simulate(
     Stream
         Of `QUANTITIES`, for each pose; the same bits with any executor.
     """
+    workers = checked_executor(executor)
+    if progress is not None:
+        function("progress", progress)
     chunks = -(-draw.count // CHUNK)
     pilot_seed, *seeds = draw.seed.spawn(chunks + 1)
     sizes = [CHUNK] * (chunks - 1) + [draw.count - CHUNK * (chunks - 1)]
@@ -119,7 +124,7 @@ def simulate(
                 yield replace(block, seed=seed, count=count, bins=bins)
 
     done, block = 0, list[Stream]()
-    for place, (task, found) in enumerate(_in_order(tasks(), executor)):
+    for place, (task, found) in enumerate(_in_order(tasks(), workers)):
         if place % chunks == 0:
             block = found
         else:

@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike
 
 from pkmcal import digits
 from pkmcal import motion as motions
+from pkmcal.arguments import number, word
 from pkmcal.complete import complete, completed_rates
 from pkmcal.core import POSE, FloatArray, as_rows
 from pkmcal.events import Event, events
 from pkmcal.geometries import ON_THE_MANIFOLD
-from pkmcal.law import CUBIC, QUINTIC, JerkLimited, Polynomial, jerk_limited, limit
+from pkmcal.law import CUBIC, QUINTIC, JerkLimited, Polynomial, jerk_limited, limit, seconds
 from pkmcal.robot import Robot, require_parallel
 from pkmcal.screw import from_pose, to_pose
 from pkmcal.workspace import dexterity, moved_coordinates
@@ -88,7 +89,7 @@ class Move:
         t : array_like (...)
             s.
         """
-        times = np.asarray(t, dtype=np.float64)
+        times = seconds(t)
         made = {
             "pose": self._in_pose,
             "coordinates": self._in_coordinates,
@@ -224,10 +225,10 @@ def move(
     """
     require_parallel(robot)
     ends = [_pose(robot, "start", start), _pose(robot, "end", end)]
-    if space not in ("pose", "coordinates", "joint"):
-        raise ValueError(f"space must be 'pose', 'coordinates' or 'joint', found {space!r}")
-    if duration is not None and not (np.isfinite(duration) and duration > 0):
-        raise ValueError(f"duration must be positive, in s; found {duration}")
+    word("space", space, ("pose", "coordinates", "joint"))
+    word("law", law, (*_LAWS, "jerk-limited"))
+    if duration is not None:
+        number("duration", duration, above=0)
     n = robot.n_actuators
     limits = {
         name: limit(name, value, n)
@@ -243,8 +244,6 @@ def move(
             )
         smooth = jerk_limited(q[0], q[1], **limits)
         return _followed(Move(robot, ends[0], ends[1], space, smooth))
-    if law not in _LAWS:
-        raise ValueError(f"law must be cubic, quintic or jerk-limited, found {law!r}")
     if "jerk" in limits:
         raise ValueError("jerk is limited by the law 'jerk-limited' alone")
     sides = (q[0], q[1]) if space == "joint" else (np.array(0.0), np.array(1.0))

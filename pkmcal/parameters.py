@@ -186,7 +186,7 @@ def parameters(
         free = robot.model.free
         if not free:
             raise ValueError(f"free: {robot.name} declares no free parameters, name some")
-    chosen = geometry.match(free)
+    chosen = geometry.match(free, "free")
     if not chosen:
         raise ValueError("free: name at least one parameter")
     places = np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)

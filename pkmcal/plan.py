@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
+from pkmcal.arguments import number, whole, word, words
 from pkmcal.arm_machine import ArmMachine, as_machine
 from pkmcal.core import POSE, as_rows
 from pkmcal.equations import Equations
@@ -18,7 +19,6 @@ from pkmcal.identifiability import in_words, plain_basis
 from pkmcal.parameters import Parameters, Prior, Share, parameters
 from pkmcal.robot import Robot
 from pkmcal.serial import SerialArm
-from pkmcal.suggest import did_you_mean
 from pkmcal.tracker import Tracker
 from pkmcal.virtual import VirtualMachine
 
@@ -174,11 +174,7 @@ def plan_poses(
     >>> len(plan), plan.predicted < plan.at_random
     (20, True)
     """
-    if criterion not in CRITERIA:
-        near = did_you_mean(str(criterion), CRITERIA, listed=0)
-        raise ValueError(
-            f"criterion must be one of {', '.join(CRITERIA)}; found {criterion!r}{near}"
-        )
+    word("criterion", criterion, CRITERIA)
     if (count is None) == (accuracy is None):
         raise ValueError("give either count, how many poses, or accuracy, the error wanted in mm")
     machine = as_machine(robot)
@@ -190,7 +186,7 @@ def plan_poses(
     poses, q, inside = poses[safe], q[safe], inside[safe]
     everything = design.predicted(np.arange(len(q)))
     if count is not None:
-        chosen = design.grown(_count(count, len(q)))
+        chosen = design.grown(whole("count", count, 1, len(q), ", the candidates"))
     else:
         chosen = design.reaching(_accuracy(accuracy, everything, len(q)))
     return Plan(
@@ -270,10 +266,9 @@ def _equations(
     unknown: str | Sequence[str],
 ) -> Equations:
     """What would be measured, the rows of a pose one after another."""
-    words = (unknown,) if isinstance(unknown, str) else tuple(unknown)
-    for word in words:
-        if word not in ("frame", "target"):
-            raise ValueError(f"unknown must be 'frame' or 'target', found {word!r}")
+    sought = words("unknown", unknown)
+    for each in sought:
+        word("unknown", each, ("frame", "target"))
     several = None if target is None else as_rows("target", target, 3)[0]
     count = 1 if several is None else len(several)
     measured = VirtualMachine(robot, noise).measure(
@@ -282,11 +277,11 @@ def _equations(
         None if several is None else np.tile(several, (len(q), 1)),
     )
     if measured.sigma is None:
-        raise ValueError("noise must be positive: without it any poses will do")
+        raise ValueError(f"noise must be above 0, found {noise}: without it any poses will do")
     if several is not None:
         index = np.tile(np.arange(count), len(q))
         measured = replace(measured, target=several, target_index=index)
-    share = Share(measured, np.arange(len(measured)), "frame" in words, "target" in words)
+    share = Share(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
     return Equations([share], parameters(robot, [share], free, prior, None))
 
 
@@ -321,21 +316,10 @@ def _design(
 
 
 def _accuracy(accuracy: object, best: float, candidates: int) -> float:
-    if isinstance(accuracy, bool) or not isinstance(accuracy, int | float | np.floating):
-        raise TypeError(f"accuracy must be a number, in mm; found {accuracy!r}")
-    if not 0 < accuracy < np.inf:
-        raise ValueError(f"accuracy must be above 0, in mm; found {accuracy:g}")
-    if not accuracy > best:
+    wanted = number("accuracy", accuracy, above=0)
+    if not wanted > best:
         raise ValueError(
             f"accuracy: all {candidates} candidates together predict {best:.3g} mm, found"
-            f" {accuracy:g}; offer other candidates, a better instrument or a prior"
+            f" {wanted:g}; offer other candidates, a better instrument or a prior"
         )
-    return float(accuracy)
-
-
-def _count(count: object, candidates: int) -> int:
-    if isinstance(count, bool) or not isinstance(count, int | np.integer):
-        raise TypeError(f"count must be a whole number, found {count!r}")
-    if not 1 <= count <= candidates:
-        raise ValueError(f"count must be from 1 to {candidates}, the candidates; found {count}")
-    return int(count)
+    return wanted

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.core import FloatArray
+from pkmcal.arguments import function, number, whole
+from pkmcal.core import FloatArray, as_numbers
 from pkmcal.seed import checked_seed
 from pkmcal.swarm import Swarm, SwarmSettings
 
@@ -112,12 +113,12 @@ def pso(
     """
     settings = SwarmSettings(particles, iterations, inertia, cognitive, social)
     low, high = _bounds(lower, upper)
-    if patience is not None and (
-        isinstance(patience, bool) or not isinstance(patience, int) or patience < 1
-    ):
-        raise ValueError(f"patience must be a whole number from 1 or None, found {patience!r}")
-    if not tolerance >= 0:
-        raise ValueError(f"tolerance must be zero or more, found {tolerance!r}")
+    function("objective", objective)
+    if patience is not None:
+        whole("patience", patience, 1, note=" or None")
+    number("tolerance", tolerance, least=0)
+    if progress is not None:
+        function("progress", progress)
     swarm = Swarm(settings, low, high, checked_seed(seed))
     history: list[float] = []
     stagnated = False
@@ -139,9 +140,7 @@ def pso(
 def _bounds(lower: ArrayLike, upper: ArrayLike) -> tuple[FloatArray, FloatArray]:
     given = []
     for name, bound in (("lower", lower), ("upper", upper)):
-        array = np.asarray(bound)
-        if array.dtype.kind not in "iuf":
-            raise TypeError(f"{name} must be an array of numbers, found dtype {array.dtype}")
+        array = as_numbers(name, bound, "n")
         if array.ndim != 1 or not len(array):
             raise ValueError(f"{name} must have shape (n,), found {array.shape}")
         if not np.isfinite(array).all():

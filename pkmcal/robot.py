@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import modes, robotfile
+from pkmcal.arguments import instance, whole
 from pkmcal.assemblies import Assemblies
 from pkmcal.core import FloatArray, as_rows
 from pkmcal.feasible import Feasibility, feasibility
@@ -163,8 +164,8 @@ class Robot(Kinematics):
         rows, shape = as_rows("q", q, self.n_actuators)
         if shape != ():
             raise ValueError(f"q must have shape ({self.n_actuators},), found {np.shape(q)}")
-        if starts is not None and (isinstance(starts, bool) or starts < 0):
-            raise ValueError(f"starts must be a whole number from 0 or None, found {starts!r}")
+        if starts is not None:
+            whole("starts", starts, 0, note=" or None")
         subject = self._subject(rows[0])
         found = modes.find(subject, starts)
         apart = modes.distance(found.poses, self._own_home[None], self.length)
@@ -316,6 +317,4 @@ class Robot(Kinematics):
 
 def require_parallel(robot: object, name: str = "robot") -> None:
     """Refuse what is no parallel machine with a TypeError that names the argument."""
-    if not isinstance(robot, Robot):
-        found = type(robot).__name__
-        raise TypeError(f"{name} must be a Robot, a parallel machine; found {found}")
+    instance(name, robot, Robot, ", a parallel machine")

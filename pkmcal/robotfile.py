@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal import arguments
 from pkmcal.core import MAPS, POSE
 from pkmcal.geometry import Geometry
 from pkmcal.limb_kinds import KINDS, Unit
@@ -122,7 +123,7 @@ def write(model: Model, path: str | os.PathLike[str], comment: str = "") -> None
     OSError
         The folder does not exist or cannot be written.
     """
-    write_whole(path, comment + text_of(model))
+    write_whole(path, arguments.comment(comment) + text_of(model))
 
 
 def parse(content: bytes, place: str, file: str | None) -> Model:

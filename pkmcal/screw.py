@@ -7,13 +7,13 @@ those of the paper on joint structure errors, DOI 10.3969/j.issn.1673-9833.2020.
 from __future__ import annotations
 
 import math
-import sys
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import core_serial
+from pkmcal.arguments import number
 from pkmcal.core import FloatArray, as_numbers, as_rows
 
 _RIGID = 1e-6  # by so much a matrix may miss being a motion
@@ -51,9 +51,7 @@ def exp(twist: ArrayLike, angle: ArrayLike = 1.0) -> FloatArray:
     [0.0, -1.0, 0.0, 100.0]
     """
     _, shape = as_rows("twist", twist, 6)
-    factor = np.asarray(angle)
-    if factor.dtype.kind not in "iuf":
-        raise TypeError(f"angle must be numbers, found dtype {factor.dtype}")
+    factor = as_numbers("angle", angle, "N")
     try:
         np.broadcast_shapes(shape, factor.shape)
     except ValueError:
@@ -312,10 +310,7 @@ def joint_error(
     """
     given = {"dx": dx, "dy": dy, "dz": dz, "dphi": dphi, "dtheta": dtheta, "dpsi": dpsi}
     for name, value in given.items():
-        if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-            raise TypeError(f"{name} must be a number, found {value!r}")
-        if not abs(value) <= sys.float_info.max:
-            raise ValueError(f"{name} must be finite, found {value!r:.60}")
+        number(name, value)
     twist = log(from_pose(list(given.values())))
     angle, way = math.hypot(*twist[:3]), math.hypot(*twist[3:])
     if angle == 0.0:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
+from pkmcal.arguments import number, word, words
 from pkmcal.core import POSE, FloatArray
 from pkmcal.geometries import ideal, off
 from pkmcal.robot import Robot, require_parallel
@@ -134,10 +135,7 @@ def sensitivity(
     """
     require_parallel(robot)
     size = step_size(step)
-    if cases is None:
-        names = own_names(robot)
-    else:
-        names = [cases] if isinstance(cases, str) else list(cases)
+    names = own_names(robot) if cases is None else list(words("cases", cases))
     if not names:
         raise ValueError("cases: name at least one number of the geometry")
     at = ideal(robot, poses)
@@ -146,7 +144,7 @@ def sensitivity(
     exact = np.empty((len(names), len(at.poses), 6))
     linear = np.empty_like(exact)
     for i, case in enumerate(names):
-        places = [geometry.names.index(name) for name in geometry.match(case)]
+        places = [geometry.names.index(name) for name in geometry.match(case, "cases")]
         errors = [size * PER_STEP[geometry.units[place]] for place in places]
         changed = {
             geometry.names[place]: geometry.values[place] + error
@@ -194,8 +192,7 @@ def study_cases(robot: Robot, study: str) -> list[str]:
     >>> study_cases(pk.load("2tpr2tps"), "all-limbs")[:3]
     ['offset*', 'base*.x', 'base*.y']
     """
-    if study not in STUDIES:
-        raise ValueError(f"study must be one of {', '.join(STUDIES)}, found {study!r}")
+    word("study", study, STUDIES)
     geometry = robot.geometry
     own = set(own_names(robot))
     if study == "offsets":
@@ -217,11 +214,10 @@ def step_size(step: float) -> float:
     ValueError, TypeError
         No number, not finite, or 0.
     """
-    if isinstance(step, bool) or not isinstance(step, int | float | np.integer | np.floating):
-        raise TypeError(f"step must be a number, found {step!r}")
-    if not np.isfinite(step) or step == 0:
-        raise ValueError(f"step must be finite and not 0, found {step}")
-    return float(step)
+    size = number("step", step)
+    if size == 0:
+        raise ValueError(f"step must not be 0, found {step}")
+    return size
 
 
 def _mean_size(errors: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal import screw
 from pkmcal import serial_input as checked
+from pkmcal.arguments import instance
 from pkmcal.core import FloatArray, as_rows
 from pkmcal.core_serial import Arm, Links
 from pkmcal.serial_inverse import ArmInverse, damped_least_squares
@@ -65,7 +66,7 @@ class SerialArm:
         name: str = "serial arm",
         joint_errors: ArrayLike | None = None,
     ) -> None:
-        self._name = name
+        self._name = instance("name", name, str)
         self._axes, self._points = checked.axes_and_points(axes, points)
         self._kinds = checked.kinds_of(kinds, len(self._axes))
         self._home = checked.motion("home", home)

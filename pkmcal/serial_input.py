@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import screw
-from pkmcal.core import FloatArray, as_rows
+from pkmcal.arguments import word, words
+from pkmcal.core import FloatArray, as_numbers, as_rows
 from pkmcal.core_serial import FRAMES
-from pkmcal.suggest import did_you_mean
 from pkmcal.toml_table import unit_vector
 
 KINDS = ("revolute", "prismatic")
@@ -60,20 +60,16 @@ def _unit(axes: FloatArray) -> FloatArray:
 def kinds_of(given: str | Sequence[str] | None, joints: int) -> tuple[str, ...]:
     """A kind for each joint."""
     one = "revolute" if given is None else given
-    words = [one] * joints if isinstance(one, str) else one
-    if not isinstance(words, Sequence):
-        raise TypeError(f"kinds must be a word or a sequence of words, found {given!r}")
-    if len(words) != joints:
-        raise ValueError(f"kinds: one word for each of {joints} joints, found {len(words)}")
-    for word in words:
-        if word not in KINDS:
-            raise ValueError(f"kinds: {word!r} is no kind of joint{did_you_mean(str(word), KINDS)}")
-    return tuple(words)
+    said = words("kinds", one) * (joints if isinstance(one, str) else 1)
+    if len(said) != joints:
+        raise ValueError(f"kinds: one word for each of {joints} joints, found {len(said)}")
+    return tuple(word("kinds", each, KINDS) for each in said)
 
 
 def motion(name: str, given: ArrayLike) -> FloatArray:
     """One finite motion, given as (4, 4) or as a pose (6,)."""
-    pose = np.shape(given) == (6,)
+    given = as_numbers(name, given, "4, 4")
+    pose = given.shape == (6,)
     rows, shape = screw.as_motions(name, screw.from_pose(given) if pose else given)
     if shape or not np.isfinite(rows).all():
         raise ValueError(
@@ -85,9 +81,7 @@ def motion(name: str, given: ArrayLike) -> FloatArray:
 
 def frame_number(frame: str) -> int:
     """Of a frame that twists are seen in."""
-    if frame not in FRAMES:
-        raise ValueError(f"frame: {frame!r} is unknown{did_you_mean(str(frame), FRAMES)}")
-    return FRAMES.index(frame)
+    return FRAMES.index(word("frame", frame, FRAMES))
 
 
 def joint_frames(axes: FloatArray) -> FloatArray:

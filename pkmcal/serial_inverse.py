@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from pkmcal import screw
 from pkmcal import serial_input as checked
+from pkmcal.arguments import word
 from pkmcal.core import STATUS, FloatArray, IntArray, as_rows
-from pkmcal.suggest import did_you_mean
 
 if TYPE_CHECKING:
     from pkmcal.serial import SerialArm
@@ -69,8 +69,7 @@ def damped_least_squares(
     Steps δ = Jᵀ (J Jᵀ + λ)⁻¹ e with the twist e that is left, each row with a damping λ of its
     own: a tenth after a step that helped, fivefold after one that did not.
     """
-    if not isinstance(parts, str) or parts not in PARTS:
-        raise ValueError(f"parts: {parts!r} is unknown{did_you_mean(str(parts), PARTS)}")
+    word("parts", parts, PARTS)
     rows, shape = screw.as_motions("target", target)
     goal = rows.reshape(-1, 4, 4)
     n = arm.n_joints

@@ -6,13 +6,13 @@ import difflib
 from collections.abc import Iterable
 
 
-def did_you_mean(name: str, known: Iterable[str], listed: int = 12) -> str:
+def did_you_mean(name: object, known: Iterable[str], listed: int = 12) -> str:
     """Say which known name is near, or list the known ones where they are few.
 
     Parameters
     ----------
     name : str
-        What was found.
+        What was found; anything else is near to nothing.
     known : iterable of str
         What would have been right.
     listed : int
@@ -32,8 +32,9 @@ def did_you_mean(name: str, known: Iterable[str], listed: int = 12) -> str:
     """
     names = list(dict.fromkeys(known))
     by_lower = {each.lower(): each for each in reversed(names)}
-    near = difflib.get_close_matches(name.lower(), list(by_lower), n=1, cutoff=0.6)
-    if near and len(name) > 2:  # two letters are near to too much
+    found = name if isinstance(name, str) else ""
+    near = difflib.get_close_matches(found.lower(), list(by_lower), n=1, cutoff=0.6)
+    if near and len(found) > 2:  # two letters are near to too much
         return f"; did you mean {by_lower[near[0]]!r}?"
     if 0 < len(names) <= listed:
         return f"; known: {', '.join(names)}"

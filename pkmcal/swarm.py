@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal._core import ffi, lib
+from pkmcal.arguments import number, whole
 from pkmcal.core import ISA, FloatArray, ensure, in_threads, pointer
 
 SWARMS_PER_THREAD = 16  # fewer do not pay for a thread
@@ -44,15 +45,9 @@ class SwarmSettings:
 
     def __post_init__(self) -> None:
         for name, least in (("particles", 1), ("iterations", 0)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < least:
-                raise ValueError(f"{name} must be a whole number from {least}, found {value!r}")
+            whole(name, getattr(self, name), least)
         for name in ("inertia", "cognitive", "social"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise ValueError(f"{name} must be a number, found {value!r}")
-            if not np.isfinite(value):
-                raise ValueError(f"{name} must be finite, found {value!r}")
+            number(name, getattr(self, name))
 
     @property
     def spread_growth(self) -> float:

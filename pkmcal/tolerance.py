@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
-from pkmcal.core import POSE, FloatArray
+from pkmcal.arguments import number, whole
+from pkmcal.core import POSE, FloatArray, as_numbers
 from pkmcal.geometries import ideal
 from pkmcal.monte_carlo import Draw, Progress, simulate
 from pkmcal.robot import Robot, require_parallel
@@ -198,8 +199,7 @@ def tolerance(
     require_parallel(robot)
     seed = checked_seed(seed)
     places, deviations = sigma_of(robot, sigma)
-    if isinstance(samples, bool) or not isinstance(samples, int | np.integer) or samples < 2:
-        raise ValueError(f"samples must be a whole number from 2, found {samples!r}")
+    whole("samples", samples, 2)
     at = ideal(robot, poses)
     effect = robot.error_jacobian(at.poses, at.actuators)[:, :, places] * deviations
     variance = effect**2
@@ -257,14 +257,14 @@ def sigma_of(robot: Robot, sigma: Sigma) -> tuple[NDArray[np.intp], FloatArray]:
     found = np.zeros(len(geometry))
     if isinstance(sigma, Mapping):
         for pattern, given in sigma.items():
-            matched = [geometry.names.index(name) for name in geometry.match(pattern)]
+            matched = [geometry.names.index(name) for name in geometry.match(pattern, "sigma")]
             covered = sorted({geometry.units[place] for place in matched})
             if len(covered) > 1:
                 raise ValueError(
                     f"sigma: {pattern!r} covers numbers in {' and '.join(covered)}; name them apart"
                 )
             found[matched] = _deviations(f"sigma of {pattern}", given, ())
-    elif np.ndim(sigma) == 0:
+    elif as_numbers("sigma", sigma, len(geometry)).ndim == 0:
         found[~geometry.tied & (units == "mm")] = _deviations("sigma", sigma, ())
     else:
         found[:] = _deviations("sigma", sigma, (len(geometry),))
@@ -277,9 +277,9 @@ def sigma_of(robot: Robot, sigma: Sigma) -> tuple[NDArray[np.intp], FloatArray]:
 
 
 def _deviations(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
-    array = np.asarray(given)
-    if array.dtype.kind not in "iuf":
-        raise TypeError(f"{name} must be a number or numbers, found dtype {array.dtype}")
+    if shape == ():
+        return np.array(number(name, given, least=0))
+    array = as_numbers(name, given, "p")
     if array.shape != shape:
         raise ValueError(f"{name} must have shape {shape}, found {array.shape}")
     if not (np.isfinite(array) & (array >= 0)).all():

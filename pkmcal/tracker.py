@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pkmcal.arguments import number
 from pkmcal.core import as_rows
 
 FloatArray = NDArray[np.float64]
@@ -44,9 +45,7 @@ class Tracker:
 
     def __post_init__(self) -> None:
         for name in ("range", "azimuth", "elevation"):
-            sigma = getattr(self, name)
-            if not (np.isfinite(sigma) and sigma > 0):
-                raise ValueError(f"{name} must be a positive standard deviation; found {sigma!r}")
+            number(name, getattr(self, name), above=0)
         place, shape = as_rows("position", self.position, 3)
         if shape or not np.isfinite(place).all():
             raise ValueError(f"position must be three finite numbers; found {self.position!r}")

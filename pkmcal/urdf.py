@@ -7,12 +7,11 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from pkmcal import screw
+from pkmcal import arguments, screw
 from pkmcal.core import FloatArray
 from pkmcal.serial import SerialArm
 from pkmcal.suggest import did_you_mean
@@ -149,7 +148,7 @@ def _parsed(path: str | os.PathLike[str]) -> Any:
         import yourdfpy
     except ImportError:
         raise ImportError("URDF files need yourdfpy: pip install 'pkmcal[urdf]'") from None
-    if not Path(path).is_file():
+    if not arguments.path("path", path).is_file():
         raise FileNotFoundError(f"{path}: no such file")
     try:
         root = ElementTree.parse(path).getroot()

@@ -8,6 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pkmcal.arguments import number, shown, word
 from pkmcal.arm_machine import ArmMachine
 from pkmcal.measurement_fields import numbers
 from pkmcal.measurements import COMPONENTS, Measurements
@@ -61,14 +62,16 @@ class VirtualMachine:
         seed: int = 0,
         angle_noise: float | None = None,
     ) -> None:
+        if not hasattr(true_robot, "forward"):
+            raise TypeError(f"true_robot must be a Robot or SerialArm, found {shown(true_robot)}")
         self.true_robot = true_robot
         self._machine: Solvable = (
             ArmMachine(true_robot) if isinstance(true_robot, SerialArm) else true_robot
         )
-        self.noise = noise if isinstance(noise, Tracker) else _deviation("noise", noise)
+        self.noise = noise if isinstance(noise, Tracker) else number("noise", noise, least=0)
         if angle_noise is None:
             angle_noise = 0.0 if isinstance(noise, Tracker) else noise / _ARM
-        self.angle_noise = _deviation("angle_noise", angle_noise)
+        self.angle_noise = number("angle_noise", angle_noise, least=0)
         self._random = np.random.default_rng(checked_seed(seed))
 
     def measure(
@@ -103,9 +106,10 @@ class VirtualMachine:
             Rows that the machine cannot reach, by number; or an argument that does not fit.
         """
         actuators = np.atleast_2d(numbers("q", q))
-        if actuators.ndim != 2:
-            raise ValueError(f"q must have shape (N, n) or (n,); found {actuators.shape}")
-        width = len(COMPONENTS.get(kind, ()))
+        n = getattr(self._machine, "n_actuators", actuators.shape[-1])
+        if actuators.ndim != 2 or actuators.shape[1] != n or not actuators.size:
+            raise ValueError(f"q must have shape (N, {n}) or ({n},); found {np.shape(q)}")
+        width = len(COMPONENTS[word("kind", kind, COMPONENTS)])
         blank = Measurements(
             actuators,
             np.zeros((len(actuators), width) if width > 1 else len(actuators)),
@@ -140,9 +144,3 @@ class VirtualMachine:
         deviations = {"mm": self.noise, "rad": self.angle_noise}
         sigma = np.array([deviations[unit] for unit in blank.units])
         return sigma * drawn, sigma if (sigma > 0).all() else None
-
-
-def _deviation(name: str, value: float) -> float:
-    if not (np.isfinite(value) and value >= 0):
-        raise ValueError(f"{name} must be a finite number, zero or more; found {value!r}")
-    return float(value)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 from os import PathLike
-from pathlib import Path
+
+from pkmcal import arguments
 
 
 def write_whole(path: str | PathLike[str], content: str | bytes) -> None:
@@ -22,7 +23,7 @@ def write_whole(path: str | PathLike[str], content: str | bytes) -> None:
     OSError
         The folder does not exist or cannot be written; what was there before is untouched.
     """
-    path = Path(path)
+    path = arguments.path("path", path)
     if not path.parent.is_dir():
         raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
     beside = path.with_name(f".{path.name}.{os.getpid()}.part")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal import digits
+from pkmcal.arguments import number, whole
 from pkmcal.core import POSE, FloatArray, as_rows
 from pkmcal.feasible import Feasibility
 from pkmcal.geometries import completed
@@ -269,9 +270,8 @@ def sample_poses(robot: Robot, count: int = 30, seed: int = 0, share: float = 0.
     ((5, 6), True)
     """
     require_parallel(robot)
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 0:
-        raise ValueError(f"count must be a whole number from 0, found {count!r}")
-    if not 0 <= share <= 1:
+    whole("count", count, 0)
+    if number("share", share, least=0) > 1:
         raise ValueError(f"share must be from 0 to 1, found {share!r}")
     random = np.random.default_rng(checked_seed(seed))
     box = reach(robot)
@@ -341,7 +341,7 @@ def require_moved(robot: Robot, axes: Mapping[str, object]) -> None:
     moved = moved_coordinates(robot)
     for name in axes:
         if name not in moved:
-            known = did_you_mean(str(name), moved)
+            known = did_you_mean(name, moved)
             raise ValueError(f"axes: {name!r} is no coordinate that {robot.name} moves{known}")
 
 

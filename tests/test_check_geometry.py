@@ -239,7 +239,7 @@ def test_nonsense_is_checked_without_a_failure(name: str) -> None:
 
 
 def test_an_arm_is_refused() -> None:
-    with pytest.raises(TypeError, match="a parallel machine; found SerialArm"):
+    with pytest.raises(TypeError, match="a parallel machine, found SerialArm"):
         pk.check_geometry(pk.load("3r"))  # type: ignore[arg-type]
 
 

@@ -94,7 +94,7 @@ def test_postures_of_an_arm_are_chosen_from_a_file_of_joint_coordinates(tmp_path
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["hexapod", "--count", "0"], "count must be from 1 to"),
+        (["hexapod", "--count", "0"], "count must be a whole number from 1 to"),
         (["hexapod", "--accuracy", "1e-9"], "accuracy: all"),
         (["hexapd"], "did you mean 'hexapod'"),
         (["3r"], "--poses: 3R arm is a serial arm"),
@@ -128,7 +128,7 @@ def test_calibrate_takes_a_trackers_noise(tmp_path: Path) -> None:
     [
         ("0.01", "--tracker 0.01: expected RANGE,AZIMUTH,ELEVATION"),
         ("0.01,a,b", "expected RANGE,AZIMUTH,ELEVATION"),
-        ("0.01,0,1", "--tracker 0.01,0,1: azimuth must be a positive"),
+        ("0.01,0,1", "--tracker 0.01,0,1: azimuth must be above 0"),
     ],
 )
 def test_a_tracker_that_is_none_is_named(text: str, words: str) -> None:

@@ -140,7 +140,7 @@ def test_poses_that_are_not_solved_make_exit_code_1(tmp_path: Path) -> None:
 
 def test_wrong_input_is_refused_in_one_line() -> None:
     assert "did you mean 'hexapod'" in refused("sensitivity", "hexapd")
-    assert "step must be finite and not 0" in refused("sensitivity", "hexapod", "--step", "0")
+    assert "step must not be 0, found 0" in refused("sensitivity", "hexapod", "--step", "0")
     assert "home breaks a limit or is singular" in refused("sensitivity", "rbt-6t03p-printed")
     Path("p.csv").write_text("x [mm],zz [mm]\n0,1\n", encoding="utf-8")
     assert "unknown column 'zz'" in refused("sensitivity", "hexapod", "--poses", "p.csv")

@@ -222,7 +222,7 @@ def test_a_tied_number_names_the_parameters_that_drive_it() -> None:
         ({"radius": None}, TypeError, "radius must be a number, found None"),
         (np.zeros(19), ValueError, r"must have shape \(20,\), found \(19,\)"),
         (np.zeros((1, 20)), ValueError, r"must have shape \(20,\), found \(1, 20\)"),
-        (["a"] * 20, TypeError, "must be numbers, found an array of <U1"),
+        (["a"] * 20, TypeError, "changes must be an array of numbers, found dtype <U1"),
         (np.full(20, np.nan), ValueError, r"base1\.x must be finite, found nan"),
     ],
 )

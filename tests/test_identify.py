@@ -394,5 +394,5 @@ def test_the_examples_of_the_document_are_run() -> None:
 @pytest.mark.parametrize("word", ["frame", "target", "attachment"])
 def test_what_is_no_word_is_named(paper: Robot, word: str) -> None:
     measured = VirtualMachine(paper).measure(paper.inverse(paper.home[None]))
-    with pytest.raises(TypeError, match=f"{word} must be 'known' or 'unknown', found None"):
+    with pytest.raises(ValueError, match=f"{word} must be one of known, unknown; found None"):
         identify(paper, measured, **{word: None})  # type: ignore[arg-type]

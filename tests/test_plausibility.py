@@ -263,7 +263,7 @@ def test_tied_numbers_are_refused_with_their_parameter() -> None:
 def test_measurements_of_another_machine_are_refused(points: Measurements) -> None:
     with pytest.raises(ValueError, match="hexapod has 6 actuators, found 4"):
         identify(pk.load("hexapod"), points)
-    with pytest.raises(TypeError, match="must be Measurements, found list"):
+    with pytest.raises(TypeError, match="must be a Measurements, found list"):
         identify(pk.load("hexapod"), [[1, 2, 3]])  # type: ignore[list-item]
     with pytest.raises(ValueError, match="none given"):
         identify(pk.load("hexapod"), [])

@@ -265,7 +265,7 @@ BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"particles": 0}, ValueError, "particles"),
     ({"iterations": -1}, ValueError, "iterations"),
     ({"inertia": np.nan}, ValueError, "inertia"),
-    ({"social": "1.5"}, ValueError, "social"),
+    ({"social": "1.5"}, TypeError, "social"),
     ({"seed": -1}, ValueError, "seed"),
     ({"seed": 2**64}, ValueError, "seed"),
     ({"patience": 0}, ValueError, "patience"),

@@ -365,7 +365,7 @@ def _stretched(factor: float) -> np.ndarray:
     [
         (lambda: screw.exp([1, 2, 3]), ValueError, r"twist must have shape \(..., 6\)"),
         (lambda: screw.exp(np.ones((2, 6)), [1, 2, 3]), ValueError, "angle has shape"),
-        (lambda: screw.exp([1] * 6, "1"), TypeError, "angle must be numbers"),
+        (lambda: screw.exp([1] * 6, "1"), TypeError, "angle must be an array of numbers"),
         (lambda: screw.exp(["a"] * 6), TypeError, "twist must be an array of numbers"),
         (lambda: screw.log(np.eye(3)), ValueError, r"motion must have shape \(..., 4, 4\)"),
         (lambda: screw.log(_stretched(1.01)), ValueError, "rigid motions, found another"),

@@ -327,7 +327,7 @@ def test_later_entries_override_and_arrays_go_by_place() -> None:
     ("sigma", "error", "words"),
     [
         ({"bse1.x": 0.1}, ValueError, "did you mean 'base1.x'"),
-        (-0.1, ValueError, "sigma must be finite and not negative, found -0.1"),
+        (-0.1, ValueError, "sigma must be 0 or more, found -0.1"),
         ({"offset1": float("inf")}, ValueError, "sigma of offset1 must be finite"),
         ({"offset1": "wide"}, TypeError, "sigma of offset1 must be a number"),
         ({"*": 0.1}, ValueError, "covers numbers in 1 and mm; name them apart"),

@@ -68,7 +68,7 @@ def test_the_trackers_covariances_make_a_better_calibration_than_one_sigma() -> 
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({"range": 0.0}, "range must be a positive standard deviation; found 0.0"),
+        ({"range": 0.0}, "range must be above 0, found 0.0"),
         ({"azimuth": np.nan}, "azimuth must be"),
         ({"elevation": -1e-5}, "elevation must be"),
         ({"position": (1, 2)}, "position must have shape"),

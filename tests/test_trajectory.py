@@ -72,7 +72,7 @@ def test_time_is_the_first_axis_and_scalars_are_allowed() -> None:
     [
         (([0, 1], [0], 1.0), "start and end must have one shape"),
         ((0.0, np.nan, 1.0), "end must be finite"),
-        ((0.0, 1.0, 0.0), "duration must be positive"),
+        ((0.0, 1.0, 0.0), "duration must be above 0"),
     ],
 )
 def test_wrong_laws_are_refused(arguments: Any, words: str) -> None:
@@ -398,7 +398,7 @@ def test_wrong_moves_are_refused() -> None:
     up = np.add(home, [0, 0, 10, 0, 0, 0])
     for words, arguments in (
         ("give a duration, or limits", {}),
-        ("duration must be positive", {"duration": -1.0}),
+        ("duration must be above 0", {"duration": -1.0}),
         ("velocity must be positive", {"velocity": -3.0}),
         ("velocity must be one limit or 6", {"velocity": [1.0, 2.0]}),
         ("space must be", {"duration": 1.0, "space": "poses"}),

@@ -303,7 +303,7 @@ def test_an_arm_is_no_parallel_machine_wherever_one_is_needed() -> None:
         "move": lambda: pk.trajectory.move(arm, pose[0], pose[0], duration=1.0),
     }
     for call in calls.values():
-        with pytest.raises(TypeError, match="robot must be a Robot, a parallel machine; found Ser"):
+        with pytest.raises(TypeError, match="robot must be a Robot, a parallel machine, found Ser"):
             call()
 
 

@@ -1,0 +1,181 @@
+"""Single arguments of public calls: as they are wanted, or an error that names them."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from collections.abc import Collection, Iterable
+from concurrent.futures import Executor
+from pathlib import Path
+from typing import TypeVar, cast
+
+import numpy as np
+
+from pkmcal.suggest import did_you_mean
+
+T = TypeVar("T")
+
+
+def number(name: str, value: object, least: float = -math.inf, above: float = -math.inf) -> float:
+    """A finite number, `least` or more, above `above`.
+
+    Raises
+    ------
+    TypeError
+        No number, or a truth value.
+    ValueError
+        Not finite, or too small.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        raise TypeError(f"{name} must be a number, found {shown(value)}")
+    if not abs(value) <= sys.float_info.max:
+        raise ValueError(f"{name} must be finite, found {shown(value)}")
+    if not value >= least:
+        raise ValueError(f"{name} must be {least:g} or more, found {value}")
+    if not value > above:
+        raise ValueError(f"{name} must be above {above:g}, found {value}")
+    return float(value)
+
+
+def whole(name: str, value: object, least: int, most: float = math.inf, note: str = "") -> int:
+    """A whole number from `least` to `most`; `note` is for the message.
+
+    Raises
+    ------
+    ValueError
+        Anything else.
+    """
+    counted = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not counted or not least <= cast(int, value) <= most:
+        span = f"from {least}" + (f" to {most}" if most < math.inf else "") + note
+        raise ValueError(f"{name} must be a whole number {span}, found {shown(value)}")
+    return int(cast(int, value))
+
+
+def word(name: str, value: object, known: Collection[str]) -> str:
+    """One of the known words.
+
+    Raises
+    ------
+    ValueError
+        Anything else.
+    """
+    if not isinstance(value, str) or value not in known:
+        near = did_you_mean(value, known, listed=0)
+        raise ValueError(f"{name} must be one of {', '.join(known)}; found {shown(value)}{near}")
+    return value
+
+
+def words(name: str, value: object) -> tuple[str, ...]:
+    """A name, or several: each a str.
+
+    Raises
+    ------
+    TypeError
+        Anything else.
+    """
+    if isinstance(value, str):
+        return (value,)
+    try:
+        several = tuple(cast(Iterable[object], value))
+    except TypeError:
+        raise TypeError(f"{name} must be a name or several, found {shown(value)}") from None
+    for each in several:
+        if not isinstance(each, str):
+            raise TypeError(f"{name} must be a name or several, found {shown(each)} among them")
+    return cast(tuple[str, ...], several)
+
+
+def instance(name: str, value: object, wanted: type[T], note: str = "") -> T:
+    """An object of one class; `note` is for the message.
+
+    Raises
+    ------
+    TypeError
+        Anything else.
+    """
+    if not isinstance(value, wanted):
+        article = "an" if wanted.__name__[0] in "AEIOU" else "a"
+        raise TypeError(f"{name} must be {article} {wanted.__name__}{note}, found {kind(value)}")
+    return value
+
+
+def flag(name: str, value: object) -> bool:
+    """True or False.
+
+    Raises
+    ------
+    TypeError
+        Anything else.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name} must be True or False, found {shown(value)}")
+    return bool(value)
+
+
+def function(name: str, value: T) -> T:
+    """Something that can be called.
+
+    Raises
+    ------
+    TypeError
+        Anything else.
+    """
+    if not callable(value):
+        raise TypeError(f"{name} must be a function, found {shown(value)}")
+    return value
+
+
+def executor(value: Executor | None) -> Executor | None:
+    """Whose workers compute, or None.
+
+    Raises
+    ------
+    TypeError
+        Anything else; of Dask the executor is asked for, not the client.
+    """
+    if value is None:
+        return None
+    return instance("executor", value, Executor, " of concurrent.futures or alike, or None")
+
+
+def path(name: str, value: object) -> Path:
+    """Where a file or folder is.
+
+    Raises
+    ------
+    TypeError
+        No str or path.
+    """
+    if not isinstance(value, str | os.PathLike):
+        raise TypeError(f"{name} must be a str or path, found {shown(value)}")
+    return Path(value)
+
+
+def comment(value: object) -> str:
+    """Lines for the head of a file, each with its ``#``.
+
+    Raises
+    ------
+    TypeError
+        No str.
+    ValueError
+        A line without its ``#``, or an end in the middle of a line.
+    """
+    text = instance("comment", value, str)
+    for line in text.splitlines():
+        if line and not line.startswith("#"):
+            raise ValueError(f"comment: each of its lines must start with #, found {line!r:.60}")
+    return text if not text or text.endswith("\n") else text + "\n"
+
+
+def kind(value: object) -> str:
+    """What class an argument is of."""
+    return type(value).__name__
+
+
+def shown(value: object) -> str:
+    """An argument as a message shows it: what is long, by its class."""
+    text = repr(value)
+    return text if len(text) <= 60 and "\n" not in text else kind(value)
