@@ -14,7 +14,8 @@ from pkmcal.limb_kinds import Unit
 from pkmcal.robotfile_write import lines
 from pkmcal.serial import ERRORS, SerialArm
 from pkmcal.serial_input import KINDS
-from pkmcal.toml_table import Table, Units, shown
+from pkmcal.toml_source import Source
+from pkmcal.toml_table import Table, shown
 from pkmcal.whole_file import write_whole
 
 TOP = ("name", "units", "tool", "joint")
@@ -26,20 +27,21 @@ def is_arm(data: Mapping[str, Any]) -> bool:
     return "joint" in data and "limb" not in data
 
 
-def parse(data: Mapping[str, Any], place: str) -> SerialArm:
-    """Make an arm of a file's content; `place` stands before every message.
+def parse(source: Source) -> SerialArm:
+    """Make an arm of what its file says.
 
     Raises
     ------
     ValueError
-        A mistake in the file: one line with the file, the table, the key and what was found.
+        A mistake in the file: one line with the file, its line, the table, the key and what was
+        found.
     """
-    top = Table(data, place, "", Units())
+    top = Table(source.data, source)
     top.only(TOP, "a serial arm")
-    units = robotfile.read_units(top)
-    tool = Table(top.table("tool").data, place, "[tool]", units)
+    top.units = robotfile.read_units(top)
+    tool = top.table("tool")
     tool.only(("home",))
-    joints = [Table(each, place, f"[[joint]] {i}", units) for i, each in enumerate(_joints(top), 1)]
+    joints = top.tables("joint", "an arm")
     for joint in joints:
         joint.only(("kind", "axis", "point", "error"))
     given: dict[str, Any] = {
@@ -53,7 +55,7 @@ def parse(data: Mapping[str, Any], place: str) -> SerialArm:
     try:
         return SerialArm(**given)
     except ValueError as error:  # numbers that are each right, and too large together
-        raise ValueError(f"{place}: {error}") from None
+        raise ValueError(f"{source.place}: {error}") from None
 
 
 def write(arm: SerialArm, path: str | os.PathLike[str], comment: str = "") -> None:
@@ -74,15 +76,6 @@ def write(arm: SerialArm, path: str | os.PathLike[str], comment: str = "") -> No
             joint["error"] = error
         blocks.append("[[joint]]\n" + lines(joint))
     write_whole(path, arguments.comment(comment) + "\n".join(blocks))
-
-
-def _joints(top: Table) -> list[Mapping[str, Any]]:
-    found = top["joint"]
-    if not isinstance(found, list) or not all(isinstance(each, Mapping) for each in found):
-        top.fail("joint", "every joint is a table of its own, headed [[joint]] in double brackets")
-    if not found:
-        top.fail("joint", "an arm has at least one joint")
-    return found
 
 
 def _point(joint: Table) -> list[float]:

@@ -8,6 +8,7 @@ from typing import Literal, overload
 from pkmcal import armfile, robotfile
 from pkmcal.robot import Robot
 from pkmcal.serial import SerialArm
+from pkmcal.toml_source import Source
 
 
 @overload
@@ -40,10 +41,10 @@ def load(robot: str | PathLike[str]) -> Robot | SerialArm:
     6
     """
     content, place, file = robotfile.located(robot)
-    data = robotfile.tables(content, place)
-    if armfile.is_arm(data):
-        return armfile.parse(data, place)
-    return Robot(robotfile.parse(content, place, file))
+    source = Source(content, place)
+    if armfile.is_arm(source.data):
+        return armfile.parse(source)
+    return Robot(robotfile.parse(source, file))
 
 
 def load_parallel(robot: str | PathLike[str]) -> Robot:

@@ -8,6 +8,7 @@ from pkmcal import robotfile
 from pkmcal.armfile import is_arm
 from pkmcal.limb_kinds import ALIASES, KINDS
 from pkmcal.suggest import did_you_mean
+from pkmcal.toml_source import Source
 
 _HEAD = """\
 # Made by `pkmcal new {name}`. Change what differs on your machine, measure it, run
@@ -81,7 +82,7 @@ def template(machine: str) -> str:
     if machine not in known:
         raise ValueError(f"unknown machine {machine!r}{did_you_mean(machine, known)}")
     content, place, _ = robotfile.located(machine)
-    text, data = content.decode(), robotfile.tables(content, place)
+    text, data = content.decode(), Source(content, place).data
     keys = _ARM if is_arm(data) else _PARALLEL + "".join(_limb_keys(data["limb"]))
     return f"{_HEAD.format(name=machine)}{keys}#\n{text}"
 

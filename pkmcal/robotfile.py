@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterator, Mapping
 from importlib import resources
 from pathlib import Path
@@ -20,13 +19,9 @@ from pkmcal.model import Limb, Model
 from pkmcal.robotfile_limbs import Parameters, read_limbs
 from pkmcal.robotfile_write import text_of
 from pkmcal.suggest import did_you_mean
+from pkmcal.toml_source import Source
 from pkmcal.toml_table import ANGLE_UNITS, LENGTH_UNITS, Table, Units, shown
 from pkmcal.whole_file import write_whole
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
 
 FloatArray = NDArray[np.float64]
 
@@ -68,8 +63,8 @@ def read(robot: str | os.PathLike[str]) -> Model:
     Raises
     ------
     ValueError
-        An unknown name, or a mistake in the file: one line with the file, the table, the key and
-        what was found.
+        An unknown name, or a mistake in the file: one line with the file, its line, the table,
+        the key and what was found.
     FileNotFoundError
         No such file.
     TypeError
@@ -80,7 +75,8 @@ def read(robot: str | os.PathLike[str]) -> Model:
     >>> read("hexapod").map
     'spatial'
     """
-    return parse(*located(robot))
+    content, place, file = located(robot)
+    return parse(Source(content, place), file)
 
 
 def located(robot: str | os.PathLike[str]) -> tuple[bytes, str, str | None]:
@@ -126,23 +122,21 @@ def write(model: Model, path: str | os.PathLike[str], comment: str = "") -> None
     write_whole(path, arguments.comment(comment) + text_of(model))
 
 
-def parse(content: bytes, place: str, file: str | None) -> Model:
-    """Make a model of a robot file's content; `place` stands before every message."""
-    data = tables(content, place)
-    top = Table(data, place, "", Units())
+def parse(source: Source, file: str | None) -> Model:
+    """Make a model of what a robot file says."""
+    top = Table(source.data, source)
     top.only(TOP)
-    units = read_units(top)
-    top = Table(data, place, "", units)
-    parameters = Parameters(_section(top, "parameters", optional=True))
-    limbs = read_limbs(list(_limb_tables(top)), parameters)
+    top.units = read_units(top)
+    parameters = Parameters(_section(top, "parameters"))
+    limbs = read_limbs(top.tables("limb", "a robot"), parameters)
     values = parameters.finish([number.name for number in limbs.numbers])
     geometry = Geometry(limbs.numbers, parameters.ordered_units(), limbs.values | values)
 
-    pose = _section(top, "pose")
+    pose = top.table("pose")
     pose.only(("map", "home", "match"))
     pose_map = pose.choice("map", MAPS, "pose map")
     _check_rows(pose, pose_map, limbs.limbs)
-    frames = _section(top, "frames", optional=True)
+    frames = _section(top, "frames")
     frames.only(("base", "tool"))
     return Model(
         name=top.text("name"),
@@ -151,49 +145,26 @@ def parse(content: bytes, place: str, file: str | None) -> Model:
         match=_read_match(pose),
         limbs=limbs.limbs,
         geometry=geometry,
-        free=_read_free(_section(top, "calibration", optional=True), geometry),
-        stated=_read_stated(_section(top, "stated", optional=True), geometry, limbs.limbs),
+        free=_read_free(_section(top, "calibration"), geometry),
+        stated=_read_stated(_section(top, "stated"), geometry, limbs.limbs),
         base_frame=_read_pose(frames, "base", POSE) if "base" in frames else None,
         tool_frame=_read_pose(frames, "tool", POSE) if "tool" in frames else None,
         file=file,
     )
 
 
-def tables(content: bytes, place: str) -> dict[str, Any]:
-    """What a TOML file says, before anything is checked; `place` stands before every message."""
-    try:
-        data: dict[str, Any] = tomllib.loads(content.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{place}: not a text file in UTF-8 (byte {error.start})") from None
-    except (ValueError, RecursionError) as error:  # a syntax error, an endless number or nesting
-        raise ValueError(f"{place}: not valid TOML: {error}") from None
-    return data
-
-
-def _section(top: Table, key: str, optional: bool = False) -> Table:
-    value = top.data.get(key, {}) if optional else top[key]
-    if not isinstance(value, Mapping):
-        top.fail(key, f"must be a table, found {shown(value)}")
-    return Table(value, top.file, f"[{key}]", top.units)
+def _section(top: Table, key: str) -> Table:
+    """A table that may be left out."""
+    return top.table(key) if key in top else Table({}, top.source, (key,), top.units)
 
 
 def read_units(top: Table) -> Units:
     """The units that a file states."""
-    table = _section(top, "units")
+    table = top.table("units")
     table.only(("length", "angle"))
     length = table.choice("length", LENGTH_UNITS, "unit of length")
     angle = table.choice("angle", ANGLE_UNITS, "unit of angle")
     return Units(LENGTH_UNITS[length], ANGLE_UNITS[angle])
-
-
-def _limb_tables(top: Table) -> Iterator[Table]:
-    found = top["limb"]
-    if not isinstance(found, list) or not all(isinstance(each, Mapping) for each in found):
-        top.fail("limb", "every limb is a table of its own, headed [[limb]] in double brackets")
-    if not found:
-        top.fail("limb", "a robot has at least one limb")
-    for i, data in enumerate(found, 1):
-        yield Table(data, top.file, f"[[limb]] {i}", top.units)
 
 
 def _check_rows(pose: Table, pose_map: str, limbs: tuple[Limb, ...]) -> None:
@@ -245,7 +216,8 @@ def _read_stated(table: Table, geometry: Geometry, limbs: tuple[Limb, ...]) -> M
     stated = {}
     for name, value in _flat(table.data):
         if name not in units:
-            table.fail("", f"the robot has no number {name!r}{did_you_mean(name, units)}")
+            known = did_you_mean(name, units)
+            table.fail("", f"the robot has no number {name!r}{known}", at=name)
         stated[name] = table.as_number(name, value, units[name])
     return stated
 

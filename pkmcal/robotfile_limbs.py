@@ -39,7 +39,8 @@ class Parameters:
         self._used_at: dict[str, str] = {}
         for name in table.data:
             if not PARAMETER_NAME.fullmatch(name):
-                table.fail("", f"{name!r} is no name: letters, digits and _, no digit first")
+                what = f"{name!r} is no name: letters, digits and _, no digit first"
+                table.fail("", what, at=name)
             table.as_number(name, table.data[name], "1")
 
     def term(self, table: Table, key: str, value: object, unit: Unit) -> Term:
@@ -53,7 +54,7 @@ class Parameters:
             known = did_you_mean(name, self.table.data)
             table.fail(key, f"[parameters] defines no {name!r}{known}")
         before = self.units.setdefault(name, unit)
-        first = self._used_at.setdefault(name, table.where(key).removeprefix(f"{table.file}: "))
+        first = self._used_at.setdefault(name, table.name(key))
         if before != unit:
             table.fail(
                 key, f"{name} is {UNIT_WORDS[unit]} here and {UNIT_WORDS[before]} in {first}"

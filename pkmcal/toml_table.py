@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 
 from pkmcal.limb_kinds import Unit
 from pkmcal.suggest import did_you_mean
+from pkmcal.toml_source import KeyPath, Source
 
 LENGTH_UNITS: dict[str, float] = {"mm": 1.0, "m": 1000.0, "in": 25.4}
 ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": math.pi / 180.0}
@@ -42,33 +43,44 @@ class Table:
     ----------
     data : mapping
         The table as the TOML reader gives it.
-    file : str
-        File name for messages.
-    place : str
-        The table's heading for messages, such as ``[[limb]] 2``; empty for the top of the file.
+    source : Source
+        The file.
+    path : tuple of str and int
+        Where the table stands in it; () for all of it.
     units : Units
         The file's units.
-    prefix : str
-        For a table within a table, its key and a dot.
     """
 
     def __init__(
-        self, data: Mapping[str, Any], file: str, place: str, units: Units, prefix: str = ""
+        self,
+        data: Mapping[str, Any],
+        source: Source,
+        path: KeyPath = (),
+        units: Units | None = None,
     ) -> None:
         self.data = data
-        self.file = file
-        self.place = place
-        self.units = units
-        self.prefix = prefix
+        self.source = source
+        self.path = path
+        self.units = units or Units()
 
-    def where(self, key: str = "") -> str:
-        """File, table and key, as every message begins; without a key, the table itself."""
-        name = (self.prefix + key).rstrip(".")
-        return ": ".join(part for part in (self.file, self.place, name) if part)
+    def name(self, key: str = "") -> str:
+        """Table and key as messages call them, such as ``[[limb]] 2: base.radius``."""
+        heading, *below = *self.path, key
+        if not self.path:
+            return key
+        if below and isinstance(below[0], int):
+            heading = f"[[{heading}]] {below.pop(0) + 1}"
+        else:
+            heading = f"[{heading}]"
+        return ": ".join(filter(None, (heading, ".".join(filter(None, map(str, below))))))
 
-    def fail(self, key: str, message: str) -> NoReturn:
-        """Raise ValueError about the value of `key`; about the table itself where it is empty."""
-        raise ValueError(f"{self.where(key)}: {message}")
+    def fail(self, key: str, message: str, at: str = "") -> NoReturn:
+        """Raise ValueError about the value of `key`; about the table itself where it is empty.
+
+        The message begins with the file and the line of the key, or of the key `at`.
+        """
+        place = self.source.where(*self.path, *filter(None, (key or at,)))
+        raise ValueError(": ".join(filter(None, (place, self.name(key), message))))
 
     def only(self, known: Iterable[str], owner: str = "") -> None:
         """Refuse every key that is not in `known`; `owner` says whose keys those are."""
@@ -76,7 +88,7 @@ class Table:
         for key in self.data:
             if key not in known:
                 of = f" of {owner}" if owner else ""
-                self.fail("", f"unknown key {key!r}{of}{did_you_mean(key, known)}")
+                self.fail("", f"unknown key {key!r}{of}{did_you_mean(key, known)}", at=key)
 
     def __contains__(self, key: str) -> bool:
         return key in self.data
@@ -89,11 +101,24 @@ class Table:
     # values -----------------------------------------------------------------------------------
 
     def table(self, key: str) -> Table:
-        """The table under `key`; its keys are named ``key.name`` in messages."""
+        """The table under `key`."""
         value = self[key]
         if not isinstance(value, Mapping):
             self.fail(key, f"must be a table, found {shown(value)}")
-        return Table(value, self.file, self.place, self.units, f"{self.prefix}{key}.")
+        return Table(value, self.source, (*self.path, key), self.units)
+
+    def tables(self, key: str, owner: str) -> list[Table]:
+        """The tables headed ``[[key]]``, of which `owner` has at least one."""
+        found = self[key]
+        if not isinstance(found, list) or not all(isinstance(each, Mapping) for each in found):
+            how = f"every {key} is a table of its own, headed [[{key}]] in double brackets"
+            self.fail(key, how)
+        if not found:
+            self.fail(key, f"{owner} has at least one {key}")
+        return [
+            Table(each, self.source, (*self.path, key, i), self.units)
+            for i, each in enumerate(found)
+        ]
 
     def text(self, key: str) -> str:
         """A text that is not empty."""

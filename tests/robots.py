@@ -10,6 +10,7 @@ import tomli_w
 
 import pkmcal as pk
 from pkmcal import robotfile
+from pkmcal.toml_source import Source
 
 
 def made(
@@ -27,7 +28,7 @@ def made(
         **sections,
     }
     text = tomli_w.dumps(content)
-    return pk.Robot(robotfile.parse(text.encode(), "made.toml", "made.toml"))
+    return pk.Robot(robotfile.parse(Source(text.encode(), "made.toml"), "made.toml"))
 
 
 def plain(value: Any) -> Any:

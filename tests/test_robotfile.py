@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from pkmcal import robotfile
 from pkmcal.model import Cone, Limb, Model
+from pkmcal.toml_source import Source
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SLIDER_LIMB = {
@@ -42,7 +43,7 @@ def document(limbs: list[dict[str, Any]], **sections: Any) -> dict[str, Any]:
 
 def parse(content: Mapping[str, Any] | str) -> Model:
     text = content if isinstance(content, str) else tomli_w.dumps(content)
-    return robotfile.parse(text.encode(), "my.toml", "my.toml")
+    return robotfile.parse(Source(text.encode(), "my.toml"), "my.toml")
 
 
 def written(model: Model, folder: Path) -> Model:
