@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
+from pkmcal.arguments import instance
+from pkmcal.arm_faults import ARM_CHECKS
 from pkmcal.finding import Finding
 from pkmcal.joint_faults import (
     angles_as_coordinates,
@@ -15,7 +16,8 @@ from pkmcal.joint_faults import (
     unlike,
 )
 from pkmcal.machine_faults import singular, unreachable, wrong_unit
-from pkmcal.robot import Robot, require_parallel
+from pkmcal.robot import Robot
+from pkmcal.serial import SerialArm
 from pkmcal.stated_faults import contradicted
 
 CHECKS = (
@@ -38,13 +40,13 @@ class GeometryCheck:
 
     Attributes
     ----------
-    robot : Robot
+    robot : Robot or SerialArm
         The machine.
     findings : tuple of Finding
         Each with what was found, in numbers, and a suggestion.
     """
 
-    robot: Robot
+    robot: Robot | SerialArm
     findings: tuple[Finding, ...]
 
     @property
@@ -69,12 +71,12 @@ class GeometryCheck:
         return "\n".join(lines)
 
 
-def check_geometry(robot: Robot) -> GeometryCheck:
+def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
     """Look for mistakes that tables of a machine's geometry have.
 
     Parameters
     ----------
-    robot : Robot
+    robot : Robot or SerialArm
         The machine.
 
     Returns
@@ -98,12 +100,15 @@ def check_geometry(robot: Robot) -> GeometryCheck:
     Raises
     ------
     TypeError
-        `robot` is no parallel machine.
+        `robot` is no machine.
 
     Notes
     -----
     Limbs count as alike within 3 % of the base's radius, so that a calibrated machine, which has
     errors of manufacture, raises no alarm; a slip smaller than that is not seen.
+
+    Of a serial arm less can be told: lengths and joint errors in another unit (unit, angle), and
+    neighbouring joints on one axis (double), where ``Finding.limbs`` counts joints.
 
     Examples
     --------
@@ -113,6 +118,9 @@ def check_geometry(robot: Robot) -> GeometryCheck:
     >>> pk.check_geometry(pk.load("rbt-6t03p-printed")).findings[0].kind
     'angle'
     """
-    require_parallel(robot)
-    found: Iterable[Finding] = (finding for check in CHECKS for finding in check(robot))
+    if isinstance(robot, SerialArm):
+        found = [finding for check in ARM_CHECKS for finding in check(robot)]
+    else:
+        instance("robot", robot, Robot, " or SerialArm")
+        found = [finding for check in CHECKS for finding in check(robot)]
     return GeometryCheck(robot, tuple(found))

@@ -15,7 +15,8 @@ class Finding:
     kind : str
         What kind of mistake; `check_geometry` lists them.
     limbs : tuple of int
-        The limbs it is about, counted from 1; empty for the machine as a whole.
+        The limbs it is about, of an arm the joints, counted from 1; empty for the machine as a
+        whole.
     what : str
         What was found, with its numbers in mm and degrees.
     suggestion : str

@@ -48,15 +48,7 @@ def wrong_unit(robot: Robot) -> Iterator[Finding]:
     sizes = _sizes(robot)
     if not sizes:  # all joints in one point, which `doubled` says
         return
-    largest = max(sizes.values())
-    if not _SMALLEST <= largest <= _LARGEST:
-        likely = "metres" if largest < _SMALLEST else "micrometres"
-        yield Finding(
-            "unit",
-            (),
-            f"the largest length of the machine is {largest:.4g} mm",
-            f"are the lengths in {likely}? See length under [units]",
-        )
+    yield from whole_size(max(sizes.values()))
     middle = float(np.exp(np.median(np.log(list(sizes.values())))))
     found = False
     for name, value in sizes.items():
@@ -71,6 +63,18 @@ def wrong_unit(robot: Robot) -> Iterator[Finding]:
             )
     if not found:
         yield from _mended(robot)
+
+
+def whole_size(largest: float) -> Iterator[Finding]:
+    """A machine whose largest length, mm, is that of none."""
+    if not _SMALLEST <= largest <= _LARGEST:
+        likely = "metres" if largest < _SMALLEST else "micrometres"
+        yield Finding(
+            "unit",
+            (),
+            f"the largest length of the machine is {largest:.4g} mm",
+            f"are the lengths in {likely}? See length under [units]",
+        )
 
 
 def _stroke_units(robot: Robot) -> Iterator[Finding]:

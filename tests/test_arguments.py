@@ -357,7 +357,7 @@ CALLS: dict[str, Call] = {
             "progress": "function",
         },
     ),
-    "check_geometry": (pk.check_geometry, {"robot": ROBOT}, {"robot": "parallel"}),
+    "check_geometry": (pk.check_geometry, {"robot": ROBOT}, {"robot": "robot"}),
     "dexterity": (
         pk.dexterity,
         {"robot": ROBOT, "poses": POSES},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -238,9 +239,60 @@ def test_nonsense_is_checked_without_a_failure(name: str) -> None:
         assert not check.ok and str(check)
 
 
-def test_an_arm_is_refused() -> None:
-    with pytest.raises(TypeError, match="a parallel machine, found SerialArm"):
-        pk.check_geometry(pk.load("3r"))  # type: ignore[arg-type]
+# --- serial arms -----------------------------------------------------------------------------
+
+
+def test_nothing_is_found_in_built_in_arms_nor_in_calibrated_ones() -> None:
+    arm, rng = pk.load("3r"), np.random.default_rng(0)
+    assert pk.check_geometry(arm).ok
+    for _ in range(20):
+        errors = rng.normal(0.0, [1.0, 1.0, 1.0, 0.01, 0.01, 0.01], (3, 6))
+        assert pk.check_geometry(arm.replace(errors)).ok
+        assert pk.check_geometry(arm.replace(errors).corrected()).ok
+
+
+def test_an_arm_in_metres_is_found() -> None:
+    arm = pk.load("3r")
+    home = arm.home
+    home[:3, 3] /= 1000.0
+    found = pk.check_geometry(pk.SerialArm(arm.axes, arm.points / 1000.0, home))
+    assert found.kinds == ("unit",)
+    assert "is 0.794 mm" in str(found) and "metres" in str(found)  # the tool: hypot(0.6, 0.52)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "kind", "words"),
+    [
+        ((1, 3), 0.5, "angle", "joint2.dphi is 0.5 rad, 28.6479 deg"),
+        ((2, 5), -1.0, "angle", "joint3.dpsi is -1 rad"),
+        ((0, 1), 150.0, "unit", "joint1.dy is 150 mm"),
+    ],
+)
+def test_a_joint_error_in_another_unit_is_found(
+    place: tuple[int, int], value: float, kind: str, words: str
+) -> None:
+    arm = pk.load("3r")
+    errors = np.zeros((3, 6))
+    errors[place] = value
+    check = pk.check_geometry(arm.replace(errors))
+    assert check.kinds == (kind,) and check.findings[0].limbs == (place[0] + 1,)
+    assert words in str(check)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_neighbours_on_one_axis_are_found_and_lose_a_rank(kind: str, sense: float) -> None:
+    along = np.array([1.0, 2.0, 2.0]) / 3.0
+    axes, points = [[0, 0, 1], along, sense * along], [[0, 0, 0], [0, 0, 520], [0, 0, 520]]
+    points[2] = points[1] + 200.0 * along
+    kinds = ["revolute", kind, kind]
+    arm = pk.SerialArm(axes, points, [0, 600, 520, 0, 0, 0], kinds)
+    assert np.linalg.matrix_rank(arm.jacobian([0.1, 0.2, 0.3])) == 2
+    found = pk.check_geometry(arm).findings
+    assert [(each.kind, each.limbs) for each in found] == [("double", (2, 3))]
+    points[2] = points[2] + np.array([0.0, 0.1, -0.1])  # beside it: for a slide it is the same
+    beside = pk.check_geometry(pk.SerialArm(axes, points, [0, 600, 520, 0, 0, 0], kinds))
+    assert beside.ok == (kind == "revolute")
 
 
 # --- the command -----------------------------------------------------------------------------
@@ -256,15 +308,15 @@ def test_exit_code_says_whether_something_was_found() -> None:
     assert bad.exit_code == 1
     assert bad.stdout == f"{pk.check_geometry(pk.load('rbt-6t03p-printed'))}\n"
     assert run("check", "hexapd").exit_code == 2
-    assert "a serial arm" in run("check", "3r").stderr
+    arm = run("check", "3r")
+    assert (arm.exit_code, arm.stdout) == (0, "3R arm: nothing found\n")
 
 
 def test_json_has_the_findings() -> None:
-    import json
-
     result = json.loads(run("check", "rbt-6t03p-printed", "--json").stdout)
     assert result["ok"] is False
     assert [each["kind"] for each in result["findings"]][:2] == ["angle", "alike"]
+    assert result["measurements"] is None
 
 
 def test_measurements_are_read_by_line_and_column(tmp_path: Path) -> None:
@@ -274,7 +326,17 @@ def test_measurements_are_read_by_line_and_column(tmp_path: Path) -> None:
     result = run("check", "hexapod", str(file))
     assert result.exit_code == 0
     assert "1 row of kind height" in result.stdout
+    told = json.loads(run("check", "hexapod", str(file), "--json").stdout)
+    assert told["measurements"] == {"kind": "height", "rows": 1, "without_pose": []}
     file.write_text(f"{columns},z [mm]\n800,800,x8,800,800,800,750\n")
     wrong = run("check", "hexapod", str(file))
     assert (wrong.exit_code, wrong.stdout) == (2, "")
     assert "line 2" in wrong.stderr and "q3" in wrong.stderr
+
+
+def test_rows_without_a_pose_are_told_in_json_too(tmp_path: Path) -> None:
+    log = tmp_path / "m.csv"
+    log.write_text("q1 [rad],q2 [rad],q3 [rad],z [mm]\n0,0,0,520\n0,1e6,0,520\n")
+    told = run("check", "3r", str(log), "--json")
+    assert told.exit_code == 1
+    assert json.loads(told.stdout)["measurements"]["without_pose"] == [1]

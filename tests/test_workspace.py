@@ -299,7 +299,6 @@ def test_an_arm_is_no_parallel_machine_wherever_one_is_needed() -> None:
         "dexterity": lambda: pk.dexterity(arm, pose),
         "sample_poses": lambda: pk.sample_poses(arm),
         "compensate": lambda: pk.compensate(arm, pose, pose),
-        "check_geometry": lambda: pk.check_geometry(arm),
         "move": lambda: pk.trajectory.move(arm, pose[0], pose[0], duration=1.0),
     }
     for call in calls.values():
