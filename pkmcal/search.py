@@ -9,9 +9,13 @@ from numpy.typing import NDArray
 
 from pkmcal.equations import Equations, Point
 from pkmcal.loss import Loss
+from pkmcal.measurements import Measurements
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+
+_FTOL = 1e-12  # of the cost: 1e-5 of a standard deviation
+_ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
 
 
 class Search:
@@ -47,6 +51,7 @@ class Search:
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
         self._method: Literal["trf", "lm"] = "trf" if bounded else "lm"
+        self._rounding = [_rounded(m, start.robot.length) for m in equations.sets]
         self._last: tuple[FloatArray, Point] = (np.zeros(len(sigma)), start)
         self._refused = np.zeros(len(equations.rows), dtype=bool)
         self.evaluations = 0
@@ -131,6 +136,8 @@ class Search:
             whitened[without] = 0.0
             return whitened
 
+        # a cost that nothing lowers: by less than rounding it need not fall
+        floor = np.linalg.norm(equations.whitened(self._rounding, noise)) / np.sqrt(_FTOL)
         first = data(self.at(u))
         worse = 10.0 * (1.0 + np.abs(first).max())
 
@@ -140,15 +147,15 @@ class Search:
             missed = (equations.status(point) != 0) & ~aside
             if missed.any():  # worse than any step that is taken
                 self._refused |= missed
-                return np.full(len(first) + len(held), worse)
-            return np.concatenate([-loss.residual(data(point)), held])
+                return np.full(len(first) + len(held) + 1, worse + floor)
+            return np.concatenate([-loss.residual(data(point)), held, [floor]])
 
         def jacobian(u: FloatArray) -> FloatArray:
             point = self.at(u)
             equations.go_on_from(point)  # the step to it was taken
             self.history.append(equations.rms(point))
             by_u = self.jacobian(point, noise, aside)
-            return np.vstack([loss.jacobian(data(point), by_u), extra])
+            return np.vstack([loss.jacobian(data(point), by_u), extra, np.zeros(len(u))])
 
         found = least_squares(
             residual,
@@ -157,10 +164,18 @@ class Search:
             bounds=self._bounds,
             method=self._method,
             x_scale=1.0,
-            ftol=1e-12,  # 1e-5 of a standard deviation
+            ftol=_FTOL,
             xtol=1e-10,
             gtol=1e-15,
             max_nfev=200,
         )
         self.converged = bool(found.status > 0)
         return found.x, float(found.cost)
+
+
+def _rounded(measured: Measurements, length: float) -> FloatArray:
+    """Rounding errors (N, k) of what is predicted, mm and rad."""
+    values = measured.values.reshape(len(measured), -1)
+    lengths = np.array([unit == "mm" for unit in measured.units])
+    size = np.abs(values[:, lengths]).max() + length
+    return np.broadcast_to(_ROUNDING * np.where(lengths, size, size / length), values.shape)
