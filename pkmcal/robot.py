@@ -10,7 +10,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import modes, robotfile
+from pkmcal import modes, redundant, robotfile
 from pkmcal.arguments import instance, whole
 from pkmcal.assemblies import Assemblies
 from pkmcal.core import FloatArray, as_rows
@@ -209,7 +209,8 @@ class Robot(Kinematics):
         ndarray (..., 6, p)
             In the order of ``geometry.names``. The column of a tied number says what that number
             alone would do; the column of a parameter what it does through all its ties.
-            NaN at a type-2 singularity.
+            NaN at a type-2 singularity. With more closures than free coordinates it is that of the
+            pose which misses them least.
         """
         given, own, q, shape = self._visited(pose, actuators)
         errors = self._by_numbers(own, q, twists=False)
@@ -265,6 +266,11 @@ class Robot(Kinematics):
     def _by_numbers(self, own: FloatArray, q: FloatArray, twists: bool) -> FloatArray:
         """How the machine's own pose follows each number of each limb, (N, 6, numbers)."""
         columns = self.geometry.slot_index.astype(np.int32)
+        if self._machine.rows > self._machine.m:
+            units = self.geometry.units[: len(columns)]
+            return redundant.error_jacobian(
+                self._machine, self._slots, own, q, columns, units, twists
+            )
         return self._machine.error_jacobian(self._slots, own, q, columns, twists)
 
     def _through_ties(self, errors: FloatArray) -> FloatArray:
