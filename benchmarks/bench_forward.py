@@ -36,12 +36,14 @@ def forward(name: str, isa: str) -> Callable[[np.ndarray], pk.Forward]:
     return lambda q: robot.forward(q, threads=1)
 
 
-def one_lane(folder: Path) -> Callable[[Callable[[np.ndarray], pk.Forward], np.ndarray], object]:
-    """Forward kinematics by the core at one lane."""
-    lane = native.OneLane(folder)
+def one_lane(
+    folder: Path, joined: int = 1
+) -> Callable[[Callable[[np.ndarray], pk.Forward], np.ndarray], object]:
+    """Forward kinematics by the core at one lane; see `native.OneLane`."""
+    lane = native.OneLane(folder, joined)
 
     def run(solve: Callable[[np.ndarray], pk.Forward], q: np.ndarray) -> pk.Forward:
-        lane.flush_denormals(True)  # or one lane is by chance two and a half times slower
+        lane.flush_denormals(True)  # or pairs are by chance two and a half times slower
         with lane:
             found = solve(q)
         lane.flush_denormals(False)
@@ -54,7 +56,8 @@ def bench_hexapod(report: Report, folder: Path) -> None:
     """Every solver on the same 100 000 rows."""
     robot = pk.load("hexapod")
     at, q = hexapod_rows(robot)
-    plain, lane, scalar = Hexapod(robot), one_lane(folder), native.scalar_newton(folder)
+    plain, scalar = Hexapod(robot), native.scalar_newton(folder)
+    lane, pairs = one_lane(folder), one_lane(folder, joined=2)
     out = np.empty_like(at)
     arrays = (plain.base, plain.platform, plain.offset, q, robot.home)
     pointers = [scalar.ffi.from_buffer("double[]", np.ascontiguousarray(a)) for a in arrays]
@@ -70,6 +73,7 @@ def bench_hexapod(report: Report, folder: Path) -> None:
     for isa, solve in solvers.items():
         fast[f"core, {isa}"] = lambda solve=solve: solve(q)
         fast[f"core at one lane, {isa}"] = lambda solve=solve: lane(solve, q)
+        fast[f"core at one lane, floats in pairs, {isa}"] = lambda solve=solve: pairs(solve, q)
     slow: dict[str, Callable[[], object]] = {
         "NumPy Newton on the batch": lambda: plain.numpy_newton(q, robot.home, CLOSED),
         f"scipy root, analytic Jacobian ({FEW} rows)": lambda: plain.scipy_root(
@@ -99,10 +103,11 @@ def bench_hexapod(report: Report, folder: Path) -> None:
     report.table(["solver", "ns a row", *(f"core {isa} is" for isa in native.available())], rows)
     for isa in native.available():
         lanes = took[f"core at one lane, {isa}"] / took[f"core, {isa}"]
+        paired = took[f"core at one lane, floats in pairs, {isa}"] / took[f"core, {isa}"]
         text = took["scalar Newton in C, native"] / took[f"core, {isa}"]
         at_least, scalars = WANTED[isa]
         report.text(
-            f"{isa}: {times(lanes)} one lane (wanted {at_least}x)"
+            f"{isa}: {times(lanes)} one lane (wanted {at_least}x), {times(paired)} with floats in pairs"
             + (f", {times(text)} the scalar Newton (wanted {scalars}x)" if scalars else "")
         )
     bench_units(report, folder)

@@ -73,11 +73,21 @@ def lane_units(folder: Path, isa: str) -> Compiled:
 class OneLane:
     """The core of csrc/ compiled with LANES 1, in the place of `core_machine.lib` while entered.
 
-    The same source, the same flags and the same three ISAs; only the number of lanes differs. To be
-    compared with `flush_denormals` on: bench_denormals says why. In one thread only.
+    The same source, the same flags and the same three ISAs; only the number of lanes differs. In one
+    thread only.
+
+    Parameters
+    ----------
+    folder : Path
+        Where it is compiled.
+    joined : int
+        Blocks of doubles to a block of floats: 1 does one number at a time, floats as well. With
+        2, as in the core, a block of floats has two even here, and the compiler does them together:
+        SIMD that one lane should not have. To be compared with `flush_denormals` on then;
+        bench_denormals says why.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, joined: int = 1) -> None:
         cores = sorted(CSRC.glob("core_*.c"))
         sources = [source for source in sorted(CSRC.glob("*.c")) if source not in cores]
         for source in cores:
@@ -87,9 +97,10 @@ class OneLane:
             sources.append(folder / source.name)
             sources[-1].write_text(text)
         sources.append(HERE / "flush_denormals.c")
-        flags = [f"-I{CSRC}", f"-I{GENERATED}", *(f for f in FLAGS if "visibility" not in f)]
+        flags = [f"-I{CSRC}", f"-I{GENERATED}", f"-DJOINED={joined}"]
+        flags += [flag for flag in FLAGS if "visibility" not in flag]
         declared = declarations(HEADER) + "void flush_denormals(int on);"
-        self._here = compiled(folder, "one_lane", declared, sources, flags)
+        self._here = compiled(folder, f"one_lane_{joined}", declared, sources, flags)
         self._lib = core_machine.lib
 
     def __enter__(self) -> OneLane:

@@ -92,13 +92,13 @@ static void core_tpr2tps(ptrdiff_t n, const double *size, const double *free, do
         ptrdiff_t row[LANES];
         real lane_free[4], out[16];
         const int count = block_rows(first, n, row);
-        for (int k = 0; k < 4; k++) lane_free[k] = gather(free + k, 4, row);
+        gather_row(free, 4, 4, row, lane_free);
         if (lengths) {
             FN(tpr2tps_lengths)(lane_size, lane_free, out);
-            for (int k = 0; k < 4; k++) scatter(out[k], lengths + k, 4, row, count);
+            scatter_row(out, 4, lengths, 4, row, count);
         } else {
             FN(tpr2tps_jacobian)(lane_size, lane_free, out);
-            for (int k = 0; k < 16; k++) scatter(out[k], jacobian + k, 16, row, count);
+            scatter_row(out, 16, jacobian, 16, row, count);
         }
     }
 }

@@ -23,10 +23,8 @@ INLINE void load_rows(const forward_call *call, const limb_numbers *limb, const 
 {
     const pkm_machine *machine = call->machine;
     in->usable = fill_mask(-1);
-    for (int a = 0; a < machine->actuators; a++)
-        in->q[a] = gather(call->q + a, machine->actuators, row);
-    if (once || call->guess_stride)
-        for (int k = 0; k < 6; k++) in->guess[k] = gather(call->guess + k, call->guess_stride, row);
+    gather_row(call->q, machine->actuators, machine->actuators, row, in->q);
+    if (once || call->guess_stride) gather_row(call->guess, call->guess_stride, 6, row, in->guess);
     for (int i = 0; i < machine->limbs; i++) {
         if (once) sphere_of_numbers(machine->driver[i], &limb[i], &in->sphere[i]);
         sphere_at(machine->driver[i], &limb[i], in->q[machine->actuator[i]], &in->sphere[i],
@@ -51,8 +49,8 @@ INLINE void store_rows(int map, const forward_call *call, const real *state, mas
     real pose[6];
     const mask good = status == fill_mask(PKM_OK);
     map_to_pose(map, state, pose);
-    for (int k = 0; k < 6; k++)
-        scatter(select(good, pose[k], fill(NAN)), call->pose + k, 6, row, count);
+    for (int k = 0; k < 6; k++) pose[k] = select(good, pose[k], fill(NAN));
+    scatter_row(pose, 6, call->pose, 6, row, count);
     scatter(select(good, residual, fill(NAN)), call->residual, 1, row, count);
     for (int l = 0; l < count; l++) {
         call->status[row[l]] = (int32_t)status[l];
@@ -85,12 +83,12 @@ INLINE int quick_rows(int map, const forward_call *call, const limb_numbers *sha
     const pkm_machine *machine = call->machine;
     const int steps = start->known ? STEPS_PREDICTED : STEPS_GUESSED;
     const int once = !shared || first == 0; /* is there anything but actuators to load? */
-    ptrdiff_t row[HALVES][LANES];
-    int count[HALVES], losses = 0;
-    const ptrdiff_t halves = (call->n - first + LANES - 1) / LANES;
-    all->halves = halves < HALVES ? (int)halves : HALVES;
-    all->blocks = (all->halves + 1) / 2;
-    for (int h = 0; h < 2 * all->blocks; h++) {
+    ptrdiff_t row[PARTS][LANES];
+    int count[PARTS], losses = 0;
+    const ptrdiff_t left = (call->n - first + LANES - 1) / LANES;
+    const int parts = left < PARTS ? (int)left : PARTS;
+    all->blocks = (parts + JOINED - 1) / JOINED;
+    for (int h = 0; h < JOINED * all->blocks; h++) {
         limb_numbers own[PKM_MAX_LIMBS];
         count[h] = block_rows(first + h * LANES, call->n, row[h]);
         if (!shared)
@@ -98,14 +96,14 @@ INLINE int quick_rows(int map, const forward_call *call, const limb_numbers *sha
         load_rows(call, shared ? shared : own, row[h], once, &all->in[h]);
     }
     for (int t = 0; t < all->blocks; t++) {
+        const rows_in *low = &all->in[JOINED * t], *high = low + JOINED - 1;
         for (int i = 0; i < machine->limbs; i++)
-            join_spheres(machine, i, once, &all->in[2 * t].sphere[i], &all->in[2 * t + 1].sphere[i],
-                         &all->sphere[t][i]);
-        start_states(map, machine, &all->in[2 * t], &all->in[2 * t + 1], start, all->state[t]);
+            join_spheres(machine, i, once, &low->sphere[i], &high->sphere[i], &all->sphere[t][i]);
+        start_states(map, machine, low, high, start, all->state[t]);
     }
     steps_in_floats(map, machine, steps, start, all);
     steps_in_doubles(map, machine, all);
-    for (int h = 0; h < all->halves; h++) {
+    for (int h = 0; h < parts; h++) {
         const mask status = select_mask(all->solved[h], fill_mask(PKM_OK), fill_mask(-1));
         store_rows(map, call, all->fine[h], status, fill(steps + 2.0), all->worst[h], row[h], count[h]);
         if (any(status))

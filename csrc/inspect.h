@@ -24,8 +24,8 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
         FN(limb_sphere) sphere[PKM_MAX_LIMBS];
         const int count = block_rows(first, n, row);
         if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
-        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
-        for (int a = 0; a < actuators; a++) lane_q[a] = gather(q + a, actuators, row);
+        gather_row(pose, 6, 6, row, lane_pose);
+        gather_row(q, actuators, actuators, row, lane_q);
         map_from_pose(map, lane_pose, state);
         FN(map_frame)(map, state, R, p);
         spheres_at(machine, limb, lane_q, sphere);
@@ -35,14 +35,13 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
             for (int k = 0; k < limb_rows; k++, r++) {
                 const real *covector = &jacobian[machine->order[r] * m];
                 real step[6], free[6], by_q = fill(0.0), by_g[SLOTS];
+                double *by_step = out->by_step + r * m, *by_free = out->by_free + r * m;
                 scatter(residual[machine->order[r]], out->residual + r, rows, row, count);
-                for (int j = 0; j < m; j++) {
-                    step[j] = covector[j] * (map_is_angle(map, j) ? machine->length : 1.0);
-                    scatter(covector[j], out->by_step + r * m + j, rows * m, row, count);
-                }
-                map_free(map, state, step, free);
+                scatter_row(covector, m, by_step, rows * m, row, count);
                 for (int j = 0; j < m; j++)
-                    scatter(free[j], out->by_free + r * m + j, rows * m, row, count);
+                    step[j] = covector[j] * (map_is_angle(map, j) ? machine->length : 1.0);
+                map_free(map, state, step, free);
+                scatter_row(free, m, by_free, rows * m, row, count);
                 if (k == 0)
                     sphere_derivatives(machine, i, &limb[i], R, p, lane_q[machine->actuator[i]],
                                        &by_q, by_g);
@@ -67,7 +66,7 @@ INLINE void limb_rows(const pkm_machine *machine, ptrdiff_t n, const double *geo
         real lane_pose[6], R[9], p[3];
         const int count = block_rows(first, n, row);
         if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
-        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
+        gather_row(pose, 6, 6, row, lane_pose);
         FN(pose_frame)(lane_pose, R, p);
         for (int i = 0; i < limbs; i++) {
             real qt, by_q, by_g[SLOTS], square = fill(0.0);
@@ -98,18 +97,19 @@ INLINE void sphere_rows(const pkm_machine *machine, ptrdiff_t n, const double *g
         real lane_q[PKM_MAX_LIMBS];
         const int count = block_rows(first, n, row);
         if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
-        for (int a = 0; a < machine->actuators; a++) lane_q[a] = gather(q + a, machine->actuators, row);
+        gather_row(q, machine->actuators, machine->actuators, row, lane_q);
         const mask reachable = spheres_at(machine, limb, lane_q, sphere);
         for (int i = 0; i < machine->limbs; i++) {
             const FN(limb_sphere) *one = &sphere[i];
-            double *to = out + i * PKM_SPHERE;
+            real numbers[PKM_SPHERE];
             for (int k = 0; k < 3; k++) {
-                scatter(one->b[k], to + k, width, row, count);
-                scatter(one->c[k], to + 3 + k, width, row, count);
-                scatter(one->base_axis[k], to + 7 + k, width, row, count);
-                scatter(one->platform_axis[k], to + 10 + k, width, row, count);
+                numbers[k] = one->b[k];
+                numbers[3 + k] = one->c[k];
+                numbers[7 + k] = one->base_axis[k];
+                numbers[10 + k] = one->platform_axis[k];
             }
-            scatter(select(reachable, one->rho, fill(NAN)), to + 6, width, row, count);
+            numbers[6] = select(reachable, one->rho, fill(NAN));
+            scatter_row(numbers, PKM_SPHERE, out + i * PKM_SPHERE, width, row, count);
         }
     }
 }

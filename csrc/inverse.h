@@ -58,11 +58,10 @@ INLINE void inverse_rows(const pkm_machine *machine, ptrdiff_t n, const double *
         const int count = block_rows(first, n, row);
         if (first == 0 || geometry_stride)
             prepare_limbs(machine, geometry, geometry_stride, row, limb);
-        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
+        gather_row(pose, 6, 6, row, lane_pose);
         FN(pose_frame)(lane_pose, R, p);
         inverse_at(machine, limb, R, p, lane_q);
-        for (int a = 0; a < machine->actuators; a++)
-            scatter(lane_q[a], q + a, machine->actuators, row, count);
+        scatter_row(lane_q, machine->actuators, q, machine->actuators, row, count);
     }
 }
 

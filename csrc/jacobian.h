@@ -153,9 +153,9 @@ INLINE void jacobian_map(int map, const pkm_machine *machine, ptrdiff_t n, const
         const int count = block_rows(first, n, row);
         if (first == 0 || geometry_stride)
             prepare_limbs(machine, geometry, geometry_stride, row, limb);
-        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
+        gather_row(pose, 6, 6, row, lane_pose);
         jacobian_block(map, machine, limb, lane_pose, out);
-        for (int k = 0; k < width; k++) scatter(out[k], jacobian + k, width, row, count);
+        scatter_row(out, width, jacobian, width, row, count);
     }
 }
 
@@ -171,10 +171,10 @@ INLINE void response_map(int map, const pkm_machine *machine, ptrdiff_t n, const
         const int count = block_rows(first, n, row);
         if (first == 0 || geometry_stride)
             prepare_limbs(machine, geometry, geometry_stride, row, limb);
-        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
-        for (int a = 0; a < actuators; a++) lane_q[a] = gather(q + a, actuators, row);
+        gather_row(pose, 6, 6, row, lane_pose);
+        gather_row(q, actuators, actuators, row, lane_q);
         response_block(map, machine, limb, lane_pose, lane_q, column, columns, twists, out);
-        for (int k = 0; k < width; k++) scatter(out[k], jacobian + k, width, row, count);
+        scatter_row(out, width, jacobian, width, row, count);
     }
 }
 

@@ -2,6 +2,8 @@
  * machine, and elimination in a fixed order. Included by lanes.h for `narrow` and for `wide`, and by
  * paths.c for complex numbers. */
 
+#define UNROLL _Pragma("GCC unroll 6") /* the loops of elimination: registers hold its rows then */
+
 INLINE real FN(fill)(NUMBER x) { return (real){0} + x; }
 
 #ifndef COMPLEX
@@ -125,6 +127,7 @@ INLINE int FN(closure_rows)(int map, int scaling, const pkm_machine *machine,
                       &residual[machine->order[r]],
                       jacobian ? &jacobian[machine->order[r] * m] : NULL);
         r++;
+        if (!machine->rows[i]) continue;
         for (int kind = ROW_BASE_PLANE; kind <= ROW_COUPLE; kind *= 2) {
             if (!(machine->rows[i] & kind)) continue;
             if (kind == ROW_BASE_PLANE)
@@ -150,28 +153,32 @@ INLINE int FN(closure_rows)(int map, int scaling, const pkm_machine *machine,
  * depend on each other and those of two do not. */
 INLINE void FN(factor)(int m, int count, real (*A)[36])
 {
-    for (int i = 0; i < m; i++)
-        for (int t = 0; t < count; t++) {
+    UNROLL for (int i = 0; i < m; i++)
+        UNROLL for (int t = 0; t < count; t++) {
             real row[6];
-            for (int j = 0; j < m; j++) row[j] = A[t][i * m + j];
-            for (int k = 0; k < i; k++) {
+            UNROLL for (int j = 0; j < m; j++) row[j] = A[t][i * m + j];
+            UNROLL for (int k = 0; k < i; k++) {
                 row[k] *= A[t][k * m + k];
-                for (int j = k + 1; j < m; j++) row[j] -= row[k] * A[t][k * m + j];
+                UNROLL for (int j = k + 1; j < m; j++) row[j] -= row[k] * A[t][k * m + j];
             }
             row[i] = 1.0f / row[i];
-            for (int j = 0; j < m; j++) A[t][i * m + j] = row[j];
+            UNROLL for (int j = 0; j < m; j++) A[t][i * m + j] = row[j];
         }
 }
 
 /* Solve with those factors, in place. */
 INLINE void FN(substitute)(int m, int count, real (*A)[36], real (*b)[PKM_MAX_ROWS])
 {
-    for (int i = 1; i < m; i++)
-        for (int j = 0; j < i; j++)
-            for (int t = 0; t < count; t++) b[t][i] -= A[t][i * m + j] * b[t][j];
-    for (int i = m - 1; i >= 0; i--) {
-        for (int j = i + 1; j < m; j++)
-            for (int t = 0; t < count; t++) b[t][i] -= A[t][i * m + j] * b[t][j];
-        for (int t = 0; t < count; t++) b[t][i] *= A[t][i * m + i];
+    for (int t = 0; t < count; t++) {
+        real x[6];
+        UNROLL for (int i = 0; i < m; i++) {
+            x[i] = b[t][i];
+            UNROLL for (int j = 0; j < i; j++) x[i] -= A[t][i * m + j] * x[j];
+        }
+        UNROLL for (int i = m - 1; i >= 0; i--) {
+            UNROLL for (int j = i + 1; j < m; j++) x[i] -= A[t][i * m + j] * x[j];
+            x[i] *= A[t][i * m + i];
+        }
+        UNROLL for (int i = 0; i < m; i++) b[t][i] = x[i];
     }
 }

@@ -1,6 +1,6 @@
 /* Lanes: one row of a batch each, at the processor's native width.
  *
- * `wide` is LANES doubles, `narrow` twice as many floats; `real`, `mask` and FN(name) stand for
+ * `wide` is LANES doubles, `narrow` as many bytes of floats; `real`, `mask` and FN(name) stand for
  * either where code is written once and included for both (kernel.h), and for `wide` elsewhere.
  * Masks are lanes of integers, all ones or zero. Conditions are written so that NaN fails.
  */
@@ -20,10 +20,14 @@
 
 #define INLINE static inline __attribute__((always_inline, unused))
 
+#ifndef JOINED
+#define JOINED 2 /* wide blocks that make a narrow one; with 1, floats too go LANES at a time */
+#endif
+
 typedef double wide __attribute__((vector_size(8 * LANES)));
 typedef int64_t wide_mask __attribute__((vector_size(8 * LANES)));
-typedef float narrow __attribute__((vector_size(8 * LANES)));
-typedef int32_t narrow_mask __attribute__((vector_size(8 * LANES)));
+typedef float narrow __attribute__((vector_size(4 * JOINED * LANES)));
+typedef int32_t narrow_mask __attribute__((vector_size(4 * JOINED * LANES)));
 
 INLINE wide root_wide(wide x)
 {
@@ -48,7 +52,7 @@ INLINE narrow root_narrow(narrow x)
 #elif LANES == 2 && defined(__SSE2__)
     return (narrow)_mm_sqrt_ps((__m128)x);
 #else
-    for (int l = 0; l < 2 * LANES; l++) x[l] = sqrtf(x[l]);
+    for (int l = 0; l < JOINED * LANES; l++) x[l] = sqrtf(x[l]);
     return x;
 #endif
 }
@@ -89,26 +93,29 @@ INLINE narrow larger_narrow(narrow a, narrow b)
 #endif
 }
 
-/* Two wide blocks, rounded to one narrow block. */
-INLINE narrow join(wide low, wide high)
+/* JOINED wide blocks, the first and the last, rounded to one narrow block. */
+INLINE narrow join(wide first, wide last)
 {
 #if LANES == 8 && defined(__AVX512DQ__)
-    const __m512 first = _mm512_castps256_ps512(_mm512_cvtpd_ps((__m512d)low));
-    return (narrow)_mm512_insertf32x8(first, _mm512_cvtpd_ps((__m512d)high), 1);
+    const __m512 low = _mm512_castps256_ps512(_mm512_cvtpd_ps((__m512d)first));
+    return (narrow)_mm512_insertf32x8(low, _mm512_cvtpd_ps((__m512d)last), 1);
 #elif LANES == 4 && defined(__AVX__)
-    const __m256 first = _mm256_castps128_ps256(_mm256_cvtpd_ps((__m256d)low));
-    return (narrow)_mm256_insertf128_ps(first, _mm256_cvtpd_ps((__m256d)high), 1);
+    const __m256 low = _mm256_castps128_ps256(_mm256_cvtpd_ps((__m256d)first));
+    return (narrow)_mm256_insertf128_ps(low, _mm256_cvtpd_ps((__m256d)last), 1);
 #elif LANES == 2 && defined(__SSE2__)
-    return (narrow)_mm_movelh_ps(_mm_cvtpd_ps((__m128d)low), _mm_cvtpd_ps((__m128d)high));
+    return (narrow)_mm_movelh_ps(_mm_cvtpd_ps((__m128d)first), _mm_cvtpd_ps((__m128d)last));
 #else
     narrow r;
-    for (int l = 0; l < LANES; l++) r[l] = (float)low[l], r[LANES + l] = (float)high[l];
+    for (int l = 0; l < LANES; l++) {
+        r[l] = (float)first[l];
+        r[(JOINED - 1) * LANES + l] = (float)last[l];
+    }
     return r;
 #endif
 }
 
-/* Half 0 or 1 of a narrow block, exactly. */
-INLINE wide half(narrow x, int which)
+/* Wide block 0 or 1 of a narrow one, exactly. */
+INLINE wide part(narrow x, int which)
 {
 #if LANES == 8 && defined(__AVX512DQ__)
     return (wide)_mm512_cvtps_pd(which ? _mm512_extractf32x8_ps((__m512)x, 1)
@@ -127,7 +134,7 @@ INLINE wide half(narrow x, int which)
 
 /* 1/x to the precision of floats: enough for a scale, and cheaper. */
 INLINE narrow rough_reciprocal_narrow(narrow x) { return 1.0f / x; }
-INLINE wide rough_reciprocal_wide(wide x) { return half(1.0f / join(x, x), 0); }
+INLINE wide rough_reciprocal_wide(wide x) { return part(1.0f / join(x, x), 0); }
 
 enum { PLAIN, SCALED }; /* systems of closure rows: see kernel.h */
 
@@ -136,19 +143,16 @@ enum { PLAIN, SCALED }; /* systems of closure rows: see kernel.h */
 #define real narrow
 #define mask narrow_mask
 #define NUMBER float
-#define COUNT (2 * LANES)
 #define FN(name) name##_narrow
 #include "kernel.h"
 #undef NARROW
 #undef real
 #undef mask
 #undef NUMBER
-#undef COUNT
 #undef FN
 #define real wide
 #define mask wide_mask
 #define NUMBER double
-#define COUNT LANES
 #define FN(name) name##_wide
 #include "kernel.h"
 
@@ -187,7 +191,7 @@ INLINE void whole_or_nan(real *numbers, int count)
     for (int k = 0; k < count; k++) numbers[k] = select(known, numbers[k], fill(NAN));
 }
 
-/* Column k of the given rows of a row-major array. */
+/* One number of each of the given rows of a row-major array. */
 INLINE real gather(const double *column, ptrdiff_t stride, const ptrdiff_t *row)
 {
     real r = {0};
@@ -204,6 +208,65 @@ INLINE void scatter(real x, double *column, ptrdiff_t stride, const ptrdiff_t *r
         for (int l = 0; l < LANES; l++) column[stride * row[l]] = lane[l];
     else
         for (int l = 0; l < count; l++) column[stride * row[l]] = lane[l];
+}
+
+#if LANES == 8 && defined(__AVX512F__)
+/* Eight rows of eight numbers to eight columns, or back. */
+INLINE void transpose(__m512d tile[8])
+{
+    __m512d pair[8], four[8];
+    for (int k = 0; k < 8; k += 2) {
+        pair[k] = _mm512_unpacklo_pd(tile[k], tile[k + 1]);
+        pair[k + 1] = _mm512_unpackhi_pd(tile[k], tile[k + 1]);
+    }
+    for (int k = 0; k < 8; k += 4)
+        for (int j = 0; j < 2; j++) {
+            four[k + j] = _mm512_shuffle_f64x2(pair[k + j], pair[k + 2 + j], 0x88);
+            four[k + 2 + j] = _mm512_shuffle_f64x2(pair[k + j], pair[k + 2 + j], 0xdd);
+        }
+    for (int j = 0; j < 4; j++) {
+        tile[j] = _mm512_shuffle_f64x2(four[j], four[4 + j], 0x88);
+        tile[4 + j] = _mm512_shuffle_f64x2(four[j], four[4 + j], 0xdd);
+    }
+}
+#endif
+
+/* The first `width` numbers of the given rows, `stride` apart: 0 where all rows share them. */
+INLINE void gather_row(const double *array, ptrdiff_t stride, int width, const ptrdiff_t *row,
+                       real *out)
+{
+    int k = 0;
+#if LANES == 8 && defined(__AVX512F__)
+    for (; k + 2 < width; k += 8) {
+        const int part = width - k < 8 ? width - k : 8;
+        __m512d tile[8];
+        for (int l = 0; l < 8; l++)
+            tile[l] = _mm512_maskz_loadu_pd((__mmask8)((1 << part) - 1), array + k + stride * row[l]);
+        transpose(tile);
+        for (int j = 0; j < 8; j++)
+            if (j < part) out[k + j] = (real)tile[j];
+    }
+#endif
+    for (; k < width; k++) out[k] = gather(array + k, stride, row);
+}
+
+/* The reverse, for the first `count` lanes. */
+INLINE void scatter_row(const real *values, int width, double *array, ptrdiff_t stride,
+                        const ptrdiff_t *row, int count)
+{
+    int k = 0;
+#if LANES == 8 && defined(__AVX512F__)
+    for (; k + 2 < width; k += 8) {
+        const int part = width - k < 8 ? width - k : 8;
+        __m512d tile[8];
+        for (int j = 0; j < 8; j++) tile[j] = (__m512d)values[k + (j < part ? j : 0)];
+        transpose(tile);
+        for (int l = 0; l < 8; l++)
+            if (l < count)
+                _mm512_mask_storeu_pd(array + k + stride * row[l], (__mmask8)((1 << part) - 1), tile[l]);
+    }
+#endif
+    for (; k < width; k++) scatter(values[k], array + k, stride, row, count);
 }
 
 /* Rows start, start + 1, ... of n; lanes past the last repeat it. Returns how many are real. */

@@ -49,8 +49,7 @@ INLINE void rates_rows(const pkm_machine *machine, ptrdiff_t n, const double *ge
         real T[3][12], rate[PKM_MAX_LIMBS], bend[PKM_MAX_LIMBS];
         const int count = block_rows(first, n, row);
         if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
-        for (int k = 0; k < 3; k++)
-            for (int j = 0; j < 12; j++) T[k][j] = gather(motion + 16 * k + j, 48, row);
+        for (int k = 0; k < 3; k++) gather_row(motion + 16 * k, 48, 12, row, T[k]);
         for (int a = 0; a < actuators; a++) rate[a] = bend[a] = fill(0.0);
         for (int i = 0; i < machine->limbs; i++) {
             real of_rate, of_bend;
@@ -64,10 +63,8 @@ INLINE void rates_rows(const pkm_machine *machine, ptrdiff_t n, const double *ge
         }
         whole_or_nan(rate, actuators);
         whole_or_nan(bend, actuators);
-        for (int a = 0; a < actuators; a++) {
-            scatter(rate[a], q1 + a, actuators, row, count);
-            scatter(bend[a], q2 + a, actuators, row, count);
-        }
+        scatter_row(rate, actuators, q1, actuators, row, count);
+        scatter_row(bend, actuators, q2, actuators, row, count);
     }
 }
 
@@ -176,19 +173,17 @@ INLINE void motion_map(int map, const pkm_machine *machine, ptrdiff_t n, const d
         real lane_pose[6], lane_q[3][PKM_MAX_LIMBS], T[3][12], rates[12];
         const int count = block_rows(first, n, row);
         if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
-        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
-        for (int a = 0; a < actuators; a++) {
-            lane_q[0][a] = gather(q + a, actuators, row);
-            lane_q[1][a] = gather(q1 + a, actuators, row);
-            lane_q[2][a] = gather(q2 + a, actuators, row);
-        }
+        gather_row(pose, 6, 6, row, lane_pose);
+        gather_row(q, actuators, actuators, row, lane_q[0]);
+        gather_row(q1, actuators, actuators, row, lane_q[1]);
+        gather_row(q2, actuators, actuators, row, lane_q[2]);
         motion_at(map, machine, limb, lane_pose, lane_q[0], lane_q[1], lane_q[2], T, rates);
         for (int k = 0; k < 3; k++) {
-            for (int j = 0; j < 12; j++) scatter(T[k][j], motion + 16 * k + j, 48, row, count);
+            scatter_row(T[k], 12, motion + 16 * k, 48, row, count);
             for (int j = 12; j < 16; j++)
                 scatter(fill(k == 0 && j == 15 ? 1.0 : 0.0), motion + 16 * k + j, 48, row, count);
         }
-        for (int k = 0; k < 12; k++) scatter(rates[k], pose_rates + k, 12, row, count);
+        scatter_row(rates, 12, pose_rates, 12, row, count);
     }
 }
 

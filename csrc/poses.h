@@ -8,10 +8,12 @@
 INLINE void scatter_pose(const real p[3], const real sine[3], const real cosine[3], double *out,
                          const ptrdiff_t *row, int count)
 {
+    real pose[6];
     for (int k = 0; k < 3; k++) {
-        scatter(p[k], out + k, 6, row, count);
-        scatter(arctangent2(sine[k], cosine[k]), out + 3 + k, 6, row, count);
+        pose[k] = p[k];
+        pose[3 + k] = arctangent2(sine[k], cosine[k]);
     }
+    scatter_row(pose, 6, out, 6, row, count);
 }
 
 /* out = A B; a stride is 0 where all rows share a pose, else 6. */
@@ -22,10 +24,8 @@ INLINE void compose_rows(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const
         ptrdiff_t row[LANES];
         real lane_a[6], lane_b[6], p[3], sine[3], cosine[3];
         const int count = block_rows(first, n, row);
-        for (int k = 0; k < 6; k++) {
-            lane_a[k] = gather(a + k, a_stride, row);
-            lane_b[k] = gather(b + k, b_stride, row);
-        }
+        gather_row(a, a_stride, 6, row, lane_a);
+        gather_row(b, b_stride, 6, row, lane_b);
         FN(pose_compose)(lane_a, lane_b, p, sine, cosine);
         scatter_pose(p, sine, cosine, out, row, count);
     }
@@ -37,7 +37,7 @@ INLINE void invert_rows(ptrdiff_t n, const double *a, double *out)
         ptrdiff_t row[LANES];
         real lane_a[6], p[3], sine[3], cosine[3];
         const int count = block_rows(first, n, row);
-        for (int k = 0; k < 6; k++) lane_a[k] = gather(a + k, 6, row);
+        gather_row(a, 6, 6, row, lane_a);
         FN(pose_invert)(lane_a, p, sine, cosine);
         scatter_pose(p, sine, cosine, out, row, count);
     }
@@ -53,13 +53,11 @@ INLINE void compose_rates_rows(ptrdiff_t n, const double *a, const double *pose,
         ptrdiff_t row[LANES];
         real lane_pose[6], lane_c[6], lane_composed[6], out[36];
         const int count = block_rows(first, n, row);
-        for (int k = 0; k < 6; k++) {
-            lane_pose[k] = gather(pose + k, 6, row);
-            lane_c[k] = gather(c + k, c_stride, row);
-            lane_composed[k] = gather(composed + k, 6, row);
-        }
+        gather_row(pose, 6, 6, row, lane_pose);
+        gather_row(c, c_stride, 6, row, lane_c);
+        gather_row(composed, 6, 6, row, lane_composed);
         FN(pose_compose_rates)(lane_a, lane_pose, lane_c, lane_composed, out);
-        for (int k = 0; k < 36; k++) scatter(out[k], rates + k, 36, row, count);
+        scatter_row(out, 36, rates, 36, row, count);
     }
 }
 
@@ -76,9 +74,9 @@ INLINE void compose_twists_rows(ptrdiff_t n, const double *a, const double *pose
         ptrdiff_t row[LANES];
         real lane_pose[6], out[36];
         const int count = block_rows(first, n, row);
-        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
+        gather_row(pose, 6, 6, row, lane_pose);
         FN(pose_compose_twists)(lane_a, lane_pose, lane_c, out);
-        for (int k = 0; k < 36; k++) scatter(out[k], twists + k, 36, row, count);
+        scatter_row(out, 36, twists, 36, row, count);
     }
 }
 

@@ -168,7 +168,7 @@ INLINE void postures_at(ptrdiff_t n, int actuators, const double *pose, const do
         ptrdiff_t row[LANES];
         real lane_pose[6], R[9], p[3];
         const int count = block_rows(first, n, row);
-        for (int k = 0; k < 6; k++) lane_pose[k] = gather(pose + k, 6, row);
+        gather_row(pose, 6, 6, row, lane_pose);
         FN(pose_frame)(lane_pose, R, p);
         for (int l = 0; l < count; l++) {
             posture *one = &out[first + l];

@@ -13,7 +13,7 @@
 #include "jacobian.h"
 #include "newton.h"
 
-enum { BLOCKS = 2, HALVES = 2 * BLOCKS, BATCH = HALVES * LANES };
+enum { BLOCKS = 2, PARTS = JOINED * BLOCKS, BATCH = PARTS * LANES }; /* narrow, wide, rows */
 enum { STEPS_PREDICTED = 2, STEPS_GUESSED = 3 }; /* Newton steps in floats */
 #define SAFE_PIVOT 1e-3 /* of a scaled system: below it row exchanges may be needed */
 
@@ -34,12 +34,12 @@ typedef struct {
 
 /* The rows of one batch between the stages. */
 typedef struct {
-    rows_in in[HALVES];
+    rows_in in[PARTS];
     limb_sphere_narrow sphere[BLOCKS][PKM_MAX_LIMBS];
     narrow state[BLOCKS][MAX_STATE], factors[BLOCKS][36];
-    real fine[HALVES][MAX_STATE], worst[HALVES];
-    mask solved[HALVES];
-    int halves, blocks; /* that hold rows: fewer at the end of the rows */
+    real fine[PARTS][MAX_STATE], worst[PARTS];
+    mask solved[PARTS];
+    int blocks; /* that hold rows: fewer at the end of the rows */
 } batch;
 
 /* Sign bits of the determinant, from the factors. */
@@ -86,24 +86,24 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
     start->known = usable[0] != 0;
 }
 
-/* Where two halves start, in floats: predicted, or at their own guesses. */
-INLINE void start_states(int map, const pkm_machine *machine, const rows_in *low,
-                         const rows_in *high, const prediction *start, narrow *state)
+/* Where the rows of a block start, in floats: predicted, or at their own guesses. */
+INLINE void start_states(int map, const pkm_machine *machine, const rows_in *first,
+                         const rows_in *last, const prediction *start, narrow *state)
 {
     const int m = map_m(map), actuators = machine->actuators;
     narrow step[6], change[PKM_MAX_LIMBS], turn = fill_narrow(0);
     if (!start->known) {
-        real first[MAX_STATE] = {0}, second[MAX_STATE] = {0};
-        map_from_pose(map, low->guess, first);
-        map_from_pose(map, high->guess, second);
-        for (int s = 0; s < MAX_STATE; s++) state[s] = join(first[s], second[s]);
+        real low[MAX_STATE] = {0}, high[MAX_STATE] = {0};
+        map_from_pose(map, first->guess, low);
+        map_from_pose(map, last->guess, high);
+        for (int s = 0; s < MAX_STATE; s++) state[s] = join(low[s], high[s]);
         return;
     }
     for (int a = 0; a < actuators; a++)
-        change[a] = join(low->q[a] - start->q[a], high->q[a] - start->q[a]);
+        change[a] = join(first->q[a] - start->q[a], last->q[a] - start->q[a]);
     for (int j = 0; j < m; j++) {
-        step[j] = fill_narrow(0);
-        for (int a = 0; a < actuators; a++) step[j] += start->slope[j * actuators + a] * change[a];
+        step[j] = start->slope[j * actuators] * change[0];
+        for (int a = 1; a < actuators; a++) step[j] += start->slope[j * actuators + a] * change[a];
         if (map_is_angle(map, j)) turn = larger_narrow(turn, absolute_narrow(step[j]));
     }
     const narrow limit = fill_narrow((float)MAX_TURN);
@@ -112,19 +112,19 @@ INLINE void start_states(int map, const pkm_machine *machine, const rows_in *low
     map_retract_narrow(map, start->state, step, state);
 }
 
-/* Two wide spheres as one narrow; the constants of shared numbers only `once`. */
-INLINE void join_spheres(const pkm_machine *machine, int i, int once, const FN(limb_sphere) *low,
-                         const FN(limb_sphere) *high, limb_sphere_narrow *both)
+/* Wide spheres as one narrow; the constants of shared numbers only `once`. */
+INLINE void join_spheres(const pkm_machine *machine, int i, int once, const FN(limb_sphere) *first,
+                         const FN(limb_sphere) *last, limb_sphere_narrow *both)
 {
     if (once || machine->driver[i] != DRIVER_LENGTH)
-        for (int k = 0; k < 3; k++) both->c[k] = join(low->c[k], high->c[k]);
-    if (once || machine->driver[i] == DRIVER_LENGTH) both->rho = join(low->rho, high->rho);
+        for (int k = 0; k < 3; k++) both->c[k] = join(first->c[k], last->c[k]);
+    if (once || machine->driver[i] == DRIVER_LENGTH) both->rho = join(first->rho, last->rho);
     if (!once) return;
-    for (int k = 0; k < 3; k++) both->b[k] = join(low->b[k], high->b[k]);
+    for (int k = 0; k < 3; k++) both->b[k] = join(first->b[k], last->b[k]);
     if (!machine->rows[i]) return;
     for (int k = 0; k < 3; k++) {
-        both->base_axis[k] = join(low->base_axis[k], high->base_axis[k]);
-        both->platform_axis[k] = join(low->platform_axis[k], high->platform_axis[k]);
+        both->base_axis[k] = join(first->base_axis[k], last->base_axis[k]);
+        both->platform_axis[k] = join(first->platform_axis[k], last->platform_axis[k]);
     }
 }
 
@@ -157,8 +157,8 @@ INLINE void steps_in_floats(int map, const pkm_machine *machine, int steps,
         narrow_mask sound = large < fill_narrow(1);
         if (start->known) sound &= determinant_sign(m, factors) == start->sign;
         const narrow one = select_narrow(sound, fill_narrow(1), fill_narrow(0));
-        for (int h = 0; h < 2; h++)
-            all->solved[2 * t + h] = all->in[2 * t + h].usable & (half(one, h) > fill(0.0));
+        for (int h = 0; h < JOINED; h++)
+            all->solved[JOINED * t + h] = all->in[JOINED * t + h].usable & (part(one, h) > fill(0.0));
     }
 }
 
@@ -166,10 +166,11 @@ INLINE void steps_in_floats(int map, const pkm_machine *machine, int steps,
 INLINE void closures_of_block(int map, const pkm_machine *machine, const batch *all, int t,
                               narrow *phi)
 {
-    real low[PKM_MAX_ROWS], high[PKM_MAX_ROWS];
-    FN(closure_rows)(map, PLAIN, machine, all->in[2 * t].sphere, all->fine[2 * t], low, NULL);
-    FN(closure_rows)(map, PLAIN, machine, all->in[2 * t + 1].sphere, all->fine[2 * t + 1], high, NULL);
-    for (int r = 0; r < map_m(map); r++) phi[r] = join(low[r], high[r]);
+    real fine[JOINED][PKM_MAX_ROWS];
+    for (int h = 0; h < JOINED; h++)
+        FN(closure_rows)(map, PLAIN, machine, all->in[JOINED * t + h].sphere,
+                         all->fine[JOINED * t + h], fine[h], NULL);
+    for (int r = 0; r < map_m(map); r++) phi[r] = join(fine[0][r], fine[JOINED - 1][r]);
 }
 
 /* Two steps in doubles with the factors found in floats: of a step that small floats hold enough. */
@@ -180,8 +181,8 @@ INLINE void steps_in_doubles(int map, const pkm_machine *machine, batch *all)
     const narrow angular = fill_narrow((float)machine->length);
     narrow phi[BLOCKS][PKM_MAX_ROWS], longest[BLOCKS][2];
     real step[6], moved[MAX_STATE];
-    for (int h = 0; h < 2 * all->blocks; h++) {
-        for (int s = 0; s < MAX_STATE; s++) moved[s] = half(all->state[h / 2][s], h % 2);
+    for (int h = 0; h < JOINED * all->blocks; h++) {
+        for (int s = 0; s < MAX_STATE; s++) moved[s] = part(all->state[h / JOINED][s], h % JOINED);
         FN(map_tidy)(map, moved, all->fine[h]);
     }
     for (int round = 0; round < 2; round++) {
@@ -194,8 +195,8 @@ INLINE void steps_in_doubles(int map, const pkm_machine *machine, batch *all)
                 longest[t][round] = larger_narrow(longest[t][round],
                                                   map_is_angle(map, j) ? length * angular : length);
             }
-            for (int h = 2 * t; h < 2 * t + 2; h++) {
-                for (int j = 0; j < m; j++) step[j] = -half(phi[t][j], h % 2);
+            for (int h = JOINED * t; h < JOINED * (t + 1); h++) {
+                for (int j = 0; j < m; j++) step[j] = -part(phi[t][j], h % JOINED);
                 FN(map_retract)(map, all->fine[h], step, moved);
                 memcpy(all->fine[h], moved, sizeof moved);
             }
@@ -211,11 +212,11 @@ INLINE void steps_in_doubles(int map, const pkm_machine *machine, batch *all)
                 scale = fill_narrow((float)(1.0 / machine->size));
             }
         }
-        for (int h = 2 * t; h < 2 * t + 2; h++) {
+        for (int h = JOINED * t; h < JOINED * (t + 1); h++) {
             /* what is left after two steps a, b that contract is about b²/a */
-            const real a = half(longest[t][0], h % 2), second = half(longest[t][1], h % 2);
+            const real a = part(longest[t][0], h % JOINED), second = part(longest[t][1], h % JOINED);
             const real first = larger(a, second);
-            all->worst[h] = half(worst, h % 2);
+            all->worst[h] = part(worst, h % JOINED);
             all->solved[h] &= (all->worst[h] <= CLOSED * size)
                             & (second * second <= SETTLED * size * first);
         }

@@ -5,19 +5,6 @@
 #include "lanes.h"
 #include "measured.h"
 
-/* Row by row where `stride` is not 0, else one for all. */
-INLINE void gather_row(const double *array, ptrdiff_t stride, int width, const ptrdiff_t *row,
-                       real *out)
-{
-    for (int k = 0; k < width; k++) out[k] = gather(array + k, stride, row);
-}
-
-INLINE void scatter_row(const real *values, int width, double *array, const ptrdiff_t *row,
-                        int count)
-{
-    for (int k = 0; k < width; k++) scatter(values[k], array + k, width, row, count);
-}
-
 INLINE void point_rows(ptrdiff_t n, const double *pose, const double *target,
                        ptrdiff_t target_stride, double *point, double *by_twist,
                        double *by_target)
@@ -29,9 +16,9 @@ INLINE void point_rows(ptrdiff_t n, const double *pose, const double *target,
         gather_row(pose, 6, 6, row, lane_pose);
         gather_row(target, target_stride, 3, row, lane_target);
         FN(measured_point)(lane_pose, lane_target, p, dp, dt);
-        scatter_row(p, 3, point, row, count);
-        scatter_row(dp, 18, by_twist, row, count);
-        scatter_row(dt, 9, by_target, row, count);
+        scatter_row(p, 3, point, 3, row, count);
+        scatter_row(dp, 18, by_twist, 18, row, count);
+        scatter_row(dt, 9, by_target, 9, row, count);
     }
 }
 
@@ -46,9 +33,9 @@ INLINE void seen_point_rows(ptrdiff_t n, const double *frame, const double *poin
         const int count = block_rows(first, n, row);
         gather_row(point, 3, 3, row, lane_point);
         FN(seen_point)(lane_frame, lane_point, s, df, dx);
-        scatter_row(s, 3, seen, row, count);
-        scatter_row(df, 18, by_frame, row, count);
-        scatter_row(dx, 9, by_point, row, count);
+        scatter_row(s, 3, seen, 3, row, count);
+        scatter_row(df, 18, by_frame, 18, row, count);
+        scatter_row(dx, 9, by_point, 9, row, count);
     }
 }
 
@@ -62,7 +49,7 @@ INLINE void seen_pose_rows(ptrdiff_t n, const double *frame, const double *seen,
         const int count = block_rows(first, n, row);
         gather_row(seen, 6, 6, row, lane_seen);
         FN(measured_pose)(lane_frame, lane_seen, out);
-        scatter_row(out, 36, by_twist, row, count);
+        scatter_row(out, 36, by_twist, 36, row, count);
     }
 }
 
@@ -79,9 +66,9 @@ INLINE void distance_rows(ptrdiff_t n, const double *pose, const double *target,
         gather_row(anchor, anchor_stride, 3, row, lane_anchor);
         FN(measured_distance)(lane_pose, lane_target, lane_anchor, &rho, dp, dt, da);
         scatter(rho, distance, 1, row, count);
-        scatter_row(dp, 6, by_twist, row, count);
-        scatter_row(dt, 3, by_target, row, count);
-        scatter_row(da, 3, by_anchor, row, count);
+        scatter_row(dp, 6, by_twist, 6, row, count);
+        scatter_row(dt, 3, by_target, 3, row, count);
+        scatter_row(da, 3, by_anchor, 3, row, count);
     }
 }
 

@@ -20,10 +20,12 @@ INLINE motion unmoved(void)
 
 INLINE motion gather_motion(const double *matrix, ptrdiff_t stride, const ptrdiff_t *row)
 {
+    real rows[12];
     motion T;
+    gather_row(matrix, stride, 12, row, rows);
     for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++) T.R[3 * i + j] = gather(matrix + 4 * i + j, stride, row);
-        T.p[i] = gather(matrix + 4 * i + 3, stride, row);
+        for (int j = 0; j < 3; j++) T.R[3 * i + j] = rows[4 * i + j];
+        T.p[i] = rows[4 * i + 3];
     }
     return T;
 }
@@ -44,13 +46,14 @@ INLINE void scatter_motion(const motion *T, double *matrix, const ptrdiff_t *row
 {
     const real *p = T->p;
     const real zero = ((p[0] - p[0]) + (p[1] - p[1])) + ((p[2] - p[2]) + (T->R[0] - T->R[0]));
+    real rows[16];
     for (int i = 0; i < 3; i++) {
-        for (int j = 0; j < 3; j++)
-            scatter(T->R[3 * i + j] + zero, matrix + 4 * i + j, 16, row, count);
-        scatter(p[i] + zero, matrix + 4 * i + 3, 16, row, count);
-        scatter(zero, matrix + 12 + i, 16, row, count);
+        for (int j = 0; j < 3; j++) rows[4 * i + j] = T->R[3 * i + j] + zero;
+        rows[4 * i + 3] = p[i] + zero;
+        rows[12 + i] = zero;
     }
-    scatter(zero + 1.0, matrix + 15, 16, row, count);
+    rows[15] = zero + 1.0;
+    scatter_row(rows, 16, matrix, 16, row, count);
 }
 
 INLINE motion composed(const motion *a, const motion *b)
@@ -81,10 +84,10 @@ INLINE real dot3(const real a[3], const real b[3]) { return a[0] * b[0] + a[1] *
 
 INLINE void gather_twist(const double *twist, const ptrdiff_t *row, real w[3], real v[3])
 {
-    for (int k = 0; k < 3; k++) {
-        w[k] = gather(twist + k, 6, row);
-        v[k] = gather(twist + 3 + k, 6, row);
-    }
+    real whole[6];
+    gather_row(twist, 6, 6, row, whole);
+    memcpy(w, whole, sizeof(real) * 3);
+    memcpy(v, whole + 3, sizeof(real) * 3);
 }
 
 INLINE void exp_rows(ptrdiff_t n, const double *twist, double *matrix)
@@ -135,7 +138,7 @@ INLINE void log_rows(ptrdiff_t n, const double *matrix, double *twist)
         angle_functions(dot3(w, w), c);
         FN(screw_log)(w, T.p, c, v);
         whole_or_nan(whole, 6);
-        for (int k = 0; k < 6; k++) scatter(whole[k], twist + k, 6, row, count);
+        scatter_row(whole, 6, twist, 6, row, count);
     }
 }
 
@@ -153,7 +156,7 @@ INLINE void exp_jacobian_rows(int inverse, ptrdiff_t n, const double *twist, dou
         else
             FN(screw_exp_jacobian)(w, v, c, D);
         whole_or_nan(D, 36);
-        for (int k = 0; k < 36; k++) scatter(D[k], jacobian + k, 36, row, count);
+        scatter_row(D, 36, jacobian, 36, row, count);
     }
 }
 
@@ -166,7 +169,7 @@ INLINE void adjoint_rows(ptrdiff_t n, const double *matrix, double *adjoint)
         const motion T = gather_motion(matrix, 16, row);
         FN(motion_adjoint)(T.R, T.p, A);
         whole_or_nan(A, 36);
-        for (int k = 0; k < 36; k++) scatter(A[k], adjoint + k, 36, row, count);
+        scatter_row(A, 36, adjoint, 36, row, count);
     }
 }
 
@@ -175,15 +178,14 @@ INLINE void pose_rows(ptrdiff_t n, const double *matrix, double *pose)
 {
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
-        real sine[2], cosine[2];
+        real sine[2], cosine[2], out[6];
         const int count = block_rows(first, n, row);
         const motion T = gather_motion(matrix, 16, row);
-        const real gamma = arctangent2(T.R[3], T.R[0]);
-        FN(rotation_tilts)(T.R, gamma, sine, cosine);
-        for (int k = 0; k < 3; k++) scatter(T.p[k], pose + k, 6, row, count);
-        for (int k = 0; k < 2; k++)
-            scatter(arctangent2(sine[k], cosine[k]), pose + 3 + k, 6, row, count);
-        scatter(gamma, pose + 5, 6, row, count);
+        memcpy(out, T.p, sizeof T.p);
+        out[5] = arctangent2(T.R[3], T.R[0]);
+        FN(rotation_tilts)(T.R, out[5], sine, cosine);
+        for (int k = 0; k < 2; k++) out[3 + k] = arctangent2(sine[k], cosine[k]);
+        scatter_row(out, 6, pose, 6, row, count);
     }
 }
 
@@ -195,8 +197,8 @@ INLINE void joint_error_rows(ptrdiff_t n, const double *error, const double *poi
         real e[6], r[3];
         motion E;
         const int count = block_rows(first, n, row);
-        for (int k = 0; k < 6; k++) e[k] = gather(error + k, 6, row);
-        for (int k = 0; k < 3; k++) r[k] = gather(point + k, 3, row);
+        gather_row(error, 6, 6, row, e);
+        gather_row(point, 3, 3, row, r);
         FN(joint_error)(e, r, E.R, E.p);
         scatter_motion(&E, matrix, row, count);
     }
@@ -231,16 +233,15 @@ INLINE void arm_link_rows(const pkm_arm *arm, ptrdiff_t n, const double *error, 
         for (int i = 0; i <= joints; i++) {
             const joint_frame from = frame_of(arm, i);
             joint_frame to = {{{0}}, {{0}}};
-            real e[6];
+            real e[6] = {0};
             motion C;
             if (i < joints) to = frame_of(arm, i + 1);
             for (int k = 0; k < 9 && i == joints; k++) to.Q[k] = home.R[k];
             for (int k = 0; k < 3 && i == joints; k++) to.r[k] = home.p[k];
-            for (int k = 0; k < 6; k++)
-                e[k] = i < joints ? gather(error + 6 * i + k, 6 * joints, row) : fill(0.0);
+            if (i < joints) gather_row(error + 6 * i, 6 * joints, 6, row, e);
             FN(arm_link)(e, from.Q, from.r, to.Q, to.r, C.R, C.p);
-            for (int k = 0; k < 9; k++) scatter(C.R[k], link + 12 * i + k, stride, row, count);
-            for (int k = 0; k < 3; k++) scatter(C.p[k], link + 12 * i + 9 + k, stride, row, count);
+            scatter_row(C.R, 9, link + 12 * i, stride, row, count);
+            scatter_row(C.p, 3, link + 12 * i + 9, stride, row, count);
         }
     }
 }
@@ -251,9 +252,13 @@ INLINE motion link_of(const pkm_links *links, int joints, int i, const ptrdiff_t
     const double *link = links->link + 12 * i;
     const ptrdiff_t stride = 12 * (joints + 1);
     motion C;
-    for (int k = 0; k < 9; k++) C.R[k] = links->by_row ? gather(link + k, stride, row) : fill(link[k]);
-    for (int k = 0; k < 3; k++)
-        C.p[k] = links->by_row ? gather(link + 9 + k, stride, row) : fill(link[9 + k]);
+    if (links->by_row) {
+        gather_row(link, stride, 9, row, C.R);
+        gather_row(link + 9, stride, 3, row, C.p);
+    } else {
+        for (int k = 0; k < 9; k++) C.R[k] = fill(link[k]);
+        for (int k = 0; k < 3; k++) C.p[k] = fill(link[9 + k]);
+    }
     return C;
 }
 
@@ -363,8 +368,7 @@ INLINE void arm_error_jacobian_rows(const pkm_arm *arm, const pkm_links *links, 
             const motion moved = T;
             double *column = jacobian + 6 * i;
             real e[6], along[9], turn[9], moment[9];
-            for (int k = 0; k < 6; k++)
-                e[k] = gather(error + 6 * i + k, links->by_row ? columns : 0, row);
+            gather_row(error + 6 * i, links->by_row ? columns : 0, 6, row, e);
             follow_link(links, arm->joints, i, row, &T);
             FN(arm_error_twists)(moved.R, before.Q, T.p, e, along, turn, moment);
             for (int k = 0; k < 3; k++) {
