@@ -2,7 +2,7 @@
 #ifndef CLOSURE_H
 #define CLOSURE_H
 
-#include "lanes.h"
+#include "rows.h"
 
 /* What of a limb depends on its numbers alone: prepared once where rows share the geometry. */
 typedef struct {

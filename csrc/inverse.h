@@ -35,33 +35,41 @@ INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *
 INLINE void inverse_at(const pkm_machine *machine, const limb_numbers *limb, const real *R,
                        const real *p, real *q)
 {
-    real lane[PKM_MAX_LIMBS];
-    double sharing[PKM_MAX_LIMBS] = {0};
+    double sharing[PKM_MAX_LIMBS];
+    for (int a = 0; a < machine->actuators; a++) sharing[a] = 0.0;
     for (int i = 0; i < machine->limbs; i++) {
-        lane[i] = limb_inverse(machine, i, &limb[i], R, p);
-        sharing[machine->actuator[i]] += 1.0;
+        const int a = machine->actuator[i];
+        const real one = limb_inverse(machine, i, &limb[i], R, p);
+        q[a] = sharing[a] > 0.0 ? q[a] + one : one;
+        sharing[a] += 1.0;
     }
-    for (int a = 0; a < machine->actuators; a++) q[a] = fill(0.0);
-    for (int i = 0; i < machine->limbs; i++) q[machine->actuator[i]] += lane[i];
-    for (int a = 0; a < machine->actuators; a++)
-        if (sharing[a] > 1.0) q[a] /= sharing[a];
+    if (machine->actuators < machine->limbs)
+        for (int a = 0; a < machine->actuators; a++) q[a] /= sharing[a];
     whole_or_nan(q, machine->actuators);
 }
 
 INLINE void inverse_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                          ptrdiff_t geometry_stride, const double *pose, double *q)
 {
+    enum { BLOCKS_INVERSE = 2 }; /* side by side: the processor overlaps them */
     limb_numbers limb[PKM_MAX_LIMBS];
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        real lane_pose[6], R[9], p[3], lane_q[PKM_MAX_LIMBS];
-        const int count = block_rows(first, n, row);
-        if (first == 0 || geometry_stride)
-            prepare_limbs(machine, geometry, geometry_stride, row, limb);
-        gather_row(pose, 6, 6, row, lane_pose);
-        FN(pose_frame)(lane_pose, R, p);
-        inverse_at(machine, limb, R, p, lane_q);
-        scatter_row(lane_q, machine->actuators, q, machine->actuators, row, count);
+    for (ptrdiff_t first = 0; first < n; first += BLOCKS_INVERSE * LANES) {
+        ptrdiff_t row[BLOCKS_INVERSE][LANES];
+        real lane_pose[BLOCKS_INVERSE][6], R[BLOCKS_INVERSE][9], p[BLOCKS_INVERSE][3];
+        real lane_q[BLOCKS_INVERSE][PKM_MAX_LIMBS];
+        int count[BLOCKS_INVERSE];
+        for (int t = 0; t < BLOCKS_INVERSE; t++) {
+            count[t] = block_rows(first + t * LANES, n, row[t]);
+            gather_row(pose, 6, 6, row[t], lane_pose[t]);
+        }
+        for (int t = 0; t < BLOCKS_INVERSE; t++) FN(pose_frame)(lane_pose[t], R[t], p[t]);
+        for (int t = 0; t < BLOCKS_INVERSE; t++) {
+            if (first + t == 0 || geometry_stride)
+                prepare_limbs(machine, geometry, geometry_stride, row[t], limb);
+            inverse_at(machine, limb, R[t], p[t], lane_q[t]);
+        }
+        for (int t = 0; t < BLOCKS_INVERSE; t++)
+            scatter_row(lane_q[t], machine->actuators, q, machine->actuators, row[t], count[t]);
     }
 }
 

@@ -2,7 +2,7 @@
 #ifndef POSES_H
 #define POSES_H
 
-#include "lanes.h"
+#include "rows.h"
 #include "frames.h"
 
 INLINE void scatter_pose(const real p[3], const real sine[3], const real cosine[3], double *out,

@@ -2,7 +2,7 @@
 #ifndef READINGS_H
 #define READINGS_H
 
-#include "lanes.h"
+#include "rows.h"
 #include "measured.h"
 
 INLINE void point_rows(ptrdiff_t n, const double *pose, const double *target,

@@ -3,7 +3,7 @@
 #ifndef SERIAL_H
 #define SERIAL_H
 
-#include "lanes.h"
+#include "rows.h"
 #include "screws.h"
 
 typedef struct {
