@@ -107,33 +107,42 @@ class Machine:
         return q
 
     def forward(
-        self, slots: FloatArray, q: FloatArray, guess: FloatArray, threads: int | None
+        self,
+        slots: FloatArray,
+        q: FloatArray,
+        guess: FloatArray,
+        threads: int | None,
+        shape: tuple[int, ...] | None = None,
     ) -> tuple[FloatArray, IntArray, IntArray, FloatArray]:
         """Actuator coordinates (N, n) to pose, status, iterations and residual.
 
         `slots` is one geometry (limbs, SLOTS), or one per row (N, limbs, SLOTS); `guess` (6,) or
-        (N, 6).
+        (N, 6). What is found has the leading `shape` of N rows, by default (N,).
         """
-        n = len(q)
-        pose, residual = np.empty((n, 6)), np.empty(n)
-        status, iterations = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
+        n, shape = len(q), (len(q),) if shape is None else shape
+        pose, residual = np.empty((*shape, 6)), np.empty(shape)
+        status, iterations = np.empty(shape, dtype=np.int32), np.empty(shape, dtype=np.int32)
         slot_stride = slots[0].size if slots.ndim == 3 else 0
         guess_stride = 6 if guess.ndim == 2 else 0
+        # made once and moved from row to row: a pointer costs as much as an array
+        to_slots, to_q, to_guess = pointer(slots), pointer(q), pointer(guess)
+        to_pose, to_residual = pointer(pose), pointer(residual)
+        to_status, to_iterations = int_pointer(status), int_pointer(iterations)
 
         def call(start: int, stop: int) -> int:
             code: int = lib.pkm_forward(
                 self.struct,
                 self.isa,
                 stop - start,
-                pointer(slots, start if slot_stride else 0),
+                to_slots + start * slot_stride,
                 slot_stride,
-                pointer(q, start),
-                pointer(guess, start if guess_stride else 0),
+                to_q + start * self.actuators,
+                to_guess + start * guess_stride,
                 guess_stride,
-                pointer(pose, start),
-                int_pointer(status, start),
-                int_pointer(iterations, start),
-                pointer(residual, start),
+                to_pose + 6 * start,
+                to_status + start,
+                to_iterations + start,
+                to_residual + start,
             )
             return code
 

@@ -31,10 +31,10 @@ class Frames:
         return compose(compose(self._base_inverse, pose), self._tool_inverse)
 
     def outward(self, pose: FloatArray) -> FloatArray:
-        """Poses (N, 6) of the machine's own to the user's frames."""
+        """Poses (..., 6) of the machine's own to the user's frames."""
         if self.trivial:
             return pose
-        return compose(compose(self._base, pose), self._tool)
+        return compose(compose(self._base, pose.reshape(-1, 6)), self._tool).reshape(pose.shape)
 
     def motion_inward(self, motion: FloatArray) -> FloatArray:
         """Motions with their derivatives (N, 3, 4, 4), from the user's frames to the machine's."""

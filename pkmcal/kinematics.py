@@ -147,18 +147,17 @@ class Kinematics:
                         f"guess must be (6,) or broadcast to {wanted}, found {found}"
                     ) from None
                 start = np.ascontiguousarray(start).reshape(-1, 6)
-        own, status, iterations, residual = self._machine.forward(self._slots, rows, start, threads)
-        system = (*shape, self._machine.rows, self._machine.m)
+        own, status, iterations, residual = self._machine.forward(
+            self._slots, rows, start, threads, shape
+        )
         return Forward(
-            self._frames.outward(own).reshape(*shape, 6),
-            status.reshape(shape),
-            iterations.reshape(shape),
-            residual.reshape(shape),
-            lambda: self._steps(own, rows).reshape(*system),
-            lambda: self._steps(
-                np.ascontiguousarray(np.broadcast_to(start, own.shape)), rows
-            ).reshape(*system),
-            lambda: modes.proofs(self._subject(rows), own).reshape(shape),
+            self._frames.outward(own),
+            status,
+            iterations,
+            residual,
+            lambda: self._steps(own, rows),
+            lambda: self._steps(np.broadcast_to(start, (len(rows), 6)).reshape(own.shape), rows),
+            lambda: modes.proofs(self._subject(rows), own.reshape(-1, 6)).reshape(shape),
         )
 
     def jacobian(self, pose: ArrayLike) -> FloatArray:
@@ -269,8 +268,10 @@ class Kinematics:
         )
 
     def _steps(self, own: FloatArray, q: FloatArray) -> FloatArray:
-        """Closure rows by a scaled twist, (N, rows, m)."""
-        return self._machine.closure(self._slots, own, q).by_step
+        """Closure rows by a scaled twist at poses (..., 6) and their coordinates (N, n)."""
+        rows = np.ascontiguousarray(own).reshape(-1, 6)
+        by_step = self._machine.closure(self._slots, rows, q).by_step
+        return by_step.reshape(*own.shape[:-1], *by_step.shape[1:])
 
 
 def _limb(limb: Limb) -> dict[str, Any]:
