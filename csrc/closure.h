@@ -72,7 +72,10 @@ INLINE void prepare_limbs(const pkm_machine *machine, const double *geometry, pt
     for (int i = 0; i < machine->limbs; i++) {
         limb_numbers *one = &limb[i];
         real F[9], P[9];
-        gather_row(geometry + i * SLOTS, stride, SLOTS, row, one->g);
+        if (stride)
+            gather_row(geometry + i * SLOTS, stride, SLOTS, row, one->g);
+        else
+            for (int s = 0; s < SLOTS; s++) one->g[s] = fill(geometry[i * SLOTS + s]);
         one->per_gain = 1.0 / one->g[GAIN];
         fill_frame(machine->frame + 9 * i, F);
         fill_frame(machine->platform_frame + 9 * i, P);

@@ -56,7 +56,7 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
 {
     const int m = map_m(map), actuators = machine->actuators;
     real pose[6], R[9], p[3], phi[PKM_MAX_ROWS], A[1][36], X[1][PKM_MAX_ROWS], by_g[SLOTS];
-    real state[MAX_STATE] = {0}, slope[6 * PKM_MAX_LIMBS] = {0};
+    real state[MAX_STATE] = {0}, slope[6 * PKM_MAX_LIMBS];
     narrow factors[36];
     FN(limb_sphere) sphere[PKM_MAX_LIMBS];
     for (int k = 0; k < 6; k++) pose[k] = fill(guess[k]);
@@ -64,6 +64,7 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
     FN(map_frame)(map, state, R, p);
     inverse_at(machine, limb, R, p, start->q);
     mask usable = spheres_at(machine, limb, start->q, sphere);
+    for (int k = 0; k < m * actuators; k++) slope[k] = fill(0.0);
     FN(closure_rows)(map, PLAIN, machine, sphere, state, phi, A[0]);
     FN(factor)(m, 1, A);
     for (int i = 0, r = 0; i < machine->limbs; i++) {

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -97,14 +98,9 @@ def as_rows(name: str, array: ArrayLike, width: int) -> tuple[FloatArray, tuple[
     return rows, given.shape[:-1]
 
 
-def pointer(array: FloatArray, start: int = 0) -> Any:
-    """C pointer to row `start` of a contiguous float64 array."""
-    return ffi.from_buffer("double *", array if start == 0 else array[start:])
-
-
-def int_pointer(array: IntArray, start: int = 0) -> Any:
-    """C pointer to entry `start` of a contiguous int32 array."""
-    return ffi.from_buffer("int32_t *", array if start == 0 else array[start:])
+# C pointer to a contiguous array of float64, or int32; it keeps the array alive.
+pointer: Callable[[FloatArray], Any] = partial(ffi.from_buffer, "double *")
+int_pointer: Callable[[IntArray], Any] = partial(ffi.from_buffer, "int32_t *")
 
 
 def ensure(code: int) -> None:

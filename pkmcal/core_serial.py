@@ -77,9 +77,9 @@ class Links(NamedTuple):
         """C arguments for the rows from `first`: the links, and a pointer to the errors."""
         by_row = self.numbers.ndim == 3
         first = first if by_row else 0
-        numbers = pointer(self.numbers, first)  # keeps the array alive, as long as it is kept
+        numbers = pointer(self.numbers[first:])  # kept as long as it is used
         links = ffi.new("pkm_links *", (by_row, numbers))
-        return (links, numbers), pointer(self.errors, first)
+        return (links, numbers), pointer(self.errors[first:])
 
 
 class Arm:
@@ -138,8 +138,8 @@ class Arm:
                     held[0],
                     self.isa,
                     stop - start,
-                    pointer(theta, start),
-                    pointer(out, start),
+                    pointer(theta[start:]),
+                    pointer(out[start:]),
                 )
             )
 
@@ -160,8 +160,8 @@ class Arm:
                     self.isa,
                     frame,
                     stop - start,
-                    pointer(theta, start),
-                    pointer(out, start),
+                    pointer(theta[start:]),
+                    pointer(out[start:]),
                 )
             )
 
@@ -183,8 +183,8 @@ class Arm:
                     self.isa,
                     frame,
                     stop - start,
-                    pointer(theta, start),
-                    pointer(out, start),
+                    pointer(theta[start:]),
+                    pointer(out[start:]),
                 )
             )
 

@@ -176,12 +176,12 @@ def minimise_eq18(
             start,
             stop - start,
             rows,
-            pointer(off, start),
+            pointer(off[start:]),
             pointer(lower),
             pointer(upper),
             pointer(state),
-            pointer(correction, start),
-            pointer(history, start),
+            pointer(correction[start:]),
+            pointer(history[start:]),
         )
         return code
 
