@@ -80,12 +80,15 @@ def bench_hexapod(report: Report, folder: Path) -> None:
             q[:FEW], robot.home
         ),
     }
+    bits = solvers["base"](q).pose.tobytes()
     for name, run in (fast | slow).items():
         found = run()
         pose = found.pose if isinstance(found, pk.Forward) else found
         worst = np.abs(pose - at[: len(pose)]).max()
         if not worst < 1e-8:
             raise RuntimeError(f"{name} is off by {worst} mm")
+        if name.startswith("core") and pose.tobytes() != bits:
+            raise RuntimeError(f"{name} gives other bits than the core")
     took = medians(fast, 25, time.thread_time) | medians(slow, 3, time.thread_time)
     best = solvers[native.available()[-1]](q)
     report.text(
