@@ -47,6 +47,7 @@ def bench_threads(report: Report) -> None:
         took = medians(
             {n: lambda n=n: robot.forward(q, threads=n) for n in (1, 2, None)},
             25 if count <= 100_000 else 9,
+            warm=True,
         )
         one = took[1]
         cells = [f"{count}", *(nanoseconds(seconds, count) for seconds in took.values())]
@@ -67,7 +68,7 @@ def bench_inverse(report: Report) -> None:
                 same = pk.load(name)
                 same._machine.isa = native.ISAS.index(isa)
                 cases[isa] = lambda same=same, at=at: same.inverse(at)
-            took = medians(cases, 25, time.thread_time)
+            took = medians(cases, 25, time.thread_time, warm=True)
             limbs = count * len(robot.model.limbs)
             rates = [f"{limbs / took[isa] / 1e6:.0f}" for isa in native.available()]
             rows.append([name, count, *rates])

@@ -89,11 +89,12 @@ def bench_hexapod(report: Report, folder: Path) -> None:
             raise RuntimeError(f"{name} is off by {worst} mm")
         if name.startswith("core") and pose.tobytes() != bits:
             raise RuntimeError(f"{name} gives other bits than the core")
-    took = medians(fast, 25, time.thread_time) | medians(slow, 3, time.thread_time)
+    took = medians(fast, 25, time.thread_time, warm=True)
+    took |= medians(slow, 3, time.thread_time)
     best = solvers[native.available()[-1]](q)
     report.text(
         f"hexapod, {ROWS} rows, cold from home, ±60 mm and ±15°, one thread, through Python, "
-        f"processor time. "
+        f"processor time of warm runs. "
         f"Worst closure {best.residual.max():.1e} mm, worst pose {np.abs(best.pose - at).max():.1e} mm; "
         f"{np.mean(best.iterations > best.iterations.min()):.2%} of the rows took Newton's safe way."
     )
@@ -186,7 +187,7 @@ def bench_others(report: Report, folder: Path) -> None:
                 raise RuntimeError(f"{name} is off")
             cases[isa] = lambda solve=solve, q=q: solve(q)
             cases[f"{isa} one lane"] = lambda solve=solve, q=q: lane(solve, q)
-        took = medians(cases, 15, time.thread_time)
+        took = medians(cases, 15, time.thread_time, warm=True)
         for isa in native.available():
             ratio = took[f"{isa} one lane"] / took[isa]
             slow = nanoseconds(took[f"{isa} one lane"], ROWS)
@@ -204,6 +205,8 @@ def bench_all_machines(report: Report) -> None:
         took = medians(
             {"forward": lambda: robot.forward(q, threads=1), "inverse": lambda: robot.inverse(at)},
             9,
+            time.thread_time,
+            warm=True,
         )
         rate = limbs * ROWS / took["inverse"] / 1e6
         forward_ns = nanoseconds(took["forward"], ROWS)

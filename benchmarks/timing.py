@@ -16,16 +16,21 @@ def medians(
     cases: Mapping[str, Callable[[], object]],
     rounds: int = 15,
     clock: Callable[[], float] = time.perf_counter,
+    warm: bool = False,
 ) -> dict[str, float]:
     """Median seconds of each case; every round runs each once, so that all see the same machine.
 
     With ``clock=time.thread_time`` other work on the machine does not count, nor do other threads.
+    With `warm` each runs once untimed just before: a virtual machine may ask microseconds for each
+    page of memory that was not touched for a tenth of a second, as while the other cases ran.
     """
     for run in cases.values():
         run()
     found: dict[str, list[float]] = {name: [] for name in cases}
     for _ in range(rounds):
         for name, run in cases.items():
+            if warm:
+                run()
             start = clock()
             run()
             found[name].append(clock() - start)
