@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pkmcal.certificate import Certificate
 from pkmcal.core import STATUS, FloatArray, IntArray
 from pkmcal.geometry import BoolArray
+from pkmcal.modes import proofs
+
+if TYPE_CHECKING:
+    from pkmcal.kinematics import Kinematics
 
 
 @dataclass(eq=False)  # a frozen one takes a microsecond more to make
@@ -33,9 +37,11 @@ class Forward:
     status: IntArray
     iterations: IntArray
     residual: FloatArray
-    _steps: Callable[[], FloatArray] = field(repr=False)
-    _steps_at_guess: Callable[[], FloatArray] = field(repr=False)
-    _proofs: Callable[[], Certificate] = field(repr=False)
+    # where it comes from, for what is computed when asked for; rows in the machine's own frame
+    _kinematics: Kinematics = field(repr=False)
+    _own: FloatArray = field(repr=False)
+    _q: FloatArray = field(repr=False)
+    _guess: FloatArray = field(repr=False)
 
     @property
     def ok(self) -> BoolArray:
@@ -49,7 +55,7 @@ class Forward:
         Rotations count as their arc at ``robot.length``; 0 is a type-2 singularity, 1 is isotropic.
         NaN where the row was not solved.
         """
-        steps = self._steps()
+        steps = self._steps(self._own)
         out = np.full(steps.shape[:-2], np.nan)
         ok = np.isfinite(steps).all(axis=(-2, -1))
         sigma = np.linalg.svd(steps[ok], compute_uv=False)
@@ -63,11 +69,11 @@ class Forward:
         False means that the pose is another assembly mode than the guess's, with a singularity
         between. True where it cannot be told: more closures than free coordinates.
         """
-        steps = self._steps()
+        steps = self._steps(self._own)
         if steps.shape[-2] != steps.shape[-1]:
             return np.asarray(self.ok)
         same = np.array(self.ok)
-        there, at_guess = steps[same], self._steps_at_guess()[same]
+        there, at_guess = steps[same], self._steps(self._guess)[same]
         same[same] = np.sign(np.linalg.det(there)) == np.sign(np.linalg.det(at_guess))
         return same
 
@@ -79,7 +85,14 @@ class Forward:
         the only one within `unique`. Not ok with more closures than free coordinates, near a
         singularity, and where the row was not solved. It costs some 12 µs a row.
         """
-        return self._proofs()
+        subject = self._kinematics._subject(self._q)
+        return proofs(subject, self._own.reshape(-1, 6)).reshape(self.status.shape)
+
+    def _steps(self, own: FloatArray) -> FloatArray:
+        """Closure rows by a scaled twist (..., rows, m), at a pose for each row or one for all."""
+        rows = np.ascontiguousarray(np.broadcast_to(own.reshape(-1, 6), (len(self._q), 6)))
+        steps = self._kinematics._steps(rows, self._q)
+        return steps.reshape(*self.status.shape, *steps.shape[1:])
 
     def failures(self) -> str:
         """What failed and where, in one line; empty where nothing did."""

@@ -150,15 +150,8 @@ class Kinematics:
         own, status, iterations, residual = self._machine.forward(
             self._slots, rows, start, threads, shape
         )
-        return Forward(
-            self._frames.outward(own),
-            status,
-            iterations,
-            residual,
-            lambda: self._steps(own, rows),
-            lambda: self._steps(np.broadcast_to(start, (len(rows), 6)).reshape(own.shape), rows),
-            lambda: modes.proofs(self._subject(rows), own.reshape(-1, 6)).reshape(shape),
-        )
+        pose = self._frames.outward(own)
+        return Forward(pose, status, iterations, residual, self, own, rows, start)
 
     def jacobian(self, pose: ArrayLike) -> FloatArray:
         """∂q/∂(free coordinates), limb by limb (eq. 12 for the 2TPR&2TPS).
@@ -268,10 +261,8 @@ class Kinematics:
         )
 
     def _steps(self, own: FloatArray, q: FloatArray) -> FloatArray:
-        """Closure rows by a scaled twist at poses (..., 6) and their coordinates (N, n)."""
-        rows = np.ascontiguousarray(own).reshape(-1, 6)
-        by_step = self._machine.closure(self._slots, rows, q).by_step
-        return by_step.reshape(*own.shape[:-1], *by_step.shape[1:])
+        """Closure rows by a scaled twist, (N, rows, m)."""
+        return self._machine.closure(self._slots, own, q).by_step
 
 
 def _limb(limb: Limb) -> dict[str, Any]:
