@@ -7,7 +7,9 @@ import statistics
 import subprocess
 import sys
 import tempfile
+import threading
 import time
+from pathlib import Path
 
 import pkmcal as pk
 from benchmarks import native
@@ -60,6 +62,25 @@ def bench_threads(report: Report) -> None:
         rows.append([*cells, times(one / took[2]), times(one / took[None])])
     report.text("Forward kinematics of the hexapod in threads, ns a row (wanted: two at 1.8x).")
     report.table(["rows", "one", "two", "None", "two is", "None is"], rows)
+    with tempfile.TemporaryDirectory() as folder:
+        lib = native.fma_peak(Path(folder), native.available()[-1]).lib
+
+    def multiply_adds(threads: int) -> None:
+        others = [
+            threading.Thread(target=lambda: lib.peak_double(4_000_000, 1.0))
+            for _ in range(threads - 1)
+        ]
+        for thread in others:
+            thread.start()
+        lib.peak_double(4_000_000, 1.0)
+        for thread in others:
+            thread.join()
+
+    took = medians({str(n): lambda n=n: multiply_adds(n) for n in (1, 2)}, 25)
+    report.text(
+        f"Two threads of multiply-adds in registers alone: {times(2 * took['1'] / took['2'])}. "
+        "Less than 2x is the machine's: cores that share their units, or other work on them."
+    )
 
 
 def bench_inverse(report: Report) -> None:

@@ -44,6 +44,7 @@ STATUS = {
     lib.PKM_INVALID: "invalid input",
 }
 ROWS_PER_THREAD = 10_000  # fewer do not pay for a thread
+PARTS_PER_THREAD = 8  # one that another program keeps waiting leaves parts to the others
 
 
 def _default_isa() -> int:
@@ -110,7 +111,7 @@ def ensure(code: int) -> None:
 
 
 def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) -> None:
-    """Run ``call(start, stop)`` over contiguous parts of the rows, one thread each.
+    """Run ``call(start, stop)`` over contiguous parts of the rows, in threads.
 
     Parameters
     ----------
@@ -128,15 +129,18 @@ def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) 
         threads = min(whole("threads", threads, 1, note=" or None"), max(rows, 1))
     if threads == 1:
         return ensure(call(0, rows))
-    edges = [rows * k // threads for k in range(threads + 1)]
+    count = min(rows, PARTS_PER_THREAD * threads)
+    parts = pairwise([rows * k // count for k in range(count + 1)])
     codes: list[int] = []
-    others = [
-        threading.Thread(target=lambda a=a, b=b: codes.append(call(a, b)))
-        for a, b in pairwise(edges[1:])
-    ]
+
+    def work() -> None:
+        for start, stop in parts:  # whoever is free takes the next
+            codes.append(call(start, stop))
+
+    others = [threading.Thread(target=work) for _ in range(threads - 1)]
     for thread in others:
         thread.start()
-    codes.append(call(edges[0], edges[1]))
+    work()
     for thread in others:
         thread.join()
     ensure(min(codes))
