@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 from cffi import FFI
 
-from csrc.build import CSRC, FLAGS, GENERATED, HEADER, declarations
+from csrc.build import CSRC, GENERATED, HEADER, declarations
+from csrc.build import flags as core_flags
 from pkmcal import core, core_machine
 from pkmcal.core import ISAS
 
@@ -97,10 +98,10 @@ class OneLane:
             sources.append(folder / source.name)
             sources[-1].write_text(text)
         sources.append(HERE / "flush_denormals.c")
-        flags = [f"-I{CSRC}", f"-I{GENERATED}", f"-DJOINED={joined}"]
-        flags += [flag for flag in FLAGS if "visibility" not in flag]
+        own = [f"-I{CSRC}", f"-I{GENERATED}", f"-DJOINED={joined}"]
+        own += [flag for flag in core_flags() if "visibility" not in flag]
         declared = declarations(HEADER) + "void flush_denormals(int on);"
-        self._here = compiled(folder, f"one_lane_{joined}", declared, sources, flags)
+        self._here = compiled(folder, f"one_lane_{joined}", declared, sources, own)
         self._lib = core_machine.lib
 
     def __enter__(self) -> OneLane:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -32,6 +33,20 @@ def run(*arguments: str | Path, cwd: Path, **environment: str) -> str:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
+
+
+def test_a_compiler_is_not_given_flags_that_it_does_not_know(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    build = runpy.run_path(str(ROOT / "csrc" / "build.py"))
+    required, faster = build["FLAGS"], build["FASTER"]
+    strange = tmp_path / "cc"
+    strange.write_text(f'#!/bin/sh\ncase "$*" in *{faster[0]}*) exit 1;; esac\n')
+    strange.chmod(0o755)
+    monkeypatch.setenv("CC", f"{strange} -m64")
+    assert build["flags"]() == required + faster[1:]
+    monkeypatch.setenv("CC", str(tmp_path / "nothing here"))
+    assert build["flags"]() == required
 
 
 def lacking(*, python: str | Path = sys.executable, **environment: str) -> str:
