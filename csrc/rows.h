@@ -39,6 +39,7 @@ INLINE void store_part(double *to, int part, tile_row x)
     _mm512_mask_storeu_pd(to, (__mmask8)((1 << part) - 1), x);
 }
 
+/* Rows to columns, or back. */
 INLINE void transpose(tile_row tile[8])
 {
     tile_row pair[8], four[8];
