@@ -95,8 +95,13 @@ def as_rows(name: str, array: ArrayLike, width: int) -> tuple[FloatArray, tuple[
     given = as_numbers(name, array, width)
     if given.ndim == 0 or given.shape[-1] != width:
         raise ValueError(f"{name} must have shape (..., {width}), found {given.shape}")
-    rows = np.ascontiguousarray(given, dtype=np.float64).reshape(-1, width)
-    return rows, given.shape[:-1]
+    return as_doubles(given).reshape(-1, width), given.shape[:-1]
+
+
+def as_doubles(given: NDArray[Any]) -> FloatArray:
+    """The same numbers as the core reads them: float64, one behind the other, aligned."""
+    doubles = np.ascontiguousarray(given, dtype=np.float64)
+    return doubles if doubles.flags.aligned else doubles.copy()
 
 
 # C pointer to a contiguous array of float64, or int32; it keeps the array alive.

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal import core_serial
 from pkmcal.arguments import number
-from pkmcal.core import FloatArray, as_numbers, as_rows
+from pkmcal.core import FloatArray, as_doubles, as_numbers, as_rows
 
 _RIGID = 1e-6  # by so much a matrix may miss being a motion
 _NO_SLIDE = 1e-13  # mm along the axis per mm of v: a rotation, up to rounding
@@ -346,7 +346,7 @@ def as_motions(name: str, motion: ArrayLike) -> tuple[FloatArray, tuple[int, ...
     given = as_numbers(name, motion, "4, 4")
     if given.ndim < 2 or given.shape[-2:] != (4, 4):
         raise ValueError(f"{name} must have shape (..., 4, 4), found {given.shape}")
-    rows = np.ascontiguousarray(given, dtype=np.float64).reshape(-1, 4, 4)
+    rows = as_doubles(given).reshape(-1, 4, 4)
     known = np.isfinite(rows).all(axis=(1, 2), keepdims=True)
     if not known.all():
         rows = np.where(known, rows, np.nan)

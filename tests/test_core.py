@@ -231,6 +231,14 @@ def numbers(robot: pk.Robot, call: str, rows: Any) -> np.ndarray:
     )()
 
 
+def test_what_the_core_reads_is_aligned() -> None:
+    whole = np.arange(72.0)
+    shifted = np.frombuffer(b"\0" + whole.tobytes(), dtype=np.uint8)[1:].view("f8").reshape(12, 6)
+    assert not shifted.flags.aligned
+    rows, _ = core.as_rows("q", shifted, 6)
+    assert rows.flags.aligned and np.array_equal(rows.ravel(), whole)
+
+
 @each_call
 def test_the_layout_of_an_array_does_not_matter(call: str) -> None:
     robot = pk.load("hexapod")
