@@ -44,7 +44,7 @@ STATUS = {
     lib.PKM_INVALID: "invalid input",
 }
 ROWS_PER_THREAD = 10_000  # fewer do not pay for a thread
-PARTS_PER_THREAD = 8  # one that another program keeps waiting leaves parts to the others
+PARTS_PER_THREAD = 4  # one that another program keeps waiting leaves parts to the others
 
 
 def _default_isa() -> int:
