@@ -29,7 +29,7 @@ help:
 	@echo "make check       fail if 'make regenerate' would change anything"
 	@echo "make bench       run the benchmarks"
 	@echo "make docs        write the reference of all names to build/docs"
-	@echo "make lint        run ruff and mypy"
+	@echo "make lint        run ruff, mypy and the contract of floors"
 	@echo "make sanitize    run the tests on a core built with the address and UB sanitizers"
 	@echo "make clean       remove what was built, $(VENV) too"
 	@echo "PYTHON=$(PYTHON) and VENV=$(VENV) can be set on the command line."
@@ -57,6 +57,7 @@ bench: $(TESTS)
 lint: $(TESTS)
 	$(BIN)/ruff check
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
 
 # the reference of all public names, from their docstrings
 docs: $(TESTS)

@@ -128,7 +128,10 @@ def bench_units(report: Report, folder: Path) -> None:
         for what in ("multiply_add", "divide"):
             one, every = (getattr(lib, f"{what}_{many}") for many in ("one", "all"))
             took = medians(
-                {"one": lambda one=one: one(steps, 1.5), "all": lambda every=every: every(steps, 1.5)},
+                {
+                    "one": lambda one=one: one(steps, 1.5),
+                    "all": lambda every=every: every(steps, 1.5),
+                },
                 41,
                 time.thread_time,
             )

@@ -10,13 +10,15 @@ import numpy as np
 
 import pkmcal as pk
 from benchmarks.timing import Report
-from pkmcal import modes
+from pkmcal.modes import find as modes
 from tests import dietmaier
 
 STARTS = 200_000
 
 
-def processor_seconds(cases: Mapping[str, Callable[[], object]], rounds: int = 15) -> dict[str, float]:
+def processor_seconds(
+    cases: Mapping[str, Callable[[], object]], rounds: int = 15
+) -> dict[str, float]:
     """Median seconds of one core that each case keeps busy: calls of this length get interrupted."""
     found: dict[str, list[float]] = {name: [] for name in cases}
     for _ in range(rounds + 1):
@@ -29,19 +31,25 @@ def processor_seconds(cases: Mapping[str, Callable[[], object]], rounds: int = 1
 
 def bench_machines(report: Report) -> None:
     """All modes of each built-in machine near home; 40 real ones wanted in 20 ms."""
-    robots = {name: pk.load(name) for name in pk.machines() if name not in ("3r", "rbt-6t03p-printed")}
+    robots = {
+        name: pk.load(name) for name in pk.machines() if name not in ("3r", "rbt-6t03p-printed")
+    }
     cases = {"Dietmaier's hexapod": (dietmaier.hexapod(), np.array(dietmaier.LENGTHS))}
     for name, robot in robots.items():
         q = robot.inverse(robot.home)
         noise = np.random.default_rng(0).normal(size=q.shape)
         cases[name] = robot, q + noise * (0.02 * np.abs(q) + 0.01)
-    took = processor_seconds({name: lambda r=r, q=q: r.forward_all(q) for name, (r, q) in cases.items()})
+    took = processor_seconds(
+        {name: lambda r=r, q=q: r.forward_all(q) for name, (r, q) in cases.items()}
+    )
     rows = []
     for name, (robot, q) in cases.items():
         found = robot.forward_all(q)
         numbers = [found.paths, found.far, len(found), int(found.certified.sum())]
         rows.append([name, *numbers, "yes" if found.complete else "no", f"{1e3 * took[name]:.1f}"])
-    report.text("Every assembly mode of a machine, one core's time (wanted: 40 real modes in 20 ms).")
+    report.text(
+        "Every assembly mode of a machine, one core's time (wanted: 40 real modes in 20 ms)."
+    )
     report.table(["machine", "paths", "far", "real", "certified", "complete", "ms"], rows)
 
 

@@ -22,8 +22,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.limb_residual import LimbResidual
-from pkmcal.swarm import PAPER, minimise_eq18
+from pkmcal.core.swarm import PAPER, minimise_eq18
+from pkmcal.kinematics.limb_residual import LimbResidual
 
 Array = np.ndarray
 HALF_WIDTH = 3.0  # mm
@@ -160,7 +160,16 @@ class Residual:
         source, library = folder / "scalar.c", folder / "scalar.so"
         source.write_text(SCALAR % self.slots.shape[2])
         compiler = os.environ.get("CC", "gcc")
-        flags = ("-std=c11", "-O3", "-march=native", "-fno-tree-vectorize", "-fno-math-errno", "-ffp-contract=off", "-shared", "-fPIC")
+        flags = (
+            "-std=c11",
+            "-O3",
+            "-march=native",
+            "-fno-tree-vectorize",
+            "-fno-math-errno",
+            "-ffp-contract=off",
+            "-shared",
+            "-fPIC",
+        )
         subprocess.run([compiler, *flags, source, "-o", library, "-lm"], check=True)
         self._scalar = ctypes.CDLL(str(library))
         self._arrays = [

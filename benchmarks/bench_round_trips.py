@@ -10,7 +10,7 @@ import argparse
 import time
 
 from benchmarks.timing import Report
-from pkmcal.core import STATUS
+from pkmcal.core.library import STATUS
 from tests.round_trips import RETURNED, SIGMA, round_trips
 from tests.workspaces import WORKSPACE
 

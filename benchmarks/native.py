@@ -12,8 +12,8 @@ from cffi import FFI
 
 from csrc.build import CSRC, GENERATED, HEADER, declarations
 from csrc.build import flags as core_flags
-from pkmcal import core, core_machine
-from pkmcal.core import ISAS
+from pkmcal.core import library, machine
+from pkmcal.core.library import ISAS
 
 HERE = Path(__file__).parent
 COMPILER = os.environ.get("CC", "gcc")
@@ -72,7 +72,7 @@ def lane_units(folder: Path, isa: str) -> Compiled:
 
 
 class OneLane:
-    """The core of csrc/ compiled with LANES 1, in the place of `core_machine.lib` while entered.
+    """The core of csrc/ compiled with LANES 1, in the place of `machine.lib` while entered.
 
     The same source, the same flags and the same three ISAs; only the number of lanes differs. In one
     thread only.
@@ -102,14 +102,14 @@ class OneLane:
         own += [flag for flag in core_flags() if "visibility" not in flag]
         declared = declarations(HEADER) + "void flush_denormals(int on);"
         self._here = compiled(folder, f"one_lane_{joined}", declared, sources, own)
-        self._lib = core_machine.lib
+        self._lib = machine.lib
 
     def __enter__(self) -> OneLane:
-        core_machine.lib = self
+        machine.lib = self
         return self
 
     def __exit__(self, *_: object) -> None:
-        core_machine.lib = self._lib
+        machine.lib = self._lib
 
     def flush_denormals(self, on: bool) -> None:
         """Count numbers too small for full precision as 0 in this thread, or not."""
@@ -120,11 +120,11 @@ class OneLane:
         return int(self._here.lib.pkm_forward(*map(self._own, arguments)))
 
     def _own(self, argument: Any) -> Any:
-        if isinstance(argument, core.ffi.CData):
-            return self._here.ffi.cast("void *", int(core.ffi.cast("intptr_t", argument)))
+        if isinstance(argument, library.ffi.CData):
+            return self._here.ffi.cast("void *", int(library.ffi.cast("intptr_t", argument)))
         return argument
 
 
 def available() -> list[str]:
     """ISAs of this processor."""
-    return list(ISAS[: core.lib.pkm_best_isa() + 1])
+    return list(ISAS[: library.lib.pkm_best_isa() + 1])

@@ -5,27 +5,27 @@ from __future__ import annotations
 from typing import Any
 
 from pkmcal import screw, trajectory
-from pkmcal.allocation import Allocation, allocate_tolerance
-from pkmcal.assemblies import Assemblies
-from pkmcal.bootstrap import Bootstrap, bootstrap
-from pkmcal.check_geometry import GeometryCheck, check_geometry
-from pkmcal.compensate import Compensation, compensate
-from pkmcal.feasible import Feasibility
-from pkmcal.forward import Forward
-from pkmcal.identification import Identification
-from pkmcal.identify import identify
+from pkmcal.arms.arm import SerialArm
+from pkmcal.calibration.bootstrap import Bootstrap, bootstrap
+from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.identify import identify
+from pkmcal.calibration.plan_poses import Plan, plan_poses
+from pkmcal.checks.check_geometry import GeometryCheck, check_geometry
+from pkmcal.compensation.compensate import Compensation, compensate
+from pkmcal.compensation.pso import SwarmResult, pso
+from pkmcal.error_model.allocation import Allocation, allocate_tolerance
+from pkmcal.error_model.sensitivity import Sensitivity, sensitivity
+from pkmcal.error_model.tolerance import Tolerance, tolerance
+from pkmcal.kinematics.forward import Forward
+from pkmcal.kinematics.limits import Feasibility
+from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.workspace import Dexterity, Workspace, dexterity, sample_poses, workspace
 from pkmcal.loading import load, machines
-from pkmcal.measurement_csv import read_measurements
-from pkmcal.measurements import Measurements
-from pkmcal.plan import Plan, plan_poses
-from pkmcal.pso import SwarmResult, pso
-from pkmcal.robot import Robot
-from pkmcal.sensitivity import Sensitivity, sensitivity
-from pkmcal.serial import SerialArm
-from pkmcal.tolerance import Tolerance, tolerance
-from pkmcal.tracker import Tracker
-from pkmcal.virtual import VirtualMachine
-from pkmcal.workspace import Dexterity, Workspace, dexterity, sample_poses, workspace
+from pkmcal.measurements.measurement_csv import read_measurements
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.tracker import Tracker
+from pkmcal.measurements.virtual_machine import VirtualMachine
+from pkmcal.modes.assemblies import Assemblies
 
 __all__ = [
     "Allocation",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import os
 import sys
@@ -12,7 +13,7 @@ from typing import TypeVar, cast
 
 import numpy as np
 
-from pkmcal.suggest import did_you_mean
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 
 T = TypeVar("T")
 
@@ -28,13 +29,13 @@ def number(name: str, value: object, least: float = -math.inf, above: float = -m
         Not finite, or too small.
     """
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise TypeError(f"{name} must be a number, found {shown(value)}")
+        raise ArgumentTypeError(f"{name} must be a number, found {shown(value)}")
     if not abs(value) <= sys.float_info.max:
-        raise ValueError(f"{name} must be finite, found {shown(value)}")
+        raise ArgumentError(f"{name} must be finite, found {shown(value)}")
     if not value >= least:
-        raise ValueError(f"{name} must be {least:g} or more, found {value}")
+        raise ArgumentError(f"{name} must be {least:g} or more, found {value}")
     if not value > above:
-        raise ValueError(f"{name} must be above {above:g}, found {value}")
+        raise ArgumentError(f"{name} must be above {above:g}, found {value}")
     return float(value)
 
 
@@ -49,7 +50,7 @@ def whole(name: str, value: object, least: int, most: float = math.inf, note: st
     counted = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not counted or not least <= cast(int, value) <= most:
         span = f"from {least}" + (f" to {most}" if most < math.inf else "") + note
-        raise ValueError(f"{name} must be a whole number {span}, found {shown(value)}")
+        raise ArgumentError(f"{name} must be a whole number {span}, found {shown(value)}")
     return int(cast(int, value))
 
 
@@ -63,7 +64,7 @@ def word(name: str, value: object, known: Collection[str]) -> str:
     """
     if not isinstance(value, str) or value not in known:
         near = did_you_mean(value, known, listed=0)
-        raise ValueError(f"{name} must be one of {', '.join(known)}; found {shown(value)}{near}")
+        raise ArgumentError(f"{name} must be one of {', '.join(known)}; found {shown(value)}{near}")
     return value
 
 
@@ -80,10 +81,12 @@ def words(name: str, value: object) -> tuple[str, ...]:
     try:
         several = tuple(cast(Iterable[object], value))
     except TypeError:
-        raise TypeError(f"{name} must be a name or several, found {shown(value)}") from None
+        raise ArgumentTypeError(f"{name} must be a name or several, found {shown(value)}") from None
     for each in several:
         if not isinstance(each, str):
-            raise TypeError(f"{name} must be a name or several, found {shown(each)} among them")
+            raise ArgumentTypeError(
+                f"{name} must be a name or several, found {shown(each)} among them"
+            )
     return cast(tuple[str, ...], several)
 
 
@@ -97,7 +100,9 @@ def instance(name: str, value: object, wanted: type[T], note: str = "") -> T:
     """
     if not isinstance(value, wanted):
         article = "an" if wanted.__name__[0] in "AEIOU" else "a"
-        raise TypeError(f"{name} must be {article} {wanted.__name__}{note}, found {kind(value)}")
+        raise ArgumentTypeError(
+            f"{name} must be {article} {wanted.__name__}{note}, found {kind(value)}"
+        )
     return value
 
 
@@ -110,7 +115,7 @@ def flag(name: str, value: object) -> bool:
         Anything else.
     """
     if not isinstance(value, bool | np.bool_):
-        raise TypeError(f"{name} must be True or False, found {shown(value)}")
+        raise ArgumentTypeError(f"{name} must be True or False, found {shown(value)}")
     return bool(value)
 
 
@@ -123,7 +128,7 @@ def function(name: str, value: T) -> T:
         Anything else.
     """
     if not callable(value):
-        raise TypeError(f"{name} must be a function, found {shown(value)}")
+        raise ArgumentTypeError(f"{name} must be a function, found {shown(value)}")
     return value
 
 
@@ -149,7 +154,7 @@ def path(name: str, value: object) -> Path:
         No str or path.
     """
     if not isinstance(value, str | os.PathLike):
-        raise TypeError(f"{name} must be a str or path, found {shown(value)}")
+        raise ArgumentTypeError(f"{name} must be a str or path, found {shown(value)}")
     return Path(value)
 
 
@@ -166,7 +171,7 @@ def comment(value: object) -> str:
     text = instance("comment", value, str)
     for line in text.splitlines():
         if line and not line.startswith("#"):
-            raise ValueError(f"comment: each of its lines must start with #, found {line!r:.60}")
+            raise ArgumentError(f"comment: each of its lines must start with #, found {line!r:.60}")
     return text if not text or text.endswith("\n") else text + "\n"
 
 
@@ -179,3 +184,51 @@ def shown(value: object) -> str:
     """An argument as a message shows it: what is long, by its class."""
     text = repr(value)
     return text if len(text) <= 60 and "\n" not in text else kind(value)
+
+
+def checked_seed(seed: int) -> int:
+    """A seed that numpy and the core take.
+
+    Raises
+    ------
+    ValueError
+        It is no whole number from 0 to 2⁶⁴ - 1.
+    """
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed < 2**64:
+        raise ArgumentError(f"seed must be a whole number from 0 to 2**64 - 1, found {seed!r}")
+    return int(seed)
+
+
+def did_you_mean(name: object, known: Iterable[str], listed: int = 12) -> str:
+    """Say which known name is near, or list the known ones where they are few.
+
+    Parameters
+    ----------
+    name : str
+        What was found; anything else is near to nothing.
+    known : iterable of str
+        What would have been right.
+    listed : int
+        Up to so many known names are listed when none is near.
+
+    Returns
+    -------
+    str
+        The end of a sentence, empty when there is nothing to say.
+
+    Examples
+    --------
+    >>> did_you_mean("ofset1", ["base1.x", "offset1"])
+    "; did you mean 'offset1'?"
+    >>> did_you_mean("q", ["mm", "rad"])
+    '; known: mm, rad'
+    """
+    names = list(dict.fromkeys(known))
+    by_lower = {each.lower(): each for each in reversed(names)}
+    found = name if isinstance(name, str) else ""
+    near = difflib.get_close_matches(found.lower(), list(by_lower), n=1, cutoff=0.6)
+    if near and len(found) > 2:  # two letters are near to too much
+        return f"; did you mean {by_lower[near[0]]!r}?"
+    if 0 < len(names) <= listed:
+        return f"; known: {', '.join(names)}"
+    return ""

@@ -5,10 +5,12 @@ from __future__ import annotations
 from os import PathLike
 from typing import Literal, overload
 
-from pkmcal import armfile, robotfile
-from pkmcal.robot import Robot
-from pkmcal.serial import SerialArm
-from pkmcal.toml_source import Source
+from pkmcal.arms import arm_file
+from pkmcal.arms.arm import SerialArm
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.toml_lines import Source
+from pkmcal.geometry import robot_file
+from pkmcal.kinematics.robot import Robot
 
 
 @overload
@@ -40,21 +42,21 @@ def load(robot: str | PathLike[str]) -> Robot | SerialArm:
     >>> pk.load("hexapod").n_actuators
     6
     """
-    content, place, file = robotfile.located(robot)
+    content, place, file = robot_file.located(robot)
     source = Source(content, place)
-    if armfile.is_arm(source.data):
-        return armfile.parse(source)
-    return Robot(robotfile.parse(source, file))
+    if arm_file.is_arm(source.data):
+        return arm_file.parse(source)
+    return Robot(robot_file.parse(source, file))
 
 
 def load_parallel(robot: str | PathLike[str]) -> Robot:
     """Load a machine as `load` does, and refuse serial arms with a ValueError."""
     machine: Robot | SerialArm = load(robot)
     if isinstance(machine, SerialArm):
-        raise ValueError(f"{robot}: a serial arm, where a parallel machine is needed")
+        raise ArgumentError(f"{robot}: a serial arm, where a parallel machine is needed")
     return machine
 
 
 def machines() -> tuple[str, ...]:
     """Names of the built-in machines, serial arms last."""
-    return robotfile.builtin_names() + robotfile.builtin_names("arms")
+    return robot_file.builtin_names() + robot_file.builtin_names("arms")

@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import core
-from pkmcal.core import FloatArray, as_rows
+from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.core.poses import tpr2tps_jacobian, tpr2tps_lengths
+from pkmcal.exceptions import ArgumentError
 
 # a b c d e f of the paper's joint table, mm (its structure table has d = 292.4)
 SIZE = (140.0, 80.0, 200.0, 294.2, 384.7, 278.5)
@@ -38,7 +39,7 @@ def leg_lengths(free: ArrayLike, size: ArrayLike = SIZE) -> FloatArray:
     """
     rows, shape = as_rows("free", free, 4)
     out = np.empty((len(rows), 4))
-    core.tpr2tps_lengths(_size(size), rows, out)
+    tpr2tps_lengths(_size(size), rows, out)
     return out.reshape(*shape, 4)
 
 
@@ -65,12 +66,12 @@ def jacobian(free: ArrayLike, size: ArrayLike = SIZE) -> FloatArray:
     """
     rows, shape = as_rows("free", free, 4)
     out = np.empty((len(rows), 4, 4))
-    core.tpr2tps_jacobian(_size(size), rows, out)
+    tpr2tps_jacobian(_size(size), rows, out)
     return out.reshape(*shape, 4, 4)
 
 
 def _size(size: ArrayLike) -> FloatArray:
     rows, shape = as_rows("size", size, 6)
     if shape:
-        raise ValueError(f"size must have shape (6,), found {(*shape, 6)}")
+        raise ArgumentError(f"size must have shape (6,), found {(*shape, 6)}")
     return rows

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import core_serial
 from pkmcal.arguments import number
-from pkmcal.core import FloatArray, as_doubles, as_numbers, as_rows
+from pkmcal.arrays import FloatArray, as_doubles, as_numbers, as_rows
+from pkmcal.core import screws as core_serial
+from pkmcal.exceptions import ArgumentError
 
 _RIGID = 1e-6  # by so much a matrix may miss being a motion
 _NO_SLIDE = 1e-13  # mm along the axis per mm of v: a rotation, up to rounding
@@ -55,7 +56,7 @@ def exp(twist: ArrayLike, angle: ArrayLike = 1.0) -> FloatArray:
     try:
         np.broadcast_shapes(shape, factor.shape)
     except ValueError:
-        raise ValueError(
+        raise ArgumentError(
             f"angle has shape {factor.shape}, which does not go with twists {shape}"
         ) from None
     given = np.asarray(twist, dtype=np.float64)  # before the product: small integers overflow
@@ -258,9 +259,9 @@ class JointError:
         """
         rows, _ = as_motions("frame", frame)
         if len(rows) != 1:
-            raise ValueError(f"frame must have shape (4, 4), found {np.shape(frame)}")
+            raise ArgumentError(f"frame must have shape (4, 4), found {np.shape(frame)}")
         if not np.isfinite(rows).all():
-            raise ValueError("frame must be finite")
+            raise ArgumentError("frame must be finite")
         return replace(self, twist=core_serial.adjoint(rows).reshape(6, 6) @ self.twist)
 
     def __str__(self) -> str:
@@ -322,7 +323,7 @@ def joint_error(
         unit = twist / (magnitude or 1.0)
     if not np.isfinite(unit).all():
         found = ", ".join(f"{name} {value:g}" for name, value in given.items())
-        raise ValueError(f"joint errors are too large for a unit screw, found {found}")
+        raise ArgumentError(f"joint errors are too large for a unit screw, found {found}")
     return JointError(unit, magnitude, kind)
 
 
@@ -345,7 +346,7 @@ def as_motions(name: str, motion: ArrayLike) -> tuple[FloatArray, tuple[int, ...
     """
     given = as_numbers(name, motion, "4, 4")
     if given.ndim < 2 or given.shape[-2:] != (4, 4):
-        raise ValueError(f"{name} must have shape (..., 4, 4), found {given.shape}")
+        raise ArgumentError(f"{name} must have shape (..., 4, 4), found {given.shape}")
     rows = as_doubles(given).reshape(-1, 4, 4)
     known = np.isfinite(rows).all(axis=(1, 2), keepdims=True)
     if not known.all():
@@ -358,5 +359,5 @@ def as_motions(name: str, motion: ArrayLike) -> tuple[FloatArray, tuple[int, ...
     if bad.size:
         where = "" if given.ndim == 2 else f" in row {bad[0]}"
         fault = f"off by {off[bad[0]]:.1g}" if off[bad[0]] > _RIGID else "it is a reflection"
-        raise ValueError(f"{name} must be rigid motions, found another matrix{where} ({fault})")
+        raise ArgumentError(f"{name} must be rigid motions, found another matrix{where} ({fault})")
     return rows.reshape(-1, 16), given.shape[:-2]

@@ -1,8 +1,8 @@
 """Trajectories: laws in time, and moves of a machine along them."""
 
-from pkmcal.events import Event
-from pkmcal.law import JerkLimited, Polynomial, cubic, jerk_limited, quintic
-from pkmcal.move import Move, MoveSample, move
+from pkmcal.moves.events import Event
+from pkmcal.moves.move import Move, MoveSample, move
+from pkmcal.moves.time_laws import JerkLimited, Polynomial, cubic, jerk_limited, quintic
 
 __all__ = [
     "Event",

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 import pkmcal as pk
-from pkmcal.core import SLOTS
-from pkmcal.joint_pattern import ALIKE, size
-from pkmcal.limb_kinds import KINDS
+from pkmcal.checks.joint_layout import ALIKE, size
+from pkmcal.core.library import SLOTS
+from pkmcal.geometry.limb_kinds import KINDS
 
 Mutation = Callable[[pk.Robot, np.random.Generator], pk.Robot | None]
 BASE, PLATFORM = slice(0, 3), slice(3, 6)

@@ -9,8 +9,8 @@ import numpy as np
 import tomli_w
 
 import pkmcal as pk
-from pkmcal import robotfile
-from pkmcal.toml_source import Source
+from pkmcal.files.toml_lines import Source
+from pkmcal.geometry import robot_file
 
 
 def made(
@@ -28,7 +28,7 @@ def made(
         **sections,
     }
     text = tomli_w.dumps(content)
-    return pk.Robot(robotfile.parse(Source(text.encode(), "made.toml"), "made.toml"))
+    return pk.Robot(robot_file.parse(Source(text.encode(), "made.toml"), "made.toml"))
 
 
 def plain(value: Any) -> Any:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 import pkmcal as pk
-from pkmcal.core import STATUS
+from pkmcal.core.library import STATUS
 
 from . import twin_rows
 from .workspaces import poses

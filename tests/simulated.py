@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.geometry import FloatArray
-from pkmcal.robot import Robot
+from pkmcal.arrays import FloatArray
+from pkmcal.kinematics.robot import Robot
 
 
 def with_errors(robot: Robot, sigma: float, rng: np.random.Generator) -> Robot:

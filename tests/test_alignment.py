@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pkmcal import alignment, core, core_readings
-from pkmcal.alignment import Seen
+from pkmcal.calibration import alignment
+from pkmcal.calibration.alignment import Seen
+from pkmcal.core import instruments
+from pkmcal.core.poses import compose
 
 TURNS = {
     "none": np.zeros(3),
@@ -30,16 +32,14 @@ def frame_of(angles: np.ndarray) -> np.ndarray:
 
 def assert_same(found: np.ndarray, expected: np.ndarray, atol: float = 1e-6) -> None:
     corners = 1000.0 * np.vstack([np.zeros(3), np.eye(3)])
-    ends = [
-        core_readings.seen_points(np.ascontiguousarray(f), corners)[0] for f in (found, expected)
-    ]
+    ends = [instruments.seen_points(np.ascontiguousarray(f), corners)[0] for f in (found, expected)]
     np.testing.assert_allclose(*ends, atol=atol)
 
 
 def seen(frame: np.ndarray, pose: np.ndarray, true: np.ndarray, said: np.ndarray,
          target: np.ndarray) -> Seen:  # fmt: skip
-    point, _, turn = core_readings.points(pose, said)
-    values = core_readings.seen_points(frame, core_readings.points(pose, true)[0])[0]
+    point, _, turn = instruments.points(pose, said)
+    values = instruments.seen_points(frame, instruments.points(pose, true)[0])[0]
     return Seen(values, point, turn, target)
 
 
@@ -78,23 +78,23 @@ def test_targets_that_translations_do_not_tell_stay_where_they_are_said() -> Non
 @every
 def test_poses_give_the_frame(angles: np.ndarray) -> None:
     pose, frame = poses(10, 0.4), frame_of(angles)
-    assert_same(alignment.of_poses(core.compose(frame, pose), pose), frame)
+    assert_same(alignment.of_poses(compose(frame, pose), pose), frame)
 
 
 @every
 def test_heights_say_which_way_is_up(angles: np.ndarray) -> None:
     point, frame = poses(10, 0.0)[:, :3].copy(), frame_of(angles)
-    values = core_readings.seen_points(frame, point)[0][:, 2]
+    values = instruments.seen_points(frame, point)[0][:, 2]
     found = alignment.of_heights(values, point)
-    np.testing.assert_allclose(core_readings.seen_points(found, point)[0][:, 2], values, atol=1e-6)
-    up = [core_readings.seen_points(f, np.eye(3))[2][0, 2] for f in (found, frame)]
+    np.testing.assert_allclose(instruments.seen_points(found, point)[0][:, 2], values, atol=1e-6)
+    up = [instruments.seen_points(f, np.eye(3))[2][0, 2] for f in (found, frame)]
     np.testing.assert_allclose(*up, atol=1e-9)
 
 
 def test_heights_over_a_plane_leave_up_as_drawn() -> None:
     point = poses(10, 0.0)[:, :3] * [1, 1, 1e-3]  # a bed that was probed
     frame = np.array([0, 0, 30.0, 0.02, -0.03, 0.0])
-    values = core_readings.seen_points(frame, point)[0][:, 2]
+    values = instruments.seen_points(frame, point)[0][:, 2]
     found = alignment.of_heights(values + 0.03 * np.random.default_rng(2).normal(size=10), point)
     np.testing.assert_allclose(found, frame, atol=0.05)
     np.testing.assert_allclose(found[3:], frame[3:], atol=5e-4)
@@ -107,4 +107,4 @@ def test_too_few_points_give_some_frame(count: int) -> None:
     assert np.isfinite(found).all()
     turn, none = np.tile(np.eye(3), (count, 1, 1)), np.full(count, -1)
     frame, _ = alignment.of_points(Seen(point + 1.0, point, turn, none))
-    np.testing.assert_allclose(core_readings.seen_points(frame, point)[0], point + 1.0, atol=1e-9)
+    np.testing.assert_allclose(instruments.seen_points(frame, point)[0], point + 1.0, atol=1e-9)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.allocation import Allocation
+from pkmcal.error_model.allocation import Allocation
 
 from .workspaces import poses
 

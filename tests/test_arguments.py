@@ -14,7 +14,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal import arguments, screw, trajectory
-from pkmcal.correction_grid import correction_grid
+from pkmcal.compensation.correction_grid import correction_grid
 
 ROBOT, ARM, FLAT = pk.load("hexapod"), pk.load("3r"), pk.load("2tpr2tps")
 POSES = ROBOT.home + [[20.0 * i, 5.0 * i**2, 0, 0, 0, 0] for i in range(8)]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.geometry import FloatArray
-from pkmcal.robot import Robot
+from pkmcal.arrays import FloatArray
+from pkmcal.kinematics.robot import Robot
 
 from . import workspaces
 from .simulated import missed, tilted_poses, with_errors

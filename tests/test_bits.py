@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import core, core_readings, core_serial, screw
-from pkmcal.core_serial import Arm
-from pkmcal.limb_residual import LimbResidual
+from pkmcal import screw
+from pkmcal.core import instruments, library, screws
+from pkmcal.core import poses as core_poses
+from pkmcal.core.screws import Arm
+from pkmcal.kinematics.limb_residual import LimbResidual
 
-ISAS = range(core.lib.pkm_best_isa() + 1)
+ISAS = range(library.lib.pkm_best_isa() + 1)
 ROWS = 37
 TAILS = [*(slice(0, n) for n in range(1, 18)), slice(3, ROWS), slice(0, ROWS)]
 ELSEWHERE = {
@@ -32,7 +34,7 @@ POSES = rng.uniform(-1, 1, (ROWS, 6)) * [300, 300, 300, 3, 1.5, 3]
 TWISTS = np.hstack([rng.normal(0, 1, (ROWS, 3)), rng.normal(0, 300, (ROWS, 3))])
 TWISTS[:9, :3] *= np.array([0, 1e-300, 1e-200, 1e-160, 1e-9, 1e-4, 1e-2, 30, 1e4])[:, None]
 TWISTS[9, :3] = [np.pi, 0, 0]
-MOTIONS = core_serial.exp(TWISTS, 0)
+MOTIONS = screws.exp(TWISTS, 0)
 POINTS = rng.normal(0, 300, (ROWS, 3))
 SIZE = np.array([140.0, 80, 200, 294.2, 384.7, 278.5])  # a ... f of the 2TPR&2TPS
 FREE = np.array([0, 400, 0, 0]) + rng.uniform(-1, 1, (ROWS, 4)) * [20, 20, 0.1, 0.1]
@@ -51,21 +53,21 @@ Case = Callable[[int, slice], list[np.ndarray]]
 
 def closed_forms(isa: int, part: slice, call: Callable[..., None], shape: tuple[int, ...]) -> list:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(core, "ISA", isa)
+        patch.setattr(core_poses, "ISA", isa)
         out = np.empty((len(FREE[part]), *shape))
         call(SIZE, np.ascontiguousarray(FREE[part]), out)
     return [out]
 
 
 def points(isa: int, part: slice) -> list[np.ndarray]:
-    one_target = core_readings.points(POSES[part], POINTS[0], isa)
-    return [*core_readings.points(POSES[part], POINTS[part], isa), *one_target]
+    one_target = instruments.points(POSES[part], POINTS[0], isa)
+    return [*instruments.points(POSES[part], POINTS[part], isa), *one_target]
 
 
 def distances(isa: int, part: slice) -> list[np.ndarray]:
     ends = POINTS[::-1][part].copy()
-    own = core_readings.distances(POSES[part], POINTS[part], ends, isa)
-    return [*own, *core_readings.distances(POSES[part], POINTS[0], POINTS[1], isa)]
+    own = instruments.distances(POSES[part], POINTS[part], ends, isa)
+    return [*own, *instruments.distances(POSES[part], POINTS[0], POINTS[1], isa)]
 
 
 def closure_cost(isa: int, part: slice) -> list[np.ndarray]:
@@ -108,24 +110,26 @@ def by_rows(call: Callable[..., np.ndarray], *given: np.ndarray) -> Case:
 
 
 def exp_jacobian(isa: int, part: slice) -> list[np.ndarray]:
-    return [core_serial.exp_jacobian(TWISTS[part], inverse, isa) for inverse in (False, True)]
+    return [screws.exp_jacobian(TWISTS[part], inverse, isa) for inverse in (False, True)]
 
 
 CASES: dict[str, Case] = {
     "points": points,
-    "seen_points": lambda isa, part: [*core_readings.seen_points(POSES[0], POINTS[part], isa)],
-    "seen_poses": lambda isa, part: [core_readings.seen_pose_rates(POSES[0], POSES[part], isa)],
+    "seen_points": lambda isa, part: [*instruments.seen_points(POSES[0], POINTS[part], isa)],
+    "seen_poses": lambda isa, part: [instruments.seen_pose_rates(POSES[0], POSES[part], isa)],
     "distances": distances,
-    "tpr2tps_lengths": lambda isa, part: closed_forms(isa, part, core.tpr2tps_lengths, (4,)),
-    "tpr2tps_jacobian": lambda isa, part: closed_forms(isa, part, core.tpr2tps_jacobian, (4, 4)),
+    "tpr2tps_lengths": lambda isa, part: closed_forms(isa, part, core_poses.tpr2tps_lengths, (4,)),
+    "tpr2tps_jacobian": lambda isa, part: closed_forms(
+        isa, part, core_poses.tpr2tps_jacobian, (4, 4)
+    ),
     "closure_cost": closure_cost,
     "spheres": spheres,
-    "exp": by_rows(core_serial.exp, TWISTS),
-    "log": by_rows(core_serial.log, MOTIONS),
-    "adjoint": by_rows(core_serial.adjoint, MOTIONS),
-    "motion_pose": by_rows(core_serial.pose, MOTIONS),
+    "exp": by_rows(screws.exp, TWISTS),
+    "log": by_rows(screws.log, MOTIONS),
+    "adjoint": by_rows(screws.adjoint, MOTIONS),
+    "motion_pose": by_rows(screws.pose, MOTIONS),
     "exp_jacobian": exp_jacobian,
-    "joint_motions": by_rows(core_serial.joint_motions, ERRORS[:, 0].copy(), POINTS),
+    "joint_motions": by_rows(screws.joint_motions, ERRORS[:, 0].copy(), POINTS),
     "arm_links": lambda isa, part: arm(isa, part, "links"),
     "arm_forward": lambda isa, part: arm(isa, part, "forward"),
     "arm_jacobian": lambda isa, part: arm(isa, part, "jacobian"),

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.identification import Identification
-from pkmcal.robot import Robot
+from pkmcal.calibration.identification import Identification
+from pkmcal.kinematics.robot import Robot
 
 from .simulated import hexapod_poses, tilted_poses, with_errors
 
@@ -62,9 +62,7 @@ def test_a_prior_is_drawn_anew_and_what_nothing_tells_stays_unknown() -> None:
     robot = pk.load("2tpr2tps")
     rng = np.random.default_rng(1)
     true = with_errors(robot, 0.5, rng)
-    measured = pk.VirtualMachine(true, seed=1).measure(
-        robot.inverse(tilted_poses(robot, 30, rng))
-    )
+    measured = pk.VirtualMachine(true, seed=1).measure(robot.inverse(tilted_poses(robot, 30, rng)))
     with_prior = pk.identify(robot, measured, prior=0.5)
     found = pk.bootstrap(with_prior, 600)
     assert np.mean(found.stderr / with_prior.stderr) == pytest.approx(1.0, abs=0.1)

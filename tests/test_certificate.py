@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import certificate, modes
+from pkmcal.modes import certificate
+from pkmcal.modes import find as modes
 
 from . import dietmaier
 

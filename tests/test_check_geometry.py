@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal import cli
+from pkmcal.cli import main as cli
 
 from .mutations import MUTATIONS, manufactured, similar, with_model, with_slots
 

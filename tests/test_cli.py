@@ -20,12 +20,14 @@ import typer
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal import cli, cli_calibrate, whole_file
-from pkmcal.cli_calibrate import read_deviations
-from pkmcal.demo import demonstrate
-from pkmcal.identification import Identification
-from pkmcal.identify import identify
-from pkmcal.measurements import Measurements
+from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.identify import identify
+from pkmcal.cli import calibrate as cli_calibrate
+from pkmcal.cli import main as cli
+from pkmcal.cli.calibrate import read_deviations
+from pkmcal.cli.demonstration import demonstrate
+from pkmcal.files import atomic as whole_file
+from pkmcal.measurements.measurements import Measurements
 
 ROOT = Path(__file__).resolve().parent.parent
 DELTA = ROOT / "examples" / "linear-delta"

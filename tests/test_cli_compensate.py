@@ -12,9 +12,9 @@ import pytest
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal import cli
-from pkmcal.csv_table import Table
-from pkmcal.pose_csv import write_poses
+from pkmcal.cli import main as cli
+from pkmcal.files.csv_table import Table
+from pkmcal.measurements.pose_csv import write_poses
 
 from .simulated import tilted_poses, with_errors
 

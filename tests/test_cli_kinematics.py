@@ -11,9 +11,9 @@ import pytest
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal import cli
-from pkmcal.command_csv import read_commands, write_commands
-from pkmcal.pose_csv import read_poses, write_poses
+from pkmcal.cli import main as cli
+from pkmcal.measurements.command_csv import read_commands, write_commands
+from pkmcal.measurements.pose_csv import read_poses, write_poses
 
 
 @pytest.fixture(autouse=True)

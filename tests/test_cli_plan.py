@@ -11,10 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal import cli
-from pkmcal.cli_calibrate import read_tracker
-from pkmcal.command_csv import read_commands
-from pkmcal.pose_csv import read_poses
+from pkmcal.cli import main as cli
+from pkmcal.cli.calibrate import read_tracker
+from pkmcal.measurements.command_csv import read_commands
+from pkmcal.measurements.pose_csv import read_poses
 
 from .simulated import hexapod_poses
 
@@ -84,7 +84,7 @@ def test_postures_of_an_arm_are_chosen_from_a_file_of_joint_coordinates(tmp_path
     assert (result.exit_code, result.stderr) == (0, "")
     expected = pk.plan_poses(arm, np.radians(degrees), 8, kind="pose")
     assert result.stdout.startswith(str(expected))
-    from pkmcal.command_csv import read_commands
+    from pkmcal.measurements.command_csv import read_commands
 
     commands = read_commands(tmp_path / "plan" / "commands.csv", arm.actuator_units)
     np.testing.assert_allclose(commands, expected.actuators, rtol=1e-15)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from pkmcal import cli
+from pkmcal.cli import main as cli
 
 ROOT = Path(__file__).resolve().parents[1]
 LINEAR_DELTA = ROOT / "examples" / "linear-delta"

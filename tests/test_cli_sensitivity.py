@@ -14,10 +14,12 @@ import pytest
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal import cli, cli_tolerance, figures
-from pkmcal.cli_calibrate import read_deviations
-from pkmcal.pose_csv import read_poses, write_poses
-from pkmcal.sensitivity import STUDIES, own_names, study_cases
+from pkmcal.cli import main as cli
+from pkmcal.cli import tolerance as cli_tolerance
+from pkmcal.cli.calibrate import read_deviations
+from pkmcal.error_model.sensitivity import STUDIES, own_names, study_cases
+from pkmcal.measurements.pose_csv import read_poses, write_poses
+from pkmcal.report import error_figures as figures
 
 
 @pytest.fixture(autouse=True)

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.compensate import compensate
-from pkmcal.geometry import FloatArray
-from pkmcal.robot import Robot
-from pkmcal.swarm import CONSTRICTION
+from pkmcal.arrays import FloatArray
+from pkmcal.compensation.compensate import compensate
+from pkmcal.core.swarm import CONSTRICTION
+from pkmcal.kinematics.robot import Robot
 
 from .simulated import hexapod_poses, tilted_poses, with_errors
 

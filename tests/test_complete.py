@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.core import POSE
+from pkmcal.core.library import POSE
 
 from . import twin, twin_rows
 from .round_trips import errors

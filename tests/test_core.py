@@ -14,8 +14,9 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import core
-from pkmcal.core import ISAS, lib
+from pkmcal.core import library
+from pkmcal.core import poses as core_poses
+from pkmcal.core.library import ISAS, lib
 
 from .workspaces import WORKSPACE, poses
 
@@ -106,13 +107,21 @@ def test_poses_are_composed_and_inverted_with_the_same_bits_on_every_isa(
     a, b = np.random.default_rng(10).uniform(-2.0, 2.0, (2, 41, 6))
     found = []
     for isa in AVAILABLE:
-        monkeypatch.setattr(core, "ISA", isa)
-        composed = core.compose(a, b)
+        monkeypatch.setattr(core_poses, "ISA", isa)
+        composed = core_poses.compose(a, b)
         for n in range(1, 18):
-            assert same_bits(core.compose(a[:n], b[:n]), composed[:n])
-        rates = core.compose_rates(a[0], b, a[1], core.compose(core.compose(a[0], b), a[1]))
-        arrays = [composed, core.compose(a[0], b), core.compose(a, b[0]), core.invert(a[0]), rates]
-        arrays.append(core.compose_twists(a[0], b, a[1]))
+            assert same_bits(core_poses.compose(a[:n], b[:n]), composed[:n])
+        rates = core_poses.compose_rates(
+            a[0], b, a[1], core_poses.compose(core_poses.compose(a[0], b), a[1])
+        )
+        arrays = [
+            composed,
+            core_poses.compose(a[0], b),
+            core_poses.compose(a, b[0]),
+            core_poses.invert(a[0]),
+            rates,
+        ]
+        arrays.append(core_poses.compose_twists(a[0], b, a[1]))
         found.append(b"".join(array.tobytes() for array in arrays))
     assert len(set(found)) == 1
 
@@ -161,10 +170,10 @@ def test_an_isa_can_be_forced_and_a_wrong_name_is_named() -> None:
 
 
 def test_an_isa_the_processor_has_not_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(core, "lib", SimpleNamespace(pkm_best_isa=lambda: 0))
+    monkeypatch.setattr(library, "lib", SimpleNamespace(pkm_best_isa=lambda: 0))
     monkeypatch.setenv("PKMCAL_ISA", "avx2")
     with pytest.raises(ValueError, match="PKMCAL_ISA=avx2: this processor has no avx2"):
-        core._default_isa()
+        library._default_isa()
 
 
 def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -235,7 +244,7 @@ def test_what_the_core_reads_is_aligned() -> None:
     whole = np.arange(72.0)
     shifted = np.frombuffer(b"\0" + whole.tobytes(), dtype=np.uint8)[1:].view("f8").reshape(12, 6)
     assert not shifted.flags.aligned
-    rows, _ = core.as_rows("q", shifted, 6)
+    rows, _ = library.as_rows("q", shifted, 6)
     assert rows.flags.aligned and np.array_equal(rows.ravel(), whole)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.correction_grid import CorrectionGrid, correction_grid
-from pkmcal.csv_table import Table
-from pkmcal.robot import Robot
+from pkmcal.compensation.correction_grid import CorrectionGrid, correction_grid
+from pkmcal.files.csv_table import Table
+from pkmcal.kinematics.robot import Robot
 
 from .simulated import with_errors
 

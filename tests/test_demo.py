@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import demo
-from pkmcal.demo import NOISE, SIGMA, Demonstration, demonstrate
-from pkmcal.identify import identify
+from pkmcal.calibration.identify import identify
+from pkmcal.cli import demonstration as demo
+from pkmcal.cli.demonstration import NOISE, SIGMA, Demonstration, demonstrate
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pkmcal import digits
+from pkmcal import display
 
 
 @pytest.mark.parametrize(
@@ -26,41 +26,41 @@ from pkmcal import digits
 def test_sigma_has_two_digits_and_the_value_ends_with_it(
     value: float, sigma: float, text: str
 ) -> None:
-    assert digits.with_uncertainty(value, sigma) == text
+    assert display.with_uncertainty(value, sigma) == text
 
 
 @pytest.mark.parametrize("sigma", [math.inf, math.nan, 0.0])
 def test_a_useless_sigma_is_named_and_the_value_stays_readable(sigma: float) -> None:
-    assert digits.with_uncertainty(340.0, sigma) == f"340 ± {sigma:g}"
+    assert display.with_uncertainty(340.0, sigma) == f"340 ± {sigma:g}"
 
 
 def test_nan_and_infinity_are_printed_as_they_are() -> None:
-    assert digits.with_uncertainty(math.nan, 0.1) == "nan ± 0.10"
-    assert digits.fixed(math.inf, -2) == "inf"
+    assert display.with_uncertainty(math.nan, 0.1) == "nan ± 0.10"
+    assert display.fixed(math.inf, -2) == "inf"
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-9, 1e5))
 def test_rounding_moves_the_value_by_less_than_a_tenth_of_sigma(value: float, sigma: float) -> None:
-    shown, shown_sigma = map(float, digits.with_uncertainty(value, sigma).split(" ± "))
+    shown, shown_sigma = map(float, display.with_uncertainty(value, sigma).split(" ± "))
     assert abs(shown - value) <= 0.06 * sigma + 1e-9 * abs(value)
     assert abs(shown_sigma - sigma) <= 0.06 * sigma
 
 
 @given(st.floats(-1, 1), st.integers(0, 6))
 def test_there_is_no_negative_zero(value: float, places: int) -> None:
-    text = digits.fixed(value, places)
+    text = display.fixed(value, places)
     assert float(text) != 0 or not text.startswith("-")
 
 
 def test_angles_are_shown_in_degrees_and_lengths_as_they_are() -> None:
-    assert digits.displayed(math.radians(30), "rad") == (pytest.approx(30), "deg")
-    assert digits.displayed(12.5, "mm") == (12.5, "mm")
+    assert display.displayed(math.radians(30), "rad") == (pytest.approx(30), "deg")
+    assert display.displayed(12.5, "mm") == (12.5, "mm")
 
 
 def test_columns_of_a_table_line_up() -> None:
-    lines = digits.table(["name", "mm"], [["radius", "1.0"], ["rod", "340.00"]], left=1)
+    lines = display.table(["name", "mm"], [["radius", "1.0"], ["rod", "340.00"]], left=1)
     assert lines.splitlines() == ["name        mm", "radius     1.0", "rod     340.00"]
 
 
 def test_the_examples_run() -> None:
-    assert doctest.testmod(digits).failed == 0
+    assert doctest.testmod(display).failed == 0

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.identify import identify
-from pkmcal.robot import Robot
-from pkmcal.virtual import VirtualMachine
+from pkmcal.calibration.identify import identify
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.virtual_machine import VirtualMachine
 
 from .simulated import hexapod_poses
 

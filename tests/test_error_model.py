@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.geometries import Geometries, forward_of
+from pkmcal.kinematics.perturbed import Geometries, forward_of
 
 ROOT = Path(__file__).resolve().parent.parent
 TEXT = (ROOT / "docs" / "error-model.md").read_text(encoding="utf-8")

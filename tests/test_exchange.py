@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from pkmcal.exchange import CRITERIA, Design
+from pkmcal.calibration.optimal_design import CRITERIA, Design
 
 PRIOR = np.diag([0.1, 0.2, 0.3, 0.4])
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.feasible import Feasibility
+from pkmcal.kinematics.limits import Feasibility
 
 from . import robots, twin
 from .workspaces import WORKSPACE, poses

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import figures
+from pkmcal.report import error_figures as figures
 
 from .workspaces import poses
 

@@ -10,7 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
-from pkmcal.core import POSE, compose, compose_rates, invert
+from pkmcal.core.library import POSE
+from pkmcal.core.poses import compose, compose_rates, invert
 
 from . import robots, twin
 from .workspaces import WORKSPACE, poses

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pkmcal.geometry import SLOTS, Geometry, LimbNumber, Term, Tie
+from pkmcal.geometry.geometry import SLOTS, Geometry, LimbNumber, Term, Tie
 
 POINT = ("x", "y", "z")
 NUMBER = st.floats(-500.0, 500.0).map(lambda v: round(v, 6))

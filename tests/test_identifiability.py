@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.identifiability import in_words, listed, observability, plain_basis
-from pkmcal.identify import identify
-from pkmcal.virtual import VirtualMachine
+from pkmcal.calibration.identifiability import in_words, listed, observability, plain_basis
+from pkmcal.calibration.identify import identify
+from pkmcal.measurements.virtual_machine import VirtualMachine
 
 from .simulated import tilted_poses
 

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import core_readings
-from pkmcal.identify import identify
-from pkmcal.measurements import Measurements
-from pkmcal.predict import predict
-from pkmcal.robot import Robot
-from pkmcal.virtual import VirtualMachine
+from pkmcal.calibration.identify import identify
+from pkmcal.core import instruments
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.observation import predict
+from pkmcal.measurements.virtual_machine import VirtualMachine
 
 from . import workspaces
 from .simulated import hexapod_poses, missed, tilted_poses, with_errors
@@ -377,7 +377,7 @@ def test_a_machine_on_a_wall_is_calibrated_as_one_on_the_floor(paper: Robot) -> 
     true = with_errors(paper, 0.5, rng)
     q = paper.inverse(tilted_poses(paper, 30, rng))
     measured = VirtualMachine(true).measure(q)
-    seen, *_ = core_readings.seen_points(wall, measured.values)
+    seen, *_ = instruments.seen_points(wall, measured.values)
     there = identify(hung, dataclasses.replace(measured, values=seen), prior=0.5)
     here = identify(paper, measured, prior=0.5)
     np.testing.assert_allclose(there.values, here.values, atol=1e-6)

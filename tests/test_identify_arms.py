@@ -12,12 +12,12 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.arm_machine import ArmMachine
-from pkmcal.equations import Equations
-from pkmcal.identify import identify
-from pkmcal.measurements import Measurements
-from pkmcal.parameters import Share, parameters
-from pkmcal.virtual import VirtualMachine
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.identify import identify
+from pkmcal.calibration.parameters import Share, parameters
+from pkmcal.measurements.calibratable import ArmMachine
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.virtual_machine import VirtualMachine
 
 ARM = pk.SerialArm.from_dh(  # an industrial arm with a wrist in one point
     a=[312, 1075, 225, 0, 0, 0],
@@ -280,7 +280,7 @@ def test_coordinates_that_are_not_finite_are_refused_by_row() -> None:
 def test_the_command_calibrates_an_arm_too(tmp_path: Path) -> None:
     from typer.testing import CliRunner
 
-    from pkmcal.cli import app
+    from pkmcal.cli.main import app
 
     erring(ARM).replace(np.zeros((6, 6))).save(tmp_path / "arm.toml")
     VirtualMachine(erring(ARM)).measure(coordinates(ARM, 40), target=TARGET).write(

@@ -9,10 +9,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
-from pkmcal import core, core_readings
-from pkmcal.identify import identify
-from pkmcal.measurements import Measurements
-from pkmcal.robot import Robot
+from pkmcal.calibration.identify import identify
+from pkmcal.core import instruments
+from pkmcal.core.poses import compose
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.measurements import Measurements
 
 from . import workspaces
 
@@ -37,9 +38,9 @@ def logged(name: str, frame: list[float], kind: str) -> tuple[Robot, Robot, Meas
     if kind == "pose":
         angle = NOISE / 500
         sigma = np.array([NOISE] * 3 + [angle] * 3)
-        values = core.compose(at, pose) + sigma * rng.normal(size=(60, 6))
+        values = compose(at, pose) + sigma * rng.normal(size=(60, 6))
         return robot, true, Measurements(q, values, kind, sigma)
-    points = core_readings.seen_points(at, core_readings.points(pose, TARGET)[0])[0]
+    points = instruments.seen_points(at, instruments.points(pose, TARGET)[0])[0]
     points += NOISE * rng.normal(size=points.shape)
     if kind == "height":
         return robot, true, Measurements(q, points[:, 2], kind, NOISE, target=TARGET)
@@ -53,7 +54,7 @@ def assert_found(found: pk.Identification, true: Robot, frame: list[float]) -> N
     first = found.free.index("frame.x")
     corners = 300.0 * np.eye(3)
     reported = np.ascontiguousarray(found.values[first : first + 6])
-    ends = [core_readings.seen_points(f, corners)[0] for f in (reported, np.array(frame))]
+    ends = [instruments.seen_points(f, corners)[0] for f in (reported, np.array(frame))]
     np.testing.assert_allclose(*ends, atol=0.3)
     off = found.robot.forward(found._equations.actuators).pose
     off -= true.forward(found._equations.actuators).pose
@@ -86,7 +87,7 @@ def test_heights_of_an_instrument_on_its_side() -> None:
 def test_uncertainty_of_a_frame_is_the_scatter_of_calibrations() -> None:
     frame = FRAMES["far and turned by 170 degrees"]
     robot, true, readings = logged("hexapod", frame, "pose")
-    clean = core.compose(np.array(frame), true.forward(readings.actuators).pose)
+    clean = compose(np.array(frame), true.forward(readings.actuators).pose)
     values, rng = [], np.random.default_rng(2)
     for _ in range(40):
         noise = readings.sigma * rng.normal(size=(60, 6))

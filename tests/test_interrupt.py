@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from pkmcal.whole_file import write_whole
+from pkmcal.files.atomic import write_whole
 
 # Says when the program is loaded, so that the signal meets its work.
 _PROGRAM = "from pkmcal.cli import main; print('ready', flush=True); main()"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from pkmcal.iso9283 import performance
+from pkmcal.measurements.iso9283 import performance
 
 
 def test_accuracy_is_the_distance_of_the_mean_from_the_command() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pkmcal.loss import Loss
+from pkmcal.calibration.loss import Loss
 
 COMPONENTS = np.array([3, 1, 6, 3, 3])
 

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import robotfile
-from pkmcal.limb_kinds import KINDS
-from pkmcal.model import Model
+from pkmcal.geometry import robot_file
+from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.model import Model
 
 from . import twin
 from .workspaces import WORKSPACE, poses
 
-MACHINES = robotfile.builtin_names()
+MACHINES = robot_file.builtin_names()
 # The print of the RBT-6T03P is singular everywhere: it has no workspace and nothing to calibrate.
 WORKING = tuple(name for name in MACHINES if name != "rbt-6t03p-printed")
 # The paper's 28 errors hold two that do nothing: platform3.x and platform4.x leave their legs'
@@ -68,7 +68,7 @@ def test_home_and_workspace_keep_every_limit(name: str) -> None:
 
 @pytest.mark.parametrize("name", WORKING)
 def test_branch_of_the_file_is_the_sign_of_the_closures_at_home(name: str) -> None:
-    model = robotfile.read(name)
+    model = robot_file.read(name)
     q = twin.inverse(model, model.home)
     for limb, n in zip(model.limbs, twin.numbers(model, None), strict=True):
         anchor, _ = twin.driver(limb, n, q[limb.actuator])
@@ -92,7 +92,7 @@ def test_default_free_set_is_independent(name: str) -> None:
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_built_in_machines_are_untied_with_offset_0_and_gain_1(name: str) -> None:
-    geometry = robotfile.read(name).geometry
+    geometry = robot_file.read(name).geometry
     assert not geometry.tied.any() and not geometry.parameters
     for number in geometry.numbers:
         if number.slot in ("offset", "gain"):
@@ -101,7 +101,7 @@ def test_built_in_machines_are_untied_with_offset_0_and_gain_1(name: str) -> Non
 
 @pytest.mark.parametrize("name", MACHINES)
 def test_built_in_machines_say_where_their_numbers_are_from(name: str) -> None:
-    text = robotfile.located(name)[0].decode()
+    text = robot_file.located(name)[0].decode()
     comment = [line for line in text.splitlines() if line.startswith("#")]
     assert any(line.startswith("# Numbers: ") for line in comment)
 
@@ -120,7 +120,7 @@ def test_file_to_start_from_is_a_machine_that_keeps_its_limits() -> None:
 def test_2tpr2tps_has_the_published_joints() -> None:
     """Table 1: a 140, b 80, c 200, e 384.7, f 278.5 mm; d is the 294.2 mm of Table 2."""
     a, b, c, d, e, f = 140.0, 80.0, 200.0, 294.2, 384.7, 278.5
-    model = robotfile.read("2tpr2tps")
+    model = robot_file.read("2tpr2tps")
     base = [(d, -e / 2, 0), (d, e / 2, 0), (0, f / 2, 0), (0, -f / 2, 0)]
     platform = [(a, -b / 2, 0), (a, b / 2, 0), (0, c / 2, 0), (0, -c / 2, 0)]
     assert np.allclose(points(model, "base"), base, rtol=0, atol=1e-12)
@@ -132,7 +132,7 @@ def test_2tpr2tps_has_the_published_joints() -> None:
 
 
 def test_hexapod_joints_lie_on_circles_of_650_and_250_mm() -> None:
-    model = robotfile.read("hexapod")
+    model = robot_file.read("hexapod")
     for point, radius, degrees in (
         ("base", 325.0, [20, 100, 140, -140, -100, -20]),
         ("platform", 125.0, [42.5, 77.5, 162.5, -162.5, -77.5, -42.5]),
@@ -152,7 +152,7 @@ def test_rbt_6t03p_stands_in_mid_stroke_on_rods_of_223_mm() -> None:
 
 
 def test_linear_delta_is_a_mini_kossel() -> None:
-    model = robotfile.read("linear-delta")
+    model = robot_file.read("linear-delta")
     reach = points(model, "base") - points(model, "platform")
     assert np.allclose(np.linalg.norm(reach, axis=1), 105.6)
     q = pk.load("linear-delta").inverse([0.0, 0.0, 240.0, 0.0, 0.0, 0.0])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.core import POSE
+from pkmcal.core.library import POSE
 
 from . import twin
 from .workspaces import WORKSPACE, poses

@@ -14,9 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pkmcal import csv_table, measurement_csv, whole_file
-from pkmcal.measurement_csv import read_measurements
-from pkmcal.measurements import COMPONENTS, Measurements
+from pkmcal.files import atomic as whole_file
+from pkmcal.files import csv_table
+from pkmcal.measurements import measurement_csv
+from pkmcal.measurements.measurement_csv import read_measurements
+from pkmcal.measurements.measurements import COMPONENTS, Measurements
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 POSITIVE = st.floats(1e-300, 1e300)

@@ -12,12 +12,12 @@ import pytest
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal import cli
-from pkmcal.command_csv import read_commands
-from pkmcal.csv_table import Table
-from pkmcal.measurement_csv import read_measurements
-from pkmcal.pose_csv import read_poses
-from pkmcal.xlsx_rows import xlsx_rows
+from pkmcal.cli import main as cli
+from pkmcal.files.csv_table import Table
+from pkmcal.files.xlsx_rows import xlsx_rows
+from pkmcal.measurements.command_csv import read_commands
+from pkmcal.measurements.measurement_csv import read_measurements
+from pkmcal.measurements.pose_csv import read_poses
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = ROOT / "tests" / "data"

@@ -13,9 +13,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pkmcal import measurements as module
-from pkmcal.measurements import COMPONENTS, Measurements
-from pkmcal.virtual import VirtualMachine
+from pkmcal.measurements import measurements as module
+from pkmcal.measurements.measurements import COMPONENTS, Measurements
+from pkmcal.measurements.virtual_machine import VirtualMachine
 
 KINDS = tuple(COMPONENTS)
 SHAPES = {"pose": (5, 6), "position": (5, 3), "height": (5,), "distance": (5,)}

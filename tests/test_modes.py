@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import core_paths, homotopy
-from pkmcal.core_paths import FAR, LOST, Paths
+from pkmcal.core import paths as core_paths
+from pkmcal.core.paths import FAR, LOST, Paths
+from pkmcal.modes import homotopy
 
 from . import dietmaier, robots, twin_rows
 

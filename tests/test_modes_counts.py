@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import homotopy
-from pkmcal.limb_kinds import KINDS
+from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.modes import homotopy
 
 PRIME = 2**31 - 1
 R = [[f"r{i}{j}" for j in range(3)] for i in range(3)]

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
-from pkmcal.core import POSE, STATUS
+from pkmcal.core.library import POSE, STATUS
 
 from . import robots, twin, twin_rows
 from .round_trips import CLOSED, round_trips

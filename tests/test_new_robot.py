@@ -12,9 +12,9 @@ import pytest
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal import cli
-from pkmcal.limb_kinds import KINDS
-from pkmcal.new_robot import template
+from pkmcal.cli import main as cli
+from pkmcal.cli.robot_template import template
+from pkmcal.geometry.limb_kinds import KINDS
 
 
 @pytest.fixture(autouse=True)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pkmcal.core import lib
-from pkmcal.normals import Normals
+from pkmcal.core.library import lib
+from pkmcal.core.random import Normals
 
 COUNT = 1 << 20
 ROOT = np.random.SeedSequence(5)

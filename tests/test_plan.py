@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.plan import Plan
-from pkmcal.robot import Robot
+from pkmcal.calibration.plan_poses import Plan
+from pkmcal.kinematics.robot import Robot
 
 from .simulated import missed, with_errors
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import core_readings
-from pkmcal.identify import identify
-from pkmcal.measurements import Measurements
-from pkmcal.robot import Robot
-from pkmcal.virtual import VirtualMachine
+from pkmcal.calibration.identify import identify
+from pkmcal.core import instruments
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.virtual_machine import VirtualMachine
 
 from . import workspaces
 from .simulated import hexapod_poses, tilted_poses, with_errors
@@ -199,7 +199,7 @@ def test_no_equation_left_over_is_named_with_a_prior_that_leaves_the_frame_out(
 def test_a_misreading_is_named_wherever_the_instrument_stands(
     paper: Robot, points: Measurements, words: str, change: Callable[[np.ndarray], np.ndarray]
 ) -> None:
-    values = core_readings.seen_points(np.array([5e3, -8e3, 1e3, 2.9, 0.3, -2.8]), points.values)[0]
+    values = instruments.seen_points(np.array([5e3, -8e3, 1e3, 2.9, 0.3, -2.8]), points.values)[0]
     wrong = dataclasses.replace(points, values=change(values))
     texts = said(paper, wrong, prior=0.5, frame="unknown", target="unknown")
     assert any(words in text for text in texts)

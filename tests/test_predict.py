@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import core_readings
-from pkmcal.equations import Equations
-from pkmcal.measurements import Measurements
-from pkmcal.parameters import Share, parameters
-from pkmcal.predict import difference, predict
-from pkmcal.robot import Robot
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.parameters import Share, parameters
+from pkmcal.core import instruments
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.observation import difference, predict
 
 from . import twin
 from .simulated import hexapod_poses
@@ -78,10 +78,10 @@ def test_points_and_distances_are_those_of_the_twin() -> None:
     rng = np.random.default_rng(3)
     pose, target, anchor = rng.normal(0, 1, (9, 6)), rng.normal(0, 9, (9, 3)), rng.normal(0, 9, 3)
     expected = np.array([p[:3] + twin.rotation(p) @ t for p, t in zip(pose, target, strict=True)])
-    np.testing.assert_allclose(core_readings.points(pose, target)[0], expected, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(instruments.points(pose, target)[0], expected, rtol=0, atol=1e-13)
     lengths = np.linalg.norm(expected - anchor, axis=1)
     np.testing.assert_allclose(
-        core_readings.distances(pose, target, anchor)[0], lengths, rtol=0, atol=1e-13
+        instruments.distances(pose, target, anchor)[0], lengths, rtol=0, atol=1e-13
     )
 
 
@@ -98,7 +98,7 @@ def test_a_frame_moves_points_as_the_pose_of_the_base_in_it() -> None:
     target = rng.normal(0, 50, (5, 3))
     seen = predict("position", pose, target, frame=frame).values
     inner = predict("position", pose, target).values
-    outer = core_readings.seen_points(frame, inner)[0]
+    outer = instruments.seen_points(frame, inner)[0]
     again = predict("position", np.tile(frame, (5, 1)), inner).values
     np.testing.assert_allclose(again, outer, atol=1e-12)
     np.testing.assert_allclose(seen, outer, atol=1e-12)

@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import core, swarm
-from pkmcal.geometry import FloatArray
-from pkmcal.limb_residual import LimbResidual
-from pkmcal.pso import pso
-from pkmcal.swarm import CONSTRICTION, PAPER, SwarmSettings, minimise_eq18
+from pkmcal.arrays import FloatArray
+from pkmcal.compensation.pso import pso
+from pkmcal.core import library, swarm
+from pkmcal.core.swarm import CONSTRICTION, PAPER, SwarmSettings, minimise_eq18
+from pkmcal.kinematics.limb_residual import LimbResidual
 
 from .simulated import hexapod_poses, tilted_poses, with_errors
 from .twin import closures
 
 AIM = np.array([0.3, -0.2, 0.1, 0.5])
 STABLE = {"inertia": 0.7298, "cognitive": 1.49618, "social": 1.49618}
-ISAS = range(core.lib.pkm_best_isa() + 1)
+ISAS = range(library.lib.pkm_best_isa() + 1)
 
 
 def distance(x: FloatArray) -> FloatArray:
@@ -285,12 +285,12 @@ def test_bad_arguments_are_named(
 
 
 def test_the_core_refuses_what_it_cannot_take() -> None:
-    struct = core.ffi.new("pkm_swarm *", {"particles": 0, "dims": 2})
-    null = core.ffi.NULL
-    assert core.lib.pkm_swarm_size(struct) == 0
-    assert core.lib.pkm_swarm_judge(struct, 0, null) == core.lib.PKM_BAD_SWARM
+    struct = library.ffi.new("pkm_swarm *", {"particles": 0, "dims": 2})
+    null = library.ffi.NULL
+    assert library.lib.pkm_swarm_size(struct) == 0
+    assert library.lib.pkm_swarm_judge(struct, 0, null) == library.lib.PKM_BAD_SWARM
     struct.particles = 5
-    assert core.lib.pkm_swarm_judge(struct, 99, null) == core.lib.PKM_BAD_ISA
+    assert library.lib.pkm_swarm_judge(struct, 99, null) == library.lib.PKM_BAD_ISA
 
 
 # --- order-2 stability -------------------------------------------------------------------------

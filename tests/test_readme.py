@@ -16,7 +16,7 @@ import pytest
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal import cli
+from pkmcal.cli import main as cli
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

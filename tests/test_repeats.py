@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.identification import Identification
-from pkmcal.measurements import Measurements
-from pkmcal.repeats import groups, split
-from pkmcal.robot import Robot
+from pkmcal.calibration.identification import Identification
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.lack_of_fit import groups, split
+from pkmcal.measurements.measurements import Measurements
 
 from .simulated import hexapod_poses, tilted_poses, with_errors
 

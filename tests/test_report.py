@@ -16,9 +16,11 @@ from matplotlib import image
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal import cli, report, report_data
-from pkmcal.identification import Identification
-from pkmcal.report_data import verdict
+from pkmcal.calibration.identification import Identification
+from pkmcal.cli import main as cli
+from pkmcal.report import contents as report_data
+from pkmcal.report import report
+from pkmcal.report.contents import verdict
 
 from . import browser
 from .simulated import hexapod_poses

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
-from pkmcal.report_data import as_seen, expected, instrument_sought
+from pkmcal.report.contents import as_seen, expected, instrument_sought
 
 from .simulated import hexapod_poses
 

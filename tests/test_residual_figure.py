@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.identification import Identification
-from pkmcal.residual_figure import residuals
+from pkmcal.calibration.identification import Identification
+from pkmcal.report.residual_figure import residuals
 
 from .simulated import hexapod_poses
 

@@ -14,9 +14,9 @@ import tomli_w
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from pkmcal import robotfile
-from pkmcal.model import Cone, Limb, Model
-from pkmcal.toml_source import Source
+from pkmcal.files.toml_lines import Source
+from pkmcal.geometry import robot_file
+from pkmcal.geometry.model import Cone, Limb, Model
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SLIDER_LIMB = {
@@ -43,12 +43,12 @@ def document(limbs: list[dict[str, Any]], **sections: Any) -> dict[str, Any]:
 
 def parse(content: Mapping[str, Any] | str) -> Model:
     text = content if isinstance(content, str) else tomli_w.dumps(content)
-    return robotfile.parse(Source(text.encode(), "my.toml"), "my.toml")
+    return robot_file.parse(Source(text.encode(), "my.toml"), "my.toml")
 
 
 def written(model: Model, folder: Path) -> Model:
-    robotfile.write(model, folder / "written.toml")
-    return robotfile.read(folder / "written.toml")
+    robot_file.write(model, folder / "written.toml")
+    return robot_file.read(folder / "written.toml")
 
 
 # to the last bit ----------------------------------------------------------------------------------
@@ -78,10 +78,10 @@ def all_bits(model: Model) -> dict[str, object]:
 
 
 @pytest.mark.parametrize(
-    "source", [*robotfile.builtin_names(), *sorted(EXAMPLES.rglob("*.toml"))], ids=str
+    "source", [*robot_file.builtin_names(), *sorted(EXAMPLES.rglob("*.toml"))], ids=str
 )
 def test_a_written_robot_reads_back_to_the_last_bit(source: str | Path, tmp_path: Path) -> None:
-    model = robotfile.read(source)
+    model = robot_file.read(source)
     assert all_bits(written(model, tmp_path)) == all_bits(model)
 
 
@@ -169,7 +169,7 @@ def test_any_robot_reads_back_to_the_last_bit(tmp_path: Path, content: dict[str,
 
 
 def test_ties_survive_saving(tmp_path: Path) -> None:
-    model = robotfile.read(EXAMPLES / "linear-delta" / "robot.toml")
+    model = robot_file.read(EXAMPLES / "linear-delta" / "robot.toml")
     again = written(model, tmp_path).geometry.replace({"radius": 150.0})
     assert np.hypot(again["base3.x"], again["base3.y"]) == pytest.approx(150.0, rel=1e-15)
     assert again.numbers == model.geometry.numbers
@@ -178,15 +178,15 @@ def test_ties_survive_saving(tmp_path: Path) -> None:
 def test_nothing_is_written_where_writing_fails(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    model = robotfile.read("hexapod")
+    model = robot_file.read("hexapod")
     with pytest.raises(FileNotFoundError, match=r"the folder .* does not exist"):
-        robotfile.write(model, tmp_path / "missing" / "robot.toml")
+        robot_file.write(model, tmp_path / "missing" / "robot.toml")
 
     target = tmp_path / "robot.toml"
     target.write_text("what was there")
     monkeypatch.setattr("os.replace", lambda *_: (_ for _ in ()).throw(OSError("disk full")))
     with pytest.raises(OSError, match="disk full"):
-        robotfile.write(model, target)
+        robot_file.write(model, target)
     assert target.read_text() == "what was there"
     assert list(tmp_path.iterdir()) == [target]
 

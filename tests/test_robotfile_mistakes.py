@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 import tomli_w
 
-from pkmcal import robotfile
-from pkmcal.model import Model
-from pkmcal.toml_source import Source
+from pkmcal.files.toml_lines import Source
+from pkmcal.geometry import robot_file
+from pkmcal.geometry.model import Model
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 DELTA = (EXAMPLES / "linear-delta" / "robot.toml").read_text()
@@ -20,7 +20,7 @@ CRANK = LEG | {"kind": "RUS", "rod": 2.0, "crank": 1.0, "branch": 1, "axis": [0,
 
 
 def parse(content: str) -> Model:
-    return robotfile.parse(Source(content.encode(), "my.toml"), "my.toml")
+    return robot_file.parse(Source(content.encode(), "my.toml"), "my.toml")
 
 
 def parse_limbs(*limbs: dict[str, Any]) -> Model:
@@ -188,10 +188,10 @@ def test_a_robot_has_limbs(content: str, message: str) -> None:
 )
 def test_an_unknown_robot_is_named(source: Any, error: type[Exception], message: str) -> None:
     with pytest.raises(error, match=re.escape(message)):
-        robotfile.read(source)
+        robot_file.read(source)
 
 
 def test_a_file_that_is_no_text_is_named(tmp_path: Path) -> None:
     (tmp_path / "robot.toml").write_bytes(b"name = \xff")
     with pytest.raises(ValueError, match=r"robot\.toml: not a text file in UTF-8 \(byte 7\)"):
-        robotfile.read(tmp_path / "robot.toml")
+        robot_file.read(tmp_path / "robot.toml")

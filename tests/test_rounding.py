@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.geometry import FloatArray
+from pkmcal.arrays import FloatArray
 
 EIGHT_ROWS = Path(__file__).parent.parent / "examples" / "2tpr2tps-eight-rows.toml"
 MACHINES = ["hexapod", "rbt-6t03p", "2tpr2tps", "rotary-delta", str(EIGHT_ROWS)]

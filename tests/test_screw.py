@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pkmcal as pk
-from pkmcal import core_serial, screw
-from pkmcal.core import ISAS
+from pkmcal import screw
+from pkmcal.core import screws as core_serial
+from pkmcal.core.library import ISAS
 
 ANGLES = [
     1e-300, 1e-200, 1e-162, 1e-154, 1e-100, 1e-30, 1e-16, 1e-9, 1e-8, 1e-6, 1e-4, 1e-3, 0.01, 0.1,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.seed import checked_seed
+from pkmcal.arguments import checked_seed
 
 
 @pytest.mark.parametrize("seed", [0, 7, 2**64 - 1, np.int64(3)])

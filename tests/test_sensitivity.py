@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pkmcal as pk
-from pkmcal.sensitivity import STUDIES, own_names, study_cases
+from pkmcal.error_model.sensitivity import STUDIES, own_names, study_cases
 
 from . import twin
 from .workspaces import WORKSPACE, poses

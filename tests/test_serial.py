@@ -20,8 +20,8 @@ from pkmcal._core import lib
 
 import pkmcal as pk
 from pkmcal import screw
-from pkmcal.core import ISAS
-from pkmcal.core_serial import Arm
+from pkmcal.core.library import ISAS
+from pkmcal.core.screws import Arm
 
 from .multibody import ENGINES
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.skeleton import exaggerated, skeleton
+from pkmcal.report.skeleton import exaggerated, skeleton
 
 PRINTED = "rbt-6t03p-printed"  # as misprinted: the machine has no pose at home
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pkmcal.streaming import BINS, REACH, Bins, Stream
+from pkmcal.core.statistics import BINS, REACH, Bins, Stream
 
 SHARES = (0.0, 0.0015, 0.025, 0.5, 0.975, 0.997, 0.9985, 1.0)
 

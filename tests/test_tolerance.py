@@ -15,10 +15,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import pkmcal as pk
-from pkmcal import monte_carlo
-from pkmcal.geometries import Geometries, forward_of
-from pkmcal.robot import Robot
-from pkmcal.tolerance import Tolerance, sigma_of
+from pkmcal.error_model import monte_carlo
+from pkmcal.error_model.tolerance import Tolerance, sigma_of
+from pkmcal.kinematics.perturbed import Geometries, forward_of
+from pkmcal.kinematics.robot import Robot
 
 from .workspaces import WORKSPACE, poses
 

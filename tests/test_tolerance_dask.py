@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal import monte_carlo
-from pkmcal.tolerance import Tolerance
+from pkmcal.error_model import monte_carlo
+from pkmcal.error_model.tolerance import Tolerance
 
 from .workspaces import poses
 

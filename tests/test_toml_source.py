@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import pkmcal as pk
-from pkmcal import robotfile
-from pkmcal.toml_source import Source, tomllib
+from pkmcal.files.toml_lines import Source, tomllib
+from pkmcal.geometry import robot_file
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 FILES = {
-    **{name: robotfile.located(name)[0].decode() for name in pk.machines()},
+    **{name: robot_file.located(name)[0].decode() for name in pk.machines()},
     **{
         str(path.relative_to(EXAMPLES)): path.read_text(encoding="utf-8")
         for path in EXAMPLES.rglob("*.toml")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.measurements import Measurements
+from pkmcal.measurements.measurements import Measurements
 
 from .simulated import hexapod_poses, missed, with_errors
 

@@ -11,9 +11,9 @@ import pytest
 from scipy.optimize import brentq
 
 import pkmcal as pk
-from pkmcal import motion as motions
-from pkmcal import move_figures
-from pkmcal.core import POSE
+from pkmcal.core.library import POSE
+from pkmcal.moves import derivatives
+from pkmcal.report import move_figures
 
 from . import twin
 
@@ -188,7 +188,7 @@ def test_platforms_held_by_constraints_accelerate_as_derivatives_in_50_digits_sa
         velocity = np.array(((after - before) / (2 * h)).tolist(), dtype=float)
         acceleration = np.array(((after - 2 * now + before) / h**2).tolist(), dtype=float)
     R = twin.rotation(at.pose)
-    spin, spin_rate = (motions.cross_matrix(each[:3]) for each in (at.twist, at.twist_rate))
+    spin, spin_rate = (derivatives.cross_matrix(each[:3]) for each in (at.twist, at.twist_rate))
     np.testing.assert_allclose(spin @ R, velocity[:3], atol=1e-12)
     np.testing.assert_allclose((spin_rate + spin @ spin) @ R, acceleration[:3], atol=1e-11)
     np.testing.assert_allclose(at.twist[3:], velocity[3], rtol=1e-11, atol=1e-10)

@@ -127,7 +127,7 @@ POSES = {
 
 
 def test_the_twin_numbers_its_slots_as_the_package_does() -> None:
-    from pkmcal.core import SLOTS
+    from pkmcal.core.library import SLOTS
 
     assert tuple(SLOTS) == twin.SLOTS
 

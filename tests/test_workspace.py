@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.workspace import reach
+from pkmcal.kinematics.workspace import reach
 
 from . import twin, twin_rows
 from .workspaces import WORKSPACE, poses

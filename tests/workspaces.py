@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal import robotfile
+from pkmcal.geometry import robot_file
 
 # Half widths of the box about the home pose: x y z in mm, alpha beta gamma in rad. A coordinate
 # that the machine does not move, or that follows from the others, has 0. rbt-6t03p-printed has no
@@ -30,7 +30,7 @@ WORKSPACE: dict[str, tuple[float, float, float, float, float, float]] = {
 def poses(name: str, count: int, seed: int = 0) -> np.ndarray:
     """Random poses (count, 6) in the box, which the machine reaches with its nominal geometry."""
     spread = np.random.default_rng(seed).uniform(-1.0, 1.0, (count, 6))
-    found = robotfile.read(name).home + spread * WORKSPACE[name]
+    found = robot_file.read(name).home + spread * WORKSPACE[name]
     if name in ("2tpr2tps", "2tpr2tps-spatial"):
         found[:, 0] = found[:, 2] * np.tan(found[:, 4])
     if name == "3rps":
@@ -48,7 +48,7 @@ def follow_3rps(poses: np.ndarray) -> None:
     gamma = np.arctan2(np.sin(alpha) * np.sin(beta), np.cos(alpha) + np.cos(beta))
     n_x, n_y = np.cos(gamma) * np.cos(beta), np.sin(gamma) * np.cos(beta)
     o_y = np.sin(gamma) * np.sin(beta) * np.sin(alpha) + np.cos(gamma) * np.cos(alpha)
-    radius = robotfile.read("3rps").geometry["platform1.x"]
+    radius = robot_file.read("3rps").geometry["platform1.x"]
     poses[:, 0] = radius * (n_x - o_y) / 2.0
     poses[:, 1] = -radius * n_y
     poses[:, 5] = gamma

@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 import pkmcal as pk
-from pkmcal.pose_csv import write_poses
-from pkmcal.swarm import CONSTRICTION
+from pkmcal.core.swarm import CONSTRICTION
+from pkmcal.measurements.pose_csv import write_poses
 
 HERE = Path(__file__).parent
 SIGMA = 0.5  # mm, of each of the 28 errors

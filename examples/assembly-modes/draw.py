@@ -12,8 +12,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import pkmcal as pk
-from pkmcal import figures
-from pkmcal.core_serial import joint_motions
+from pkmcal.core.screws import joint_motions
+from pkmcal.report import error_figures as figures
 
 HERE = Path(__file__).parent
 FORTY = (100.0, 64.5275, 108.6284, 150.3439, 128.1933, 77.1071)  # mm

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import pkmcal as pk
-from pkmcal import move_figures
+from pkmcal.report import move_figures
 
 HERE = Path(__file__).parent
 TARGETS = {"(0, 0, 50)": (163.61, 48.96), "(0, 0, -20)": (232.25, 19.68)}  # Table 2

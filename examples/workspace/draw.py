@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import pkmcal as pk
-from pkmcal import figures
+from pkmcal.report import error_figures as figures
 
 CELLS = 120  # of a slice, along each axis
 TURN = float(np.radians(88.0))

@@ -15,7 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 import pkmcal as pk
-from pkmcal.swarm import CONSTRICTION, PAPER, SwarmSettings
+from pkmcal.core.swarm import CONSTRICTION, PAPER, SwarmSettings
 
 Array = NDArray[np.float64]
 

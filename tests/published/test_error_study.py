@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 import pkmcal as pk
-from pkmcal.sensitivity import STUDIES, study_cases
+from pkmcal.error_model.sensitivity import STUDIES, study_cases
 
 from .. import twin
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from pkmcal import cli
-from pkmcal.measurements import Measurements
+from pkmcal.cli import main as cli
+from pkmcal.measurements.measurements import Measurements
 
 ROOT = Path(__file__).parents[2]
 LOG = ROOT.parent / "shared" / "data" / "linear-delta" / "probe41.csv"

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.identify import identify
-from pkmcal.measurements import Measurements
+from pkmcal.calibration.identify import identify
+from pkmcal.measurements.measurements import Measurements
 
 LOG = Path(__file__).parents[3] / "shared" / "data" / "fanuc-r2000ic" / "tracker.csv"
 

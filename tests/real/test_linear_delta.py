@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.identify import identify
-from pkmcal.measurements import Measurements
-from pkmcal.robot import Robot
+from pkmcal.calibration.identify import identify
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.measurements import Measurements
 
 ROOT = Path(__file__).parents[2]
 LOG = ROOT.parent / "shared" / "data" / "linear-delta" / "probe41.csv"

@@ -1,0 +1,117 @@
+"""Files of serial arms: TOML in, `SerialArm` out, and back to the last bit."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from pkmcal import arguments, screw
+from pkmcal.arms.arm import ERRORS, SerialArm
+from pkmcal.arms.inputs import KINDS
+from pkmcal.arrays import FloatArray, Unit
+from pkmcal.core.library import POSE
+from pkmcal.exceptions import FileError
+from pkmcal.files.atomic import write_whole
+from pkmcal.files.toml_lines import Source
+from pkmcal.files.toml_table import Table, shown
+from pkmcal.geometry import robot_file
+from pkmcal.geometry.robot_file_writer import lines
+
+TOP = ("name", "units", "tool", "joint")
+HEADER = "# A serial arm for pkmcal, at zero: lengths in mm, angles in rad.\n"
+
+
+def is_arm(data: Mapping[str, Any]) -> bool:
+    """Whether the content of a file is that of an arm: it has joints in place of limbs."""
+    return "joint" in data and "limb" not in data
+
+
+def parse(source: Source) -> SerialArm:
+    """Make an arm of what its file says.
+
+    Raises
+    ------
+    ValueError
+        A mistake in the file: one line with the file, its line, the table, the key and what was
+        found.
+    """
+    top = Table(source.data, source)
+    top.only(TOP, "a serial arm")
+    top.units = robot_file.read_units(top)
+    tool = top.table("tool")
+    tool.only(("home",))
+    joints = top.tables("joint", "an arm")
+    for joint in joints:
+        joint.only(("kind", "axis", "point", "error"))
+    given: dict[str, Any] = {
+        "axes": [joint.vector("axis") for joint in joints],
+        "points": [_point(joint) for joint in joints],
+        "home": _home(tool),
+        "kinds": [joint.choice("kind", KINDS, "kind of joint") for joint in joints],
+        "name": top.text("name"),
+        "joint_errors": [_error(joint) for joint in joints],
+    }
+    try:
+        return SerialArm(**given)
+    except ValueError as error:  # numbers that are each right, and too large together
+        raise FileError(f"{source.place}: {error}") from None
+
+
+def write(arm: SerialArm, path: str | os.PathLike[str], comment: str = "") -> None:
+    """Write an arm's file in mm and rad, `comment` at its head; it is complete or untouched.
+
+    Raises
+    ------
+    OSError
+        The folder does not exist or cannot be written.
+    """
+    head = {"name": arm.name, "units": {"length": "mm", "angle": "rad"}}
+    blocks = [HEADER, lines(head), "[tool]\n" + lines({"home": arm.home[:3].tolist()})]
+    for i, kind in enumerate(arm.kinds):
+        joint: dict[str, Any] = {"kind": kind, "axis": arm.axes[i].tolist()}
+        joint["point"] = arm.points[i].tolist()
+        error = dict(zip(ERRORS, arm.joint_errors[i].tolist(), strict=True))
+        if any(error.values()):
+            joint["error"] = error
+        blocks.append("[[joint]]\n" + lines(joint))
+    write_whole(path, arguments.comment(comment) + "\n".join(blocks))
+
+
+def _point(joint: Table) -> list[float]:
+    found = joint.list_of("point", 3, "three coordinates")
+    return [joint.as_number("point", each, "mm") for each in found]
+
+
+def _error(joint: Table) -> list[float]:
+    """The joint's six errors; those left out are 0."""
+    if "error" not in joint:
+        return [0.0] * len(ERRORS)
+    error = joint.table("error")
+    error.only(ERRORS)
+    units: tuple[Unit, ...] = ("mm", "mm", "mm", "rad", "rad", "rad")
+    return [error.number(name, unit, 0.0) for name, unit in zip(ERRORS, units, strict=True)]
+
+
+def _home(tool: Table) -> FloatArray:
+    """The tool at zero: a pose by name, or three rows of four numbers."""
+    value = tool["home"]
+    if isinstance(value, Mapping):
+        pose = tool.table("home")
+        pose.only(POSE)
+        units: dict[str, Unit] = {name: "mm" if name in "xyz" else "rad" for name in POSE}
+        return np.array([pose.number(name, units[name], 0.0) for name in POSE])
+    rows = tool.list_of("home", 3, "a pose, or three rows of four numbers")
+    if not all(isinstance(row, list) and len(row) == 4 for row in rows):
+        tool.fail("home", f"must be a pose, or three rows of four numbers, found {shown(value)}")
+    matrix = np.eye(4)
+    for i, row in enumerate(rows):
+        for j, each in enumerate(row):
+            matrix[i, j] = tool.as_number("home", each, "mm" if j == 3 else "1")
+    try:
+        screw.as_motions("home", matrix)
+    except ValueError as error:
+        tool.fail("home", str(error).partition(" ")[2])
+    return matrix

@@ -1,0 +1,62 @@
+"""Array types, and arrays of callers as float64 rows the core reads."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pkmcal.arguments import shown
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+
+FloatArray = NDArray[np.float64]
+ComplexArray = NDArray[np.complex128]
+BoolArray = NDArray[np.bool_]
+IntArray = NDArray[np.intp]
+Int32Array = NDArray[np.int32]  # what the core writes
+
+Unit = Literal["mm", "rad", "1"]
+
+
+def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:
+    """Numbers of any kind as an array; `last` axes are for the message of a ragged list.
+
+    Raises
+    ------
+    TypeError
+        Not numbers.
+    ValueError
+        A ragged list.
+    """
+    try:
+        given = np.asarray(array)
+    except ValueError:
+        raise ArgumentError(f"{name} must have shape (..., {last}), found a ragged list") from None
+    if given.dtype.kind not in "iuf":
+        alone = not isinstance(array, np.ndarray | list | tuple)
+        found = shown(array) if alone else f"dtype {given.dtype}"
+        raise ArgumentTypeError(f"{name} must be an array of numbers, found {found}")
+    return given
+
+
+def as_rows(name: str, array: ArrayLike, width: int) -> tuple[FloatArray, tuple[int, ...]]:
+    """Numbers (..., width) as contiguous float64 rows (N, width), and the leading shape.
+
+    Raises
+    ------
+    TypeError
+        Not numbers.
+    ValueError
+        Another last axis.
+    """
+    given = as_numbers(name, array, width)
+    if given.ndim == 0 or given.shape[-1] != width:
+        raise ArgumentError(f"{name} must have shape (..., {width}), found {given.shape}")
+    return as_doubles(given).reshape(-1, width), given.shape[:-1]
+
+
+def as_doubles(given: NDArray[Any]) -> FloatArray:
+    """The same numbers as the core reads them: float64, one behind the other, aligned."""
+    doubles = np.ascontiguousarray(given, dtype=np.float64)
+    return doubles if doubles.flags.aligned else doubles.copy()

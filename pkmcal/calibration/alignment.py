@@ -1,0 +1,124 @@
+"""Where an instrument stands: the frame in which what a machine predicts lies nearest to readings.
+
+In closed form or nearly so, with the machine as drawn: where the search for its errors starts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.core import screws
+
+_ROUNDS = 60  # of turning and shifting in turn
+_FLAT = 0.05  # share of the largest spread of points below which they lie in a plane, or a line
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Points of one or several sets as an instrument has them, and what the machine says of them.
+
+    Attributes
+    ----------
+    values : ndarray (N, 3)
+        As the instrument has them.
+    point : ndarray (N, 3)
+        In the base frame, with targets where they are said to be.
+    turn : ndarray (N, 3, 3)
+        From the platform's axes to those of the base.
+    target : ndarray of int (N,)
+        Which unknown target each row measured; -1 where its place is known.
+    """
+
+    values: FloatArray
+    point: FloatArray
+    turn: FloatArray
+    target: IntArray
+
+
+def of_points(seen: Seen) -> tuple[FloatArray, FloatArray]:
+    """Frame (6,) and shifts (k, 3) of the unknown targets that bring points nearest to readings.
+
+    For a given turning of the frame both its place and the shifts follow linearly; for given
+    shifts the turning is Kabsch's (W. Kabsch, Acta Crystallographica A 32 (1976) 922). The two in
+    turn, from all 24 turnings of a cube, for there are minima that are not the least.
+    """
+    from scipy.spatial.transform import Rotation
+
+    count = int(seen.target.max(initial=-1)) + 1
+    values, point = _centred(seen.values), _centred(seen.point)
+    shifted = np.zeros((len(values), 3, count, 3))
+    for k in range(count):
+        mine = seen.target == k
+        shifted[mine, :, k] = seen.turn[mine]
+    lever = _centred(shifted).reshape(3 * len(values), 3 * count)  # of all points, by the shifts
+    inverse = np.linalg.pinv(lever, rcond=1e-6)  # what points do not tell stays where it is said
+    # shifts = gain · vec(turn) - still, and turn = Kabsch of `straight` + `by_shift` · shifts
+    seen_by = np.einsum("ni,jk->njik", values, np.eye(3)).reshape(-1, 9)  # of Rᵀ v, by vec(R)
+    gain, still = inverse @ seen_by, inverse @ point.reshape(-1)
+    straight = values.T @ point
+    by_shift = np.einsum("ni,njk->ijk", values, lever.reshape(len(values), 3, 3 * count))
+    turns = Rotation.create_group("O").as_matrix()
+    for _ in range(_ROUNDS if count else 1):
+        shifts = turns.reshape(-1, 9) @ gain.T - still
+        turns = _nearest(straight + np.einsum("ijk,sk->sij", by_shift, shifts))
+    off = (turns.reshape(-1, 9) @ seen_by.T) - point.reshape(-1)
+    best = int(np.argmin(((off - off @ inverse.T @ lever.T) ** 2).sum(axis=1)))
+    shift = inverse @ off[best]
+    point = seen.point + (shifted.reshape(lever.shape) @ shift).reshape(-1, 3)
+    place = seen.values.mean(axis=0) - turns[best] @ point.mean(axis=0)
+    return _frame(turns[best], place), shift.reshape(count, 3)
+
+
+def of_poses(values: FloatArray, pose: FloatArray) -> FloatArray:
+    """Frame (6,) in which poses (N, 6) lie nearest to those that were measured (N, 6)."""
+    from scipy.spatial.transform import Rotation
+
+    measured = Rotation.from_euler("xyz", values[:, 3:])
+    turn = (measured * Rotation.from_euler("xyz", pose[:, 3:]).inv()).mean()
+    place = (values[:, :3] - turn.apply(pose[:, :3])).mean(axis=0)
+    return _frame(turn.as_matrix(), place)
+
+
+def of_heights(values: FloatArray, point: FloatArray) -> FloatArray:
+    """Frame (6,) in which points (N, 3) have nearly the heights (N,) that were measured.
+
+    Heights say which way is up, but for what lies in a plane: there it is up as drawn.
+    """
+    spread, axes = np.linalg.svd(_centred(point), full_matrices=False)[1:]
+    told = axes[spread > _FLAT * spread[0]]
+    up = np.linalg.lstsq(_centred(point) @ told.T, _centred(values), rcond=None)[0] @ told
+    rest = np.array([0.0, 0.0, 1.0]) - told.T @ told[:, 2]
+    if np.linalg.norm(rest) > _FLAT:
+        rest *= np.sqrt(max(0.0, 1.0 - up @ up)) / np.linalg.norm(rest)
+        up = up + rest
+    if not up.any():
+        up = np.array([0.0, 0.0, 1.0])
+    up /= np.linalg.norm(up)
+    frame = np.zeros(6)
+    frame[2] = (values - point @ up).mean()
+    frame[3:5] = np.arctan2(up[1], up[2]), -np.arcsin(np.clip(up[0], -1.0, 1.0))
+    return frame
+
+
+def _centred(rows: FloatArray) -> FloatArray:
+    centred: FloatArray = rows - rows.mean(axis=0)
+    return centred
+
+
+def _frame(turn: FloatArray, place: FloatArray) -> FloatArray:
+    """The pose (6,) of a turning (3, 3) and a place (3,)."""
+    motion = np.eye(4)
+    motion[:3, :3], motion[:3, 3] = turn, place
+    frame: FloatArray = screws.pose(motion.reshape(1, 16))[0]
+    return frame
+
+
+def _nearest(matrices: FloatArray) -> FloatArray:
+    """The rotations (s, 3, 3) that have most in common with matrices (s, 3, 3)."""
+    left, _, right = np.linalg.svd(matrices)
+    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+    rotations: FloatArray = left @ right
+    return rotations

@@ -1,0 +1,217 @@
+"""Calibrations repeated on measurements that could as well have been: what the residuals say.
+
+The wild bootstrap by pose: where the model says a pose is, the residuals of that pose are added
+again, corrected for what the fit has taken from them, with a sign drawn at random. Nothing is
+assumed of the noise but that poses are independent of each other and that its sign is arbitrary:
+rows of one pose may have anything in common (C. F. J. Wu, Jackknife, bootstrap and other resampling
+methods in regression analysis, Annals of Statistics 14 (1986) 1261-1295; A. C. Cameron, J. B.
+Gelbach and D. L. Miller, Bootstrap-based improvements for inference with clustered errors, Review
+of Economics and Statistics 90 (2008) 414-427). A prior's centre is drawn from the prior.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pkmcal import display
+from pkmcal.arguments import checked_seed, instance, whole
+from pkmcal.arguments import executor as checked_executor
+from pkmcal.arrays import FloatArray
+from pkmcal.calibration.equations import Equations, Point
+from pkmcal.calibration.estimator import Estimate
+from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.least_squares import Search
+from pkmcal.exceptions import ArgumentError
+
+_TOGETHER = 20  # replicates that one task computes
+_LEFT = 1e-6  # share of the noise below which a residual says nothing of it
+
+
+@dataclass(frozen=True, eq=False)
+class Bootstrap:
+    """Parameters of many calibrations; in the order of `free`, mm and rad.
+
+    Attributes
+    ----------
+    free, units : tuple of str, n
+        The parameters.
+    values : ndarray (replicates, n)
+        NaN where a replicate did not converge.
+    stderr : ndarray (n,)
+        Standard deviation of the replicates; inf where nothing tells the parameter.
+    interval95 : ndarray (n, 2)
+        Between these lie 95 % of the replicates.
+    bias : ndarray (n,)
+        Mean of the replicates less what was identified: what is not linear shows here.
+    linear : ndarray (n,)
+        `Identification.stderr`, to compare.
+    """
+
+    free: tuple[str, ...]
+    units: tuple[str, ...]
+    values: FloatArray
+    stderr: FloatArray
+    interval95: FloatArray
+    bias: FloatArray
+    linear: FloatArray
+
+    @property
+    def failed(self) -> int:
+        """How many replicates did not converge."""
+        return int(np.isnan(self.values).any(axis=1).sum())
+
+    def __str__(self) -> str:
+        rows = []
+        for i, (name, unit) in enumerate(zip(self.free, self.units, strict=True)):
+            numbers = (self.stderr[i], self.linear[i], self.bias[i], *self.interval95[i])
+            sigma, linear, bias, low, high = (
+                display.displayed(float(number), unit)[0] for number in numbers
+            )
+            places = display.decimals(sigma)
+            shown = display.displayed(0.0, unit)[1]
+            rows.append([
+                name if shown == "mm" else f"{name} [{shown}]",
+                *(display.fixed(number, places) for number in (sigma, linear, bias, low, high)),
+            ])  # fmt: skip
+        failed = f", {self.failed} did not converge" if self.failed else ""
+        heads = ["parameter", "stderr", "linear", "bias", "2.5 %", "97.5 %"]
+        title = f"{len(self.values)} bootstrap replicates{failed}"
+        return f"{title}\n{display.Table(heads, rows, left=1)!s}"
+
+
+def bootstrap(
+    found: Identification,
+    replicates: int = 1000,
+    seed: int = 0,
+    executor: Executor | None = None,
+) -> Bootstrap:
+    """Repeat a calibration to see how far its parameters scatter.
+
+    Standard errors that do not rest on the stated noise, on residuals being Gaussian, on rows of
+    one pose being independent or on the model being linear.
+
+    Parameters
+    ----------
+    found : Identification
+        The calibration.
+    replicates : int
+        How many times it is repeated.
+    seed : int
+        Of the draws; each replicate has its own, so that the numbers do not depend on how many
+        workers there are. Other processes may stop at another of the points that all are the
+        least to rounding, within 1e-4 of a standard deviation.
+    executor : concurrent.futures.Executor, optional
+        Where replicates are computed: threads, processes, or whatever else hands out tasks this
+        way. None: here.
+
+    Returns
+    -------
+    Bootstrap
+        ``.stderr``, ``.interval95``, ``.bias`` and all values.
+
+    Raises
+    ------
+    ValueError
+        Fewer than two replicates, or no residuals to draw from: as many parameters as equations.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> robot = pk.load("hexapod")
+    >>> q = robot.inverse(pk.sample_poses(robot, 20))
+    >>> found = pk.identify(robot, pk.VirtualMachine(robot).measure(q), free="offset*")
+    >>> bool((abs(pk.bootstrap(found, 200).stderr / found.stderr - 1) < 0.5).all())
+    True
+    """
+    instance("found", found, Identification)
+    whole("replicates", replicates, 2)
+    if not (found._estimate.freedom > 0).all() or not np.isfinite(found._told).all():
+        raise ArgumentError("found: no equation is left over whose residual could be drawn again")
+    seeds = np.random.SeedSequence(checked_seed(seed)).spawn(replicates)
+    parts = [seeds[k : k + _TOGETHER] for k in range(0, replicates, _TOGETHER)]
+    workers = checked_executor(executor)
+    replicate = Replicate(found._equations, found._estimate)
+    done: Iterable[FloatArray] = (workers.map if workers else map)(replicate, parts)
+    values = np.concatenate(list(done))
+    good = values[np.isfinite(values).all(axis=1)]
+    if len(good) < 2:
+        raise ArgumentError("found: its replicates do not converge, the fit is not to be trusted")
+    told = np.isfinite(found.stderr)
+    interval = np.quantile(good, (0.025, 0.975), axis=0).T
+    interval[~told] = -np.inf, np.inf
+    return Bootstrap(
+        free=found.free,
+        units=found.units,
+        values=values,
+        stderr=np.where(told, good.std(axis=0, ddof=1), np.inf),
+        interval95=interval,
+        bias=good.mean(axis=0) - found.values,
+        linear=found.stderr,
+    )
+
+
+class Replicate:
+    """A calibration with other signs of its residuals; called with seeds, in any process.
+
+    Parameters
+    ----------
+    equations, estimate : Equations, Estimate
+        Of the calibration.
+    """
+
+    def __init__(self, equations: Equations, estimate: Estimate) -> None:
+        self._equations, self._estimate = equations, estimate
+        # rows of one pose take one sign
+        edges = np.cumsum([0, *map(len, equations.sets)])
+        self._pose = np.concatenate(equations.pose_of)
+        for k, measured in enumerate(equations.sets):
+            if measured.group is not None:
+                mine = slice(edges[k], edges[k + 1])
+                self._pose[mine] = measured.pose_index + self._pose.max() + 1
+        _, self._pose = np.unique(self._pose, return_inverse=True)
+        self._residuals = equations.coloured(self._corrected(), estimate.setting.noise)
+
+    def _corrected(self) -> FloatArray:
+        """Whitened residuals (M,) with the deviation that the noise has."""
+        estimate, equations = self._estimate, self._equations
+        every = np.repeat(self._pose, equations.components)
+        root = np.sqrt(np.repeat(estimate.weights, equations.components))
+        out = np.empty_like(estimate.residual)
+        for pose in range(int(self._pose.max()) + 1):
+            mine = np.flatnonzero(every == pose)
+            jacobian = root[mine, None] * estimate.jacobian[mine]
+            left = np.eye(len(mine)) - jacobian @ estimate.covariance @ jacobian.T
+            size, axes = np.linalg.eigh(left)
+            factor = np.where(size > _LEFT, 1.0 / np.sqrt(np.maximum(size, _LEFT)), 0.0)
+            out[mine] = axes @ (factor * (axes.T @ estimate.residual[mine]))
+        return out
+
+    def __call__(self, seeds: Iterable[np.random.SeedSequence]) -> FloatArray:
+        """Parameters of one replicate for each seed, (seeds, n)."""
+        return np.array([self._one(np.random.default_rng(seed)) for seed in seeds])
+
+    def _one(self, random: np.random.Generator) -> FloatArray:
+        equations, at = self._equations, self._estimate.point
+        prior = equations.parameters.prior
+        stated = np.isfinite(prior)
+        centre = at.theta.copy()
+        centre[stated] += random.standard_normal(int(stated.sum())) * prior[stated]
+        signs = np.where(random.integers(0, 2, int(self._pose.max()) + 1), 1.0, -1.0)
+        of_rows = np.split(signs[self._pose], np.cumsum([len(m) for m in equations.sets])[:-1])
+        drawn = tuple(s[:, None] * r for s, r in zip(of_rows, self._residuals, strict=True))
+        values = [seen.values + r for seen, r in zip(at.predicted, drawn, strict=True)]
+        return self._solved(equations.with_values(values, centre), replace(at, residuals=drawn))
+
+    def _solved(self, equations: Equations, at: Point) -> FloatArray:
+        setting = self._estimate.setting
+        search = Search(equations, at)
+        kept = setting.searched.untold
+        pins = setting.searched.singular[0] * kept.T
+        u = search.best(np.zeros(len(at.theta)), setting.noise, setting.loss, pins)
+        theta = at.theta + search.scale * (u - kept @ (kept.T @ u))
+        found = equations.parameters.reported(theta)
+        return found if search.converged else np.full_like(found, np.nan)

@@ -1,0 +1,257 @@
+"""Which combinations of the parameters measurements can tell, and how well.
+
+Everything here is in scaled parameters: 1 means about 1 mm at the machine.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+
+_KINDS = 4  # kinds of parameters whose combinations are looked for
+_ELSEWHERE = 1e-5  # share of a combination outside some parameters that does not count
+_SPELLED = 6  # parameters whose shares are spelled out
+_IN_ONE_THREAD = 8192  # numbers
+ROUNDING = 1e-9  # a singular value below this share of the largest is zero
+CLEAR = 0.01  # share of the machine's size to which a combination must be told to count after all
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Combinations of the parameters, split by what the measurements tell.
+
+    Attributes
+    ----------
+    told, untold : ndarray (n, r), (n, n - r)
+        Orthonormal columns.
+    singular : ndarray (n,)
+        Singular values of the scaled, whitened Jacobian, largest first.
+    """
+
+    told: FloatArray
+    untold: FloatArray
+    singular: FloatArray
+
+    @property
+    def rank(self) -> int:
+        """How many combinations are told."""
+        return int(self.told.shape[1])
+
+    @property
+    def gap(self) -> float:
+        """Singular value of the last combination told over that of the first untold."""
+        if self.rank in (0, len(self.singular)):
+            return float("inf")
+        last, next_one = self.singular[self.rank - 1], self.singular[self.rank]
+        return float(last / next_one) if next_one > 0 else float("inf")
+
+
+Decomposed = tuple[FloatArray, FloatArray]  # singular values (n,), directions (n, n)
+
+
+def decompose(jacobian: FloatArray) -> Decomposed:
+    """Singular values (n,), zeros where there are fewer rows, and all directions (n, n)."""
+    n = jacobian.shape[1]
+    square = np.zeros((n, n))
+    factor = triangle(jacobian)
+    square[: len(factor)] = factor
+    _, singular, rows = np.linalg.svd(square)
+    return singular, rows.T
+
+
+def triangle(matrix: FloatArray) -> FloatArray:
+    """Triangular factor R of a QR factorisation: RᵀR = AᵀA.
+
+    Rows enter in blocks so small that the linear algebra library does not spread them over
+    threads, which on a busy computer takes a hundred times as long as the work itself.
+    """
+    n = matrix.shape[1]
+    block = max(n, _IN_ONE_THREAD // max(n, 1) - n)
+    factor: FloatArray = np.zeros((0, n))
+    for start in range(0, len(matrix), block):
+        stacked = np.vstack([factor, matrix[start : start + block]])
+        factor = np.asarray(np.linalg.qr(stacked, mode="r"))
+    return factor
+
+
+def directions(
+    before: Decomposed, after: Decomposed | None, size: float, faint: float = np.inf
+) -> Directions:
+    """Split the combinations by the Jacobians before and after the fit.
+
+    A combination is told if its singular value is not zero. The Jacobian before the fit, with the
+    machine as drawn, decides: there the gap is clean. Its errors blur the gap, so the one after
+    the fit overrules it only where it shows more combinations to `CLEAR` of the machine's size.
+
+    Parameters
+    ----------
+    before, after : tuple
+        `decompose` of the scaled, whitened Jacobians.
+    size : float
+        Of the machine, mm.
+    faint : float
+        Standard deviation in mm, one over the singular value, beyond which a combination does not
+        count either, before or after.
+    """
+    rank, deciding = _able(before[0], faint), before
+    if after is not None:
+        clear, able = _able(after[0], CLEAR * size), _able(after[0], faint)
+        if clear > rank or able < rank:
+            rank, deciding = (clear if clear > rank else able), after
+    singular, basis = deciding
+    return Directions(basis[:, :rank], basis[:, rank:], singular)
+
+
+def _able(singular: FloatArray, deviation: float) -> int:
+    """How many singular values are not zero and tell more than to this deviation."""
+    floor = max(ROUNDING * float(singular[0]), 1.0 / deviation)
+    return int(np.count_nonzero(singular > floor))
+
+
+def observability(jacobian: FloatArray, poses: int, rank: int) -> dict[str, float]:
+    """Observability indices O1 … O5 of a scaled Jacobian, over the combinations that are told.
+
+    Parameters
+    ----------
+    jacobian : ndarray (M, n)
+        In mm of the measured quantity per mm of the parameters, not whitened.
+    poses : int
+        Number of measured poses.
+    rank : int
+        How many combinations are told.
+
+    Notes
+    -----
+    With singular values σ1 ≥ … ≥ σr and m poses: O1 = (σ1…σr)^(1/r)/√m, O2 = σr/σ1, O3 = σr,
+    O4 = σr²/σ1, O5 = 1/Σ(1/σ) (Y. Sun and J. M. Hollerbach, Observability index selection for robot
+    calibration, ICRA 2008).
+    """
+    singular = decompose(jacobian)[0][:rank]
+    if rank == 0 or singular[-1] <= 0:
+        return dict.fromkeys(("O1", "O2", "O3", "O4", "O5"), 0.0)
+    largest, least = float(singular[0]), float(singular[-1])
+    return {
+        "O1": float(np.exp(np.log(singular).mean()) / np.sqrt(poses)),
+        "O2": least / largest,
+        "O3": least,
+        "O4": least**2 / largest,
+        "O5": float(1.0 / np.sum(1.0 / singular)),
+    }
+
+
+def plain_basis(untold: FloatArray, names: Sequence[str]) -> FloatArray:
+    """The same combinations, each of as few kinds of parameters as will do.
+
+    Parameters
+    ----------
+    untold : ndarray (n, d)
+        Orthonormal columns.
+    names : sequence of str, n
+        Of the parameters; ``base1.x`` and ``base2.x`` are of one kind.
+
+    Returns
+    -------
+    ndarray (n, d)
+        The largest entry of each column is 1.
+    """
+    d = untold.shape[1]
+    families = [_family(name) for name in names]
+    kinds = list(dict.fromkeys(families))
+    member = np.array([[family == kind for kind in kinds] for family in families])
+    found = np.zeros((d, 0))  # orthonormal combinations of the columns
+    parts: list[FloatArray] = []
+    few = (itertools.combinations(range(len(kinds)), k) for k in range(1, _KINDS + 1))
+    for support in [*itertools.chain.from_iterable(few), range(len(kinds))]:
+        if found.shape[1] == d:
+            break
+        outside = untold[~member[:, list(support)].any(axis=1)]
+        _, singular, rows = np.linalg.svd(np.vstack([outside, np.zeros((d, d))]))
+        inside = rows[np.count_nonzero(singular > _ELSEWHERE) :].T
+        _, size, turn = np.linalg.svd(inside - found @ (found.T @ inside), full_matrices=False)
+        new = inside @ turn[: np.count_nonzero(size > _ELSEWHERE)].T
+        if new.shape[1]:
+            parts.append(_reduced(untold @ new))
+            found = np.linalg.qr(np.hstack([found, new])).Q
+    return np.hstack([np.zeros((len(untold), 0)), *parts])
+
+
+def _reduced(basis: FloatArray) -> FloatArray:
+    """The same combinations by elimination: each has a parameter that the others are without."""
+    basis = basis.copy()
+    d = basis.shape[1]
+    pivots: list[int] = []
+    for k in range(d):
+        sizes = np.abs(basis[:, k:]).max(axis=1)
+        sizes[pivots] = 0.0
+        row = int(np.argmax(sizes > 0.999 * sizes.max()))
+        column = k + int(np.argmax(np.abs(basis[row, k:])))
+        basis[:, [k, column]] = basis[:, [column, k]]
+        basis[:, k] /= basis[row, k]
+        others = [j for j in range(d) if j != k]
+        basis[:, others] -= np.outer(basis[:, k], basis[row, others])
+        pivots.append(row)
+    scaled: FloatArray = basis / basis[np.abs(basis).argmax(axis=0), np.arange(d)]
+    return scaled
+
+
+def _family(name: str) -> str:
+    """What a parameter is apart from its limb; the frame is one, and so are targets."""
+    first = name.split(".")[0]
+    if first == "frame" or first.startswith(("target", "anchor")):
+        return re.sub("(frame|target|anchor).*", r"\1", first)
+    return re.sub(r"\d+", "", name)
+
+
+def in_words(combination: FloatArray, names: Sequence[str]) -> str:
+    """One combination that cannot be told, such as "base1.z … base4.z together".
+
+    Parameters
+    ----------
+    combination : ndarray (n,)
+        Its largest entry is 1.
+    names : sequence of str
+        Of the parameters.
+    """
+    groups: dict[float, list[str]] = {}
+    for value, name in zip(combination, names, strict=True):
+        if abs(value) > 0.01:
+            groups.setdefault(float(f"{value:.2g}"), []).append(name)
+    members = [name for group in groups.values() for name in group]
+    if len(members) == 1:
+        return f"{members[0]} by itself"
+    if len(groups) == 1:
+        return f"{listed(members)} together"
+    if set(groups) == {1.0, -1.0}:
+        return f"{listed(groups[1.0])} together, {listed(groups[-1.0])} against them"
+    if len(members) <= _SPELLED:
+        return "together " + ", ".join(f"{v:+g} {listed(g)}" for v, g in groups.items())
+    kinds = list(dict.fromkeys(_family(name) for name in names))
+    ordered = sorted(members, key=lambda name: (kinds.index(_family(name)), names.index(name)))
+    return f"{listed(ordered)} together, in one proportion"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names in a row; three and more that only count on, as "base1.x … base4.x"."""
+    texts: list[str] = []
+    run: list[str] = []
+    for name in [*names, ""]:
+        if run and _follows(run[-1], name):
+            run.append(name)
+            continue
+        texts += [f"{run[0]} … {run[-1]}"] if len(run) > 2 else run
+        run = [name]
+    return ", ".join(texts)
+
+
+def _follows(name: str, next_name: str) -> bool:
+    number = re.search(r"\d+", name)
+    if number is None:
+        return False
+    counted = name[: number.start()] + str(int(number.group()) + 1) + name[number.end() :]
+    return counted == next_name

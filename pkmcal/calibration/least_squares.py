@@ -1,0 +1,179 @@
+"""The search for the parameters that fit best: least squares through scipy, step by step."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.calibration.equations import Equations, Point
+from pkmcal.calibration.loss import Loss
+from pkmcal.exceptions import ArgumentError
+from pkmcal.measurements.measurements import Measurements
+
+_FTOL = 1e-12  # of the cost: 1e-5 of a standard deviation
+_ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
+
+
+class Search:
+    """Least squares in scaled parameters, u = (θ - θ0)/scale.
+
+    Parameters
+    ----------
+    equations : Equations
+        What is fitted.
+    start : Point
+        θ0, where all rows are reached.
+
+    Attributes
+    ----------
+    prior : ndarray (p, n)
+        A row for each parameter with a prior, in units of its deviation.
+    evaluations : int
+        How often the machine was solved for all rows.
+    converged : bool
+        Whether the last search did.
+    history : list of float
+        Misfit of the rows that were reached at the start and after every step taken, rms in mm.
+    """
+
+    def __init__(self, equations: Equations, start: Point) -> None:
+        parameters = equations.parameters
+        self.equations, self.start, self.scale = equations, start, parameters.scale
+        sigma = parameters.prior / self.scale
+        stated = np.flatnonzero(np.isfinite(sigma))
+        self.prior = np.eye(len(sigma))[stated] / sigma[stated, None]
+        self._centre = self.prior @ ((parameters.start - start.theta) / self.scale)
+        lower, upper = ((end - start.theta) / self.scale for end in parameters.bounds)
+        bounded = bool(np.isfinite([lower, upper]).any())
+        self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
+        self._method: Literal["trf", "lm"] = "trf" if bounded else "lm"
+        self._rounding = [_rounded(m, start.robot.length) for m in equations.sets]
+        self._last: tuple[FloatArray, Point] = (np.zeros(len(sigma)), start)
+        self._refused = np.zeros(len(equations.rows), dtype=bool)
+        self.evaluations = 0
+        self.converged = False
+        self.history: list[float] = []
+
+    def at(self, u: FloatArray) -> Point:
+        """The equations at scaled parameters (n,)."""
+        if not np.array_equal(u, self._last[0]):
+            self._last = (u.copy(), self.equations.at(self.start.theta + self.scale * u))
+            self.evaluations += 1
+        return self._last[1]
+
+    def jacobian(
+        self, point: Point, noise: FloatArray, aside: BoolArray | None = None
+    ) -> FloatArray:
+        """Derivative (M, n) of the predicted values, scaled and whitened; 0 for rows set aside.
+
+        Raises
+        ------
+        ValueError
+            It does not exist, at a singularity of the machine.
+        """
+        equations = self.equations
+        jacobian = equations.whitened(equations.jacobian(point), noise) * self.scale
+        if aside is not None:
+            jacobian[np.repeat(aside, equations.components)] = 0.0
+        if not np.isfinite(jacobian).all():
+            raise ArgumentError(
+                "no geometry near the present one agrees: the fit runs into poses"
+                " where the actuators do not hold the machine (type-2 singular)"
+            )
+        return jacobian
+
+    def best(self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray) -> FloatArray:
+        """Where the cost is least, from `u` (n,).
+
+        Rows that the machine cannot reach bar the way of a step. Where that happened, the search
+        goes round: first without those rows, then from there with all of them.
+
+        Parameters
+        ----------
+        u : ndarray (n,)
+            Where to start.
+        noise : ndarray (sets,)
+            See `Equations.whitened`.
+        loss : Loss
+            How rows count.
+        pins : ndarray (d, n)
+            Rows that hold what measurements and prior do not tell.
+        """
+        equations = self.equations
+        self._refused[:] = False
+        everything = np.zeros_like(self._refused)
+        straight, cost = self._minimum(u, noise, loss, pins, everything)
+        barred = self._refused.copy()
+        if not barred.any() or barred.all():
+            return straight
+        converged, here = self.converged, self.at(straight)
+        around, _ = self._minimum(u, noise, loss, pins, barred)
+        if self.at(around).reached:
+            around, other = self._minimum(around, noise, loss, pins, everything)
+            if other < cost:
+                return around
+        self.converged, self._last = converged, (straight, here)
+        equations.go_on_from(here)
+        return straight
+
+    def _minimum(
+        self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray, aside: BoolArray
+    ) -> tuple[FloatArray, float]:
+        """A minimum of the cost of the rows not set aside, and the cost."""
+        from scipy.optimize import least_squares
+
+        equations = self.equations
+        extra = np.vstack([self.prior, pins])
+        offset = np.concatenate([self._centre, np.zeros(len(pins))])
+        without = np.repeat(aside, equations.components)
+
+        def data(point: Point) -> FloatArray:
+            whitened = equations.whitened(point.residuals, noise)
+            whitened[without] = 0.0
+            return whitened
+
+        # a cost that nothing lowers: by less than rounding it need not fall
+        floor = np.linalg.norm(equations.whitened(self._rounding, noise)) / np.sqrt(_FTOL)
+        first = data(self.at(u))
+        worse = 10.0 * (1.0 + np.abs(first).max())
+
+        def residual(u: FloatArray) -> FloatArray:
+            point = self.at(u)
+            held = extra @ u - offset
+            missed = (equations.status(point) != 0) & ~aside
+            if missed.any():  # worse than any step that is taken
+                self._refused |= missed
+                return np.full(len(first) + len(held) + 1, worse + floor)
+            return np.concatenate([-loss.residual(data(point)), held, [floor]])
+
+        def jacobian(u: FloatArray) -> FloatArray:
+            point = self.at(u)
+            equations.go_on_from(point)  # the step to it was taken
+            self.history.append(equations.rms(point))
+            by_u = self.jacobian(point, noise, aside)
+            return np.vstack([loss.jacobian(data(point), by_u), extra, np.zeros(len(u))])
+
+        found = least_squares(
+            residual,
+            u,
+            jacobian,
+            bounds=self._bounds,
+            method=self._method,
+            x_scale=1.0,
+            ftol=_FTOL,
+            xtol=1e-10,
+            gtol=1e-15,
+            max_nfev=200,
+        )
+        self.converged = bool(found.status > 0)
+        return found.x, float(found.cost)
+
+
+def _rounded(measured: Measurements, length: float) -> FloatArray:
+    """Rounding errors (N, k) of what is predicted, mm and rad."""
+    values = measured.values.reshape(len(measured), -1)
+    lengths = np.array([unit == "mm" for unit in measured.units])
+    size = np.abs(values[:, lengths]).max() + length
+    return np.broadcast_to(_ROUNDING * np.where(lengths, size, size / length), values.shape)

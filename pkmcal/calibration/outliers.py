@@ -1,0 +1,96 @@
+"""Rows that the others contradict."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.calibration.identifiability import triangle
+
+_FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
+_MOST = 4  # at most one row in so many can be odd
+
+
+def outliers(
+    residual: FloatArray,
+    jacobian: FloatArray,
+    components: IntArray,
+    weights: FloatArray,
+    prior: FloatArray,
+) -> IntArray:
+    """Rows further off than noise explains, judged by the fit without them.
+
+    The row that the rest contradicts most is set aside, the fit is corrected to first order, and
+    so on until what is left agrees; then rows that fit the corrected fit after all return.
+
+    Parameters
+    ----------
+    residual : ndarray (M,)
+        Measured less predicted at the solution, whitened.
+    jacobian : ndarray (M, n)
+        Derivative of the predicted values to what is determined, scaled and whitened.
+    components : ndarray of int (N,)
+        Equations of each row.
+    weights : ndarray (N,)
+        Of each row in the fit.
+    prior : ndarray (p, n)
+        Derivative of the prior's equations, which stay.
+
+    Returns
+    -------
+    ndarray of int
+        In order. Where residuals exceed the stated noise on the whole, "further off" means
+        further than most.
+    """
+    rows = len(components)
+    alike = [np.flatnonzero(components == k) for k in np.unique(components)]
+    first = np.cumsum(components) - components
+    root = np.sqrt(np.repeat(weights, components))[:, None]
+    weighted = root**2 * jacobian
+    pull = weighted.T @ residual  # of the prior: at the solution the two balance
+    kept = np.ones(rows, dtype=bool)
+    for _ in range(rows // _MOST + 1):
+        use = np.repeat(kept, components)
+        factor = triangle(np.vstack([root[use] * jacobian[use], prior]))
+        normal = factor.T @ factor
+        # the ridge is for directions that only rows set aside told
+        covariance = np.linalg.inv(normal + 1e-14 * np.trace(normal) * np.eye(len(normal)))
+        shift = covariance @ (weighted[use].T @ residual[use] - pull)
+        left = residual - jacobian @ shift
+        part = np.where(kept, -weights, 1.0)  # a fitted row has pulled the fit to itself
+        squares = np.empty(rows)
+        for mine in alike:
+            e = first[mine, None] + np.arange(components[mine[0]])
+            squares[mine] = _squares(left[e], jacobian[e], covariance, part[mine])
+        spread = median_ratio(squares[kept], components[kept])
+        chance = _chance(squares / max(spread, 1.0), components)
+        worst = int(np.argmin(np.where(kept, chance, np.inf)))
+        if chance[worst] >= _FALSE_ALARM / rows:
+            break
+        kept[worst] = False
+    odd: IntArray = np.flatnonzero(~kept & (chance < _FALSE_ALARM / rows))
+    return odd
+
+
+def _squares(r: FloatArray, j: FloatArray, covariance: FloatArray, part: FloatArray) -> FloatArray:
+    """Squared length of residuals (N, k) in units of their own deviations, (N,)."""
+    variance = np.eye(r.shape[1]) + part[:, None, None] * (j @ covariance @ j.transpose(0, 2, 1))
+    values, vectors = np.linalg.eigh(variance)
+    along = (vectors.transpose(0, 2, 1) @ r[:, :, None])[:, :, 0]
+    seen = values > 1e-6  # a row that the fit follows wherever it lies says nothing
+    squares: FloatArray = np.where(seen, along**2 / np.where(seen, values, 1.0), 0.0).sum(axis=1)
+    return squares
+
+
+def median_ratio(squares: FloatArray, components: IntArray) -> float:
+    """Variance that squared lengths of rows show by their median: 1 if they are chi squared."""
+    from scipy.special import gammaincinv
+
+    return float(np.median(squares / (2 * gammaincinv(components / 2, 0.5))))
+
+
+def _chance(squares: FloatArray, components: IntArray) -> FloatArray:
+    from scipy.special import gammaincc
+
+    chance: FloatArray = gammaincc(components / 2, squares / 2)
+    return chance

@@ -1,0 +1,314 @@
+"""What a calibration estimates: numbers of the geometry, the instrument's frame, points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+
+import numpy as np
+
+from pkmcal.arguments import did_you_mean
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.core.poses import compose, compose_rates
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.measurements import Measurements
+
+Prior = float | Mapping[str, float] | None
+Bounds = Mapping[str, tuple[float, float]] | None
+
+_POINT = (("x", "mm"), ("y", "mm"), ("z", "mm"))
+_FRAME = (*_POINT, ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
+
+# The points that measurements of a kind depend on: what `predict` calls them, and users.
+POINTS: dict[str, dict[str, str]] = {
+    "pose": {},
+    "position": {"target": "target"},
+    "height": {"target": "target"},
+    "distance": {"target": "attachment", "anchor": "anchor"},
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Share:
+    """The rows of one set of measurements that are fitted or held out.
+
+    Attributes
+    ----------
+    measured : Measurements
+        These rows alone.
+    rows : ndarray of int (N,)
+        Their numbers in what the user gave, counted through all sets.
+    unknown_frame, unknown_target, unknown_attachment : bool
+        What the user says is not known of them.
+    """
+
+    measured: Measurements
+    rows: IntArray
+    unknown_frame: bool
+    unknown_target: bool
+    unknown_attachment: bool = False
+
+    @property
+    def framed(self) -> bool:
+        """Whether the unknown frame is among what it depends on."""
+        return self.unknown_frame and self.measured.kind != "distance"
+
+    @property
+    def sought(self) -> tuple[str, ...]:
+        """Which of its points are not known: "target", or "attachment" and "anchor"."""
+        unknown = {
+            "target": self.unknown_target,
+            "anchor": self.unknown_target,
+            "attachment": self.unknown_attachment,
+        }
+        return tuple(role for role in POINTS[self.measured.kind].values() if unknown[role])
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """The vector that is estimated: numbers of the geometry first, then frame and points.
+
+    Attributes
+    ----------
+    names, units : tuple of str, n
+        Units "mm", "rad" or "1".
+    start : ndarray (n,)
+        Present values.
+    scale : ndarray (n,)
+        What moves the machine by about 1 mm: 1 mm, 1 mm / length, 1 mm / travel.
+    prior : ndarray (n,)
+        Standard deviation around the present value; inf where there is none.
+    lower, upper : ndarray (n,)
+        Bounds; infinite where there are none.
+    places : ndarray of int
+        Places in the geometry's values of the first names.
+    frame : int or None
+        Column of frame.x; None where the frame is known.
+    origin : ndarray (6,)
+        Where the frame's six numbers count from: the base in the instrument's frame is at `origin`
+        followed by them. Near it they are small, and their angles regular.
+    points : mapping
+        Column of the x of each unknown point, by "target", "attachment" or "anchor" and its name.
+    robot : Robot
+        The machine they belong to.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    start: FloatArray
+    scale: FloatArray
+    prior: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    places: IntArray
+    frame: int | None
+    origin: FloatArray
+    points: Mapping[tuple[str, str], int]
+    robot: Robot
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds."""
+        return self.lower, self.upper
+
+    def values_at(self, theta: FloatArray) -> FloatArray:
+        """The geometry's values (p,) for `theta` (n,)."""
+        values: FloatArray = self.robot.geometry.values.copy()
+        values[self.places] = theta[: len(self.places)]
+        return values
+
+    def frame_at(self, theta: FloatArray) -> FloatArray | None:
+        """Pose (6,) of the base counted from `origin`; None where the frame is known."""
+        return None if self.frame is None else theta[self.frame : self.frame + 6]
+
+    def laid(self, theta: FloatArray, frame: FloatArray) -> tuple[Parameters, FloatArray]:
+        """Parameters with the base at `frame` (6,), counted from there unless limits are stated."""
+        assert self.frame is not None
+        mine, theta = slice(self.frame, self.frame + 6), theta.copy()
+        stated = np.isfinite([self.prior[mine], self.lower[mine], self.upper[mine]]).any()
+        theta[mine] = frame if stated else 0.0
+        return replace(self, origin=np.zeros(6) if stated else frame), theta
+
+    def reported(self, theta: FloatArray) -> FloatArray:
+        """The parameters (n,) with the frame's numbers counted from zero."""
+        if self.frame is None:
+            return theta
+        out: FloatArray = theta.copy()
+        mine = slice(self.frame, self.frame + 6)
+        out[mine] = compose(self.origin, np.ascontiguousarray(theta[None, mine]))[0]
+        return out
+
+    def reported_rates(self, theta: FloatArray) -> FloatArray:
+        """Derivative (n, n) of `reported` to the parameters (n,)."""
+        rates = np.eye(len(self))
+        if self.frame is not None:
+            mine, nowhere = slice(self.frame, self.frame + 6), np.zeros(6)
+            at = np.ascontiguousarray(theta[None, mine])
+            whole = compose(self.origin, at)
+            rates[mine, mine] = compose_rates(self.origin, at, nowhere, whole)[0]
+        return rates
+
+    def columns_of(self, role: str, measured: Measurements) -> IntArray:
+        """Columns of the unknown point of each row, (N, 3)."""
+        places, index = _points_of(role, measured)
+        for name in places:
+            if (role, name) not in self.points:
+                known = did_you_mean(name, (other for _, other in self.points))
+                raise ArgumentError(f"holdout: its {role} {name!r} was not fitted{known}")
+        first = np.array([self.points[role, name] for name in places])
+        columns: IntArray = first[index][:, None] + np.arange(3)
+        return columns
+
+
+def parameters(
+    robot: Robot,
+    shares: Sequence[Share],
+    free: str | Sequence[str] | None,
+    prior: Prior,
+    bounds: Bounds,
+) -> Parameters:
+    """The parameters of a calibration; the arguments are those of `identify`.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An unknown or tied name, nothing free, a prior or a bound that does not fit.
+    """
+    geometry = robot.geometry
+    if free is None:
+        free = robot.model.free
+        if not free:
+            raise ArgumentError(f"free: {robot.name} declares no free parameters, name some")
+    chosen = geometry.match(free, "free")
+    if not chosen:
+        raise ArgumentError("free: name at least one parameter")
+    places = np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)
+    names, units = list(chosen), [str(geometry.units[i]) for i in places]
+    start = list(geometry.values[places])
+    frame = None
+    if any(share.framed for share in shares):
+        frame = len(names)
+        names += [f"frame.{axis}" for axis, _ in _FRAME]
+        units += [unit for _, unit in _FRAME]
+        start += [0.0] * 6
+    points: dict[tuple[str, str], int] = {}
+    known: dict[tuple[str, str], FloatArray] = {}
+    for role, measured in ((role, share.measured) for share in shares for role in share.sought):
+        for name, place in _points_of(role, measured)[0].items():
+            if (role, name) in points:
+                if (known[role, name] != place).any():
+                    raise ArgumentError(
+                        f"{role}: {role} {name} starts at different places in different"
+                        " measurements; give different targets different target_names"
+                    )
+                continue
+            points[role, name], known[role, name] = len(names), place
+            names += [f"{role}{name}.{axis}" for axis, _ in _POINT]
+            units += [unit for _, unit in _POINT]
+            start += list(place)
+    travel = max(_travel(robot, share.measured) for share in shares)
+    of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
+    scale = np.array([of_unit[unit] for unit in units])
+    values = np.array(start, dtype=np.float64)
+    lower, upper = _bounds(bounds, names, values)
+    return Parameters(
+        names=tuple(names),
+        units=tuple(units),
+        start=values,
+        scale=scale,
+        prior=_prior(prior, names, scale, len(chosen)),
+        lower=lower,
+        upper=upper,
+        places=places,
+        frame=frame,
+        origin=np.zeros(6),
+        points=points,
+        robot=robot,
+    )
+
+
+def _travel(robot: Robot, measured: Measurements) -> float:
+    """Largest actuator coordinate, mm; an angle counts as its arc."""
+    per_unit = [robot.length if unit == "rad" else 1.0 for unit in robot.actuator_units]
+    return max(1.0, float(np.abs(measured.actuators * per_unit).max()))
+
+
+def _points_of(role: str, measured: Measurements) -> tuple[dict[str, FloatArray], IntArray]:
+    """The points of one role by name, where the user puts them, and which one each row has."""
+    given = measured.attachment if role == "attachment" else measured.target
+    names, index = measured.target_names, measured.target_index
+    one = given is None if role == "attachment" else names is None and given is None
+    if one or (given is not None and given.ndim == 1):
+        place = np.zeros(3) if given is None else given
+        return {"1": place}, np.zeros(len(measured), dtype=np.intp)
+    if names is None or index is None:
+        raise ArgumentError(
+            f"{role}: one place per row cannot be estimated; say with target_index which of a few"
+            " each row measured"
+        )
+    places = np.zeros((len(names), 3)) if given is None else given
+    return dict(zip(names, places, strict=True)), index
+
+
+def _matching(argument: str, pattern: object, names: Sequence[str]) -> list[int]:
+    if not isinstance(pattern, str):
+        raise ArgumentTypeError(f"{argument}: names must be str, found {pattern!r}")
+    hits = [i for i, name in enumerate(names) if fnmatchcase(name, pattern)]
+    if not hits:
+        raise ArgumentError(
+            f"{argument}: no free parameter matches {pattern!r}{did_you_mean(pattern, names)}"
+        )
+    return hits
+
+
+def _prior(prior: Prior, names: Sequence[str], scale: FloatArray, of_machine: int) -> FloatArray:
+    sigma = np.full(len(names), np.inf)
+    if prior is None:
+        return sigma
+    if isinstance(prior, Mapping):
+        for pattern, value in prior.items():
+            hits = _matching("prior", pattern, names)
+            sigma[hits] = _positive(f"prior of {pattern}", value)
+    else:
+        sigma[:of_machine] = _positive("prior", prior) * scale[:of_machine]
+    return sigma
+
+
+def _positive(what: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        raise ArgumentTypeError(f"{what} must be a number, a standard deviation; found {value!r}")
+    if not value > 0:
+        raise ArgumentError(f"{what} must be positive; found {value}")
+    return float(value)
+
+
+def _bounds(
+    bounds: Bounds, names: Sequence[str], start: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
+    if bounds is None:
+        return lower, upper
+    if not isinstance(bounds, Mapping):
+        raise ArgumentTypeError(
+            f"bounds must map names to (lower, upper); found {type(bounds).__name__}"
+        )
+    for pattern, pair in bounds.items():
+        try:
+            low, high = (float(end) for end in pair)
+        except (TypeError, ValueError):
+            raise ArgumentError(
+                f"bounds of {pattern} must be (lower, upper); found {pair!r}"
+            ) from None
+        for i in _matching("bounds", pattern, names):
+            if not low <= start[i] <= high or not low < high:
+                raise ArgumentError(
+                    f"bounds of {names[i]} must enclose its present value {start[i]:.9g};"
+                    f" found {low:g} to {high:g}"
+                )
+            lower[i], upper[i] = low, high
+    return lower, upper

@@ -1,0 +1,332 @@
+"""Which poses to measure, so that a calibration knows best where the machine goes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pkmcal import display
+from pkmcal.arguments import number, whole, word, words
+from pkmcal.arms.arm import SerialArm
+from pkmcal.arrays import FloatArray, IntArray, as_rows
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.identifiability import in_words, plain_basis
+from pkmcal.calibration.optimal_design import CRITERIA, Design
+from pkmcal.calibration.parameters import Parameters, Prior, Share, parameters
+from pkmcal.core.library import POSE
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.perturbed import ideal
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.calibratable import ArmMachine, as_machine
+from pkmcal.measurements.tracker import Tracker
+from pkmcal.measurements.virtual_machine import VirtualMachine
+
+_DRAWS = 25  # of poses at random, to compare a plan with
+_ERROR = 0.5  # mm; what numbers may be off by that have no prior
+_TIMES, _MACHINES = 2.0, 16  # so many machines with so many times these errors must get there
+_FOUND = 1e-6  # mm, rad: how near to a pose forward kinematics must end
+_UNTOLD = 1e-3  # mm a pose moves per mm along a combination that cannot be told
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Poses to measure.
+
+    Attributes
+    ----------
+    robot : Robot or SerialArm
+        The machine they are for.
+    indices : ndarray of int (count,)
+        Which of the candidates, in their order.
+    poses : ndarray (count, 6)
+        mm and rad.
+    actuators : ndarray (count, n)
+        What leads there, mm and rad.
+    predicted : float
+        Root mean square over the targets of how far off a machine calibrated at these poses will
+        be, √trace(J C Jᵀ), mm.
+    at_random : float
+        The same for as many candidates drawn at random, median of 25 draws.
+    all_candidates : float
+        The same for all candidates that keep the machine's limits.
+    left_out : int
+        How many candidates break limits, are not found by forward kinematics from home, or are so
+        near a singularity that errors of the geometry bar the way there.
+    parameters : tuple of str
+        What the calibration is to find.
+    """
+
+    robot: Robot | SerialArm
+    indices: IntArray
+    poses: FloatArray
+    actuators: FloatArray
+    predicted: float
+    at_random: float
+    all_candidates: float
+    left_out: int
+    parameters: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+    def __str__(self) -> str:
+        left_out = f"; {self.left_out} candidates left out" if self.left_out else ""
+        if isinstance(self.robot, SerialArm):  # several postures have one pose
+            names: Sequence[str] = [f"q{i + 1}" for i in range(self.robot.n_joints)]
+            given, units = self.actuators, self.robot.actuator_units
+        else:
+            names, given, units = POSE, self.poses, ("mm",) * 3 + ("rad",) * 3
+        turning = np.array([unit == "rad" for unit in units])
+        heads = ["candidate"]
+        heads += [f"{n} [{'deg' if t else 'mm'}]" for n, t in zip(names, turning, strict=True)]
+        rows = [
+            [str(index), *(display.fixed(float(value), 3) for value in row)]
+            for index, row in zip(
+                self.indices, np.where(turning, np.degrees(given), given), strict=True
+            )
+        ]
+        return "\n".join([
+            f"{self.robot.name}: measure {_poses(len(self))} for {len(self.parameters)} parameters"
+            f"{left_out}",
+            f"predicted error {self.predicted:.3g} mm rms; {_poses(len(self))} at random"
+            f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g}",
+            *([] if np.isfinite(self.predicted) else ["too few: not all of them would be told"]),
+            str(display.Table(heads, rows)),
+        ])  # fmt: skip
+
+
+def plan_poses(
+    robot: Robot | SerialArm,
+    candidates: ArrayLike,
+    count: int | None = None,
+    accuracy: float | None = None,
+    targets: ArrayLike | None = None,
+    criterion: str = "prediction",
+    kind: str = "position",
+    target: ArrayLike | None = None,
+    noise: float | Tracker = 0.02,
+    free: str | Sequence[str] | None = None,
+    prior: Prior = None,
+    unknown: str | Sequence[str] = (),
+) -> Plan:
+    """Choose poses to measure among candidates, by exchange.
+
+    Poses enter one by one, always the one that helps most; then each in turn makes room for the
+    best of all candidates, until none wants to be exchanged.
+
+    Parameters
+    ----------
+    robot : Robot or SerialArm
+        The machine as drawn, or as last calibrated.
+    candidates : array_like (N, 6), for a serial arm (N, n)
+        Poses that could be measured, mm and rad; of an arm its joint coordinates. Those that break
+        the machine's limits are left out, and those that machines with twice the errors of the
+        prior (0.5 mm without one) do not reach. A pose that its closures do not allow is completed
+        (`Robot.complete`). An arm's file has no limits: offer what it may take.
+    count : int, optional
+        How many to choose.
+    accuracy : float, optional
+        Instead of `count`: as few as predict this error at the targets, mm.
+    targets : array_like (T, 6), for a serial arm (T, n), optional
+        The poses where the machine is to be accurate; by default the candidates. Accurate at the
+        origin of its platform or tool, wherever `target` is measured.
+    criterion : {"prediction", "D", "A"}
+        What is made least: the predicted error at the targets, the volume of the parameters'
+        confidence region (largest det of the information), or the sum of their variances, scaled
+        to mm at the machine.
+    kind : {"position", "pose", "height", "distance"}
+        What will be measured; see `Measurements`.
+    target : array_like (3,) or (k, 3), optional
+        The measured point of the platform, mm, or several that are measured at every pose. For
+        distances the fixed points of the base.
+    noise : float or Tracker
+        Of the instrument, as `VirtualMachine` takes it.
+    free, prior
+        As `identify` takes them.
+    unknown : str or sequence of str
+        What `identify` will have to find along: "frame", "target".
+
+    Returns
+    -------
+    Plan
+        ``.indices``, ``.poses``, ``.actuators`` and the ``.predicted`` error.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument that does not fit; no candidate within limits; a wanted accuracy that not even
+        all candidates reach; parameters that move the targets and that no candidate tells.
+
+    Notes
+    -----
+    V. V. Fedorov, Theory of Optimal Experiments, Academic Press 1972. The predicted error is that
+    of optimal design for prediction (I- or V-optimality) over the targets.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> robot = pk.load("hexapod")
+    >>> plan = pk.plan_poses(robot, pk.sample_poses(robot, 100), count=20, kind="pose")
+    >>> len(plan), plan.predicted < plan.at_random
+    (20, True)
+    """
+    word("criterion", criterion, CRITERIA)
+    if (count is None) == (accuracy is None):
+        raise ArgumentError(
+            "give either count, how many poses, or accuracy, the error wanted in mm"
+        )
+    machine = as_machine(robot)
+    poses, q, inside, offered = _within_limits(machine, candidates)
+    aims = (poses, q) if targets is None else _aims(machine, targets)
+    equations = _equations(machine, q, kind, target, noise, free, prior, unknown)
+    safe = _safe(equations.parameters, poses, q)
+    design = _design(equations, safe, *aims, criterion)
+    poses, q, inside = poses[safe], q[safe], inside[safe]
+    everything = design.predicted(np.arange(len(q)))
+    if count is not None:
+        chosen = design.grown(whole("count", count, 1, len(q), ", the candidates"))
+    else:
+        chosen = design.reaching(_accuracy(accuracy, everything, len(q)))
+    return Plan(
+        robot=robot,
+        indices=inside[chosen],
+        poses=poses[chosen],
+        actuators=q[chosen],
+        predicted=design.predicted(chosen),
+        at_random=design.at_random(len(chosen), _DRAWS),
+        all_candidates=everything,
+        left_out=offered - len(inside),
+        parameters=equations.parameters.names,
+    )
+
+
+def _poses(count: int) -> str:
+    return f"{count} pose{'s' * (count != 1)}"
+
+
+def _commanded(name: str, robot: Robot, places: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Poses and actuators of poses, or of an arm's joint coordinates; NaN where there are none."""
+    if isinstance(robot, ArmMachine):
+        there, q, _ = robot.visited(as_rows(name, places, robot.n_actuators)[0])
+    else:
+        there, q, _ = ideal(robot, as_rows(name, places, 6)[0])
+    return there, q
+
+
+def _aims(robot: Robot, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    there, q = _commanded("targets", robot, targets)
+    lost = np.flatnonzero(~np.isfinite(there).all(axis=1))
+    if len(lost):
+        raise ArgumentError(f"targets: {robot.name} has no such pose (row {lost[0]})")
+    return there, q
+
+
+def _within_limits(
+    robot: Robot, candidates: ArrayLike
+) -> tuple[FloatArray, FloatArray, IntArray, int]:
+    """Poses and actuators of the candidates that can be measured, which ones, and of how many."""
+    there, q = _commanded("candidates", robot, candidates)
+    good = np.asarray(np.isfinite(there).all(axis=1))
+    if not isinstance(robot, ArmMachine):  # whose file has no limits
+        good[good] = robot.feasible(there[good]).ok
+    # `identify` starts from home, too, and must find them
+    good[good] = np.abs(robot.forward(q[good]).pose - there[good]).max(axis=1) < _FOUND
+    inside = np.flatnonzero(good)
+    if not len(inside):
+        raise ArgumentError(
+            f"candidates: none of {len(there)} is within the limits of {robot.name}"
+        )
+    return there[inside], q[inside], inside, len(there)
+
+
+def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> NDArray[np.bool_]:
+    """Which candidates machines with errors reach, too: none beside a singularity."""
+    k = len(chosen.places)
+    sigma = np.minimum(chosen.prior, _ERROR * chosen.scale)[:k]
+    random, values = np.random.default_rng(0), chosen.robot.geometry.values
+    safe = np.ones(len(q), dtype=bool)
+    for _ in range(_MACHINES):
+        erroneous = values.copy()
+        erroneous[chosen.places] += _TIMES * sigma * random.standard_normal(k)
+        machine = chosen.robot._nudged(erroneous)
+        safe[safe] = machine.forward(q[safe], guess=poses[safe]).ok
+    if not safe.any():
+        raise ArgumentError(
+            "candidates: all are so near a singularity that errors bar the way there"
+        )
+    return safe
+
+
+def _equations(
+    robot: Robot,
+    q: FloatArray,
+    kind: str,
+    target: ArrayLike | None,
+    noise: float | Tracker,
+    free: str | Sequence[str] | None,
+    prior: Prior,
+    unknown: str | Sequence[str],
+) -> Equations:
+    """What would be measured, the rows of a pose one after another."""
+    sought = words("unknown", unknown)
+    for each in sought:
+        word("unknown", each, ("frame", "target"))
+    several = None if target is None else as_rows("target", target, 3)[0]
+    count = 1 if several is None else len(several)
+    measured = VirtualMachine(robot, noise).measure(
+        np.repeat(q, count, axis=0),
+        kind,
+        None if several is None else np.tile(several, (len(q), 1)),
+    )
+    if measured.sigma is None:
+        raise ArgumentError(f"noise must be above 0, found {noise}: without it any poses will do")
+    if several is not None:
+        index = np.tile(np.arange(count), len(q))
+        measured = replace(measured, target=several, target_index=index)
+    share = Share(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
+    return Equations([share], parameters(robot, [share], free, prior, None))
+
+
+def _design(
+    equations: Equations,
+    safe: NDArray[np.bool_],
+    aims: FloatArray,
+    aims_at: FloatArray,
+    criterion: str,
+) -> Design:
+    chosen = equations.parameters
+    point = equations.start()
+    rows = equations.whitened(equations.jacobian(point), np.ones(1)) * chosen.scale
+    stated = np.isfinite(chosen.prior)
+    prior = np.diag(chosen.scale / chosen.prior)[stated]
+    k = len(chosen.places)
+    twists = chosen.robot.error_twists(aims, aims_at)
+    by_geometry = twists[:, 3:, chosen.places] * chosen.scale[:k]
+    aimed = np.concatenate([by_geometry, np.zeros((len(aims), 3, len(chosen) - k))], axis=2)
+    if not np.isfinite(rows).all() or not np.isfinite(aimed).all():
+        raise ArgumentError(
+            "candidates or targets: one is singular, where nothing holds the platform"
+        )
+    blocks = rows.reshape(len(safe), -1, len(chosen))[safe]
+    design = Design(blocks, prior, aimed, criterion, chosen.robot.length)
+    moving = np.abs(aimed @ design.untold).max(initial=0.0)
+    if moving > _UNTOLD:
+        words = [in_words(c, chosen.names) for c in plain_basis(design.untold, chosen.names).T]
+        raise ArgumentError(
+            f"candidates: not even all of them tell {words[0]}, which moves the targets; offer"
+            " others, free fewer parameters or state a prior"
+        )
+    return design
+
+
+def _accuracy(accuracy: object, best: float, candidates: int) -> float:
+    wanted = number("accuracy", accuracy, above=0)
+    if not wanted > best:
+        raise ArgumentError(
+            f"accuracy: all {candidates} candidates together predict {best:.3g} mm, found"
+            f" {wanted:g}; offer other candidates, a better instrument or a prior"
+        )
+    return wanted

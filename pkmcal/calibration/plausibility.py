@@ -1,0 +1,197 @@
+"""Whether measurements can be what they are said to be: units, columns, repeats, enough of them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal.arrays import FloatArray
+from pkmcal.calibration.equations import Equations, Point
+from pkmcal.calibration.identifiability import listed
+from pkmcal.calibration.parameters import Parameters, Share
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.measurements import Measurements
+
+_GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
+FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
+_BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
+_LEFT_OVER = 0.5  # equations that show how good a fit is
+_TELLING = 0.2  # a reading that leaves so little of the misfit is what was meant
+_FACTORS = {
+    "mm": (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)),
+    "rad": (
+        ("degrees", np.pi / 180),
+        ("milliradians", 1e-3),
+        ("radians that were taken for degrees", 180 / np.pi),
+    ),
+}
+
+
+def misread(shares: Sequence[Share], parameters: Parameters, point: Point) -> list[str]:
+    """What measurements that the machine misses grossly were probably meant to be.
+
+    Each set is read in other units and with columns exchanged; a reading that fits far better is
+    named.
+    """
+    size = parameters.robot.length
+    found = []
+    for i, share in enumerate(shares):
+        present = _misfit(point.residuals[i], size)
+        if present <= _GROSS * size:
+            continue
+        trials = {
+            words: _misfit(_alone(replace(share, measured=other), parameters), size)
+            for words, other in _readings(share.measured, parameters.robot.actuator_units)
+        }
+        words = min(trials, key=lambda text: trials[text])
+        if trials[words] < _TELLING * present:
+            which = f"measurements {i + 1}: " if len(shares) > 1 else ""
+            off = (
+                f"off by {present:.3g} mm" if np.isfinite(present) else "out of the machine's reach"
+            )
+            found.append(f"{which}{off} as given, but by {trials[words]:.3g} mm if {words}")
+    return found
+
+
+def _alone(share: Share, parameters: Parameters) -> FloatArray:
+    (residual,) = Equations([share], parameters).start().residuals
+    return residual
+
+
+def _misfit(residual: FloatArray, size: float) -> float:
+    """Root mean square residual, mm; angles as their arc. inf if a row is not reached."""
+    arcs = residual * np.array([1.0, 1.0, 1.0, size, size, size])[: residual.shape[1]]
+    squares = (arcs**2).sum(axis=1)
+    return float(np.sqrt(squares.mean())) if np.isfinite(squares).all() else float("inf")
+
+
+def _readings(
+    measured: Measurements, actuator_units: Sequence[str]
+) -> Iterator[tuple[str, Measurements]]:
+    """Other things that measurements could have been meant to be."""
+    for unit in dict.fromkeys(actuator_units):
+        mine = np.array([unit == other for other in actuator_units])
+        for name, factor in _FACTORS[unit]:
+            q = np.where(mine, measured.actuators * factor, measured.actuators)
+            yield f"the actuators are in {name}", replace(measured, actuators=q)
+    yield "the actuators count the other way", replace(measured, actuators=-measured.actuators)
+    columns = np.arange(measured.actuators.shape[1])
+    for a, b in itertools.combinations(columns, 2):
+        order = columns.copy()
+        order[[a, b]] = b, a
+        swapped = replace(measured, actuators=measured.actuators[:, order])
+        yield f"q{a + 1} and q{b + 1} are exchanged", swapped
+    for unit in dict.fromkeys(measured.units):
+        mine = np.array([unit == other for other in measured.units])
+        what = "angles" if unit == "rad" else "measured lengths"
+        for name, factor in _FACTORS[unit]:
+            values = measured.values * (factor if mine.all() else np.where(mine, factor, 1.0))
+            yield f"the {what} are in {name}", replace(measured, values=values)
+    names = measured.components
+    for one, other in itertools.combinations(range(len(names)), 2):
+        if measured.units[one] != measured.units[other]:
+            continue
+        values = measured.values.copy()
+        values[:, [one, other]] = values[:, [other, one]]
+        yield f"{names[one]} and {names[other]} are exchanged", replace(measured, values=values)
+
+
+def beyond_strokes(equations: Equations, start: Point, end: Point) -> list[str]:
+    """Rows whose actuators are out of the strokes that the robot file states.
+
+    They are if they are both with the machine as drawn, whose offsets may be unknown, and as
+    identified, which may have been misled.
+    """
+    out = np.ones((len(equations.actuators), len(start.robot.model.limbs)), dtype=bool)
+    for point in (end, start):
+        if out.any():
+            drive = point.robot.feasible(point.pose).drive
+            out &= _out_of_stroke(point.robot, drive)
+    if not out.any():
+        return []
+    limbs = []
+    for i in np.flatnonzero(out.any(axis=0)):
+        low, high = start.robot.model.limbs[i].stroke or (0.0, 0.0)
+        beyond = drive[out[:, i], i]
+        limbs.append(
+            f"limb {i + 1} at {beyond.min():.4g} to {beyond.max():.4g}, its stroke is {low:g} to"
+            f" {high:g}"
+        )
+    poses_of = np.concatenate(equations.pose_of)
+    broken = np.asarray(out.any(axis=1))
+    rows = equations.rows[broken[poses_of]].tolist()
+    shown = ", ".join(map(str, rows[:10])) + (", …" if len(rows) > 10 else "")
+    more = f" and {len(limbs) - 2} more limbs" if len(limbs) > 2 else ""
+    return [
+        f"actuators out of stroke in {len(rows)} of {len(poses_of)} rows (rows {shown}):"
+        f" {'; '.join(limbs[:2])}{more}; check units, signs and columns of the actuators, or the"
+        " strokes in the robot file"
+    ]
+
+
+def _out_of_stroke(robot: Robot, drive: FloatArray) -> NDArray[np.bool_]:
+    """Which drives (K, limbs) are beyond their strokes by more than errors explain."""
+    strokes = [limb.stroke or (-np.inf, np.inf) for limb in robot.model.limbs]
+    low, high = np.array(strokes).T
+    room = np.where(np.isfinite(low), _BEYOND * (high - low), 0.0)
+    out: NDArray[np.bool_] = (drive < low - room) | (drive > high + room)
+    return out
+
+
+def strayed(start: Point, end: Point, parameters: Parameters) -> list[str]:
+    """Numbers of the geometry that moved further than errors of manufacture move them."""
+    k = len(parameters.places)
+    moved = np.abs((end.theta - start.theta) / parameters.scale)[:k]
+    far = np.flatnonzero(moved > FAR * parameters.robot.length)
+    if not len(far):
+        return []
+    names = listed([parameters.names[i] for i in far])
+    return [
+        f"{names} moved by up to {moved.max():.3g} mm, further than errors of a machine: check that"
+        " the robot file describes this one, or free fewer parameters"
+    ]
+
+
+def meagre(equations: Equations, rank: int, dof: float, with_prior: bool) -> list[str]:
+    """Too few measurements, one pose only, rows that were entered twice."""
+    found = []
+    n, count = len(equations.parameters), int(equations.components.sum())
+    if len(equations.actuators) == 1 and len(equations.rows) > 1:
+        found.append("all rows have the same actuators: measure different poses")
+    elif count < n and not with_prior:
+        found.append(
+            f"{count} equations for {n} parameters: measure more poses, free fewer parameters or"
+            " state a prior"
+        )
+    elif dof < _LEFT_OVER:
+        found.append(
+            f"{count} equations for {rank} combinations of parameters: nothing is left"
+            " over to show how good the fit is; measure more poses"
+        )
+    start = 0
+    for measured in equations.sets:
+        rows = equations.rows[start : start + len(measured)]
+        start += len(measured)
+        targets = (
+            np.zeros(len(measured)) if measured.target_index is None else measured.target_index
+        )
+        table = np.column_stack([
+            measured.actuators,
+            measured.values.reshape(len(measured), -1),
+            targets,
+        ])  # fmt: skip
+        _, first, inverse = np.unique(table, axis=0, return_index=True, return_inverse=True)
+        twins = first[inverse.reshape(-1)]
+        copies = np.flatnonzero(twins != np.arange(len(measured)))
+        if len(copies):
+            pairs = [f"{rows[i]} of {rows[twins[i]]}" for i in copies[:5]]
+            more = ", …" if len(copies) > 5 else ""
+            found.append(
+                f"{len(copies)} rows equal others to the last digit (row {', '.join(pairs)}{more}):"
+                " copied, not measured again?"
+            )
+    return found

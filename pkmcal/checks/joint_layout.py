@@ -1,0 +1,177 @@
+"""How the joints of a machine lie: their circles, their order, and what limbs have in common."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal.arrays import FloatArray
+from pkmcal.core.library import DRIVERS, SLOTS
+from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.robot import Robot
+
+_SAME_ANGLE = 1e-6  # rad
+ALIKE = 0.03  # of the base's radius: by less, errors of manufacture make limbs differ
+
+
+@dataclass(frozen=True, eq=False)
+class Joints:
+    """Base or platform joints, seen along z.
+
+    Attributes
+    ----------
+    side : str
+        "base" or "platform".
+    points : ndarray (limbs, 3)
+        mm.
+    """
+
+    side: str
+    points: FloatArray
+
+    @property
+    def radii(self) -> FloatArray:
+        """Distance from the z axis, mm."""
+        return np.asarray(np.hypot(self.points[:, 0], self.points[:, 1]))
+
+    @property
+    def angles(self) -> FloatArray:
+        """Polar angles about the z axis, rad."""
+        return np.arctan2(self.points[:, 1], self.points[:, 0])
+
+    @property
+    def senses(self) -> frozenset[int]:
+        """Ways the joints follow each other in one turn: +1 counter-clockwise, -1 clockwise.
+
+        Joints at the same angle may follow each other either way.
+        """
+        steps = np.roll(self.angles, -1) - self.angles
+        found = set()
+        for way in (1, -1):
+            forward = np.mod(way * steps + _SAME_ANGLE, 2 * np.pi) - _SAME_ANGLE
+            if abs(float(forward.sum()) - 2 * np.pi) < 1e-3:
+                found.add(way)
+        return frozenset(found)
+
+    def circle(self, room: float) -> tuple[FloatArray, float, NDArray[np.bool_]] | None:
+        """The circle that most joints lie on: centre (2,), radius, and which lie on it.
+
+        About the z axis where more than half lie on one; otherwise through any three joints, if
+        all but two of the joints, and four at least, lie on it. None where there is no such circle.
+        """
+        on, radius = majority(self.radii, room)
+        count = len(self.points)
+        if 2 * on.sum() > count and radius > room:
+            return np.zeros(2), radius, on
+        best: tuple[FloatArray, float, NDArray[np.bool_]] | None = None
+        for three in combinations(range(count), 3) if count >= 5 else ():
+            corners = self.points[list(three), :2]
+            system = np.column_stack([2 * corners, np.ones(3)])
+            if abs(np.linalg.det(system)) < 1e-9 * max(1.0, float(np.abs(system).max())) ** 2:
+                continue
+            x, y, rest = np.linalg.solve(system, (corners**2).sum(axis=1))
+            centre = np.array([x, y])
+            radius = float(np.sqrt(rest + x * x + y * y))
+            on = np.abs(np.linalg.norm(self.points[:, :2] - centre, axis=1) - radius) <= room
+            if on.sum() >= max(4, count - 2) and (best is None or on.sum() > best[2].sum()):
+                best = centre, radius, on
+        return best
+
+
+def joints(robot: Robot) -> tuple[Joints, Joints]:
+    """Base and platform joints of a machine."""
+    slots = robot.geometry.slots
+    return Joints("base", slots[:, 0:3]), Joints("platform", slots[:, 3:6])
+
+
+def size(robot: Robot) -> float:
+    """Root mean square distance of the base joints from their middle, mm; or `Robot.length`."""
+    base = joints(robot)[0].points
+    return max(float(np.sqrt(((base - base.mean(axis=0)) ** 2).sum(axis=1).mean())), robot.length)
+
+
+def majority(values: FloatArray, room: float) -> tuple[NDArray[np.bool_], float]:
+    """The largest group of values within `room` of one of them, and its median."""
+    near = np.abs(values[:, None] - values) <= room
+    best = int(near.sum(axis=1).argmax())
+    return near[best], float(np.median(values[near[best]]))
+
+
+@dataclass(frozen=True, eq=False)
+class Trait:
+    """One number of each limb that alike limbs have in common.
+
+    Attributes
+    ----------
+    name, unit : str
+        What it is, and "mm", "deg" or "1".
+    values : ndarray (limbs,)
+        In that unit; NaN for a limb that has none.
+    scale : float
+        mm that one unit counts as.
+    """
+
+    name: str
+    unit: str
+    values: FloatArray
+    scale: float
+
+    def odd(self, room: float) -> tuple[list[int], float]:
+        """Limbs (from 0) that are unlike the others by more than `room` mm, and what others have.
+
+        Where more than half are alike: those that are like no other, and the value of the many.
+        Where limbs come in alike groups: two that are like no other, and NaN. Otherwise none.
+        """
+        place = np.flatnonzero(np.isfinite(self.values))
+        if len(place) < 3:
+            return [], np.nan
+        values = self.values[place] * self.scale
+        near = np.abs(values[:, None] - values) <= room
+        alone = near.sum(axis=1) == 1
+        many, usual = majority(values, room)
+        limbs = place[alone].tolist()
+        if 2 * many.sum() > len(values):
+            return limbs, usual / self.scale
+        return (limbs if len(limbs) == 2 and len(values) >= 4 else []), np.nan
+
+
+def traits(robot: Robot) -> list[Trait]:
+    """What alike limbs have in common."""
+    base, platform = joints(robot)
+    mm = size(robot)
+    degree = mm * np.pi / 180
+    limbs = robot.model.limbs
+    between = np.degrees(np.abs(np.angle(np.exp(1j * (base.angles - platform.angles)))))
+    off_axis = (base.radii > 1e-6 * mm) & (platform.radii > 1e-6 * mm)
+    found = [
+        Trait("base radius", "mm", base.radii, 1.0),
+        Trait("platform radius", "mm", platform.radii, 1.0),
+        Trait("angle between base and platform joint", "deg",
+              np.where(off_axis, between, np.nan), degree),
+        Trait("height of the base joint", "mm", base.points[:, 2], 1.0),
+        Trait("height of the platform joint", "mm", platform.points[:, 2], 1.0),
+    ]  # fmt: skip
+    drive = robot.feasible(robot.home).drive
+    ends = np.array([limb.stroke or (np.nan, np.nan) for limb in limbs])
+    slot = dict(zip(SLOTS, robot.geometry.slots.T, strict=True))
+    for driver in DRIVERS:
+        mine = [KINDS[limb.kind].driver == driver for limb in limbs]
+        if not any(mine):
+            continue
+        rods = [] if driver == "length" else [Trait("rod", "mm", slot["rod"], 1.0)]
+        if driver == "crank":
+            rods.append(Trait("crank", "mm", slot["crank"], 1.0))
+        unit, shown, scale = ("deg", 180 / np.pi, degree) if driver == "crank" else ("mm", 1.0, 1.0)
+        own = (
+            *rods,
+            Trait(f"{driver} at home", unit, drive * shown, scale),
+            Trait("offset", unit, slot["offset"] * shown, scale),
+            Trait("gain", "1", slot["gain"], mm),
+            Trait("lower end of the stroke", unit, ends[:, 0] * shown, scale),
+            Trait("upper end of the stroke", unit, ends[:, 1] * shown, scale),
+        )
+        found += [replace(trait, values=np.where(mine, trait.values, np.nan)) for trait in own]
+    return found

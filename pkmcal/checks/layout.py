@@ -1,0 +1,221 @@
+"""Mistakes that show in where the joints lie and in what limbs have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.checks.finding import Finding, named
+from pkmcal.checks.joint_layout import ALIKE, Joints, joints, size, traits
+from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.robot import Robot
+
+_SAME = 1e-9  # relative: the same number written twice
+_WIDER = 1.05  # a platform so much wider than its base was meant to be the base
+_FULL_TURN = 360.0
+
+
+def angles_as_coordinates(robot: Robot) -> Iterator[Finding]:
+    """Polar angles in degrees as both x and y, or as y beside a radius, or taken for radians."""
+    base, platform = joints(robot)
+    read: dict[str, FloatArray] = {}
+    for side in (base, platform):
+        x, y = side.points[:, 0], side.points[:, 1]
+        within = float(np.abs(y).max()) <= _FULL_TURN and np.ptp(y) > 0
+        if len(y) < 3 or not within:
+            continue
+        both = (np.abs(x - y) <= _SAME * np.abs(y)).all()
+        beside_radius = np.ptp(x) <= _SAME * np.abs(x).max() and len(set(y.tolist())) == len(y) > 3
+        if both or beside_radius:
+            read[side.side] = y
+    if read:
+        yield _polar(robot, read)
+    for side in (base, platform):
+        turned = np.degrees(side.angles)
+        spread = float(np.ptp(turned))
+        off_axis = side.radii.min() > ALIKE * max(float(side.radii.max()), 1e-9)
+        if side.side not in read and len(turned) >= 3 and off_axis and 0 < spread <= 2 * np.pi:
+            again = ", ".join(f"{angle:.4g}" for angle in np.degrees(turned))
+            yield Finding(
+                "angle",
+                tuple(range(1, len(turned) + 1)),
+                f"all {side.side} joints lie within {spread:.3g} deg of each other, seen from the"
+                " middle",
+                f"were their angles in radians? They would be {again} deg; see angle under [units]",
+            )
+
+
+def _polar(robot: Robot, read: dict[str, FloatArray]) -> Finding:
+    """The finding, with what the legs are once the numbers are read as polar angles."""
+    shown = " and ".join(
+        f"x = {side.points[0, 0]:.6g}, y = {side.points[0, 1]:.6g} … ({side.side})"
+        for side in joints(robot)
+        if side.side in read
+    )
+    what = f"joints on one line that are spread like angles: {shown}"
+    advice = "read as polar angles, base = { radius = …, angle = …, z = … }"
+    if len(read) == 2:
+        turn = np.abs(np.mod(read["base"] - read["platform"] + 180, 360) - 180)
+        what += f"; as angles base and platform are {turn.min():.6g} to {turn.max():.6g} deg apart"
+        radii = _stated_radii(robot)
+        if radii is not None:
+            legs = _legs(robot, read, radii)
+            advice += (
+                f"; on circles of radius {radii[0]:.6g} and {radii[1]:.6g} mm all legs are"
+                f" {legs.min():.8g} to {legs.max():.8g} mm at home"
+            )
+            if "length" in robot.model.stated:
+                advice += f", and {robot.model.stated['length']:.6g} mm are stated"
+    return Finding("angle", tuple(range(1, len(robot.model.limbs) + 1)), what, advice)
+
+
+def _stated_radii(robot: Robot) -> tuple[float, float] | None:
+    """Radii of both circles, from what is stated: of all readings the one that fits the legs."""
+    stated = robot.model.stated
+    options = []
+    for side in ("base", "platform"):
+        sizes = [stated[key] for key in (f"{side}_radius", f"{side}_diameter") if key in stated]
+        options.append([size / part for size in sizes for part in (1.0, 2.0)])
+    if not all(options):
+        return None
+    pairs = [(first, second) for first in options[0] for second in options[1]]
+    length = stated.get("length")
+    if length is None:
+        return pairs[0]
+    read = {side.side: side.points[:, 1] for side in joints(robot)}
+    return min(pairs, key=lambda pair: abs(float(_legs(robot, read, pair).mean()) - length))
+
+
+def _legs(robot: Robot, read: dict[str, FloatArray], radii: tuple[float, float]) -> FloatArray:
+    """Distances between base and platform joints at home with polar angles (deg) and radii."""
+    base, platform = (
+        np.column_stack([
+            radius * np.cos(np.radians(read[side.side])),
+            radius * np.sin(np.radians(read[side.side])),
+            side.points[:, 2],
+        ])
+        for side, radius in zip(joints(robot), radii, strict=True)
+    )  # fmt: skip
+    moved = platform + robot.model.home[:3]
+    return np.asarray(np.linalg.norm(moved - base, axis=1))
+
+
+def doubled(robot: Robot) -> Iterator[Finding]:
+    """Limbs of the same joints, and joints that more than two limbs of a free platform share."""
+    base, platform = joints(robot)
+    room = 1e-3 * size(robot)
+    count = len(robot.model.limbs)
+    both = np.hstack([base.points, platform.points])
+    pairs = combinations(range(count), 2)
+    copies = [(i, j) for i, j in pairs if float(np.linalg.norm(both[i] - both[j])) <= room]
+    for i, j in copies:
+        place = ", ".join(f"{number:.6g}" for number in base.points[i])
+        yield Finding(
+            "double",
+            (i + 1, j + 1),
+            f"{named((i, j))} have the same joints; the base joint is at ({place}) mm",
+            f"was limb {j + 1} copied from limb {i + 1} and not changed?",
+        )
+    if robot.model.map != "spatial":
+        return
+    for side in (base, platform):
+        near = np.linalg.norm(side.points[:, None] - side.points, axis=2) <= room
+        shared = np.flatnonzero(near.sum(axis=1) > 2)
+        if len(shared) and not copies:
+            yield Finding(
+                "double",
+                tuple(int(i) + 1 for i in shared),
+                f"{named(shared)} share one {side.side} joint",
+                "no more than two limbs can: check these joints",
+            )
+
+
+def swapped(robot: Robot) -> Iterator[Finding]:
+    """A platform that is wider than its base."""
+    base, platform = (float(np.median(side.radii)) for side in joints(robot))
+    if platform > _WIDER * base > 0:
+        yield Finding(
+            "swapped",
+            (),
+            f"the platform joints are {platform:.6g} mm from the axis, those of the base"
+            f" {base:.6g} mm",
+            "were base and platform exchanged? Swap them if the platform is the smaller one",
+        )
+
+
+def opposite_order(robot: Robot) -> Iterator[Finding]:
+    """Base joints counted one way round and platform joints another."""
+    base, platform = joints(robot)
+    if platform.radii.min() <= ALIKE * float(base.radii.max()):
+        return
+    if base.senses == platform.senses or base.senses & platform.senses:
+        return
+    mirrored = bool(base.senses and platform.senses)
+    yield Finding(
+        "order",
+        (),
+        f"seen from above, the base joints run {_way(base)} and the platform joints"
+        f" {_way(platform)}",
+        "one of the tables has a left-handed frame: turn the sign of its x or of its y"
+        if mirrored
+        else "were two joints exchanged? Joint 1 of the base and of the platform belong to limb 1",
+    )
+
+
+def _way(side: Joints) -> str:
+    if not side.senses:
+        return "neither way round"
+    return "counter-clockwise" if 1 in side.senses else "clockwise"
+
+
+def off_circle(robot: Robot) -> Iterator[Finding]:
+    """Joints that are off the circle of the others."""
+    room = ALIKE * size(robot)
+    for side in joints(robot):
+        found = side.circle(room)
+        if found is None:
+            continue
+        centre, radius, on = found
+        where = "" if not centre.any() else f" about ({centre[0]:.6g}, {centre[1]:.6g}) mm"
+        for i in np.flatnonzero(~on).tolist():
+            away = float(np.linalg.norm(side.points[i, :2] - centre))
+            yield Finding(
+                "circle",
+                (i + 1,),
+                f"{side.side} joint {i + 1} is {abs(away - radius):.4g} mm off the circle of radius"
+                f" {radius:.6g} mm{where} that {on.sum()} of {len(on)} {side.side} joints lie on",
+                f"check its x and y: ({side.points[i, 0]:.6g}, {side.points[i, 1]:.6g}) mm",
+            )
+
+
+def unlike(robot: Robot) -> Iterator[Finding]:
+    """Limbs that are unlike the others."""
+    room = ALIKE * size(robot)
+    circles = {f"{side.side} radius" for side in joints(robot) if _has_circle(side, room)}
+    kinds = {KINDS[limb.kind].name for limb in robot.model.limbs}
+    for trait in traits(robot):
+        if trait.name in circles:  # said by `off_circle`
+            continue
+        limbs, usual = trait.odd(room)
+        if not limbs:
+            continue
+        values = ", ".join(f"{trait.values[i]:.6g}" for i in limbs)
+        of_others = (
+            f"{usual:.6g} {trait.unit} with the others"
+            if np.isfinite(usual)
+            else "unlike each other, where the others come in alike pairs"
+        )
+        same = " of the same kind" if len(kinds) == 1 else ""
+        yield Finding(
+            "alike",
+            tuple(i + 1 for i in limbs),
+            f"{trait.name}: {values} {trait.unit} in {named(limbs)}, {of_others}",
+            f"limbs{same} are as a rule alike: check {named(limbs)}",
+        )
+
+
+def _has_circle(side: Joints, room: float) -> bool:
+    return side.circle(room) is not None

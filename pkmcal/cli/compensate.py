@@ -1,0 +1,141 @@
+"""`pkmcal compensate`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from pkmcal.arrays import FloatArray
+from pkmcal.cli.output import folder
+from pkmcal.cli.robot_argument import ROBOT, contents
+from pkmcal.core.library import POSE
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.csv_table import Table
+from pkmcal.files.provenance import comment
+from pkmcal.kinematics.robot import Robot
+from pkmcal.loading import load_parallel
+from pkmcal.measurements.pose_csv import read_poses, write_poses
+from pkmcal.report.as_json import as_json
+
+_BESIDE = re.compile(r"q\d+|sigma(\..+)?|group")  # in a file of measurements, and not needed here
+
+
+def compensate(
+    robot: Annotated[str, ROBOT],
+    desired: Annotated[Path, typer.Argument(metavar="DESIRED.csv", help="Poses asked for.")],
+    measured: Annotated[
+        Path,
+        typer.Argument(
+            metavar="MEASURED.csv",
+            help="Where the machine went with the commands of its inverse kinematics, row by row:"
+            " poses, or positions 'x \\[mm], y \\[mm], z \\[mm]'.",
+        ),
+    ],
+    method: Annotated[
+        str, typer.Option(metavar="WORD", help="exact, or pso: a particle swarm, as published.")
+    ] = "exact",
+    orientation: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WORD",
+            help="measured, assumed (as desired) or from-position (beta of a 2TPR&2TPS). By"
+            " default what the file and the machine allow.",
+        ),
+    ] = None,
+    match: Annotated[
+        str | None,
+        typer.Option(metavar="NAMES", help="Coordinates that count: 'x,y,z,alpha'; else all six."),
+    ] = None,
+    common: Annotated[bool, typer.Option("--common", help="One correction for all poses.")] = False,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the swarm.")] = 0,
+    bounds: Annotated[
+        float | None,
+        typer.Option(metavar="NUMBER", help="Of the swarm's corrections, mm or rad."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write poses, commands, corrections: DIR/corrected.csv."),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
+) -> int:
+    """Correct the commands of a machine by where it went (eq. 18 of the 2TPR&2TPS paper).
+
+    Exit code 1: a limb cannot reach some of the poses, or some were measured too far off.
+
+    Example: pkmcal compensate 2tpr2tps examples/2tpr2tps-compensation/desired.csv
+    examples/2tpr2tps-compensation/measured.csv
+    """
+    from pkmcal.compensation.compensate import compensate as corrected
+
+    machine = load_parallel(robot)
+    poses = read_poses(desired, machine)
+    reached = read_reached(measured)
+    if len(reached) != len(poses):
+        raise ArgumentError(f"{measured}: {len(reached)} rows for the {len(poses)} of {desired}")
+    found = corrected(
+        machine,
+        poses,
+        reached,
+        method=method,
+        orientation=orientation or _orientation(machine, reached, measured),
+        match=None if match is None else [name.strip() for name in match.split(",")],
+        common=common,
+        seed=seed,
+        bounds=bounds,
+    )
+    if out is not None:
+        units = [f"[{unit}]" for unit in machine.actuator_units]
+        columns = {
+            f"{word}{i + 1} {unit}": values[:, i]
+            for word, values in (("q", found.actuators), ("dq", found.correction))
+            for i, unit in enumerate(units)
+        }
+        read = contents(robot, desired, measured)
+        write_poses(folder(out) / "corrected.csv", poses, columns, comment(read))
+    if json:
+        typer.echo(as_json(found))
+    else:
+        typer.echo(found)
+        if out is not None:
+            typer.echo(f"\ncommands: {out / 'corrected.csv'}")
+    return 0 if np.isfinite(found.actuators).all() and not found.gross.any() else 1
+
+
+def read_reached(path: Path) -> FloatArray:
+    """Measured poses (N, 6) or positions (N, 3) of a file, mm and rad.
+
+    Raises
+    ------
+    ValueError
+        Naming file, line and column: some angles without the others, an unknown column, a missing
+        unit, a cell without a number.
+    OSError
+        The file cannot be read.
+    """
+    table = Table(path)
+    table.refuse_unknown(
+        lambda name: name in POSE or _BESIDE.fullmatch(name) is not None, list(POSE)
+    )
+    wanted = POSE if any(name in table.columns for name in POSE[3:]) else POSE[:3]
+    table.require(wanted)
+    return np.stack(
+        [table.numbers(name, "rad" if name in POSE[3:] else "mm")[0] for name in wanted], axis=1
+    )
+
+
+def _orientation(robot: Robot, reached: FloatArray, path: Path) -> str:
+    """Where the orientation comes from when nothing is said."""
+    if reached.shape[1] == 6:
+        return "measured"
+    if robot.model.map == "2tpr2tps":
+        return "from-position"
+    if robot.model.map == "translation":
+        return "assumed"
+    raise ArgumentError(
+        f"{path}: positions do not tell the orientation of {robot.name};"
+        " measure it, or take the desired one: --orientation assumed"
+    )

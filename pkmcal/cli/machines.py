@@ -1,0 +1,51 @@
+"""`pkmcal machines`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from pkmcal import display, loading
+from pkmcal.arms.arm import SerialArm
+from pkmcal.core.library import POSE
+from pkmcal.measurements.calibratable import ArmMachine
+from pkmcal.report.as_json import as_json
+
+
+def machines(
+    json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+) -> int:
+    """List the built-in machines.
+
+    Their names stand wherever a command takes a robot file.
+
+    Example: pkmcal machines
+    """
+    rows: dict[str, dict[str, Sequence[str]]] = {}
+    for name in loading.machines():
+        machine = loading.load(name)
+        if isinstance(machine, SerialArm):
+            free = ArmMachine(machine).model.free
+            rows[name] = {"limbs": list(machine.kinds), "coordinates": POSE, "free": free}
+            continue
+        rows[name] = {
+            "limbs": [limb.kind for limb in machine.model.limbs],
+            "coordinates": machine.coordinates,
+            "free": machine.model.free,
+        }
+    if json:
+        typer.echo(as_json(rows))
+        return 0
+    table = [
+        [
+            name,
+            ", ".join(f"{list(row['limbs']).count(k)} {k}" for k in dict.fromkeys(row["limbs"])),
+            " ".join(row["coordinates"]),
+            str(len(row["free"])),
+        ]
+        for name, row in rows.items()
+    ]
+    typer.echo(str(display.Table(["machine", "limbs", "moves in", "free"], table, left=3)))
+    return 0

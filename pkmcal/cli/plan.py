@@ -1,0 +1,131 @@
+"""`pkmcal plan`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from pkmcal.arrays import FloatArray
+from pkmcal.calibration.plan_poses import Plan, plan_poses
+from pkmcal.cli.calibrate import free_names, read_deviations
+from pkmcal.cli.output import folder
+from pkmcal.cli.progress import progress
+from pkmcal.cli.robot_argument import ROBOT_OR_ARM, contents
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.provenance import comment
+from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.workspace import sample_poses
+from pkmcal.loading import load
+from pkmcal.measurements.calibratable import ArmMachine, as_given, as_machine
+from pkmcal.measurements.command_csv import read_commands, write_commands
+from pkmcal.measurements.pose_csv import read_poses, write_poses
+from pkmcal.report.as_json import as_json
+
+_DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach
+
+
+def plan(
+    robot: Annotated[str, ROBOT_OR_ARM],
+    count: Annotated[
+        int | None, typer.Option(metavar="N", help="How many poses; 30 by default.")
+    ] = None,
+    accuracy: Annotated[
+        float | None,
+        typer.Option(metavar="MM", help="Instead: as few as will do for this predicted error."),
+    ] = None,
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="CSV",
+            help="Candidates, with columns such as 'y \\[mm]' and 'alpha \\[deg]'; by default"
+            f" {_DRAWN} are drawn in the workspace. Of an arm 'q1 \\[deg]' ….",
+        ),
+    ] = None,
+    targets: Annotated[
+        Path | None,
+        typer.Option(metavar="CSV", help="Where it is to be accurate; by default the candidates."),
+    ] = None,
+    criterion: Annotated[
+        str, typer.Option(metavar="WORD", help="prediction, D or A: what is made least.")
+    ] = "prediction",
+    kind: Annotated[
+        str, typer.Option(metavar="KIND", help="What is measured: position, pose or height.")
+    ] = "position",
+    noise: Annotated[
+        float, typer.Option(metavar="MM", help="Of the instrument, one standard deviation.")
+    ] = 0.02,
+    free: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="What will be identified, as for calibrate."),
+    ] = None,
+    prior: Annotated[
+        list[str] | None,
+        typer.Option(metavar="[NAME=]σ", help="How far numbers may be off, as for calibrate."),
+    ] = None,
+    unknown: Annotated[
+        list[str] | None,
+        typer.Option(metavar="WORD", help="frame or target: what is not known of the instrument."),
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the candidates drawn.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write poses.csv and commands.csv, the actuators."),
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
+) -> int:
+    """Choose the poses to measure for a calibration.
+
+    To commands.csv add columns of what was measured there, and give it to calibrate.
+    Exit code 1: these poses are too few to tell all parameters.
+
+    Example: pkmcal plan hexapod --kind pose --count 20 --out plan
+    """
+    machine = as_machine(load(robot))
+    chosen = free_names(machine, free)
+    with progress("choosing poses"):
+        made = plan_poses(
+            as_given(machine),
+            _drawn(machine, seed) if poses is None else _places(machine, poses),
+            count=30 if count is None and accuracy is None else count,
+            accuracy=accuracy,
+            targets=None if targets is None else _places(machine, targets),
+            criterion=criterion,
+            kind=kind,
+            noise=noise,
+            free=chosen or None,
+            prior=read_deviations("--prior", prior or [], machine, chosen),
+            unknown=unknown or (),
+        )
+    read = comment(contents(robot, *(path for path in (poses, targets) if path is not None)))
+    written = [] if out is None else _write(made, folder(out), read)
+    if json:
+        typer.echo(as_json(made))
+    else:
+        typer.echo("\n".join([str(made), *([""] if written else []), *map(str, written)]))
+    return 0 if np.isfinite(made.predicted) else 1
+
+
+def _drawn(machine: Robot, seed: int) -> FloatArray:
+    if isinstance(machine, ArmMachine):
+        raise ArgumentError(
+            f"--poses: {machine.name} is a serial arm, whose limits are not known: a file of joint"
+            " coordinates to choose from is needed, with columns such as 'q1 [deg]'"
+        )
+    return sample_poses(machine, _DRAWN, seed, _SHARE)
+
+
+def _places(machine: Robot, path: Path) -> FloatArray:
+    """Poses of a file, or an arm's joint coordinates."""
+    if isinstance(machine, ArmMachine):
+        return read_commands(path, machine.actuator_units)
+    return read_poses(path, machine)
+
+
+def _write(made: Plan, out: Path, head: str) -> list[Path]:
+    poses, commands = out / "poses.csv", out / "commands.csv"
+    write_poses(poses, made.poses, comment=head)
+    write_commands(commands, made.robot.actuator_units, made.actuators, head)
+    return [poses, commands]

@@ -1,0 +1,99 @@
+"""A robot file to start from: a built-in machine with words on every key that it has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from pkmcal.arguments import did_you_mean
+from pkmcal.arms.arm_file import is_arm
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.toml_lines import Source
+from pkmcal.geometry import robot_file
+from pkmcal.geometry.limb_kinds import ALIASES, KINDS
+
+_HEAD = """\
+# Made by `pkmcal new {name}`. Change what differs on your machine, measure it, run
+#     pkmcal calibrate {name}.toml measured.csv --report report
+#
+"""
+_PARALLEL = """\
+# units         of every number below; mm, m or in; deg or rad
+# [pose]        map: the coordinates it moves in; home: a pose in the middle of the workspace
+# [parameters]  names for numbers that limbs share: `radius = 160.0` here, "radius" there
+# [calibration] free: what is found unless --free says otherwise; wildcards are allowed
+# [frames]      base, tool: poses of the machine's frames in yours, if they differ
+# [stated]      what a data sheet claims, to compare: `rod = 340.0`
+# [[limb]]      one for each, counted from 1 in the names of its numbers (base1.x, offset1 …)
+"""
+_KEYS = {
+    "kind": "{kinds}",
+    "actuator": "which q drives it, if not its own: several limbs may name one",
+    "base": "its joint on the base: [x, y, z], or {{ radius = …, angle = …, z = … }}",
+    "platform": "its joint on the platform, in the platform's frame",
+    "slider": "direction of the carriage's travel, of any length",
+    "normal": "of the plane that the limb stays in",
+    "revolute": "axis of its joint on the platform, in the platform's frame",
+    "universal": "first axis of its joint on the base, with couple",
+    "couple": "a length: makes its second constraint count too",
+    "weights": "of its constraints beside the length",
+    "axis": "of the crank, at base",
+    "zero": "where the crank points at 0",
+    "crank": "length of the crank",
+    "rod": "length from carriage or crank to the platform joint",
+    "offset, gain": "the drive is at gain · q + offset; 0 and 1 if left out",
+    "branch": "which of the two places that a rod can lead to: 1 or -1",
+    "stroke": "least and most of gain · q + offset",
+    "base_cone": "{{ axis = …, angle = … }}: how far its joint on the base swings",
+    "platform_cone": "the same of its joint on the platform",
+}
+_KINDS = {
+    "UPS": "a leg of variable length",
+    "UPR": "a leg of variable length that keeps to a plane of the platform",
+    "RPS": "a leg of variable length that keeps to a plane of the base",
+    "PUS": "a carriage and a rod",
+    "RUS": "a crank and a rod",
+}
+_ARM = """\
+# units      of every number below; mm, m or in; deg or rad
+# [tool]     home: pose of the tool with all joints at zero
+# [[joint]]  one for each, from the base: kind, axis and a point on it with all joints at zero;
+#            error (optional): dx dy dz dphi dtheta dpsi, what a calibration finds
+"""
+
+
+def template(machine: str) -> str:
+    """The text of a robot file that loads as the built-in machine.
+
+    Parameters
+    ----------
+    machine : str
+        A name of `pkmcal.machines`.
+
+    Raises
+    ------
+    ValueError
+        No such machine.
+
+    Examples
+    --------
+    >>> print(template("hexapod").splitlines()[0])
+    # Made by `pkmcal new hexapod`. Change what differs on your machine, measure it, run
+    """
+    known = [*robot_file.builtin_names(), *robot_file.builtin_names("arms")]
+    if machine not in known:
+        raise ArgumentError(f"unknown machine {machine!r}{did_you_mean(machine, known)}")
+    content, place, _ = robot_file.located(machine)
+    text, data = content.decode(), Source(content, place).data
+    keys = _ARM if is_arm(data) else _PARALLEL + "".join(_limb_keys(data["limb"]))
+    return f"{_HEAD.format(name=machine)}{keys}#\n{text}"
+
+
+def _limb_keys(limbs: Iterable[dict[str, object]]) -> Iterable[str]:
+    """A line for each key that limbs of these kinds may have."""
+    named = dict.fromkeys(str(limb["kind"]) for limb in limbs)
+    kinds = {kind: ALIASES.get(kind, kind) for kind in named}
+    used = {key for kind in kinds.values() for key in KINDS[kind].keys()}  # noqa: SIM118
+    told = ("\n#" + 18 * " ").join(f"{name}: {_KINDS[kind]}" for name, kind in kinds.items())
+    for names, words in _KEYS.items():
+        if names.split(",")[0] in used:
+            yield f"#   {names:13}  {words.format(kinds=told)}\n"

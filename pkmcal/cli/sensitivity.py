@@ -1,0 +1,122 @@
+"""`pkmcal sensitivity`."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from pkmcal.cli.output import folder
+from pkmcal.cli.progress import progress
+from pkmcal.cli.robot_argument import ROBOT, contents
+from pkmcal.core.library import POSE
+from pkmcal.error_model.sensitivity import STUDIES, Sensitivity, study_cases
+from pkmcal.error_model.sensitivity import sensitivity as errors_of
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.atomic import write_whole
+from pkmcal.files.provenance import comment
+from pkmcal.kinematics.workspace import sample_poses
+from pkmcal.loading import load_parallel
+from pkmcal.measurements.pose_csv import read_poses, write_poses
+from pkmcal.report.as_json import as_json
+
+_TITLES = {
+    "limb1": "one number of limb 1 in error",
+    "offsets": "one zero length in error",
+    "all-limbs": "the same error on all limbs",
+}
+
+
+def sensitivity(
+    robot: Annotated[str, ROBOT],
+    poses: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="CSV",
+            help="Poses, with columns such as 'y \\[mm]' and 'alpha \\[deg]'; by default 30"
+            " are drawn in the workspace.",
+        ),
+    ] = None,
+    step: Annotated[
+        float, typer.Option(metavar="MM", help="The error; angles get so many mrad.")
+    ] = 1.0,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the poses drawn.")] = 0,
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the files go.")] = Path(
+        "pkmcal-sensitivity"
+    ),
+    json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
+) -> int:
+    """Show what an error of each number of the geometry does to the pose.
+
+    Three studies: the numbers of limb 1 one by one, the zero lengths, and each kind of number on
+    all limbs together; of each a figure pose by pose and one of the means. Every error is solved
+    exactly, beside its linear prediction. Exit code 1: some poses were not solved.
+
+    Example: pkmcal sensitivity 2tpr2tps --out errors
+    """
+    machine = load_parallel(robot)
+    at = sample_poses(machine, seed=seed) if poses is None else read_poses(poses, machine)
+    found = {
+        name: errors_of(machine, at, step, cases)
+        for name in STUDIES
+        if (cases := study_cases(machine, name))
+    }
+    if not found:
+        raise ArgumentError(f"{robot}: no number of its geometry can be in error")
+    read = contents(robot, *([] if poses is None else [poses]))
+    written = _write(found, folder(out), comment(read))
+    if json:
+        typer.echo(as_json({name: _as_mapping(result) for name, result in found.items()}))
+    else:
+        for name, result in found.items():
+            typer.echo(f"{_TITLES[name]}\n{result}\n")
+        typer.echo("\n".join(str(path) for path in written))
+    return 0 if not any(result.failed.any() for result in found.values()) else 1
+
+
+def _as_mapping(found: Sensitivity) -> dict[str, object]:
+    names = ("cases", "step", "poses", "mean", "mean_linear", "exact", "linear", "failed")
+    return {name: getattr(found, name) for name in names}
+
+
+def _write(found: dict[str, Sensitivity], out: Path, head: str) -> list[Path]:
+    """The table, the poses, and two figures of each study."""
+    from pkmcal.report import error_figures as figures
+
+    first = next(iter(found.values()))
+    table, poses = out / "sensitivity.csv", out / "poses.csv"
+    write_whole(table, head + _table(found))
+    write_poses(poses, first.poses, comment=head)
+    written = [table, poses]
+    with progress("figures") as moved:
+        for k, (name, result) in enumerate(found.items()):
+            moved(k, len(found))
+            title = f"{result.robot.name}: {_TITLES[name]}, {result.step:g} mm"
+            written += figures.save(figures.errors_by_pose(result, title), out / f"{name}-poses")
+            written += figures.save(figures.mean_errors(result, title), out / f"{name}-mean")
+    return written
+
+
+def _table(found: dict[str, Sensitivity]) -> str:
+    """Means of all studies as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    units = ["mm" if name in "xyz" else "deg" for name in POSE]
+    writer.writerow([
+        *("study", "error of"),
+        *(f"{how} d{name} [{unit}]" for how in ("mean", "linear")
+          for name, unit in zip(POSE, units, strict=True)),
+    ])  # fmt: skip
+    for name, result in found.items():
+        for case, mean, linear in zip(result.cases, result.mean, result.mean_linear, strict=True):
+            lengths_and_angles = (mean[:3], mean[3:], linear[:3], linear[3:])
+            factors = (1.0, 180 / np.pi, 1.0, 180 / np.pi)
+            sizes = np.concatenate([
+                part * factor for part, factor in zip(lengths_and_angles, factors, strict=True)
+            ])  # fmt: skip
+            writer.writerow([name, case, *(f"{size:.6g}" for size in sizes)])
+    return text.getvalue()

@@ -1,0 +1,276 @@
+"""Corrections of the actuator commands that bring a machine to the poses asked for (eq. 18)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal import display
+from pkmcal.arguments import checked_seed, flag, instance, whole, word
+from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows
+from pkmcal.core.swarm import PAPER, SwarmSettings, minimise_eq18
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.kinematics import Match
+from pkmcal.kinematics.robot import Robot, require_parallel
+
+Measured = ArrayLike | Callable[[FloatArray], ArrayLike]
+
+METHODS = ("exact", "pso")
+ORIENTATIONS = ("measured", "assumed", "from-position")
+_ASSUMED = {
+    "measured": "orientation as measured",
+    "assumed": "orientation assumed as desired: its error stays, and passes for one of position",
+    "from-position": "beta from the position, the other angles assumed as desired",
+}
+_LISTED = 12  # a longer list of poses is printed with its middle left out
+
+
+@dataclass(frozen=True, eq=False)
+class Compensation:
+    """Corrected commands. Rows are poses; a row that a limb cannot reach is NaN.
+
+    Attributes
+    ----------
+    actuators : ndarray (N, n)
+        What to command: the ideal commands with the correction added, mm or rad.
+    correction : ndarray (N, n)
+        ΔL of eq. 18, mm or rad.
+    objective : ndarray (N,)
+        E of eq. 18 at the correction of the last pass: 0 for the exact method unless one
+        correction serves all poses, and what the swarm left.
+    history : ndarray (N, passes) or (N, passes · (iterations + 1))
+        Exact: E with the correction that was in force at each measurement, which is how far off
+        the actuators' readings were, as the ideal machine sees them. Of a swarm: its lowest E
+        before the first and after every iteration, pass by pass; with one correction for all
+        poses, the root mean square of E over them.
+    gross : ndarray of bool (N,)
+        The position was off by more than ``robot.length``: no error of a geometry but
+        of units, of the frame of the measurements, or of the order of their rows.
+    method, orientation : str
+        As asked for.
+    units : tuple of str, n
+        Of the actuators, "mm" or "rad".
+    """
+
+    actuators: FloatArray
+    correction: FloatArray
+    objective: FloatArray
+    history: FloatArray
+    gross: BoolArray
+    method: str
+    orientation: str
+    units: tuple[str, ...]
+
+    def __str__(self) -> str:
+        count = len(self.actuators)
+        title = f"{count} pose{'s' * (count != 1)}"
+        heads = ["row"]
+        heads += [f"{q}{i} [{u}]" for q in ("q", "dq") for i, u in enumerate(self.units, 1)]
+        rows = [
+            [str(row), *(display.fixed(float(value), 4) for value in (*q, *dq))]
+            for row, (q, dq) in enumerate(zip(self.actuators, self.correction, strict=True))
+        ]
+        if len(rows) > _LISTED:
+            rows[_LISTED - 4 : -3] = [["⋮"] * len(heads)]
+        known = self.history[np.isfinite(self.history).all(axis=1)]
+        if not len(known):
+            return f"{title}; no pose that was both asked for and measured is within reach"
+        each = np.sqrt((known**2).mean(axis=0))
+        unit = " and ".join(sorted(set(self.units)))
+        if self.method == "exact":
+            off = ", ".join(f"{value:.3g}" for value in each)
+            story = f"off by {off} {unit} (rms of the actuators, pass by pass)"
+        else:
+            story = f"swarm from {each[0]:.3g} to {each[-1]:.3g} {unit} (rms of E)"
+        lines = [f"{title}; {story}", _ASSUMED[self.orientation], str(display.Table(heads, rows))]
+        if self.gross.any():
+            lines.append(
+                f"{self.gross.sum()} of {count} were off by more than errors of a machine: check"
+                " units, frame and order of the rows"
+            )
+        return "\n".join(lines)
+
+
+def compensate(
+    robot: Robot,
+    desired: ArrayLike,
+    measured: Measured,
+    method: str = "exact",
+    orientation: str = "measured",
+    match: Match = None,
+    common: bool = False,
+    passes: int = 1,
+    seed: int = 0,
+    bounds: ArrayLike | None = None,
+    swarm: SwarmSettings = PAPER,
+) -> Compensation:
+    """Correct the commands of a machine by where it went.
+
+    Eq. 18 of the 2TPR&2TPS paper asks for the ΔL that makes E = √Σ(L* - L - ΔL)² least, with L*
+    the actuators of the desired pose and L those of the measured one, both through the inverse
+    kinematics of the ideal machine. Its minimiser is ΔL = L* - L.
+
+    Parameters
+    ----------
+    robot : Robot
+        The ideal machine: the one whose inverse kinematics makes the commands.
+    desired : array_like (N, 6)
+        Poses asked for, mm and rad.
+    measured : array_like (N, 6) or (N, 3), or callable
+        Poses or positions that were reached with the ideal commands; or a function that takes
+        commands (N, n), has them carried out and returns what was measured.
+    method : {"exact", "pso"}
+        The minimiser in closed form; or a particle swarm that looks for it (eq. 19), as published.
+        The closed form gives the same answer without the swarm's remainder and in no time.
+    orientation : {"measured", "assumed", "from-position"}
+        Where the orientation of the measured pose comes from. "measured": from the six numbers.
+        "assumed": it is the desired one. "from-position": of the 2TPR&2TPS, whose β follows from
+        the position by x = z tan β (eq. 7); the other angles are the desired ones.
+    match : bool or names of coordinates, optional
+        Which coordinates count, as for `Robot.inverse`; all six by default. A real machine of
+        fewer than six degrees of freedom leaves the manifold of the ideal one, and six numbers
+        cannot all be met: then match as many as there are degrees of freedom, the position
+        first, such as ("x", "y", "z", "alpha").
+    common : bool
+        One correction for all poses, the mean, in place of one for each.
+    passes : int
+        How often to measure and correct; more than once needs a callable.
+    seed : int
+        Of the swarms, from 0 to 2⁶⁴ - 1; not used by the exact method.
+    bounds : array_like () or (n,), optional
+        The swarm looks for the correction of a pass between minus and plus this, mm or rad; by
+        default twice the largest difference L* - L of any pose.
+    swarm : SwarmSettings
+        Size and factors of the swarms; by default the paper's. `pkmcal.swarm.CONSTRICTION` are
+        stable ones.
+
+    Returns
+    -------
+    Compensation
+        Corrected commands, corrections, and E pass by pass or iteration by iteration.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument that does not fit.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> from pkmcal.compensate import compensate
+    >>> robot = pk.load("hexapod")
+    >>> real = robot.replace({"offset1": 0.2})
+    >>> found = compensate(
+    ...     robot, [[0, 0, 850, 0, 0, 0]], lambda q: real.forward(q).pose, passes=3
+    ... )
+    >>> found.correction.round(6) + 0.0
+    array([[-0.2,  0. ,  0. ,  0. ,  0. ,  0. ]])
+    """
+    require_parallel(robot)
+    word("method", method, METHODS)
+    word("orientation", orientation, ORIENTATIONS)
+    flag("common", common)
+    instance("swarm", swarm, SwarmSettings)
+    if orientation == "from-position" and robot.model.map != "2tpr2tps":
+        raise ArgumentError(
+            "orientation='from-position' is for machines whose position tells their orientation,"
+            f" those of the pose map 2tpr2tps; {robot.name} has the map {robot.model.map}"
+        )
+    if whole("passes", passes, 1) > 1 and not callable(measured):
+        raise ArgumentError("passes: more than one needs measured to be a function of the commands")
+    poses, shape = as_rows("desired", desired, 6)
+    if len(shape) != 1 or not len(poses):
+        raise ArgumentError(f"desired must have shape (N, 6), found {(*shape, 6)}")
+    ideal = robot.inverse(poses, match)
+    seed = checked_seed(seed)
+    half_width = None if bounds is None else _half_width(bounds, ideal.shape[1])
+    correction = np.zeros_like(ideal)
+    gross = np.zeros(len(poses), dtype=bool)
+    history = []
+    for _ in range(passes):
+        reached = measured(ideal + correction) if callable(measured) else measured
+        at = _pose_of(reached, poses, orientation)
+        gross |= np.linalg.norm((at - poses)[:, :3], axis=1) > robot.length
+        off = ideal - robot.inverse(at, match)
+        if method == "pso":
+            step, of_pass = _by_swarm(off, common, half_width, seed, swarm)
+        else:
+            step = np.broadcast_to(_mean(off), off.shape) if common else off
+            of_pass = np.linalg.norm(off, axis=1)[:, None]
+        history.append(of_pass)
+        correction = correction + step
+    return Compensation(
+        actuators=ideal + correction,
+        correction=correction,
+        objective=np.linalg.norm(off - step, axis=1),
+        history=np.concatenate(history, axis=1),
+        gross=gross,
+        method=method,
+        orientation=orientation,
+        units=robot.actuator_units,
+    )
+
+
+def _mean(off: FloatArray) -> FloatArray:
+    """Of the rows that were reached (n,); NaN where there is none."""
+    reached = off[np.isfinite(off).all(axis=1)]
+    mean: FloatArray = reached.mean(axis=0) if len(reached) else np.full(off.shape[1], np.nan)
+    return mean
+
+
+def _half_width(bounds: ArrayLike, n: int) -> FloatArray:
+    given = as_numbers("bounds", bounds, n)
+    if given.shape not in ((), (n,)):
+        raise ArgumentError(f"bounds must be a number or have shape ({n},), found {bounds!r}")
+    if not (np.isfinite(given) & (given > 0)).all():
+        raise ArgumentError(f"bounds must be finite and positive, found {bounds!r}")
+    return np.array(np.broadcast_to(given, (n,)), dtype=np.float64)
+
+
+def _by_swarm(
+    off: FloatArray,
+    common: bool,
+    half_width: FloatArray | None,
+    seed: int,
+    settings: SwarmSettings,
+) -> tuple[FloatArray, FloatArray]:
+    """Corrections (N, n) and the swarms' history (N, iterations + 1)."""
+    reached = np.isfinite(off).all(axis=1)
+    if half_width is None:
+        widest = 2 * float(np.abs(off[reached]).max(initial=0.0))
+        half_width = np.full(off.shape[1], widest)
+    sets = off[None, reached] if common and reached.any() else off[:, None]
+    step, history = minimise_eq18(settings, sets, half_width, seed)
+    return (
+        np.broadcast_to(step, off.shape),
+        np.broadcast_to(history, (len(off), history.shape[1])),
+    )
+
+
+def _pose_of(reached: ArrayLike, desired: FloatArray, orientation: str) -> FloatArray:
+    """The measured poses, their orientation from where `orientation` says."""
+    given = as_numbers("measured", reached, 6)
+    width = given.shape[-1] if given.ndim else 0
+    if orientation != "measured" and width == 3:
+        rows, shape = as_rows("measured", given, 3)
+    elif width == 3:
+        raise ArgumentError(
+            "measured: positions do not tell the orientation; give poses (N, 6), or"
+            " orientation='assumed'"
+        )
+    else:
+        rows, shape = as_rows("measured", given, 6)
+    if shape != (len(desired),):
+        raise ArgumentError(
+            f"measured must have one row for each of {len(desired)} poses, found {given.shape}"
+        )
+    if orientation == "measured":
+        return rows
+    pose: FloatArray = desired.copy()
+    pose[:, :3] = rows[:, :3]
+    if orientation == "from-position":
+        pose[:, 4] = np.arctan2(pose[:, 0], pose[:, 2])
+    return pose

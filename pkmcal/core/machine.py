@@ -1,0 +1,317 @@
+"""A machine in the compiled core: its kinematics of rows of poses and actuator coordinates."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pkmcal._core import ffi, lib
+from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.core.library import DRIVERS, ISA, MAPS, ROWS, ensure, in_threads, int_pointer, pointer
+
+
+class Closure(NamedTuple):
+    """Closure rows of N poses, limb by limb and the sphere row first.
+
+    Attributes
+    ----------
+    residual : ndarray (N, rows)
+        mm.
+    by_step : ndarray (N, rows, m)
+        By the map's step, with an angle as its arc at the characteristic length.
+    by_free : ndarray (N, rows, m)
+        By the free coordinates, mm and rad.
+    by_q : ndarray (N, rows, n)
+        By the actuator coordinates.
+    """
+
+    residual: FloatArray
+    by_step: FloatArray
+    by_free: FloatArray
+    by_q: FloatArray
+
+
+class Machine:
+    """A machine in the core: what of a robot does not change with its geometry.
+
+    Parameters
+    ----------
+    map : str
+        A key of `MAPS`.
+    limbs : list of dict
+        Of each limb: driver, rows (names), actuator, branch, frame, platform_frame (3, 3), lever,
+        weights of the sphere row and the other rows.
+    length : float
+        Characteristic length, mm.
+    slots, home : ndarray
+        Geometry (limbs, SLOTS) and pose (6,) at which the order of elimination is chosen.
+    isa : int
+        Index into `ISAS`.
+    """
+
+    def __init__(
+        self,
+        map: str,
+        limbs: list[dict[str, Any]],
+        length: float,
+        slots: FloatArray,
+        home: FloatArray,
+        isa: int = ISA,
+    ) -> None:
+        struct = ffi.new("pkm_machine *")
+        struct.map = list(MAPS).index(map)
+        struct.limbs = len(limbs)
+        struct.actuators = 1 + max(limb["actuator"] for limb in limbs)
+        struct.length = length
+        struct.size = float(np.abs(slots).sum(axis=1).max() + np.abs(home[:3]).sum())
+        weights: list[float] = []
+        for i, limb in enumerate(limbs):
+            struct.driver[i] = DRIVERS.index(limb["driver"])
+            struct.rows[i] = sum(1 << ROWS.index(row) for row in limb["rows"])
+            struct.actuator[i] = limb["actuator"]
+            struct.branch[i] = limb["branch"]
+            struct.lever[i] = limb["lever"]
+            for k in range(9):
+                struct.frame[9 * i + k] = limb["frame"].flat[k]
+                struct.platform_frame[9 * i + k] = limb["platform_frame"].flat[k]
+            weights += limb["weights"]
+        for r, weight in enumerate(weights):
+            struct.weight[r] = weight
+        ensure(lib.pkm_order_rows(struct, pointer(slots), pointer(home)))
+        self.struct = struct
+        self.isa = isa
+        self.actuators: int = struct.actuators
+        self.m = len(MAPS[map])
+        self.rows = len(weights)
+
+    def inverse(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """Poses (N, 6) to actuator coordinates (N, n)."""
+        q = np.empty((len(pose), self.actuators))
+        if len(pose):
+            ensure(
+                lib.pkm_inverse(
+                    self.struct, self.isa, len(pose), pointer(slots), 0, pointer(pose), pointer(q)
+                )
+            )
+        return q
+
+    def forward(
+        self,
+        slots: FloatArray,
+        q: FloatArray,
+        guess: FloatArray,
+        threads: int | None,
+        shape: tuple[int, ...] | None = None,
+    ) -> tuple[FloatArray, Int32Array, Int32Array, FloatArray]:
+        """Actuator coordinates (N, n) to pose, status, iterations and residual.
+
+        `slots` is one geometry (limbs, SLOTS), or one per row (N, limbs, SLOTS); `guess` (6,) or
+        (N, 6). What is found has the leading `shape` of N rows, by default (N,).
+        """
+        n, shape = len(q), (len(q),) if shape is None else shape
+        pose, residual = np.empty((*shape, 6)), np.empty(shape)
+        status, iterations = np.empty(shape, dtype=np.int32), np.empty(shape, dtype=np.int32)
+        slot_stride = slots[0].size if slots.ndim == 3 else 0
+        guess_stride = 6 if guess.ndim == 2 else 0
+        # made once and moved from row to row: a pointer costs as much as an array
+        to_slots, to_q, to_guess = pointer(slots), pointer(q), pointer(guess)
+        to_pose, to_residual = pointer(pose), pointer(residual)
+        to_status, to_iterations = int_pointer(status), int_pointer(iterations)
+
+        def call(start: int, stop: int) -> int:
+            code: int = lib.pkm_forward(
+                self.struct,
+                self.isa,
+                stop - start,
+                to_slots + start * slot_stride,
+                slot_stride,
+                to_q + start * self.actuators,
+                to_guess + start * guess_stride,
+                guess_stride,
+                to_pose + 6 * start,
+                to_status + start,
+                to_iterations + start,
+                to_residual + start,
+            )
+            return code
+
+        if n:
+            in_threads(call, n, threads)
+        return pose, status, iterations, residual
+
+    def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """∂q/∂free at poses (N, 6): (N, n, m)."""
+        out = np.empty((len(pose), self.actuators, self.m))
+        if len(pose):
+            ensure(
+                lib.pkm_jacobian(
+                    self.struct, self.isa, len(pose), pointer(slots), 0, pointer(pose), pointer(out)
+                )
+            )
+        return out
+
+    def forward_jacobian(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
+        """∂pose/∂q at poses (N, 6): (N, 6, n)."""
+        out = np.empty((len(pose), 6, self.actuators))
+        if len(pose):
+            ensure(
+                lib.pkm_forward_jacobian(
+                    self.struct,
+                    self.isa,
+                    len(pose),
+                    pointer(slots),
+                    0,
+                    pointer(pose),
+                    pointer(q),
+                    pointer(out),
+                )
+            )
+        return out
+
+    def error_jacobian(
+        self,
+        slots: FloatArray,
+        pose: FloatArray,
+        q: FloatArray,
+        columns: Int32Array,
+        twists: bool = False,
+    ) -> FloatArray:
+        """∂pose/∂(numbers at `columns` of the flattened slots): (N, 6, columns).
+
+        Or of the twist (ω, v) of the platform by them.
+        """
+        out = np.empty((len(pose), 6, len(columns)))
+        if out.size:
+            ensure(
+                lib.pkm_error_jacobian(
+                    self.struct,
+                    self.isa,
+                    len(pose),
+                    pointer(slots),
+                    0,
+                    pointer(pose),
+                    pointer(q),
+                    int_pointer(columns),
+                    len(columns),
+                    twists,
+                    pointer(out),
+                )
+            )
+        return out
+
+    def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Velocity and acceleration of the actuators, (N, n) each.
+
+        `motion` (N, 3, 4, 4) is the platform's homogeneous matrix and its first and second
+        derivative by time.
+        """
+        n = len(motion)
+        velocity, acceleration = np.empty((n, self.actuators)), np.empty((n, self.actuators))
+        if n:
+            ensure(
+                lib.pkm_rates(
+                    self.struct,
+                    self.isa,
+                    n,
+                    pointer(slots),
+                    pointer(motion),
+                    pointer(velocity),
+                    pointer(acceleration),
+                )
+            )
+        return velocity, acceleration
+
+    def motion(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, q1: FloatArray, q2: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The platform's motion at poses (N, 6) as the actuators move with q1 and q2 (N, n).
+
+        The homogeneous matrix with its first and second derivative by time (N, 3, 4, 4), and
+        velocity and acceleration of the pose (N, 6) each. NaN where singular.
+        """
+        n = len(pose)
+        motion, rates = np.empty((n, 3, 4, 4)), np.empty((n, 2, 6))
+        if n:
+            ensure(
+                lib.pkm_motion(
+                    self.struct,
+                    self.isa,
+                    n,
+                    pointer(slots),
+                    pointer(pose),
+                    pointer(q),
+                    pointer(q1),
+                    pointer(q2),
+                    pointer(motion),
+                    pointer(rates),
+                )
+            )
+        return motion, rates[:, 0], rates[:, 1]
+
+    def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
+        """The closure rows and their derivatives at poses (N, 6) and coordinates (N, n)."""
+        n, m = len(pose), self.m
+        out = Closure(
+            np.empty((n, self.rows)),
+            np.empty((n, self.rows, m)),
+            np.empty((n, self.rows, m)),
+            np.empty((n, self.rows, self.actuators)),
+        )
+        if n:
+            ensure(
+                lib.pkm_closure(
+                    self.struct,
+                    self.isa,
+                    n,
+                    pointer(slots),
+                    pointer(pose),
+                    pointer(q),
+                    pointer(out.residual),
+                    pointer(out.by_step),
+                    pointer(out.by_free),
+                    pointer(out.by_q),
+                )
+            )
+        return out
+
+    def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """What the limbs are at coordinates (N, n): (N, limbs, 13).
+
+        Platform joint (3), anchor (3), length, axis at the base (3), axis at the platform (3), in
+        mm; lengths are NaN in rows where a limb has no positive one.
+        """
+        out = np.empty((len(q), self.struct.limbs, lib.PKM_SPHERE))
+        if len(q):
+            ensure(
+                lib.pkm_spheres(
+                    self.struct, self.isa, len(q), pointer(slots), pointer(q), pointer(out)
+                )
+            )
+        return out
+
+    def limbs(
+        self, slots: FloatArray, pose: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Look at each limb at poses (N, 6).
+
+        Its q̃ (N, limbs), and the unit vectors from its anchor to the
+        platform joint in base and in platform axes (N, limbs, 3).
+        """
+        n, limbs = len(pose), slots.shape[-2]
+        drive = np.empty((n, limbs))
+        base, platform = np.empty((n, limbs, 3)), np.empty((n, limbs, 3))
+        if n:
+            ensure(
+                lib.pkm_limbs(
+                    self.struct,
+                    self.isa,
+                    n,
+                    pointer(slots),
+                    pointer(pose),
+                    pointer(drive),
+                    pointer(base),
+                    pointer(platform),
+                )
+            )
+        return drive, base, platform

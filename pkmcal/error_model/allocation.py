@@ -1,0 +1,316 @@
+"""Which tolerance each joint may have, so that the pose error stays below what is allowed."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal import display
+from pkmcal.arguments import did_you_mean, number, words
+from pkmcal.arrays import FloatArray
+from pkmcal.core.library import POSE
+from pkmcal.error_model.tolerance import Tolerance, tolerance
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.perturbed import ideal
+from pkmcal.kinematics.robot import Robot, require_parallel
+
+DISTANCE = "distance"
+_SLACK = 1e-6  # of a limit, by which shares may overdraw it before they are scaled to it
+_JOINT = re.compile(r"([a-z_]+[0-9]+)\.[xyz]")  # base1.x belongs to base1.*
+
+Allowed = float | Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Allocation:
+    """Tolerances by joint, and what they lead to.
+
+    Attributes
+    ----------
+    joints : tuple of str, g
+        Each stands for the numbers that it matches.
+    sigma : ndarray (g,)
+        Standard deviation that each of its numbers may have, mm or rad; inf where they have no
+        effect on what is limited.
+    cost : ndarray (g,) or None
+        Weights of what each joint costs; None for equal contributions.
+    allowed : mapping of str to float
+        Limits of the distance of the position and of coordinates, mm and rad.
+    reached : mapping of str to float
+        What 99.7 % of the machines do not exceed at the worst pose, by Monte Carlo with draws of
+        its own.
+    contribution : ndarray (g,)
+        Share of each joint in the linear variance of what is limited, where it is tightest,
+        percent.
+    check : Tolerance
+        The Monte Carlo behind `reached`.
+    """
+
+    joints: tuple[str, ...]
+    sigma: FloatArray
+    cost: FloatArray | None
+    allowed: Mapping[str, float]
+    reached: Mapping[str, float]
+    contribution: FloatArray
+    check: Tolerance
+
+    def __str__(self) -> str:
+        geometry = self.check.robot.geometry
+        rows = []
+        for joint, sigma, share in zip(self.joints, self.sigma, self.contribution, strict=True):
+            first = geometry.names.index(geometry.match(joint)[0])
+            value, unit = display.displayed(float(sigma), geometry.units[first])
+            rows.append([f"{joint} [{unit}]", f"{value:.4g}", f"{share:.1f}"])
+        how = "equal contributions" if self.cost is None else "least cost"
+        lines = [
+            f"{self.check.robot.name}: tolerances by {how}, {self.check.poses.size // 6} poses",
+            str(display.Table(["joint", "sigma", "share [%]"], rows, left=1)),
+            "",
+        ]
+        for name, limit in self.allowed.items():
+            quantity = "rad" if name in POSE[3:] else "mm"
+            most, shown = display.displayed(limit, quantity)
+            reached, _ = display.displayed(self.reached[name], quantity)
+            lines.append(
+                f"{name}: {most:.4g} {shown} allowed; 99.7 % of {self.check.samples} machines stay"
+                f" within {reached:.4g} {shown} at the worst pose"
+            )
+        return "\n".join(lines)
+
+
+def allocate_tolerance(
+    robot: Robot,
+    poses: ArrayLike,
+    allowed: Allowed,
+    joints: str | Sequence[str] | None = None,
+    cost: float | Mapping[str, float] | None = None,
+    samples: int = 100_000,
+    seed: int = 0,
+    executor: Executor | None = None,
+) -> Allocation:
+    """Share an allowed pose error out among the joints.
+
+    Parameters
+    ----------
+    robot : Robot
+        The machine without errors.
+    poses : array_like (..., 6)
+        Where the error is limited, mm and rad; see `tolerance`.
+    allowed : float or mapping
+        What 99.7 % of the machines must not exceed at any of the poses: a number is the distance of
+        the position, mm; a mapping limits ``"distance"`` and coordinates ``"x"`` … ``"gamma"``, mm
+        and rad.
+    joints : str or sequence of str, optional
+        Names or wildcards; all numbers that one matches get the same sigma. By default every joint
+        and every other length: ``base1.*``, ``platform1.*``, ``offset1`` …
+    cost : float or mapping, optional
+        None gives every joint the same share of the variance. Otherwise the sum of cost/sigma over
+        all numbers is made least: a tolerance half as wide costs twice as much; weights by joint,
+        1 for those not named.
+    samples, seed, executor
+        Of the Monte Carlo simulations; see `tolerance`.
+
+    Returns
+    -------
+    Allocation
+        ``.sigma`` and the check of it.
+
+    Raises
+    ------
+    ValueError, TypeError
+        No limit above 0, one so wide that machines with such errors have no pose, an unknown or
+        tied name, no name at all, a number named by two joints, a cost that is not above 0.
+
+    Notes
+    -----
+    The shares come from linear propagation. Then all sigmas are scaled together until the exact
+    machines, drawn from `seed`, just keep the limits, and are checked with draws from `seed` + 1.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> robot = pk.load("2tpr2tps")
+    >>> found = pk.allocate_tolerance(robot, robot.home, 0.5, ["base*", "platform*", "offset*"])
+    >>> found.contribution.round(1)
+    array([33.3, 33.3, 33.3])
+    """
+    require_parallel(robot)
+    limits = _limits(allowed)
+    groups = _groups(robot, joints)
+    weights = None if cost is None else _weights(cost, groups)
+    at = ideal(robot, poses)
+    if not np.isfinite(at.poses).all():
+        row = int(np.flatnonzero(~np.isfinite(at.poses).all(axis=1))[0])
+        raise ArgumentError(f"poses: the machine cannot take row {row}")
+    jacobian = robot.error_jacobian(at.poses, at.actuators)
+    variance = np.stack(
+        [(jacobian[:, :, places] ** 2).sum(axis=-1) for places in groups.values()], axis=-1
+    )
+    use = np.concatenate([_used(variance, name) / limit**2 for name, limit in limits.items()])
+    if not use.any():
+        raise ArgumentError(
+            f"allowed: none of {', '.join(groups)} has an effect on {', '.join(limits)}"
+        )
+    felt = use.max(axis=0) > 1e-18 * use.max()
+    sigma = np.full(len(groups), np.inf)
+    sigma[felt] = (
+        _equal(use[:, felt])
+        if weights is None
+        else _cheapest(use[:, felt], (weights * [len(p) for p in groups.values()])[felt])
+    )
+    first = _simulate(robot, at.poses, groups, sigma, samples, seed, executor)
+    sigma /= max(_reached(first, name) / limit for name, limit in limits.items())
+    check = _simulate(robot, at.poses, groups, sigma, samples, seed + 1, executor)
+    spent = use[:, felt] * sigma[felt] ** 2
+    tightest = spent[np.argmax(spent.sum(axis=1))]
+    contribution = np.zeros(len(groups))
+    contribution[felt] = 100 * tightest / tightest.sum()
+    return Allocation(
+        tuple(groups),
+        sigma,
+        weights,
+        limits,
+        {name: _reached(check, name) for name in limits},
+        contribution,
+        check,
+    )
+
+
+def _used(variance: FloatArray, name: str) -> FloatArray:
+    """What one mm² or rad² of each joint adds to the variance that is limited, (N, g)."""
+    if name == DISTANCE:
+        total: FloatArray = variance[:, :3].sum(axis=1)
+        return total
+    return variance[:, POSE.index(name)]
+
+
+def _equal(use: FloatArray) -> FloatArray:
+    """The same share of the budget where each joint matters most; then all as wide as they may."""
+    sigma = 1 / np.sqrt(use.max(axis=0))
+    return np.asarray(sigma / np.sqrt((use @ sigma**2).max()))
+
+
+def _cheapest(use: FloatArray, cost: FloatArray) -> FloatArray:
+    """Least sum of cost/sigma with use @ sigma² ≤ 1 in every row.
+
+    Convex in log sigma. Only rows that some trial broke are taken as conditions.
+    """
+    from scipy.optimize import NonlinearConstraint, minimize
+
+    logs = np.log(_equal(use))
+    cost = cost / (cost * np.exp(-logs)).sum()
+    rows: list[int] = []
+
+    def price(s: FloatArray) -> float:
+        return float((cost * np.exp(-s)).sum())
+
+    def price_by_logs(s: FloatArray) -> FloatArray:
+        return -cost * np.exp(-s)
+
+    def spent(s: FloatArray) -> FloatArray:
+        return np.asarray(np.log(use[rows] @ np.exp(2 * s)))
+
+    def spent_by_logs(s: FloatArray) -> FloatArray:
+        each = use[rows] * np.exp(2 * s)
+        return np.asarray(2 * each / each.sum(axis=1, keepdims=True))
+
+    for _ in range(len(use)):
+        total = use @ np.exp(2 * logs)
+        if rows and total.max() <= 1 + _SLACK:
+            break
+        rows.append(int(np.argmax(total)))
+        logs = minimize(
+            price,
+            logs,
+            jac=price_by_logs,
+            method="SLSQP",
+            constraints=NonlinearConstraint(spent, -np.inf, 0.0, jac=spent_by_logs),
+            options={"maxiter": 500, "ftol": 1e-13},
+        ).x
+    return np.asarray(np.exp(logs) / np.sqrt((use @ np.exp(2 * logs)).max()))
+
+
+def _simulate(
+    robot: Robot,
+    poses: FloatArray,
+    groups: Mapping[str, list[int]],
+    sigma: FloatArray,
+    samples: int,
+    seed: int,
+    executor: Executor | None,
+) -> Tolerance:
+    deviations = np.zeros(len(robot.geometry))
+    for places, each in zip(groups.values(), sigma, strict=True):
+        deviations[places] = each if np.isfinite(each) else 0.0
+    found = tolerance(robot, poses, deviations, samples, seed, executor)
+    if lost := int(found.failed.max()):
+        raise ArgumentError(
+            f"allowed: errors that use it up leave {lost} of {samples} machines without a pose;"
+            " allow less"
+        )
+    return found
+
+
+def _reached(found: Tolerance, name: str) -> float:
+    """What 99.7 % of the machines do not exceed at the worst pose."""
+    if name == DISTANCE:
+        return float(found.distance997.max())
+    return float(np.abs(found.interval997[..., POSE.index(name), :]).max())
+
+
+def _limits(allowed: Allowed) -> dict[str, float]:
+    given = allowed if isinstance(allowed, Mapping) else {DISTANCE: allowed}
+    known = (DISTANCE, *POSE)
+    for name, limit in given.items():
+        if name not in known:
+            raise ArgumentError(
+                f"allowed: {name!r} is no error of a pose{did_you_mean(name, known)}"
+            )
+        number(f"allowed {name}", limit, above=0)
+    if not given:
+        raise ArgumentError("allowed must limit something, found nothing")
+    return {name: float(limit) for name, limit in given.items()}
+
+
+def _groups(robot: Robot, joints: str | Sequence[str] | None) -> dict[str, list[int]]:
+    """Places in ``geometry.names`` of the numbers of each joint."""
+    geometry = robot.geometry
+    if joints is None:
+        lengths = [
+            name
+            for name, unit, tied in zip(geometry.names, geometry.units, geometry.tied, strict=True)
+            if unit == "mm" and not tied
+        ]
+        joints = list(dict.fromkeys(_JOINT.sub(r"\1.*", name) for name in lengths))
+    groups: dict[str, list[int]] = {}
+    owner: dict[str, str] = {}
+    joints = words("joints", joints)
+    if not joints:
+        raise ArgumentError("joints: name at least one")
+    for joint in joints:
+        names = geometry.match(joint, "joints")
+        places = [geometry.names.index(name) for name in names]
+        if len({geometry.units[place] for place in places}) > 1:
+            raise ArgumentError(
+                f"joints: {joint!r} covers lengths and other numbers; name them apart"
+            )
+        for name in names:
+            if name in owner:
+                raise ArgumentError(f"joints: {name} is named by {owner[name]!r} and {joint!r}")
+            owner[name] = joint
+        groups[joint] = places
+    return groups
+
+
+def _weights(cost: float | Mapping[str, float], groups: Mapping[str, list[int]]) -> FloatArray:
+    given = cost if isinstance(cost, Mapping) else dict.fromkeys(groups, cost)
+    for name, weight in given.items():
+        if name not in groups:
+            raise ArgumentError(f"cost: {name!r} is none of the joints{did_you_mean(name, groups)}")
+        number(f"cost of {name}", weight, above=0)
+    return np.array([float(given.get(name, 1.0)) for name in groups])

@@ -1,0 +1,160 @@
+"""Many machines with random errors, solved exactly, in chunks of a fixed size.
+
+Each chunk has a seed of its own and is combined in its place, so that the numbers depend neither on
+how many workers there are nor on which is first.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal.arguments import executor as checked_executor
+from pkmcal.arguments import function
+from pkmcal.arrays import FloatArray
+from pkmcal.core.random import Normals
+from pkmcal.core.statistics import Bins, Stream
+from pkmcal.geometry.model import Model
+from pkmcal.kinematics.perturbed import Geometries, forward_of, quantities_off
+from pkmcal.kinematics.robot import Robot
+
+CHUNK = 16_384  # machines that share a seed
+BATCH = 2_048  # of these solved at a time: what fits the cache
+POSES = 16  # solved by one task
+PILOT = 1_024  # machines that tell how wide the bins must be; one batch
+AHEAD = 32  # tasks that are handed to an executor before the first of them is looked at
+
+QUANTITIES = ("x", "y", "z", "alpha", "beta", "gamma", "distance")
+Progress = Callable[[int, int], object]
+
+
+@dataclass(frozen=True, eq=False)
+class Draw:
+    """One task: so many machines at some poses.
+
+    Attributes
+    ----------
+    model : Model
+        The machine without errors.
+    places : ndarray of int (k,)
+        Which names have errors.
+    sigma : ndarray (k,)
+        Their standard deviations.
+    poses, actuators : ndarray (P, 6), (P, n)
+        Ideal poses and what leads there.
+    seed : SeedSequence
+        Of this chunk.
+    count : int
+        How many machines.
+    bins : tuple of Bins
+        Of each pose.
+    """
+
+    model: Model
+    places: NDArray[np.intp]
+    sigma: FloatArray
+    poses: FloatArray
+    actuators: FloatArray
+    seed: np.random.SeedSequence
+    count: int
+    bins: tuple[Bins, ...] = ()
+
+    def errors(self) -> Iterator[list[FloatArray]]:
+        """Pose errors of a batch of machines after the other: for each pose (7, n)."""
+        robot = Robot(self.model)
+        normals = Normals(self.seed)
+        errors = np.empty((min(BATCH, self.count), len(self.sigma)))
+        geometries = Geometries(robot.geometry, self.places, len(errors))
+        for start in range(0, self.count, BATCH):
+            drawn = normals.fill(errors[: self.count - start])
+            drawn *= self.sigma
+            slots = geometries.with_errors(drawn)
+            yield [
+                quantities_off(forward_of(robot, slots, q, pose), pose)
+                for pose, q in zip(self.poses, self.actuators, strict=True)
+            ]
+
+    def run(self) -> list[Stream]:
+        """Moments and counts of each pose."""
+        streams = [Stream(bins) for bins in self.bins]
+        for batch in self.errors():
+            for stream, values in zip(streams, batch, strict=True):
+                stream.add(values)
+        return streams
+
+
+def simulate(
+    draw: Draw, executor: Executor | None = None, progress: Progress | None = None
+) -> Iterator[Stream]:
+    """Pose errors of ``draw.count`` machines, one pose after the other.
+
+    Parameters
+    ----------
+    draw : Draw
+        All machines and all poses; its seed is the root of all seeds, its bins are found here.
+    executor : Executor, optional
+        Whose workers solve the chunks: threads, processes, Dask, MPI.
+    progress : callable, optional
+        Called with the poses solved so far and those there are, all machines counted.
+
+    Yields
+    ------
+    Stream
+        Of `QUANTITIES`, for each pose; the same bits with any executor.
+    """
+    workers = checked_executor(executor)
+    if progress is not None:
+        function("progress", progress)
+    chunks = -(-draw.count // CHUNK)
+    pilot_seed, *seeds = draw.seed.spawn(chunks + 1)
+    sizes = [CHUNK] * (chunks - 1) + [draw.count - CHUNK * (chunks - 1)]
+
+    def tasks() -> Iterator[Draw]:
+        for first in range(0, len(draw.poses), POSES):
+            part = slice(first, first + POSES)
+            block = replace(draw, poses=draw.poses[part], actuators=draw.actuators[part])
+            (pilot,) = replace(block, seed=pilot_seed, count=PILOT).errors()
+            bins = tuple(Bins.around(v[:, np.isfinite(v).all(axis=0)]) for v in pilot)
+            for seed, count in zip(seeds, sizes, strict=True):
+                yield replace(block, seed=seed, count=count, bins=bins)
+
+    done, block = 0, list[Stream]()
+    for place, (task, found) in enumerate(_in_order(tasks(), workers)):
+        if place % chunks == 0:
+            block = found
+        else:
+            for stream, other in zip(block, found, strict=True):
+                stream.merge(other)
+        done += task.count * len(task.poses)
+        if progress is not None:
+            progress(done, draw.count * len(draw.poses))
+        if place % chunks == chunks - 1:
+            yield from block
+
+
+def _in_order(
+    tasks: Iterator[Draw], executor: Executor | None
+) -> Iterator[tuple[Draw, list[Stream]]]:
+    """Each task with its result, in order; with an executor, `AHEAD` of them are on their way."""
+    if executor is None:
+        for task in tasks:
+            yield task, task.run()
+        return
+    waiting: deque[tuple[Draw, Future[list[Stream]]]] = deque()
+    try:
+        for task in tasks:
+            waiting.append((task, executor.submit(Draw.run, task)))
+            if len(waiting) >= AHEAD:
+                first, future = waiting.popleft()
+                yield first, future.result()
+        while waiting:
+            first, future = waiting.popleft()
+            yield first, future.result()
+    finally:
+        for _, future in waiting:
+            future.cancel()

@@ -1,0 +1,23 @@
+"""Errors and warnings of the package: one base for all, and the built-in ones they also are."""
+
+from __future__ import annotations
+
+
+class Error(Exception):
+    """What pkmcal raises about its arguments and files."""
+
+
+class ArgumentError(Error, ValueError):
+    """An argument that makes no sense; the message names it and says what was found."""
+
+
+class ArgumentTypeError(ArgumentError, TypeError):
+    """An argument of a type that is not taken; the message names it and says what was found."""
+
+
+class FileError(ArgumentError):
+    """What a file says makes no sense; the message names the file and, where it can, the line."""
+
+
+class CalibrationWarning(UserWarning):
+    """What `identify` has to say about a fit that succeeded."""

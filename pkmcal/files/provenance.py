@@ -1,0 +1,47 @@
+"""Where a file comes from: the version that wrote it and the checksums of what was read."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+
+_LONGEST = 120  # letters of a name
+
+
+def version() -> str:
+    """The version of this package."""
+    from importlib.metadata import version as installed  # takes a while to import
+
+    return installed("pkmcal")
+
+
+def checksums(files: Mapping[str, bytes]) -> dict[str, str]:
+    """SHA-256 of files by their printable names."""
+    return {printable(name): hashlib.sha256(data).hexdigest() for name, data in files.items()}
+
+
+def comment(files: Mapping[str, bytes]) -> str:
+    """Lines for the head of a TOML or CSV file.
+
+    Examples
+    --------
+    >>> print(comment({"probe.csv": b""}))  # doctest: +ELLIPSIS
+    # Written by pkmcal ... from
+    #   probe.csv, sha256 e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855
+    <BLANKLINE>
+    """
+    lines = [f"# Written by pkmcal {version()} from"]
+    lines += [f"#   {name}, sha256 {digest}" for name, digest in checksums(files).items()]
+    return "\n".join(lines) + "\n"
+
+
+def printable(text: str, longest: int = _LONGEST) -> str:
+    r"""A name on one line: control characters replaced, a long one cut.
+
+    Examples
+    --------
+    >>> printable("rod\n1")
+    'rod�1'
+    """
+    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+    return shown if len(shown) <= longest else shown[: longest - 1] + "…"

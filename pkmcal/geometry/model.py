@@ -1,0 +1,125 @@
+"""What a robot file says, as data: limbs, pose map, home, geometry. No kinematics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pkmcal.arrays import FloatArray, Unit
+from pkmcal.geometry.geometry import Geometry
+from pkmcal.geometry.limb_kinds import KINDS
+
+
+@dataclass(frozen=True, eq=False)
+class Cone:
+    """Limit of a joint: the limb stays within `angle` of `axis`.
+
+    The direction that is limited runs from the base joint (the carriage, the crank's end) to the
+    platform joint, seen in base axes for a base cone and in platform axes for a platform cone.
+
+    Attributes
+    ----------
+    axis : ndarray (3,)
+        Unit vector.
+    angle : float
+        Half the cone's opening, rad.
+    """
+
+    axis: FloatArray
+    angle: float
+
+
+@dataclass(frozen=True, eq=False)
+class Limb:
+    """One limb, apart from its numbers, which are in the geometry.
+
+    Attributes
+    ----------
+    kind : str
+        A name of `pkmcal.limb_kinds.KINDS`.
+    actuator : int
+        Which actuator drives it, counted from 0; limbs may share one.
+    branch : int
+        +1 or -1, the sign of u·∂c/∂q̃ with u from carriage to platform joint; 0 where the kind
+        has no branches.
+    frame : ndarray (3, 3)
+        Orthonormal and right-handed, columns e1 e2 e3 in base axes: e3 is the stated reference of
+        the slider, the crank's axis, the normal or the universal joint's axis; e1 is the crank's
+        direction at q̃ = 0 and otherwise chosen from e3. The identity where unused.
+    platform_frame : ndarray (3, 3)
+        The same for the revolute joint's axis, in platform axes.
+    couple : float
+        Length λ of the couple row in mm; 0 without that row.
+    weights : tuple of float
+        Of the rows beside the sphere row, in the order of ``LimbKind.all_rows``.
+    stroke : tuple of float or None
+        Limits of q̃; mm or rad.
+    base_cone, platform_cone : Cone or None
+        Limits of the joints.
+    """
+
+    kind: str
+    actuator: int
+    branch: int
+    frame: FloatArray
+    platform_frame: FloatArray
+    couple: float = 0.0
+    weights: tuple[float, ...] = ()
+    stroke: tuple[float, float] | None = None
+    base_cone: Cone | None = None
+    platform_cone: Cone | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A robot as its file describes it; mm and rad.
+
+    Attributes
+    ----------
+    name : str
+        The robot's name.
+    map : str
+        Pose map: "spatial", "translation", "planar" or "2tpr2tps".
+    home : ndarray (6,)
+        x y z α β γ; what the map does not leave free is 0.
+    match : tuple of str or None
+        The coordinates that determine a pose where limbs constrain it.
+    limbs : tuple of Limb
+        Limb 1 first.
+    geometry : Geometry
+        The numbers of the limbs and the named parameters.
+    free : tuple of str
+        Names that a calibration frees unless told otherwise; empty when the file has none.
+    stated : mapping of str to float
+        What a data sheet claims, by name of a number, of a slot ("rod": every rod), or of
+        `pkmcal.robotfile.STATED_SIZES`.
+    base_frame : ndarray (6,) or None
+        Pose of the machine's own frame in the frame poses are given in.
+    tool_frame : ndarray (6,) or None
+        Pose of the tool in the platform's own frame.
+    file : str or None
+        Where the model was read; a built-in machine has none.
+    """
+
+    name: str
+    map: str
+    home: FloatArray
+    match: tuple[str, ...] | None
+    limbs: tuple[Limb, ...]
+    geometry: Geometry
+    free: tuple[str, ...]
+    stated: Mapping[str, float]
+    base_frame: FloatArray | None = None
+    tool_frame: FloatArray | None = None
+    file: str | None = None
+
+    @property
+    def n_actuators(self) -> int:
+        """Number of actuators."""
+        return 1 + max(limb.actuator for limb in self.limbs)
+
+    @property
+    def actuator_units(self) -> tuple[Unit, ...]:
+        """Unit of each actuator coordinate, "mm" or "rad"."""
+        units = {limb.actuator: KINDS[limb.kind].actuator_unit for limb in self.limbs}
+        return tuple(units[i] for i in range(self.n_actuators))

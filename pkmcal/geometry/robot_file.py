@@ -1,0 +1,232 @@
+"""Robot files: TOML in, `Model` out, and back to the last bit."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pkmcal import arguments
+from pkmcal.arguments import did_you_mean
+from pkmcal.arrays import FloatArray, Unit
+from pkmcal.core.library import MAPS, POSE
+from pkmcal.exceptions import ArgumentTypeError, FileError
+from pkmcal.files.atomic import write_whole
+from pkmcal.files.toml_lines import Source
+from pkmcal.files.toml_table import ANGLE_UNITS, LENGTH_UNITS, Table, Units, shown
+from pkmcal.geometry.geometry import Geometry
+from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.model import Limb, Model
+from pkmcal.geometry.robot_file_limbs import Parameters, read_limbs
+from pkmcal.geometry.robot_file_writer import text_of
+
+# What a data sheet states beside single numbers: of the circles of the joints, and of the legs at
+# home, which a machine with length limbs has.
+STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_diameter", "length")
+TOP = ("name", "units", "frames", "pose", "parameters", "calibration", "stated", "limb")
+
+
+_BUILTIN = resources.files("pkmcal") / "builtin"
+
+
+def builtin_names(folder: str = "machines") -> tuple[str, ...]:
+    """Names of the built-in machines; of the serial arms with the folder "arms"."""
+    found = (_BUILTIN / folder).iterdir()
+    names = (entry.name for entry in found)
+    return tuple(sorted(name[: -len(".toml")] for name in names if name.endswith(".toml")))
+
+
+def _builtin() -> dict[str, Any]:
+    return {
+        name: _BUILTIN / folder / f"{name}.toml"
+        for folder in ("machines", "arms")
+        for name in builtin_names(folder)
+    }
+
+
+def read(robot: str | os.PathLike[str]) -> Model:
+    """Read a robot file or a built-in machine.
+
+    Parameters
+    ----------
+    robot : str or path
+        The name of a built-in machine, or a file.
+
+    Returns
+    -------
+    Model
+        What the file says, in mm and rad.
+
+    Raises
+    ------
+    ValueError
+        An unknown name, or a mistake in the file: one line with the file, its line, the table,
+        the key and what was found.
+    FileNotFoundError
+        No such file.
+    TypeError
+        `robot` is neither text nor a path.
+
+    Examples
+    --------
+    >>> read("hexapod").map
+    'spatial'
+    """
+    content, place, file = located(robot)
+    return parse(Source(content, place), file)
+
+
+def located(robot: str | os.PathLike[str]) -> tuple[bytes, str, str | None]:
+    """Content of a file or a built-in machine, how messages call it, and its path.
+
+    Raises as `read` does, where there is no such file.
+    """
+    if not isinstance(robot, str | os.PathLike):
+        raise ArgumentTypeError(f"robot must be a name or a path, found {robot!r}")
+    known = _builtin()
+    if isinstance(robot, str) and robot in known:
+        return known[robot].read_bytes(), f"built-in machine {robot}", None
+    path = Path(robot)
+    if path.is_file():
+        return path.read_bytes(), str(path), str(path)
+    if path.is_dir():
+        raise FileError(f"{path}: this is a folder, not a robot file")
+    if isinstance(robot, str) and path.name == robot and not path.suffix:
+        raise FileError(f"unknown machine {robot!r}{did_you_mean(robot, known)}")
+    near = (each.name for each in path.parent.glob("*.toml"))
+    raise FileNotFoundError(f"{path}: no such file{did_you_mean(path.name, near, listed=0)}")
+
+
+def write(model: Model, path: str | os.PathLike[str], comment: str = "") -> None:
+    """Write a robot file in mm and rad, which `read` reads back to the last bit.
+
+    The file is complete or untouched.
+
+    Parameters
+    ----------
+    model : Model
+        The robot.
+    path : str or path
+        Where to write; an existing file is replaced.
+    comment : str
+        Lines for its head, each with its ``#``.
+
+    Raises
+    ------
+    OSError
+        The folder does not exist or cannot be written.
+    """
+    write_whole(path, arguments.comment(comment) + text_of(model))
+
+
+def parse(source: Source, file: str | None) -> Model:
+    """Make a model of what a robot file says."""
+    top = Table(source.data, source)
+    top.only(TOP)
+    top.units = read_units(top)
+    parameters = Parameters(_section(top, "parameters"))
+    limbs = read_limbs(top.tables("limb", "a robot"), parameters)
+    values = parameters.finish([number.name for number in limbs.numbers])
+    geometry = Geometry(limbs.numbers, parameters.ordered_units(), limbs.values | values)
+
+    pose = top.table("pose")
+    pose.only(("map", "home", "match"))
+    pose_map = pose.choice("map", MAPS, "pose map")
+    _check_rows(pose, pose_map, limbs.limbs)
+    frames = _section(top, "frames")
+    frames.only(("base", "tool"))
+    return Model(
+        name=top.text("name"),
+        map=pose_map,
+        home=_read_pose(pose, "home", MAPS[pose_map], f"the map {pose_map}"),
+        match=_read_match(pose),
+        limbs=limbs.limbs,
+        geometry=geometry,
+        free=_read_free(_section(top, "calibration"), geometry),
+        stated=_read_stated(_section(top, "stated"), geometry, limbs.limbs),
+        base_frame=_read_pose(frames, "base", POSE) if "base" in frames else None,
+        tool_frame=_read_pose(frames, "tool", POSE) if "tool" in frames else None,
+        file=file,
+    )
+
+
+def _section(top: Table, key: str) -> Table:
+    """A table that may be left out."""
+    return top.table(key) if key in top else Table({}, top.source, (key,), top.units)
+
+
+def read_units(top: Table) -> Units:
+    """The units that a file states."""
+    table = top.table("units")
+    table.only(("length", "angle"))
+    length = table.choice("length", LENGTH_UNITS, "unit of length")
+    angle = table.choice("angle", ANGLE_UNITS, "unit of angle")
+    return Units(LENGTH_UNITS[length], ANGLE_UNITS[angle])
+
+
+def _check_rows(pose: Table, pose_map: str, limbs: tuple[Limb, ...]) -> None:
+    rows = sum(1 + len(KINDS[limb.kind].all_rows(limb.couple > 0.0)) for limb in limbs)
+    if rows < (free := len(MAPS[pose_map])):
+        pose.fail("map", f"{pose_map} has {free} free coordinates, but the limbs close only {rows}")
+
+
+def _read_pose(table: Table, key: str, known: tuple[str, ...], owner: str = "") -> FloatArray:
+    pose = table.table(key)
+    pose.only(known, owner)
+    units: dict[str, Unit] = {name: "mm" if name in "xyz" else "rad" for name in POSE}
+    found = np.array([pose.number(name, units[name], 0.0) for name in POSE])
+    found.flags.writeable = False
+    return found
+
+
+def _read_match(pose: Table) -> tuple[str, ...] | None:
+    if "match" not in pose:
+        return None
+    names = pose.texts("match")
+    for name in names:
+        if name not in POSE:
+            pose.fail("match", f"{name!r} is no coordinate{did_you_mean(name, POSE)}")
+    if not names or len(set(names)) < len(names):
+        pose.fail("match", f"must name some coordinates once each, found {shown(names)}")
+    return tuple(names)
+
+
+def _read_free(table: Table, geometry: Geometry) -> tuple[str, ...]:
+    table.only(("free",))
+    if "free" not in table:
+        return ()
+    patterns = table.texts("free")
+    try:
+        return tuple(geometry.match(patterns))
+    except ValueError as error:
+        table.fail("free", str(error))
+
+
+def _read_stated(table: Table, geometry: Geometry, limbs: tuple[Limb, ...]) -> Mapping[str, float]:
+    units: dict[str, Unit] = dict(zip(geometry.names, geometry.units, strict=True))
+    for limb in limbs:
+        for _, name, unit in KINDS[limb.kind].numbers("", limb.couple > 0.0):
+            if unit == "mm":
+                units.setdefault(name, unit)
+    for name in STATED_SIZES:
+        units.setdefault(name, "mm")
+    stated = {}
+    for name, value in _flat(table.data):
+        if name not in units:
+            known = did_you_mean(name, units)
+            table.fail("", f"the robot has no number {name!r}{known}", at=name)
+        stated[name] = table.as_number(name, value, units[name])
+    return stated
+
+
+def _flat(data: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Pairs of dotted name and value: an unquoted ``base1.x`` is a table within a table."""
+    for key, value in data.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value

@@ -1,0 +1,129 @@
+"""The text of a robot file: what `read` makes of it is the model, to the last bit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pkmcal.arrays import FloatArray
+from pkmcal.core.library import MAPS, POSE
+from pkmcal.geometry.geometry import Geometry
+from pkmcal.geometry.limb_kinds import KINDS, PLATFORM_TILT_SLOTS, TILT_SLOTS
+from pkmcal.geometry.model import Cone, Limb, Model
+from pkmcal.geometry.ties import LimbNumber, Term
+
+HEADER = "# A robot for pkmcal: lengths in mm, angles in rad.\n"
+
+
+def text_of(model: Model) -> str:
+    """The TOML text of a model, in mm and rad."""
+    head = {"name": model.name, "units": {"length": "mm", "angle": "rad"}}
+    blocks = [HEADER, lines(head)]
+    blocks += [f"[{key}]\n{lines(table)}" for key, table in _sections(model).items() if table]
+    limbs = (_limb(limb, i, model.geometry) for i, limb in enumerate(model.limbs))
+    blocks += [f"[[limb]]\n{lines(limb)}" for limb in limbs]
+    return "\n".join(blocks)
+
+
+def lines(table: Mapping[str, Any]) -> str:
+    """The keys of a table, each with its value on one line."""
+    return "".join(f"{_key(key)} = {_value(value)}\n" for key, value in table.items())
+
+
+def _key(key: str) -> str:
+    import tomli_w
+
+    return tomli_w.dumps({key: 0}).partition(" = ")[0]
+
+
+def _value(value: object) -> str:
+    """A value on one line: lists and tables within a table stay on theirs."""
+    import tomli_w
+
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(key)} = {_value(value[key])}" for key in value) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    return tomli_w.dumps({"_": value}).removeprefix("_ = ").removesuffix("\n")
+
+
+def _sections(model: Model) -> dict[str, Mapping[str, Any]]:
+    geometry = model.geometry
+    pose: dict[str, Any] = {
+        "map": model.map,
+        "home": _pose(model.home, MAPS[model.map]),
+    }
+    if model.match is not None:
+        pose["match"] = list(model.match)
+    frames = {"base": model.base_frame, "tool": model.tool_frame}
+    return {
+        "pose": pose,
+        "frames": {k: _pose(v, POSE) for k, v in frames.items() if v is not None},
+        "parameters": {name: geometry[name] for name in geometry.parameters},
+        "calibration": {"free": list(model.free)} if model.free else {},
+        "stated": model.stated,
+    }
+
+
+def _pose(pose: FloatArray, names: tuple[str, ...]) -> dict[str, float]:
+    return {name: float(pose[POSE.index(name)]) for name in names}
+
+
+def _limb(limb: Limb, i: int, geometry: Geometry) -> dict[str, Any]:
+    kind = KINDS[limb.kind]
+    couple = limb.couple > 0.0
+    numbers = {number.slot: number for number in geometry.numbers if number.limb == i}
+
+    def entry(slot: str) -> float | str:
+        tie = numbers[slot].tie
+        return geometry[numbers[slot].name] if tie is None else _term(tie.terms[0])
+
+    data: dict[str, Any] = {
+        "kind": limb.kind,
+        "actuator": limb.actuator + 1,
+        "base": _point("base", numbers, geometry),
+        "platform": _point("platform", numbers, geometry),
+    }
+    if kind.platform_axis is not None:
+        data[kind.platform_axis] = limb.platform_frame[:, 2].tolist()
+        data[f"{kind.platform_axis}_tilt"] = [entry(slot) for slot in PLATFORM_TILT_SLOTS]
+    if kind.base_axis is not None and kind.has_base_axis(couple):
+        data[kind.base_axis] = limb.frame[:, 2].tolist()
+        data[f"{kind.base_axis}_tilt"] = [entry(slot) for slot in TILT_SLOTS]
+    if kind.driver == "crank":
+        data["zero"] = limb.frame[:, 0].tolist()
+    data.update({key: entry(key) for key in (*kind.lengths, "offset", "gain")})
+    if couple:
+        data["couple"] = limb.couple
+    if limb.weights:
+        data["weights"] = list(limb.weights)
+    if kind.has_branch:
+        data["branch"] = limb.branch
+    if limb.stroke is not None:
+        data["stroke"] = list(limb.stroke)
+    for key, cone in (("base_cone", limb.base_cone), ("platform_cone", limb.platform_cone)):
+        if cone is not None:
+            data[key] = _cone(cone)
+    return data
+
+
+def _point(
+    point: str, numbers: Mapping[str, LimbNumber], geometry: Geometry
+) -> list[float | str] | dict[str, float | str]:
+    xyz = [numbers[f"{point}.{axis}"] for axis in "xyz"]
+    entries = [geometry[n.name] if n.tie is None else _term(n.tie.terms[0]) for n in xyz]
+    tie = xyz[0].tie
+    if tie is None or tie.rule == "equal":
+        return entries
+    radius, angle = tie.terms
+    return {"radius": _term(radius), "angle": _term(angle), "z": entries[2]}
+
+
+def _term(term: Term) -> float | str:
+    if term.name is None:
+        return term.factor
+    return term.name if term.factor > 0.0 else f"-{term.name}"
+
+
+def _cone(cone: Cone) -> dict[str, Any]:
+    return {"axis": cone.axis.tolist(), "angle": cone.angle}

@@ -1,0 +1,106 @@
+"""Which limits of which limbs a pose keeps: reach, strokes and joint cones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.geometry.model import Cone, Limb
+
+ROUNDING = 1e-12  # relative: a pose at a limit keeps it
+
+
+@dataclass(frozen=True, eq=False)
+class Feasibility:
+    """Limits kept, for each pose and limb; every array is (..., limbs).
+
+    Attributes
+    ----------
+    reach : ndarray of bool
+        The limb has an actuator coordinate there at all.
+    stroke : ndarray of bool
+        q̃ is within its stroke; True where the limb states none.
+    base_cone, platform_cone : ndarray of bool
+        The joint's cone is kept; True where the limb states none.
+    drive : ndarray
+        q̃ of each limb, mm or rad; NaN out of reach.
+    stroke_margin, base_cone_margin, platform_cone_margin : ndarray
+        How far inside its limit each is, mm or rad; below 0 where it is broken, infinite where the
+        limb states none.
+    """
+
+    reach: BoolArray
+    stroke: BoolArray
+    base_cone: BoolArray
+    platform_cone: BoolArray
+    drive: FloatArray
+    stroke_margin: FloatArray
+    base_cone_margin: FloatArray
+    platform_cone_margin: FloatArray
+
+    LIMITS = ("reach", "stroke", "base_cone", "platform_cone")
+
+    @property
+    def ok(self) -> BoolArray:
+        """Whether every limb keeps every limit, (...)."""
+        kept = self.reach & self.stroke & self.base_cone & self.platform_cone
+        return np.asarray(kept.all(axis=-1))
+
+    def broken(self) -> list[str]:
+        """What is broken, one line per limit and limb, over all poses."""
+        lines = []
+        for limit in self.LIMITS:
+            kept = getattr(self, limit).reshape(-1, self.reach.shape[-1])
+            for limb in range(kept.shape[1]):
+                rows = np.flatnonzero(~kept[:, limb])
+                if rows.size:
+                    what = limit.replace("_", " ")
+                    shown = ", ".join(map(str, rows[:5])) + (", …" if rows.size > 5 else "")
+                    lines.append(f"limb {limb + 1}: {what} broken in rows {shown}")
+        return lines
+
+    def __str__(self) -> str:
+        ok = np.atleast_1d(self.ok)
+        return "\n".join([f"{int(ok.sum())} of {ok.size} poses keep all limits", *self.broken()])
+
+
+def feasibility(
+    limbs: tuple[Limb, ...], drive: FloatArray, on_base: FloatArray, on_platform: FloatArray
+) -> Feasibility:
+    """Compare limbs at N poses with their limits.
+
+    Parameters
+    ----------
+    limbs : tuple of Limb
+        With strokes and cones, or without.
+    drive : ndarray (N, limbs)
+        q̃, NaN out of reach.
+    on_base, on_platform : ndarray (N, limbs, 3)
+        Unit vectors from anchor to platform joint, in base and platform axes.
+    """
+    stroke, base_cone, platform_cone = (np.full(drive.shape, np.inf) for _ in range(3))
+    room = np.zeros((3, drive.shape[1]))
+    for i, limb in enumerate(limbs):
+        if limb.stroke is not None:
+            low, high = limb.stroke
+            room[0, i] = abs(low) + abs(high)
+            stroke[:, i] = np.minimum(drive[:, i] - low, high - drive[:, i])
+        for k, cone, margin, direction in (
+            (1, limb.base_cone, base_cone, on_base),
+            (2, limb.platform_cone, platform_cone, on_platform),
+        ):
+            if cone is not None:
+                room[k, i] = cone.angle
+                margin[:, i] = _inside(cone, direction[:, i])
+    margins = (stroke, base_cone, platform_cone)
+    kept = [margin >= -ROUNDING * size for margin, size in zip(margins, room, strict=True)]
+    return Feasibility(
+        np.isfinite(drive), kept[0], kept[1], kept[2], drive, stroke, base_cone, platform_cone
+    )
+
+
+def _inside(cone: Cone, direction: FloatArray) -> FloatArray:
+    across = np.linalg.norm(np.cross(cone.axis, direction), axis=-1)
+    return np.asarray(cone.angle - np.arctan2(across, direction @ cone.axis))

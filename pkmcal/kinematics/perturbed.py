@@ -1,0 +1,180 @@
+"""One robot with a geometry of its own in every row, and the poses where its ideal one is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pkmcal._core import lib
+from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.core.library import int_pointer, pointer
+from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.geometry import Geometry
+from pkmcal.geometry.ties import Term, Tie
+from pkmcal.kinematics.robot import Robot
+
+ON_THE_MANIFOLD = 1e-6  # mm of closure error up to which a pose is taken as it is given
+
+
+class Ideal(NamedTuple):
+    """Poses that a robot without errors takes, and the actuator coordinates that lead there.
+
+    Attributes
+    ----------
+    poses : ndarray (N, 6)
+        x y z in mm, α β γ in rad; NaN where there is none.
+    actuators : ndarray (N, n)
+        mm or rad.
+    shape : tuple of int
+        The batch's leading shape.
+    """
+
+    poses: FloatArray
+    actuators: FloatArray
+    shape: tuple[int, ...]
+
+
+def ideal(robot: Robot, poses: ArrayLike) -> Ideal:
+    """Command poses: what the machine's closures do not allow is completed first.
+
+    Parameters
+    ----------
+    robot : Robot
+        The machine without errors.
+    poses : array_like (..., 6)
+        x y z in mm, α β γ in rad. Of a pose that the machine cannot take, the coordinates that
+        its file declares are kept (`Robot.complete`).
+
+    Raises
+    ------
+    ValueError, TypeError
+        A wrong shape, no pose at all, or no numbers.
+    """
+    given, shape = as_rows("poses", poses, 6)
+    if not len(given):
+        raise ArgumentError("poses must be at least one, found none")
+    rows = completed(robot, given)
+    actuators = robot.inverse(rows)
+    return Ideal(robot.forward(actuators, guess=rows).pose, actuators, shape)
+
+
+def completed(robot: Robot, poses: FloatArray) -> FloatArray:
+    """Poses (N, 6) with those completed that the closures do not allow; NaN where there is none."""
+    fits = robot.violation(poses) <= ON_THE_MANIFOLD
+    if fits.all():
+        return poses
+    poses = poses.copy()
+    poses[~fits] = robot.complete(poses[~fits])
+    return poses
+
+
+class Geometries:
+    """Geometries with errors, as the core takes them, a batch after the other.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Without errors.
+    places : ndarray of int (k,)
+        Which of ``geometry.names`` have errors: limb numbers first, none of them tied.
+    rows : int
+        How many geometries a batch has at most.
+    """
+
+    def __init__(self, geometry: Geometry, places: NDArray[np.intp], rows: int) -> None:
+        self._geometry = geometry
+        self._slots = np.repeat(geometry.slots.reshape(1, -1), rows, axis=0)
+        own = int(np.searchsorted(places, len(geometry.numbers)))  # parameters come after
+        self._own = np.ascontiguousarray(geometry.slot_index[places[:own]], dtype=np.int32)
+        self._parameters = {geometry.names[place]: own + i for i, place in enumerate(places[own:])}
+        self._tied = [
+            (place, number.tie)
+            for place, number in zip(geometry.slot_index, geometry.numbers, strict=True)
+            if number.tie and not self._parameters.keys().isdisjoint(number.tie.drivers)
+        ]
+
+    def with_errors(self, errors: FloatArray) -> FloatArray:
+        """Slots (N, limbs, SLOTS) for errors (N, k), mm and rad; valid until the next call.
+
+        Tied numbers follow their parameters exactly.
+        """
+        geometry, slots = self._geometry, self._slots[: len(errors)]
+        code = lib.pkm_with_errors(
+            len(errors),
+            len(self._own),
+            pointer(np.ascontiguousarray(errors[:, : len(self._own)])),
+            int_pointer(self._own),
+            slots.shape[1],
+            pointer(geometry.slots),
+            pointer(slots),
+        )
+        if code < 0:
+            raise ArgumentError(f"the core refused the call (code {code})")
+        changed = {
+            name: geometry[name] + errors[:, column] for name, column in self._parameters.items()
+        }
+        for place, tie in self._tied:
+            slots[:, place] = _tied(tie, geometry, changed)
+        return slots.reshape(len(errors), *geometry.slots.shape)
+
+
+def _tied(tie: Tie, geometry: Geometry, changed: Mapping[str, FloatArray]) -> FloatArray:
+    def value(term: Term) -> FloatArray | float:
+        if term.name is None:
+            return term.factor
+        return term.factor * changed.get(term.name, geometry[term.name])
+
+    first, *angle = map(value, tie.terms)
+    if tie.rule != "equal":
+        first = first * (np.cos(angle[0]) if tie.rule == "cos" else np.sin(angle[0]))
+    return np.asarray(first)
+
+
+def forward_of(
+    robot: Robot, slots: FloatArray, actuators: FloatArray, guess: FloatArray
+) -> FloatArray:
+    """Poses of machines that differ in geometry and have the same actuator coordinates.
+
+    Parameters
+    ----------
+    robot : Robot
+        What the machines have in common.
+    slots : ndarray (N, limbs, SLOTS)
+        Their geometries.
+    actuators : ndarray (n,)
+        mm or rad.
+    guess : ndarray (6,)
+        Where to start, in the robot's frames.
+
+    Returns
+    -------
+    ndarray (N, 6)
+        NaN where a machine has no pose near the guess.
+    """
+    q = np.repeat(actuators[None], len(slots), axis=0)
+    start = robot._frames.inward(guess[None])[0]
+    own = robot._machine.forward(slots, q, start, threads=1)[0]
+    return robot._frames.outward(own)
+
+
+def off(poses: FloatArray, from_poses: FloatArray) -> FloatArray:
+    """Pose errors (..., 6), eq. 16: angles the short way round."""
+    error = poses - from_poses
+    _short_way(error[..., 3:])
+    return error
+
+
+def quantities_off(poses: FloatArray, from_pose: FloatArray) -> FloatArray:
+    """Errors of poses (N, 6) from one pose and the distance of their positions, (7, N)."""
+    found = np.empty((7, len(poses)))
+    np.subtract(poses.T, from_pose[:, None], out=found[:6])
+    _short_way(found[3:6])
+    np.sqrt(found[0] ** 2 + found[1] ** 2 + found[2] ** 2, out=found[6])
+    return found
+
+
+def _short_way(angles: FloatArray) -> None:
+    angles -= 2 * np.pi * np.rint(angles / (2 * np.pi))

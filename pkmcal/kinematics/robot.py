@@ -1,0 +1,329 @@
+"""`Robot`: a machine with its geometry, what an error in it does, its limits and its file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import fields, replace
+from os import PathLike
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal.arguments import instance, whole
+from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry import robot_file
+from pkmcal.geometry.geometry import Geometry
+from pkmcal.geometry.model import Model
+from pkmcal.kinematics import overconstrained
+from pkmcal.kinematics.kinematics import Kinematics, Match
+from pkmcal.kinematics.limits import Feasibility, feasibility
+from pkmcal.modes import find as modes
+from pkmcal.modes.assemblies import Assemblies
+
+
+class Robot(Kinematics):
+    """A parallel machine: immutable; `replace` gives a changed one.
+
+    Made by `load`. Poses are x y z in mm and α β γ in rad with R = Rz(γ) Ry(β) Rx(α), platform to
+    base, in the robot's base and tool frames where its file has them; actuator coordinates are mm
+    or rad as the limbs say. All calls take any leading batch shape.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> robot = pk.load("2tpr2tps")
+    >>> q = robot.inverse([0, 0, 400, 0, 0, 0])
+    >>> robot.forward(q).pose.round(6) + 0.0
+    array([  0.,   0., 400.,   0.,   0.,   0.])
+    """
+
+    # what it is -----------------------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """The robot's name."""
+        return self.model.name
+
+    @property
+    def geometry(self) -> Geometry:
+        """The named numbers: ``.names .values .units``, ``["base1.x"]``."""
+        return self.model.geometry
+
+    @property
+    def actuator_units(self) -> tuple[str, ...]:
+        """Unit of each actuator coordinate, "mm" or "rad"."""
+        return self.model.actuator_units
+
+    def __reduce__(self) -> tuple[type[Robot], tuple[Model]]:
+        return Robot, (self.model,)
+
+    def __repr__(self) -> str:
+        return f"<Robot {self.name}: {len(self.model.limbs)} limbs, {' '.join(self.coordinates)}>"
+
+    # poses the machine can take -------------------------------------------------------------------
+
+    def complete(self, pose: ArrayLike, match: Match = True) -> FloatArray:
+        """The pose the machine takes when some coordinates are to be kept.
+
+        Parameters
+        ----------
+        pose : array_like (..., 6)
+            x y z in mm, α β γ in rad; what is not matched is where the search starts.
+        match : True or names of coordinates
+            As many as the machine has degrees of freedom; True takes those its file declares, or
+            its free coordinates.
+
+        Returns
+        -------
+        ndarray (..., 6)
+            NaN where the machine has no such pose.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> pose = pk.load("2tpr2tps").complete([0, 10, 400, 0.1, 0.2, 0])
+        >>> bool(abs(pose[0] - 400 * np.tan(0.2)) < 1e-9)
+        True
+        """
+        rows, shape = self._own_rows(pose)
+        return self._frames.outward(self._completed(rows, match)[0]).reshape(*shape, 6)
+
+    def violation(self, pose: ArrayLike) -> FloatArray:
+        """How far a pose is from one the machine can take.
+
+        Parameters
+        ----------
+        pose : array_like (..., 6)
+            x y z in mm, α β γ in rad.
+
+        Returns
+        -------
+        ndarray (...)
+            The largest closure error that is left with the limbs at their inverse, mm. Near 0
+            where six numbers are free, or where they fit.
+        """
+        rows, shape = self._own_rows(pose)
+        q = self._machine.inverse(self._slots, rows)
+        residual = self._machine.closure(self._slots, rows, q).residual
+        return np.asarray(np.abs(residual).max(axis=1)).reshape(shape)
+
+    def feasible(self, pose: ArrayLike) -> Feasibility:
+        """Which limits of which limbs a pose keeps.
+
+        Parameters
+        ----------
+        pose : array_like (..., 6)
+            x y z in mm, α β γ in rad.
+
+        Returns
+        -------
+        Feasibility
+            ``.ok`` for each pose; reach, stroke and joint cones for each limb.
+        """
+        rows, shape = self._own_rows(pose)
+        drive, on_base, on_platform = self._machine.limbs(self._slots, rows)
+        found = feasibility(self.model.limbs, drive, on_base, on_platform)
+        return Feasibility(
+            *(
+                getattr(found, field.name).reshape(*shape, len(self.model.limbs))
+                for field in fields(Feasibility)
+            )
+        )
+
+    def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
+        """Every assembly mode at given actuator coordinates, with proof.
+
+        Every complex solution of the closures is followed from a start system where all are known
+        (parameter homotopy), each real one is certified by the theorem of Newton and Kantorovich.
+        Machines without a start system, and doubts, are given random starts, which prove nothing.
+
+        Parameters
+        ----------
+        q : array_like (n,)
+            Actuator coordinates, mm or rad.
+        starts : int, optional
+            Random starts of Newton's method. By default none where the paths prove that no mode is
+            missing, otherwise 2000.
+
+        Returns
+        -------
+        Assemblies
+            ``.poses`` (k, 6), nearest to home first, ``.certified`` (k,), ``.complete``.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A wrong shape, or no numbers.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> modes = pk.load("2tpr2tps").forward_all([450.0, 452.0, 400.0, 405.0])
+        >>> len(modes), bool(modes.certified.all()), modes.complete
+        (8, True, True)
+        """
+        rows, shape = as_rows("q", q, self.n_actuators)
+        if shape != ():
+            raise ArgumentError(f"q must have shape ({self.n_actuators},), found {np.shape(q)}")
+        if starts is not None:
+            whole("starts", starts, 0, note=" or None")
+        subject = self._subject(rows[0])
+        found = modes.find(subject, starts)
+        apart = modes.distance(found.poses, self._own_home[None], self.length)
+        own = np.ascontiguousarray(found.poses[np.argsort(apart)])
+        poses = self._frames.outward(own)
+
+        def led(pose: FloatArray, actuators: ArrayLike | None, steps: int) -> FloatArray:
+            own = self._frames.inward(pose[None])
+            if actuators is None:
+                begin = self._machine.inverse(self._slots, own)
+            else:
+                begin = as_rows("actuators", actuators, self.n_actuators)[0]
+            end = modes.led(subject, own, begin, steps)
+            outward: FloatArray = self._frames.outward(end)[0]
+            return outward
+
+        return modes.assemblies(
+            subject,
+            found,
+            poses,
+            np.argsort(apart),
+            _apart=lambda pose: modes.distance(own, self._frames.inward(pose), self.length),
+            _feasible=lambda: self.feasible(poses).ok,
+            _led=led,
+        )
+
+    # errors of its geometry -----------------------------------------------------------------------
+
+    def error_jacobian(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
+        """∂pose/∂geometry with the actuators held: what a small error of each number does.
+
+        Parameters
+        ----------
+        pose : array_like (..., 6)
+            x y z in mm, α β γ in rad.
+        actuators : array_like (..., n), optional
+            The coordinates that lead to these poses; the inverse of the pose by default.
+
+        Returns
+        -------
+        ndarray (..., 6, p)
+            In the order of ``geometry.names``. The column of a tied number says what that number
+            alone would do; the column of a parameter what it does through all its ties.
+            NaN at a type-2 singularity. With more closures than free coordinates it is that of the
+            pose which misses them least.
+        """
+        given, own, q, shape = self._visited(pose, actuators)
+        errors = self._by_numbers(own, q, twists=False)
+        errors = self._through_ties(self._frames.rates_outward(own, given, errors))
+        return errors.reshape(*shape, 6, len(self.geometry))
+
+    def error_twists(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
+        """`error_jacobian` with the motion as a twist, which is regular at every orientation.
+
+        Parameters
+        ----------
+        pose, actuators : array_like
+            As for `error_jacobian`.
+
+        Returns
+        -------
+        ndarray (..., 6, p)
+            The platform's turning, then the velocity of its origin, both in base axes, by each
+            number: rad and mm per mm or rad. NaN at a type-2 singularity.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")
+        >>> upright = [0, 0, 850, 0, 0, 0]  # where α β γ turn about the axes
+        >>> twists, rates = robot.error_twists(upright), robot.error_jacobian(upright)
+        >>> bool(abs(twists[[3, 4, 5, 0, 1, 2]] - rates).max() < 1e-12)
+        True
+        """
+        _, own, q, shape = self._visited(pose, actuators)
+        errors = self._by_numbers(own, q, twists=True)
+        errors = self._through_ties(self._frames.twists_outward(own, errors))
+        return errors.reshape(*shape, 6, len(self.geometry))
+
+    def visited(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+        """Pose, actuator coordinates and batch shape of poses (..., 6)."""
+        rows, _, q, shape = self._visited(places, None)
+        return rows, q, shape
+
+    def _visited(
+        self, pose: ArrayLike, actuators: ArrayLike | None
+    ) -> tuple[FloatArray, FloatArray, FloatArray, tuple[int, ...]]:
+        """Poses as given and the machine's own, their actuators, and the batch's shape."""
+        given, shape = as_rows("pose", pose, 6)
+        own = self._frames.inward(given)
+        if actuators is None:
+            return given, own, self._machine.inverse(self._slots, own), shape
+        q, q_shape = as_rows("actuators", actuators, self.n_actuators)
+        if q_shape != shape:
+            raise ArgumentError(f"actuators are a batch {q_shape}, poses a batch {shape}")
+        return given, own, q, shape
+
+    def _by_numbers(self, own: FloatArray, q: FloatArray, twists: bool) -> FloatArray:
+        """How the machine's own pose follows each number of each limb, (N, 6, numbers)."""
+        columns = self.geometry.slot_index.astype(np.int32)
+        if self._machine.rows > self._machine.m:
+            units = self.geometry.units[: len(columns)]
+            return overconstrained.error_jacobian(
+                self._machine, self._slots, own, q, columns, units, twists
+            )
+        return self._machine.error_jacobian(self._slots, own, q, columns, twists)
+
+    def _through_ties(self, errors: FloatArray) -> FloatArray:
+        """The same (N, 6, p) with the columns of named parameters after those of the numbers."""
+        count = len(self.geometry) - errors.shape[2]
+        if not count:
+            return errors
+        named = errors @ self.geometry.chain[:, -count:]
+        return np.concatenate([errors, named], axis=-1)
+
+    # changing and saving --------------------------------------------------------------------------
+
+    def replace(self, changes: Mapping[str, float] | FloatArray) -> Robot:
+        """A robot with some numbers of its geometry changed.
+
+        Parameters
+        ----------
+        changes : mapping of str to float, or array (p,)
+            mm and rad; a tied number cannot be replaced.
+
+        Raises
+        ------
+        ValueError
+            An unknown or tied name, a value that is not finite, a wrong shape.
+        """
+        return Robot(replace(self.model, geometry=self.geometry.replace(changes)))
+
+    def _nudged(self, values: FloatArray) -> Robot:
+        """`replace` for numbers (p,) near the present ones, without ordering the elimination anew.
+
+        Three times as fast, for machines that live as long as one step of a search.
+        """
+        nudged = copy(self)
+        nudged.model = replace(self.model, geometry=self.geometry.replace(values))
+        nudged._slots = np.ascontiguousarray(nudged.model.geometry.slots)
+        return nudged
+
+    def save(self, path: str | PathLike[str], comment: str = "") -> None:
+        """Write the robot file; `load` reads it back to the last bit.
+
+        Parameters
+        ----------
+        path : str or path
+            Where to write; an existing file is replaced, whole or not at all.
+        comment : str, optional
+            Lines for its head, each with its ``#``.
+        """
+        robot_file.write(self.model, path, comment)
+
+
+def require_parallel(robot: object, name: str = "robot") -> None:
+    """Refuse what is no parallel machine with a TypeError that names the argument."""
+    instance(name, robot, Robot, ", a parallel machine")

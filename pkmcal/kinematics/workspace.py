@@ -1,0 +1,378 @@
+"""Where a machine can go and how well it moves there: grids of poses, limits, singularities."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal import display
+from pkmcal.arguments import checked_seed, did_you_mean, number, whole
+from pkmcal.arrays import BoolArray, FloatArray, as_rows
+from pkmcal.core.library import POSE
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.limits import Feasibility
+from pkmcal.kinematics.perturbed import completed
+from pkmcal.kinematics.robot import Robot, require_parallel
+
+_BLOCK = 20_000  # poses at a time
+_STEPS = 200  # along each coordinate, in search of the end of the workspace
+_SMALLEST = 0.1  # of the conditioning at home: poses nearer to a singularity are not drawn
+_PATIENCE = 100  # times as many draws as poses are wanted
+_POWER = {1: "", 2: "²", 3: "³"}
+
+
+@dataclass(frozen=True, eq=False)
+class Dexterity:
+    """How well closures hold poses, for poses of any leading shape; NaN out of reach.
+
+    The singular values are those of the closures by a twist of the platform, rotations as their
+    arc at ``robot.length``: how far the joints part in mm when the platform yields by 1 mm.
+
+    Attributes
+    ----------
+    conditioning : ndarray (...)
+        σ_min/σ_max: 1 is isotropic, 0 a type-2 singularity. As `Forward.conditioning`.
+    sigma_min : ndarray (...)
+        The smallest: how well the weakest direction is held; 0 at a type-2 singularity.
+    manipulability : ndarray (...)
+        Their product.
+    determinant : ndarray (...)
+        The product with a sign, which changes across a type-2 singularity; NaN where there are
+        more closures than free coordinates.
+    transmission : ndarray (...)
+        The least of the limbs' |cos| of the angle between the limb and the motion of its actuator;
+        0 at a type-1 singularity, 1 for a limb whose own length is driven.
+    """
+
+    conditioning: FloatArray
+    sigma_min: FloatArray
+    manipulability: FloatArray
+    determinant: FloatArray
+    transmission: FloatArray
+
+
+def dexterity(robot: Robot, poses: ArrayLike) -> Dexterity:
+    """Conditioning, manipulability and distance from singularities at poses.
+
+    Parameters
+    ----------
+    robot : Robot
+        The machine.
+    poses : array_like (..., 6)
+        x y z in mm, α β γ in rad; on the machine's closures (`Robot.complete`).
+
+    Returns
+    -------
+    Dexterity
+        Arrays of the poses' leading shape.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A wrong shape, or no numbers.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> robot = pk.load("2tpr2tps")
+    >>> found = dexterity(robot, robot.home)
+    >>> round(float(found.conditioning), 3), round(float(found.transmission), 3)
+    (0.104, 1.0)
+    """
+    require_parallel(robot)
+    rows, shape = as_rows("poses", poses, 6)
+    found = [_dexterity(robot, rows[i : i + _BLOCK]) for i in range(0, len(rows), _BLOCK)]
+    joined = np.concatenate(found, axis=1) if found else np.empty((5, 0))
+    return Dexterity(*(column.reshape(shape) for column in joined))
+
+
+def _dexterity(robot: Robot, poses: FloatArray) -> FloatArray:
+    """The five measures, one per row (5, N)."""
+    own, _ = robot._own_rows(poses)
+    slots = robot._slots
+    closure = robot._machine.closure(slots, own, robot._machine.inverse(slots, own))
+    out = np.full((5, len(own)), np.nan)
+    numbers = np.concatenate([closure.by_step, closure.by_q], axis=-1)
+    good = np.isfinite(numbers).all(axis=(1, 2))
+    steps = closure.by_step[good]
+    sigma = np.linalg.svd(steps, compute_uv=False)
+    out[0, good] = sigma[:, -1] / sigma[:, 0]
+    out[1, good] = sigma[:, -1]
+    out[2, good] = sigma.prod(axis=1)
+    if steps.shape[1] == steps.shape[2]:
+        out[3, good] = np.linalg.det(steps)
+    out[4, good] = _transmission(robot, closure.by_q[good])
+    return out
+
+
+def _transmission(robot: Robot, by_q: FloatArray) -> FloatArray:
+    least = np.full(len(by_q), np.inf)
+    row = 0
+    for i, limb in enumerate(robot.model.limbs):
+        kind = KINDS[limb.kind]
+        arm = abs(float(robot.geometry[f"gain{i + 1}"]))
+        if kind.driver == "crank":
+            arm *= abs(float(robot.geometry[f"crank{i + 1}"]))
+        least = np.minimum(least, np.abs(by_q[:, row, limb.actuator]) / arm)
+        row += 1 + len(kind.all_rows(limb.couple > 0))
+    return least
+
+
+@dataclass(frozen=True, eq=False)
+class Workspace:
+    """A grid of poses; coordinate k of it runs along axis k of every array.
+
+    Attributes
+    ----------
+    robot : Robot
+        The machine.
+    axes : tuple of str
+        The coordinates that the grid runs through.
+    values : tuple of ndarray
+        Their values, mm and rad: the middles of equal cells.
+    poses : ndarray (..., 6)
+        NaN where the machine has no such pose.
+    feasibility : Feasibility
+        Which limits are kept.
+    dexterity : Dexterity
+        How well the poses are held.
+    """
+
+    robot: Robot
+    axes: tuple[str, ...]
+    values: tuple[FloatArray, ...]
+    poses: FloatArray
+    feasibility: Feasibility
+    dexterity: Dexterity
+
+    @property
+    def inside(self) -> BoolArray:
+        """Which poses keep all limits and lie on the same side of all singularities as home."""
+        return _inside(self.robot, self.feasibility, self.dexterity)
+
+    @property
+    def cell(self) -> float:
+        """Size of one cell: the product of the steps, mm and rad."""
+        return float(np.prod([axis[1] - axis[0] for axis in self.values]))
+
+    @property
+    def volume(self) -> float:
+        """Cells inside times their size: mm³ where the axes are x, y and z."""
+        return float(self.inside.sum()) * self.cell
+
+    def __str__(self) -> str:
+        cells = " x ".join(str(len(axis)) for axis in self.values)
+        rows = []
+        for name, axis in zip(self.axes, self.values, strict=True):
+            half = (axis[1] - axis[0]) / 2
+            ends = (axis[0] - half, axis[-1] + half)
+            (low, unit), (high, _) = (display.displayed(v, _unit(name)) for v in map(float, ends))
+            rows.append([f"{name} [{unit}]", f"{low:.6g}", f"{high:.6g}"])
+        units = [_unit(name) for name in self.axes]
+        powers = (f"{unit}{_POWER[units.count(unit)]}" for unit in dict.fromkeys(units))
+        share = 100 * float(self.inside.mean())
+        inside = self.dexterity.conditioning[self.inside]
+        best = f"; conditioning {inside.min():.3f} to {inside.max():.3f}" if inside.size else ""
+        return "\n".join([
+            f"{self.robot.name}: grid of {cells} poses, {share:.1f} % inside{best}",
+            str(display.Table(["axis", "from", "to"], rows, left=1)),
+            f"volume {self.volume:.4g} {' '.join(powers)}",
+        ])  # fmt: skip
+
+
+def workspace(
+    robot: Robot,
+    axes: Mapping[str, tuple[float, float, int]],
+    at: ArrayLike | None = None,
+) -> Workspace:
+    """A grid through the workspace: its slices, its volume, conditioning and singularities.
+
+    Parameters
+    ----------
+    robot : Robot
+        The machine.
+    axes : mapping
+        Coordinates with their ends (mm, rad) and the number of cells between:
+        ``{"y": (-100, 100, 50), "z": (300, 500, 50)}`` is a slice of 50 x 50 poses.
+    at : array_like (6,), optional
+        The other coordinates; home by default.
+
+    Returns
+    -------
+    Workspace
+        ``.inside``, ``.volume``, ``.dexterity`` …
+
+    Raises
+    ------
+    ValueError
+        No coordinate, an unknown one, or one that the machine does not move by itself; ends in
+        the wrong order; fewer than two cells.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> found = pk.workspace(pk.load("2tpr2tps"), {"y": (-300, 300, 30), "z": (200, 600, 40)})
+    >>> found.inside.shape, bool(found.inside[15, 20])
+    ((30, 40), True)
+    """
+    require_parallel(robot)
+    require_moved(robot, axes)
+    values = tuple(_middles(name, ends) for name, ends in axes.items())
+    start, _ = as_rows("at", robot.home if at is None else at, 6)
+    shape = tuple(len(axis) for axis in values)
+    rows = np.repeat(start[:1], int(np.prod(shape)), axis=0)
+    for name, column in zip(axes, np.meshgrid(*values, indexing="ij"), strict=True):
+        rows[:, POSE.index(name)] = column.ravel()
+    blocks = [completed(robot, rows[i : i + _BLOCK]) for i in range(0, len(rows), _BLOCK)]
+    rows = np.concatenate(blocks)
+    poses = rows.reshape(*shape, 6)
+    return Workspace(
+        robot, tuple(axes), values, poses, robot.feasible(poses), dexterity(robot, poses)
+    )
+
+
+def sample_poses(robot: Robot, count: int = 30, seed: int = 0, share: float = 0.5) -> FloatArray:
+    """Random poses in the workspace: within all limits, and not near a singularity.
+
+    Parameters
+    ----------
+    robot : Robot
+        The machine.
+    count : int
+        How many.
+    seed : int
+        Of the draws.
+    share : float
+        How much of the way from home to the end of each coordinate is used, up to 1.
+
+    Returns
+    -------
+    ndarray (count, 6)
+        mm and rad. Drawn evenly in a box: what the coordinates `reach` one by one, times `share`.
+
+    Raises
+    ------
+    ValueError
+        The machine has too few such poses; a count, seed or share that does not fit.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> robot = pk.load("hexapod")
+    >>> poses = pk.sample_poses(robot, 5)
+    >>> poses.shape, bool(robot.feasible(poses).ok.all())
+    ((5, 6), True)
+    """
+    require_parallel(robot)
+    whole("count", count, 0)
+    if number("share", share, least=0) > 1:
+        raise ArgumentError(f"share must be from 0 to 1, found {share!r}")
+    random = np.random.default_rng(checked_seed(seed))
+    box = reach(robot)
+    columns = [POSE.index(name) for name in box]
+    home = robot.home[columns]
+    low, high = home + share * (np.transpose(list(box.values())) - home)
+    kept = np.empty((0, 6))
+    for _ in range(_PATIENCE):
+        drawn = np.repeat(robot.home[None], 2 * count, axis=0)
+        drawn[:, columns] = random.uniform(low, high, (2 * count, len(columns)))
+        drawn = completed(robot, drawn)
+        kept = np.concatenate([kept, drawn[_good(robot, drawn)]])
+        if len(kept) >= count:
+            return kept[:count]
+    raise ArgumentError(f"{robot.name}: found {len(kept)} good poses, {count} are wanted")
+
+
+def reach(robot: Robot) -> dict[str, tuple[float, float]]:
+    """How far each coordinate alone goes from home, mm and rad.
+
+    Returns
+    -------
+    dict of str to (float, float)
+        Of each coordinate that the machine moves: least and most, before a limit is broken or a
+        singularity is near.
+
+    Raises
+    ------
+    ValueError
+        Home is no good pose.
+    """
+    if not _good(robot, robot.home[None])[0]:
+        raise ArgumentError(f"{robot.name}: home breaks a limit or is singular")
+    joints = np.abs(robot.geometry.slots[:, :6]).sum(axis=1)
+    size = float(joints.max() + np.abs(robot.home[:3]).sum())
+    found = {}
+    for name in moved_coordinates(robot):
+        step = np.radians(90.0) / _STEPS if name in POSE[3:] else 2 * size / _STEPS
+        ends = []
+        for sign in (-1.0, 1.0):
+            ray = np.repeat(robot.home[None], _STEPS, axis=0)
+            ray[:, POSE.index(name)] += sign * step * np.arange(_STEPS)
+            good = _good(robot, completed(robot, ray))
+            last = int(np.argmin(good)) - 1 if not good.all() else _STEPS - 1
+            ends.append(float(ray[last, POSE.index(name)]))
+        found[name] = (ends[0], ends[1])
+    return found
+
+
+def moved_coordinates(robot: Robot) -> tuple[str, ...]:
+    """The coordinates that determine a pose."""
+    return tuple(robot.model.match or robot.coordinates)
+
+
+def require_moved(robot: Robot, axes: Mapping[str, object]) -> None:
+    """Refuse axes that span nothing, or along which the machine does not move by itself.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Naming the coordinate.
+    """
+    if not isinstance(axes, Mapping):
+        raise ArgumentTypeError(
+            f"axes must map coordinates to numbers, found {type(axes).__name__}"
+        )
+    if not axes:
+        raise ArgumentError("axes names no coordinate")
+    moved = moved_coordinates(robot)
+    for name in axes:
+        if name not in moved:
+            known = did_you_mean(name, moved)
+            raise ArgumentError(f"axes: {name!r} is no coordinate that {robot.name} moves{known}")
+
+
+def _inside(robot: Robot, feasible: Feasibility, dexterity_there: Dexterity) -> BoolArray:
+    home = dexterity(robot, robot.home)
+    side = np.sign(dexterity_there.determinant) * np.sign(home.determinant)
+    held = (side > 0) | (np.isnan(home.determinant) & (dexterity_there.conditioning > 0))
+    return np.asarray(feasible.ok & held)
+
+
+def _good(robot: Robot, poses: FloatArray) -> BoolArray:
+    there = dexterity(robot, poses)
+    least = _SMALLEST * float(dexterity(robot, robot.home).conditioning)
+    return _inside(robot, robot.feasible(poses), there) & (there.conditioning > max(least, 1e-9))
+
+
+def _middles(name: str, ends: tuple[float, float, int]) -> FloatArray:
+    given = np.asarray(ends)
+    if given.dtype.kind not in "iuf" or given.shape != (3,):
+        raise ArgumentError(f"axes: {name} must be (low, high, cells), found {ends!r}")
+    low, high, cells = given.tolist()
+    count = int(cells) if np.isfinite(cells) else 0
+    if count != cells:
+        raise ArgumentError(f"axes: {name} must have a whole number of cells, found {cells}")
+    if not -np.inf < low < high < np.inf:
+        raise ArgumentError(f"axes: {name} must run from low to high, found {low} to {high}")
+    if count < 2:
+        raise ArgumentError(f"axes: {name} must have two cells at least, found {count}")
+    middles: FloatArray = low + (high - low) * (np.arange(count) + 0.5) / count
+    return middles
+
+
+def _unit(name: str) -> str:
+    return "rad" if name in POSE[3:] else "mm"

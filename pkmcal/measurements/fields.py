@@ -1,0 +1,153 @@
+"""The fields of `Measurements`: arrays of the right shape, or an error that names the argument."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pkmcal.arguments import words
+from pkmcal.arrays import as_numbers
+from pkmcal.exceptions import ArgumentError
+from pkmcal.measurements.tracker import Tracker
+
+
+def numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:
+    """A copy as finite doubles."""
+    array = np.array(as_numbers(name, given, "n"), dtype=np.float64)
+    if not np.isfinite(array).all():
+        first = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+        where = f" at index {', '.join(map(str, first))}" if first else ""
+        raise ArgumentError(f"{name} must be finite; found {array[first]}{where}")
+    return array
+
+
+def integers(name: str, given: ArrayLike, rows: int) -> NDArray[np.int64]:
+    """A copy as whole numbers, one per row."""
+    array = numbers(name, given)
+    if array.shape != (rows,):
+        raise ArgumentError(f"{name} must have shape ({rows},); found {array.shape}")
+    if (array != np.round(array)).any():
+        row = int(np.argmax(array != np.round(array)))
+        raise ArgumentError(f"{name} must be whole numbers; found {array[row]} in row {row}")
+    return array.astype(np.int64)
+
+
+def sigma_array(
+    given: ArrayLike | Tracker, kind: str, shape: tuple[int, int], values: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Standard deviations (N, k) or covariances (N, k, k)."""
+    rows, k = shape
+    if isinstance(given, Tracker):
+        if kind != "position":
+            raise ArgumentError(f"sigma: a tracker measures positions, not values of kind {kind!r}")
+        covariance = given.covariance(values)
+        return np.asarray(0.5 * (covariance + covariance.transpose(0, 2, 1)))
+    sigma = numbers("sigma", given)
+    if sigma.ndim == 3 and sigma.shape == (rows, k, k):
+        for row, matrix in enumerate(sigma):
+            if (matrix != matrix.T).any() or np.linalg.eigvalsh(matrix)[0] <= 0:
+                raise ArgumentError(
+                    f"sigma: row {row} is not a covariance matrix (symmetric, positive)"
+                )
+        return sigma
+    if k == 1 and sigma.shape == (rows,):
+        sigma = sigma[:, None]
+    if sigma.shape not in ((), (k,), (rows, 1), (rows, k)):
+        raise ArgumentError(
+            f"sigma for {rows} measurements of kind {kind!r} must be a number or have shape ({k},),"
+            f" ({rows}, 1), ({rows}, {k}) or ({rows}, {k}, {k}); found {sigma.shape}"
+        )
+    if not (sigma > 0).all():
+        raise ArgumentError(f"sigma must be positive; found {sigma.min()} (None means not known)")
+    return np.array(np.broadcast_to(sigma, shape))
+
+
+def target_array(
+    given: ArrayLike | None, kind: str, index: NDArray[np.int64] | None, rows: int
+) -> NDArray[np.float64] | None:
+    """One target, one per row, or several that an index chooses from; None where none is given."""
+    if kind == "pose" and (given is not None or index is not None):
+        raise ArgumentError("target: a pose is the platform's own and takes no target")
+    if index is not None and index.min() < 0:
+        raise ArgumentError(f"target_index counts from 0; found {index.min()}")
+    if given is None:
+        if kind == "distance":
+            raise ArgumentError(
+                "target: a distance needs the fixed point it is measured to, (x, y, z) in mm in"
+                " the base frame"
+            )
+        return None
+    target = numbers("target", given)
+    if index is not None:
+        if target.ndim != 2 or target.shape[1] != 3:
+            raise ArgumentError(
+                f"target must have shape (k, 3) with target_index; found {target.shape}"
+            )
+        if index.max() >= len(target):
+            raise ArgumentError(
+                f"target_index must be below {len(target)}, the number of targets;"
+                f" found {index.max()}"
+            )
+    elif target.shape not in ((3,), (rows, 3)):
+        raise ArgumentError(
+            f"target must have shape (3,) or ({rows}, 3), or (k, 3) with target_index;"
+            f" found {target.shape}"
+        )
+    return target
+
+
+def attachment_array(
+    given: ArrayLike | None, kind: str, targets: int | None, rows: int
+) -> NDArray[np.float64] | None:
+    """One attachment, one per row, or one for each of the several targets; None without."""
+    if given is None:
+        return None
+    if kind != "distance":
+        raise ArgumentError(
+            f"attachment: distances alone have one, values of kind {kind!r} a target"
+        )
+    attachment = numbers("attachment", given)
+    if attachment.shape not in ((3,), (rows if targets is None else targets, 3)):
+        several = rows if targets is None else targets
+        raise ArgumentError(
+            f"attachment must have shape (3,) or ({several}, 3); found {attachment.shape}"
+        )
+    return attachment
+
+
+def names_of_targets(
+    given: Sequence[str] | None,
+    index: NDArray[np.int64] | None,
+    target: NDArray[np.float64] | None,
+) -> tuple[str, ...] | None:
+    """Names of the several targets, "1", "2", … unless given; None where there is no index."""
+    if index is None:
+        if given is not None:
+            raise ArgumentError("target_names need target_index, which says where each is measured")
+        return None
+    if given is None:
+        count = int(index.max()) + 1 if target is None else len(target)
+        return tuple(str(i + 1) for i in range(count))
+    names = words("target_names", given)
+    odd = [name for name in names if name != " ".join(name.split()) or not name]
+    if odd or len(set(names)) < len(names):
+        raise ArgumentError(f"target_names must be different names on one line; found {names!r}")
+    if len(names) <= index.max() or (target is not None and len(names) != len(target)):
+        wanted = int(index.max()) + 1 if target is None else len(target)
+        raise ArgumentError(f"target_names must name {wanted} targets; found {len(names)}")
+    return names
+
+
+def units_of_actuators(given: str | Sequence[str] | None, count: int) -> tuple[str, ...] | None:
+    """One unit per actuator, "mm" or "rad"; None where none is given."""
+    if given is None:
+        return None
+    units = words("actuator_units", given)
+    units = units * count if isinstance(given, str) else units
+    if len(units) != count or any(unit not in ("mm", "rad") for unit in units):
+        raise ArgumentError(
+            f'actuator_units must be "mm" or "rad" for {count} actuators; found {given!r}'
+        )
+    return units

@@ -1,0 +1,359 @@
+"""Measurements in CSV files: columns by name, in any order, with their units in brackets.
+
+====================================  =============================================================
+columns                               meaning
+====================================  =============================================================
+``q1 [mm]`` … ``qn [mm]``             actuator coordinates, lengths or angles
+``x [mm], y [mm], z [mm]``            a position; with ``alpha``, ``beta``, ``gamma [deg]`` a pose
+``z [mm]`` alone                      a height
+``distance [mm]``                     from the fixed point ``target`` to the ``attachment``
+``A.x [mm], A.y [mm], A.z [mm]`` …    positions of several targets A, B, … in one row
+``sigma [mm]``                        standard deviation of the row, of every component
+``sigma.x [mm]``, ``sigma.alpha``…    … or of each component
+``cov.x.y [mm*mm]`` …                 … or their covariances, all on and above the diagonal
+``group``                             a whole number, the same for repeats of one pose
+``target``                            name of the target that the row measured
+``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
+``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
+====================================  =============================================================
+
+Names are also taken as instruments and controllers write them: capitals, ``Joint 1``, ``J1``,
+``Axis 1``, ``Leg 1`` for q1, ``Height`` for z, ``Roll``, ``Pitch``, ``Yaw`` for alpha, beta, gamma,
+``Std`` for sigma, ``Reflector`` or ``SMR`` for target, ``Pose`` for group. ``Index``, ``Time``,
+``Date`` and ``Comment`` are left out. ``Rx`` and the like are not taken: makers differ in what
+they mean. Lengths are in mm, cm, m, um or in; angles in rad, mrad or deg; covariances in products
+of mm and rad. What separates the columns and which lines are skipped: `pkmcal.csv_table`.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import itertools
+import re
+from collections.abc import Iterator, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal import arguments
+from pkmcal.exceptions import ArgumentTypeError, FileError
+from pkmcal.files.atomic import write_whole
+from pkmcal.files.column_names import BESIDE, RESERVED, known_as
+from pkmcal.files.csv_table import Table
+from pkmcal.measurements.measurements import COMPONENTS, Measurements
+
+_AXES = ("x", "y", "z")
+_ANGLES = ("alpha", "beta", "gamma")
+_ACTUATOR = re.compile(r"q[1-9][0-9]*")
+_OF_A_TARGET = re.compile(r"(?P<target>[^.]+)\.[xyz]")
+
+
+def read_measurements(path: str | PathLike[str], robot: Any = None) -> Measurements:
+    r"""Read measurements from a CSV file; see `pkmcal.measurement_csv` for its columns.
+
+    A row with several targets (``A.x``, ``B.x`` …) yields one measurement per target, in the order
+    of the columns, with the same actuators: `target_index` says which, `target_names` the names.
+    Where a target was not seen, its three cells are empty and the measurement is left out.
+
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    robot : Robot, optional
+        The machine that was measured; its number of actuators and their units are compared.
+
+    Returns
+    -------
+    Measurements
+        In mm and rad.
+
+    Raises
+    ------
+    ValueError
+        Naming the file and, as far as there is one, line and column: what is missing, unknown,
+        given twice, without unit or not a number.
+    OSError
+        The file cannot be read.
+
+    Examples
+    --------
+    >>> import os, tempfile
+    >>> path = os.path.join(tempfile.mkdtemp(), "probe.csv")
+    >>> with open(path, "w") as file:
+    ...     _ = file.write("q1 [deg],q2 [deg],z [um]\n90,-90,1500\n")
+    >>> m = read_measurements(path)
+    >>> m.kind, m.actuator_units, m.values
+    ('height', ('rad', 'rad'), array([1.5]))
+    """
+    table = Table(path)
+    table.rename(known_as)
+    table.leave_out(BESIDE)
+    several = _several_targets(table)
+    _refuse_unknown(table, several)
+    actuators, units = _read_actuators(table)
+    _compare(table, units, robot)
+    kind = _kind(table, several)
+    fields: dict[str, Any] = {"sigma": _read_sigma(table, kind)}
+    if "group" in table.columns:
+        fields["group"] = table.integers("group")
+    if several:
+        actuators, values, fields = _read_several(table, several, actuators, fields)
+    else:
+        columns = [_read(table, *component)[0] for component in COMPONENTS[kind]]
+        values = columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
+        fields |= _read_targets(table, kind)
+    try:
+        return Measurements(actuators, values, kind, actuator_units=units, **fields)
+    except ValueError as error:
+        raise FileError(f"{table.path}: {error}") from None
+
+
+def write_measurements(
+    measurements: Measurements, path: str | PathLike[str], comment: str = ""
+) -> None:
+    """Write measurements in mm and rad, one row each, so that they are read back to the last bit.
+
+    Several targets are written as the columns ``target`` and ``target.x`` …; of the targets, those
+    that no row measured are left out.
+
+    Parameters
+    ----------
+    measurements : Measurements
+        What to write.
+    path : str or path
+        The file; replaced as a whole or not at all.
+    comment : str, optional
+        Lines for its head, each with its ``#``.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; one that was there before is untouched.
+    """
+    headings, columns = zip(*_columns(measurements), strict=True)
+    text = io.StringIO()
+    text.write(arguments.comment(comment))
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(headings)
+    writer.writerows(zip(*columns, strict=True))
+    write_whole(path, text.getvalue())
+
+
+# --- reading -----------------------------------------------------------------------------------
+
+
+def _several_targets(table: Table) -> tuple[str, ...]:
+    """Names of the targets that have columns of their own, in the order of the columns."""
+    matches = (_OF_A_TARGET.fullmatch(name) for name in table.columns)
+    found = dict.fromkeys(match["target"] for match in matches if match)
+    return tuple(name for name in found if name not in RESERVED)
+
+
+def _refuse_unknown(table: Table, several: tuple[str, ...]) -> None:
+    components = _AXES + _ANGLES
+    names = [*(f"q{i + 1}" for i in range(len(table.columns))), *components, "distance"]
+    names += ["sigma", "group", "target"]
+    names += [f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES]
+    names += [f"{target}.{axis}" for target in several for axis in _AXES]
+    deviations = [f"sigma.{name}" for name in components]
+    pairs = itertools.combinations_with_replacement(components, 2)
+    known = {*names, *deviations, *(f"cov.{a}.{b}" for a, b in pairs)}
+    table.refuse_unknown(lambda name: name in known or bool(_ACTUATOR.fullmatch(name)), names)
+
+
+def _read(table: Table, name: str, *quantities: str, blank: bool = False) -> tuple[Any, str]:
+    table.require([name])
+    return table.numbers(name, *quantities, blank=blank)
+
+
+def _read_actuators(table: Table) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+    count = max((int(n[1:]) for n in table.columns if _ACTUATOR.fullmatch(n)), default=1)
+    read = [_read(table, f"q{i + 1}", "mm", "rad") for i in range(count)]
+    return np.stack([values for values, _ in read], axis=1), tuple(unit for _, unit in read)
+
+
+def _compare(table: Table, units: tuple[str, ...], robot: Any) -> None:
+    if robot is not None and not hasattr(robot, "actuator_units"):
+        raise ArgumentTypeError(
+            f"robot must be a Robot or SerialArm, found {arguments.shown(robot)}"
+        )
+    expected = units if robot is None else tuple(robot.actuator_units)
+    if len(expected) != len(units):
+        raise table.header_error(
+            f"{len(units)} actuator columns, q1 to q{len(units)}; the robot has {len(expected)}"
+        )
+    for i, (unit, robots) in enumerate(zip(units, expected, strict=True)):
+        if unit != robots:
+            what = {"mm": "a length", "rad": "an angle"}
+            raise table.header_error(
+                f"column 'q{i + 1}' is {what[unit]}; the robot's actuator is {what[robots]}"
+            )
+
+
+def _kind(table: Table, several: tuple[str, ...]) -> str:
+    """What was measured, by the columns that are there."""
+    names = table.columns.keys()
+    groups = {
+        "distance": {"distance"} & names,
+        "x, y, z": {*_AXES, *_ANGLES} & names,
+        f"several targets ({', '.join(several)})": set(several),
+    }
+    there = [title for title, columns in groups.items() if columns]
+    if len(there) > 1:
+        raise table.header_error(f"more than one thing measured: {' and '.join(there)}")
+    if not there:
+        raise table.header_error(
+            "nothing measured: expected columns x, y, z, or z alone, or distance, or A.x, A.y, A.z"
+        )
+    if "distance" in names:
+        return "distance"
+    if several:
+        return "position"
+    if names.isdisjoint(("x", "y", *_ANGLES)):
+        return "height"
+    return "position" if names.isdisjoint(_ANGLES) else "pose"
+
+
+def _read_sigma(table: Table, kind: str) -> NDArray[np.float64] | None:
+    """Deviations (rows, 1) or (rows, k), or covariances (rows, k, k)."""
+    given = [name for name in table.columns if name.partition(".")[0] in ("sigma", "cov")]
+    if not given:
+        return None
+    names, units = zip(*COMPONENTS[kind], strict=True)
+    pairs = list(itertools.combinations_with_replacement(range(len(names)), 2))
+    forms = {
+        "one": ["sigma"],
+        "each": [f"sigma.{name}" for name in names],
+        "covariance": [f"cov.{names[i]}.{names[j]}" for i, j in pairs],
+    }
+    form = "covariance" if given[0].startswith("cov") else "each" if "." in given[0] else "one"
+    if form == "one" and kind == "pose":
+        raise table.header_error(
+            f"column 'sigma' for poses: expected {forms['each'][0]!r} to {forms['each'][-1]!r}"
+        )
+    table.require(forms[form])
+    for name in given:
+        if name not in forms[form]:
+            raise table.header_error(f"column {name!r} does not go with {given[0]!r} and {kind}s")
+    if form == "covariance":
+        sigma = np.empty((len(table), len(names), len(names)))
+        for name, (i, j) in zip(forms[form], pairs, strict=True):
+            sigma[:, i, j] = sigma[:, j, i] = table.numbers(name, f"{units[i]}*{units[j]}")[0]
+        return sigma
+    of = units if form == "each" else units[:1]
+    columns = [table.numbers(n, unit)[0] for n, unit in zip(forms[form], of, strict=True)]
+    for name, column in zip(forms[form], columns, strict=True):
+        if not (column > 0).all():
+            row = int(np.argmin(column > 0))
+            raise table.cell_error(name, row, f"must be positive, found {column[row]:g}")
+    return np.stack(columns, axis=1)
+
+
+def _read_several(
+    table: Table, targets: tuple[str, ...], actuators: NDArray[np.float64], fields: dict[str, Any]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, Any]]:
+    """One measurement per row and target that was seen there, row by row."""
+    for name in table.columns:
+        if name.partition(".")[0] in ("target", "attachment"):
+            raise table.header_error(f"column {name!r} does not go with '{targets[0]}.x'")
+    values = np.empty((len(table), len(targets), 3))
+    for t, target in enumerate(targets):
+        names = [f"{target}.{axis}" for axis in _AXES]
+        table.require(names)
+        for axis, name in enumerate(names):
+            values[:, t, axis] = table.numbers(name, "mm", blank=True)[0]
+        part = np.isnan(values[:, t]).any(axis=1) & ~np.isnan(values[:, t]).all(axis=1)
+        if part.any():
+            row = int(np.argmax(part))
+            name = names[int(np.argmax(np.isnan(values[row, t])))]
+            raise table.cell_error(name, row, "found an empty cell beside ones with numbers")
+    rows, index = np.nonzero(~np.isnan(values).any(axis=2))
+    chosen = {name: None if value is None else value[rows] for name, value in fields.items()}
+    chosen |= {"target_index": index, "target_names": targets}
+    return actuators[rows], values[rows, index], chosen
+
+
+def _read_targets(table: Table, kind: str) -> dict[str, Any]:
+    """The target of each row, by name, by place or both."""
+    points = {name: _read_point(table, name) for name in ("target", "attachment")}
+    fields: dict[str, Any] = {name: place for name, place in points.items() if place is not None}
+    named = "target" in table.columns
+    if kind == "pose" and (named or "target" in fields):
+        raise table.header_error("columns of a target do not go with poses")
+    if kind == "distance" and "target" not in fields:
+        raise table.header_error("missing column 'target.x': a distance is measured to a point")
+    if kind != "distance" and "attachment" in fields:
+        raise table.header_error(f"column 'attachment.x' goes with distances, not with {kind}s")
+    if not named:
+        return {name: _one(place) for name, place in fields.items()}
+    names = table.texts("target")
+    order = list(dict.fromkeys(names))
+    index = np.array([order.index(name) for name in names])
+    first = [names.index(name) for name in order]
+    for name, places in fields.items():
+        moved = (places != places[first][index]).any(axis=1)
+        if moved.any():
+            row = int(np.argmax(moved))
+            line = table.lines[names.index(names[row])]
+            what = "place" if name == "target" else name
+            raise table.cell_error(
+                "target", row, f"{names[row]!r} has another {what} here than in line {line}"
+            )
+    chosen = {name: places[first] for name, places in fields.items()}
+    if "attachment" in chosen:
+        chosen["attachment"] = _one(chosen["attachment"])
+    return chosen | {"target_index": index, "target_names": order}
+
+
+def _read_point(table: Table, name: str) -> NDArray[np.float64] | None:
+    """A point of each row (rows, 3); None where it has no columns."""
+    columns = [f"{name}.{axis}" for axis in _AXES]
+    if not any(column in table.columns for column in columns):
+        return None
+    return np.stack([_read(table, column, "mm")[0] for column in columns], axis=1)
+
+
+def _one(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """One point (3,) where all rows have the same, to the last bit: 0.0 is not -0.0."""
+    bits = places.view(np.int64)
+    one: NDArray[np.float64] = places[0] if (bits == bits[0]).all() else places
+    return one
+
+
+# --- writing -----------------------------------------------------------------------------------
+
+
+def _columns(m: Measurements) -> Iterator[tuple[str, Sequence[str]]]:
+    """Headings and cells, in the order in which they are written."""
+    for i, unit in enumerate(m.actuator_units or ("mm",) * m.actuators.shape[1]):
+        yield f"q{i + 1} [{unit}]", _exact(m.actuators[:, i])
+    components = COMPONENTS[m.kind]
+    for i, (name, unit) in enumerate(components):
+        yield f"{name} [{unit}]", _exact(m.values.reshape(len(m), -1)[:, i])
+    if m.sigma is not None and m.sigma.ndim == 3:
+        for i, j in itertools.combinations_with_replacement(range(len(components)), 2):
+            (a, of_a), (b, of_b) = components[i], components[j]
+            yield f"cov.{a}.{b} [{of_a}*{of_b}]", _exact(m.sigma[:, i, j])
+    elif m.sigma is not None and m.kind != "pose" and (m.sigma == m.sigma[:, :1]).all():
+        yield "sigma [mm]", _exact(m.sigma[:, 0])
+    elif m.sigma is not None:
+        for i, (name, unit) in enumerate(components):
+            yield f"sigma.{name} [{unit}]", _exact(m.sigma[:, i])
+    if m.target_index is not None and m.target_names is not None:
+        yield "target", [m.target_names[i] for i in m.target_index]
+    places = {} if m.target is None else {"target": m.targets}
+    if m.attachment is not None:
+        places["attachment"] = m.attachments
+    for point, rows in places.items():
+        for axis, name in enumerate(_AXES):
+            yield f"{point}.{name} [mm]", _exact(rows[:, axis])
+    if m.group is not None:
+        yield "group", [str(number) for number in m.group]
+
+
+def _exact(values: NDArray[np.float64]) -> list[str]:
+    """The shortest decimals that are read back to the same bits."""
+    return [repr(float(value)) for value in values]

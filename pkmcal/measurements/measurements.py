@@ -1,0 +1,353 @@
+"""What was measured on a machine: actuator readings and, beside them, poses, points or lengths."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pkmcal import display
+from pkmcal.arguments import checked_seed, shown, word
+from pkmcal.exceptions import ArgumentError
+from pkmcal.measurements.fields import (
+    attachment_array,
+    integers,
+    names_of_targets,
+    numbers,
+    sigma_array,
+    target_array,
+    units_of_actuators,
+)
+from pkmcal.measurements.tracker import Tracker
+
+_LENGTHS = (("x", "mm"), ("y", "mm"), ("z", "mm"))
+_ANGLES = (("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
+
+# What one measured value of each kind consists of: its components and their units.
+COMPONENTS: dict[str, tuple[tuple[str, str], ...]] = {
+    "pose": _LENGTHS + _ANGLES,
+    "position": _LENGTHS,
+    "height": (("z", "mm"),),
+    "distance": (("distance", "mm"),),
+}
+
+_LISTED_ROWS = 12  # a longer list of measurements is printed with its middle left out
+
+
+@dataclass(frozen=True, init=False, eq=False, repr=False)
+class Measurements:
+    """Actuator readings with what an instrument measured there. Arrays are copied and read-only.
+
+    Parameters
+    ----------
+    actuators : (N, n) array
+        Actuator coordinates as commanded or read, mm or rad as the limbs say.
+    values : (N, 6), (N, 3) or (N,) array
+        What was measured, in mm and rad, in the base frame (or the instrument's, where
+        `identify` is told that the frame is unknown); see `kind`.
+    kind : {"position", "pose", "height", "distance"}
+        "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the target,
+        (N, 3). "height": z of the target, (N,). "distance": from the target, which here is a
+        fixed point of the base frame, to the attachment, a point of the platform, (N,).
+    sigma : scalar, (k,), (N, 1), (N, k) or (N, k, k) array, or Tracker, optional
+        Standard deviation of the values in their own units; k is the number of components of the
+        kind. (N, k, k) are covariance matrices. One number for poses counts as mm and as rad.
+        For heights and distances (N,) will do. A `Tracker` gives each position the covariance
+        that follows from where it stands. None: not known. Kept as (N, k) or (N, k, k).
+    target : (3,), (N, 3) or (k, 3) array, optional
+        The measured point in the platform frame, mm: one for all rows, one per row, or several
+        with `target_index`. None: the platform's origin. For distances: the fixed point of the
+        base frame, and required.
+    group : (N,) array of int, optional
+        Rows with the same number are repeats of one pose. None: rows with the same actuator
+        readings are.
+    target_index : (N,) array of int, optional
+        Which of several targets each row measured, counted from 0. With `target=None` the
+        targets' places on the platform are not known.
+    target_names : sequence of str, optional
+        Names of the several targets; "1", "2", … by default.
+    actuator_units : str or sequence of str, optional
+        "mm" or "rad", one for all or one per actuator. None: not stated; written as mm.
+    attachment : (3,), (N, 3) or (k, 3) array, optional
+        The point in the platform frame, mm, from which distances are measured: of a wire, a ball
+        bar, a leg. One for all rows, one per row, or with `target_index` one for each target.
+        None: the platform's origin.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A shape, a number or a name that does not fit; the message names the argument.
+
+    Examples
+    --------
+    >>> m = Measurements([[450, 452, 400, 405]], [[6.0, -6.2, 400.5]], sigma=0.02)
+    >>> print(m)
+    1 measured position, 4 actuators, sigma 0.020 mm
+    row        q1        q2        q3        q4  x [mm]  y [mm]   z [mm]
+      0  450.0000  452.0000  400.0000  405.0000   6.000  -6.200  400.500
+    """
+
+    actuators: NDArray[np.float64]
+    values: NDArray[np.float64]
+    kind: str = "position"
+    sigma: NDArray[np.float64] | None = None
+    target: NDArray[np.float64] | None = None
+    group: NDArray[np.int64] | None = None
+    target_index: NDArray[np.int64] | None = None
+    target_names: tuple[str, ...] | None = None
+    actuator_units: tuple[str, ...] | None = None
+    attachment: NDArray[np.float64] | None = None
+
+    # The types above are those of the attributes; anything array-like is taken.
+    def __init__(
+        self,
+        actuators: ArrayLike,
+        values: ArrayLike,
+        kind: str = "position",
+        sigma: ArrayLike | Tracker | None = None,
+        target: ArrayLike | None = None,
+        group: ArrayLike | None = None,
+        target_index: ArrayLike | None = None,
+        target_names: Sequence[str] | None = None,
+        actuator_units: str | Sequence[str] | None = None,
+        attachment: ArrayLike | None = None,
+    ) -> None:
+        word("kind", kind, COMPONENTS)
+        q = numbers("actuators", actuators)
+        if q.ndim != 2 or 0 in q.shape:
+            raise ArgumentError(f"actuators must have shape (N, n), not empty; found {q.shape}")
+        shape = (len(q), len(COMPONENTS[kind]))
+        expected = shape if shape[1] > 1 else shape[:1]
+        v = numbers("values", values)
+        if v.shape != expected:
+            raise ArgumentError(
+                f"values of kind {kind!r} must have shape {expected} for {len(q)} rows of"
+                f" actuators; found {v.shape}"
+            )
+        index = None if target_index is None else integers("target_index", target_index, len(q))
+        place = target_array(target, kind, index, len(q))
+        targets = None if place is None or index is None else len(place)
+        fields: dict[str, Any] = {
+            "actuators": q,
+            "values": v,
+            "kind": kind,
+            "sigma": None if sigma is None else sigma_array(sigma, kind, shape, v),
+            "target": place,
+            "group": None if group is None else integers("group", group, len(q)),
+            "target_index": index,
+            "target_names": names_of_targets(target_names, index, place),
+            "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
+            "attachment": attachment_array(attachment, kind, targets, len(q)),
+        }
+        self.__setstate__(fields)
+
+    def __setstate__(self, fields: dict[str, Any]) -> None:
+        for name, value in fields.items():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    def __len__(self) -> int:
+        return len(self.actuators)
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the components of one value: ("x", "y", "z") for a position."""
+        return tuple(name for name, _ in COMPONENTS[self.kind])
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the components, "mm" or "rad"."""
+        return tuple(unit for _, unit in COMPONENTS[self.kind])
+
+    @property
+    def targets(self) -> NDArray[np.float64]:
+        """The target of every row, (N, 3) in mm; zeros where none was given.
+
+        Raises
+        ------
+        ValueError
+            Several targets whose places were not given.
+        """
+        if self.target is None and self.target_names is not None:
+            raise ArgumentError(
+                f"target: the places of {', '.join(self.target_names)} on the platform are not"
+                ' known; give them as an array, or identify them with target="unknown"'
+            )
+        return self._of_rows(self.target)
+
+    @property
+    def attachments(self) -> NDArray[np.float64]:
+        """The attachment of every row, (N, 3) in mm; zeros where none was given."""
+        return self._of_rows(self.attachment)
+
+    def _of_rows(self, place: NDArray[np.float64] | None) -> NDArray[np.float64]:
+        place = np.zeros(3) if place is None else place
+        if self.target_index is not None and place.ndim == 2:
+            place = place[self.target_index]
+        return np.array(np.broadcast_to(place, (len(self), 3)), order="C")
+
+    @property
+    def pose_index(self) -> NDArray[np.int64]:
+        """Which pose each row belongs to, (N,), counted from 0: by `group`, else by actuators."""
+        rows = self.actuators if self.group is None else self.group[:, None]
+        return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+
+    def select(self, rows: ArrayLike | slice) -> Measurements:
+        """Some of the rows, as measurements: a slice, row numbers or a mask of N booleans.
+
+        Raises
+        ------
+        ValueError
+            No row is left, or a row number is out of range.
+        """
+        try:
+            chosen = rows if isinstance(rows, slice) else np.asarray(rows)
+            picked = np.atleast_1d(np.arange(len(self))[chosen])
+        except (IndexError, ValueError) as error:
+            raise ArgumentError(
+                f"rows do not fit {len(self)} measurements: found {shown(rows)}, {error}"
+            ) from None
+        if picked.ndim != 1 or len(picked) == 0:
+            raise ArgumentError(f"rows must choose at least one of {len(self)} measurements")
+        per_row: dict[str, Any] = {
+            name: None if value is None else value[picked]
+            for name, value in vars(self).items()
+            if name in ("actuators", "values", "sigma", "group", "target_index")
+        }
+        for name in ("target", "attachment"):
+            place = getattr(self, name)
+            if place is not None and place.ndim == 2 and self.target_index is None:
+                per_row[name] = place[picked]
+        return dataclasses.replace(self, **per_row)
+
+    def split(self, holdout: float, seed: int = 0) -> tuple[Measurements, Measurements]:
+        """Measurements to fit and measurements to hold out, drawn at random by whole poses.
+
+        Parameters
+        ----------
+        holdout : float or int
+            A fraction of the poses between 0 and 1, or a number of poses.
+        seed : int
+            Of the draw.
+
+        Returns
+        -------
+        fit, held_out : Measurements
+            In the order of the rows. Repeats of one pose (see `pose_index`) stay together.
+
+        Raises
+        ------
+        ValueError
+            Nothing would be left on one of the two sides.
+        """
+        pose = self.pose_index
+        poses = int(pose.max()) + 1
+        fraction = isinstance(holdout, float) and 0 < holdout < 1
+        count = max(1, round(holdout * poses)) if fraction else holdout
+        whole = isinstance(count, (int, np.integer)) and not isinstance(count, bool)
+        if not whole or not 0 < count < poses:
+            raise ArgumentError(
+                f"holdout must be a fraction between 0 and 1, or a number of poses below {poses};"
+                f" found {holdout!r}"
+            )
+        drawn = np.random.default_rng(checked_seed(seed)).permutation(poses)[: int(count)]
+        held = np.isin(pose, drawn)
+        return self.select(~held), self.select(held)
+
+    def write(self, path: str | PathLike[str], comment: str = "") -> None:
+        """Write a CSV file that `read_measurements` reads back to the last bit, or nothing.
+
+        Parameters
+        ----------
+        path : str or path
+            The file; replaced as a whole or not at all.
+        comment : str, optional
+            Lines for its head, each with its ``#``.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written; one that was there before is untouched.
+        """
+        from pkmcal.measurements.measurement_csv import write_measurements
+
+        write_measurements(self, path, comment)
+
+    def __repr__(self) -> str:
+        return f"<Measurements: {self._title()}>"
+
+    def __str__(self) -> str:
+        units = self.actuator_units or ("",) * self.actuators.shape[1]
+        heads, columns = ["row"], [[str(row) for row in range(len(self))]]
+        for i, unit in enumerate(units):
+            heads.append(_heading(f"q{i + 1}", unit))
+            columns.append(_column(self.actuators[:, i], unit, None))
+        deviations = self._deviations()
+        for i, (name, unit) in enumerate(COMPONENTS[self.kind]):
+            heads.append(_heading(name, unit))
+            sigma = None if deviations is None else deviations[:, i]
+            columns.append(_column(self.values.reshape(len(self), -1)[:, i], unit, sigma))
+        if self.target_index is not None and self.target_names is not None:
+            heads.append("target")
+            columns.append([self.target_names[i] for i in self.target_index])
+        if self.group is not None:
+            heads.append("group")
+            columns.append([str(number) for number in self.group])
+        rows = list(zip(*columns, strict=True))
+        if len(rows) > _LISTED_ROWS:
+            rows[_LISTED_ROWS - 4 : -3] = [("⋮",) * len(heads)]
+        return self._title() + "\n" + str(display.Table(heads, rows))
+
+    def _deviations(self) -> NDArray[np.float64] | None:
+        """Standard deviations (N, k), also where covariance matrices were given."""
+        if self.sigma is None or self.sigma.ndim == 2:
+            return self.sigma
+        variances: NDArray[np.float64] = np.diagonal(self.sigma, axis1=1, axis2=2)
+        return np.sqrt(variances)
+
+    def _title(self) -> str:
+        many = "" if len(self) == 1 else "s"
+        n = self.actuators.shape[1]
+        parts = [f"{len(self)} measured {self.kind}{many}", f"{n} actuator{'' if n == 1 else 's'}"]
+        parts.append("sigma " + self._sigma_text())
+        if self.target_names is not None:
+            known = "" if self.target is not None else " (places not known)"
+            parts.append(f"targets {' '.join(self.target_names)}{known}")
+        elif self.target is not None and self.target.ndim == 1:
+            parts.append("target ({:g}, {:g}, {:g}) mm".format(*self.target))
+        return ", ".join(parts)
+
+    def _sigma_text(self) -> str:
+        deviations = self._deviations()
+        if deviations is None:
+            return "not known"
+        texts = []
+        for unit in dict.fromkeys(self.units):
+            of_unit = deviations[:, [u == unit for u in self.units]]
+            ends = dict.fromkeys(_sigma_number(s, unit) for s in (of_unit.min(), of_unit.max()))
+            texts.append(" to ".join(ends) + " " + display.displayed(0.0, unit)[1])
+        return " and ".join(texts)
+
+
+def _sigma_number(sigma: float, unit: str) -> str:
+    shown, _ = display.displayed(float(sigma), unit)
+    return display.fixed(shown, display.decimals(shown))
+
+
+def _heading(name: str, unit: str) -> str:
+    shown = display.displayed(0.0, unit)[1]
+    return f"{name} [{shown}]" if shown else name
+
+
+def _column(values: NDArray[np.float64], unit: str, sigma: NDArray[np.float64] | None) -> list[str]:
+    """Numbers to the digits their sigma supports, else to 0.1 µm and 0.0001 degrees."""
+    places = 4
+    if sigma is not None:
+        places = display.decimals(display.displayed(float(sigma.min()), unit)[0])
+    return [display.fixed(display.displayed(float(value), unit)[0], places) for value in values]

@@ -1,0 +1,119 @@
+"""What an instrument would read at given poses, and how that changes with what is not known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.core import instruments
+from pkmcal.core.poses import compose, compose_rates
+
+_ORIGIN = np.zeros(3)
+_NOWHERE = np.zeros(6)
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """Readings of one kind and their derivatives.
+
+    Attributes
+    ----------
+    values : ndarray (N, k)
+        In mm and rad, as `Measurements` of the kind have them.
+    by_twist : ndarray (N, k, 6)
+        Derivative to the twist of the platform: ω, then the velocity of its origin, in base axes.
+    by_target : ndarray (N, k, 3) or None
+        Derivative to the measured point of the platform; None for poses.
+    by_anchor : ndarray (N, k, 3) or None
+        Derivative to the fixed point of the base; distances alone have one.
+    by_frame : ndarray (N, k, 6) or None
+        Derivative to the pose of the base, counted from the origin; None where there is no frame.
+    """
+
+    values: FloatArray
+    by_twist: FloatArray
+    by_target: FloatArray | None = None
+    by_anchor: FloatArray | None = None
+    by_frame: FloatArray | None = None
+
+
+def predict(
+    kind: str,
+    pose: FloatArray,
+    target: FloatArray = _ORIGIN,
+    anchor: FloatArray = _ORIGIN,
+    frame: FloatArray | None = None,
+    origin: FloatArray = _NOWHERE,
+) -> Predicted:
+    """Readings at poses.
+
+    Parameters
+    ----------
+    kind : {"pose", "position", "height", "distance"}
+        What is read.
+    pose : ndarray (N, 6)
+        Of the platform in the base frame, mm and rad.
+    target : ndarray (3,) or (N, 3)
+        The measured point in the platform frame, mm.
+    anchor : ndarray (3,) or (N, 3)
+        The point of the base frame that distances are measured from, mm.
+    frame : ndarray (6,) or None
+        Pose of the base in the instrument's frame; None: they are one. Distances have no frame.
+    origin : ndarray (6,)
+        Where that pose counts from, another one in the instrument's frame.
+    """
+    if kind == "distance":
+        return _distances(pose, target, anchor)
+    if kind == "pose":
+        return _poses(pose, frame, origin)
+    seen = _points(pose, target, frame, origin)
+    return _heights(seen) if kind == "height" else seen
+
+
+def _points(
+    pose: FloatArray, target: FloatArray, frame: FloatArray | None, origin: FloatArray
+) -> Predicted:
+    point, by_twist, by_target = instruments.points(pose, target)
+    if frame is None:
+        return Predicted(point, by_twist, by_target)
+    near, by_frame, by_point = instruments.seen_points(frame, point)
+    seen, _, by_near = instruments.seen_points(origin, near)
+    by_point = by_near @ by_point
+    return Predicted(seen, by_point @ by_twist, by_point @ by_target, by_frame=by_near @ by_frame)
+
+
+def _heights(seen: Predicted) -> Predicted:
+    rows = {name: part[:, 2:3] for name, part in vars(seen).items() if part is not None}
+    return replace(seen, **rows)
+
+
+def _distances(pose: FloatArray, target: FloatArray, anchor: FloatArray) -> Predicted:
+    distance, *derivatives = instruments.distances(pose, target, anchor)
+    for by in derivatives:
+        by[distance == 0] = 0.0  # no direction there
+    return Predicted(distance[:, None], *(by[:, None, :] for by in derivatives))
+
+
+def _poses(pose: FloatArray, frame: FloatArray | None, origin: FloatArray) -> Predicted:
+    if frame is None:
+        return Predicted(pose, instruments.seen_pose_rates(_NOWHERE, pose))
+    whole = compose(origin, frame[None])[0]
+    seen = compose(whole, pose)
+    by_frame = compose_rates(origin, np.tile(frame, (len(pose), 1)), pose, seen)
+    return Predicted(seen, instruments.seen_pose_rates(whole, seen), by_frame=by_frame)
+
+
+def difference(kind: str, values: FloatArray, predicted: FloatArray) -> FloatArray:
+    """Measured less predicted, (N, k); angles the short way round."""
+    residual: FloatArray = values.reshape(predicted.shape) - predicted
+    if kind == "pose":
+        residual[:, 3:] = np.remainder(residual[:, 3:] + np.pi, 2 * np.pi) - np.pi
+    return residual
+
+
+def distance_per_point(residual: FloatArray) -> FloatArray:
+    """How far off each measured point is, mm (N,); of poses their position."""
+    off: FloatArray = np.linalg.norm(residual[:, :3], axis=1)
+    return off

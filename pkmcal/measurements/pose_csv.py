@@ -1,0 +1,88 @@
+"""Poses in a CSV file: columns ``x [mm]`` … ``gamma [deg]`` in any order."""
+
+from __future__ import annotations
+
+import csv
+import io
+from os import PathLike
+
+import numpy as np
+
+from pkmcal import display
+from pkmcal.arrays import FloatArray
+from pkmcal.core.library import POSE
+from pkmcal.files.atomic import write_whole
+from pkmcal.files.column_names import BESIDE, known_as
+from pkmcal.files.csv_table import Table
+from pkmcal.kinematics.robot import Robot
+
+_DECIMALS = {"mm": 6, "deg": 8}
+
+
+def read_poses(path: str | PathLike[str], robot: Robot) -> FloatArray:
+    """Read the poses of a file, mm and rad.
+
+    Parameters
+    ----------
+    path : str or path
+        A file with columns ``x [mm]`` … ``gamma [deg]``, or other units of length and angle;
+        other spellings as in `read_measurements`.
+    robot : Robot
+        Whose home pose stands for columns that are not there.
+
+    Returns
+    -------
+    ndarray (N, 6)
+        x y z in mm, α β γ in rad.
+
+    Raises
+    ------
+    ValueError
+        Naming file, line and column: an unknown column, a missing unit, a cell without a number.
+    OSError
+        The file cannot be read.
+    """
+    table = Table(path)
+    table.rename(known_as)
+    table.leave_out(BESIDE)
+    table.refuse_unknown(POSE.__contains__, POSE)
+    poses = np.repeat(robot.home[None], len(table), axis=0)
+    for k, name in enumerate(POSE):
+        if name in table.columns:
+            poses[:, k], _ = table.numbers(name, "mm" if k < 3 else "rad")
+    return poses
+
+
+def write_poses(
+    path: str | PathLike[str],
+    poses: FloatArray,
+    columns: dict[str, FloatArray] | None = None,
+    comment: str = "",
+) -> None:
+    """Write poses (N, 6), angles in degrees, and other columns beside them.
+
+    Parameters
+    ----------
+    path : str or path
+        `read_poses` reads it back, to 1e-6 mm, where there are no other columns.
+    poses : ndarray (N, 6)
+        mm and rad.
+    columns : dict of str to ndarray (N,), optional
+        By heading, which says the unit.
+    comment : str, optional
+        Lines for its head, each with its ``#``.
+    """
+    text = io.StringIO()
+    text.write(comment)
+    writer = csv.writer(text, lineterminator="\n")
+    units = ["mm" if k < 3 else "deg" for k in range(6)]
+    others = columns or {}
+    heading = [f"{name} [{unit}]" for name, unit in zip(POSE, units, strict=True)]
+    writer.writerow([*heading, *others])
+    shown = np.concatenate([poses[:, :3], np.degrees(poses[:, 3:])], axis=1)
+    for i, row in enumerate(shown):
+        cells = (
+            display.fixed(float(v), _DECIMALS[unit]) for v, unit in zip(row, units, strict=True)
+        )
+        writer.writerow([*cells, *(f"{column[i]:.8g}" for column in others.values())])
+    write_whole(path, text.getvalue())

@@ -1,0 +1,147 @@
+"""A machine with known errors, measured by an instrument with known noise."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pkmcal.arguments import checked_seed, number, shown, word
+from pkmcal.arms.arm import SerialArm
+from pkmcal.arrays import FloatArray
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.measurements.calibratable import ArmMachine
+from pkmcal.measurements.fields import numbers
+from pkmcal.measurements.measurements import COMPONENTS, Measurements
+from pkmcal.measurements.observation import predict
+from pkmcal.measurements.tracker import Tracker
+
+_ARM = 200.0  # mm; an instrument good to 0.02 mm over it is good to 1e-4 rad
+
+
+class Solvable(Protocol):
+    """What a virtual machine asks of a robot."""
+
+    def forward(self, q: NDArray[np.float64]) -> Any:
+        """A result with `pose` (N, 6) and `ok` (N,) for actuators (N, n)."""
+        ...
+
+
+class VirtualMachine:
+    """A machine that can be commanded and measured, in place of a real one.
+
+    Parameters
+    ----------
+    true_robot : Robot or SerialArm
+        The machine as it really is, with its errors.
+    noise : float or Tracker
+        Standard deviation of the instrument in mm, for every length it reads; or a tracker, which
+        measures positions. 0: no noise.
+    seed : int
+        Of the noise. Each call of `measure` draws on; two machines with one seed read the same.
+    angle_noise : float, optional
+        Standard deviation of measured angles in rad; by default that of `noise` on an arm of
+        200 mm.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> robot = pk.load("hexapod")
+    >>> machine = pk.VirtualMachine(robot.replace({"offset1": 0.5}), noise=0.01)
+    >>> print(machine.measure(robot.inverse(robot.home)).kind)
+    position
+    """
+
+    def __init__(
+        self,
+        true_robot: Solvable | SerialArm,
+        noise: float | Tracker = 0.02,
+        seed: int = 0,
+        angle_noise: float | None = None,
+    ) -> None:
+        if not hasattr(true_robot, "forward"):
+            raise ArgumentTypeError(
+                f"true_robot must be a Robot or SerialArm, found {shown(true_robot)}"
+            )
+        self.true_robot = true_robot
+        self._machine: Solvable = (
+            ArmMachine(true_robot) if isinstance(true_robot, SerialArm) else true_robot
+        )
+        self.noise = noise if isinstance(noise, Tracker) else number("noise", noise, least=0)
+        if angle_noise is None:
+            angle_noise = 0.0 if isinstance(noise, Tracker) else noise / _ARM
+        self.angle_noise = number("angle_noise", angle_noise, least=0)
+        self._random = np.random.default_rng(checked_seed(seed))
+
+    def measure(
+        self,
+        q: ArrayLike,
+        kind: str = "position",
+        target: ArrayLike | None = None,
+        attachment: ArrayLike | None = None,
+    ) -> Measurements:
+        """Command actuators and measure where the machine goes.
+
+        Parameters
+        ----------
+        q : (N, n) or (n,) array
+            Actuator coordinates, mm or rad.
+        kind : {"position", "pose", "height", "distance"}
+            What the instrument reads; see `Measurements`.
+        target : (3,) or (N, 3) array, optional
+            The measured point in the platform frame, mm; by default the platform's origin. For
+            distances the fixed point of the base frame, and required.
+        attachment : (3,) or (N, 3) array, optional
+            The point in the platform frame, mm, from which distances are measured.
+
+        Returns
+        -------
+        Measurements
+            With the instrument's noise as sigma; None where a component has no noise.
+
+        Raises
+        ------
+        ValueError
+            Rows that the machine cannot reach, by number; or an argument that does not fit.
+        """
+        actuators = np.atleast_2d(numbers("q", q))
+        n = getattr(self._machine, "n_actuators", actuators.shape[-1])
+        if actuators.ndim != 2 or actuators.shape[1] != n or not actuators.size:
+            raise ArgumentError(f"q must have shape (N, {n}) or ({n},); found {np.shape(q)}")
+        width = len(COMPONENTS[word("kind", kind, COMPONENTS)])
+        blank = Measurements(
+            actuators,
+            np.zeros((len(actuators), width) if width > 1 else len(actuators)),
+            kind,
+            target=target,
+            actuator_units=getattr(self._machine, "actuator_units", None),
+            attachment=attachment,
+        )
+        solved = self._machine.forward(actuators)
+        failed = np.flatnonzero(~np.asarray(solved.ok))
+        if len(failed):
+            rows = ", ".join(map(str, failed[:10])) + (", …" if len(failed) > 10 else "")
+            raise ArgumentError(
+                f"q: {len(failed)} of {len(actuators)} rows have no pose on the true machine"
+                f" (rows {rows})"
+            )
+        places = (blank.targets, blank.attachments)
+        point, fixed = places[::-1] if kind == "distance" else places
+        exact = predict(kind, np.asarray(solved.pose), point, fixed).values
+        noise, sigma = self._drawn(blank, exact)
+        values = (exact + noise).reshape(blank.values.shape)
+        return dataclasses.replace(blank, values=values, sigma=sigma)
+
+    def _drawn(self, blank: Measurements, exact: FloatArray) -> tuple[FloatArray, Any]:
+        """Noise (N, k), and the sigma to state."""
+        drawn = self._random.standard_normal(exact.shape)
+        if isinstance(self.noise, Tracker):
+            if blank.kind != "position":
+                raise ArgumentError(f"kind: a tracker measures positions, found {blank.kind!r}")
+            covariance = self.noise.covariance(exact)
+            return (np.linalg.cholesky(covariance) @ drawn[:, :, None])[:, :, 0], self.noise
+        deviations = {"mm": self.noise, "rad": self.angle_noise}
+        sigma = np.array([deviations[unit] for unit in blank.units])
+        return sigma * drawn, sigma if (sigma > 0).all() else None

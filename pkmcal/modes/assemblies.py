@@ -1,0 +1,134 @@
+"""Every assembly mode of a machine at given actuator coordinates, and what is proven about it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pkmcal.arguments import whole
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows
+from pkmcal.exceptions import ArgumentError
+
+Signs = NDArray[np.int8]
+
+
+@dataclass(frozen=True, eq=False)
+class Assemblies:
+    """The poses a machine can have at one set of actuator coordinates, nearest to home first.
+
+    Attributes
+    ----------
+    poses : ndarray (k, 6)
+        x y z in mm, α β γ in rad.
+    certified : ndarray of bool (k,)
+        Proven to be near a solution, one each, and to be the only one near.
+    error : ndarray (k,)
+        How far the solution is at most, mm; entries of R count times ``robot.length``. NaN where
+        nothing is proven.
+    unique : ndarray (k,)
+        No other solution is within this distance of the pose, in the same measure.
+    complete : bool
+        True only where it is known that no mode is missing and every mode is certified.
+    reason : str
+        Why it is complete, or why it is not.
+    sign : ndarray of int (k,)
+        Sign of the closures' determinant: modes of different signs have a type-2 singularity
+        between them. 0 with more closures than free coordinates.
+    mirror : ndarray of int (k,)
+        Which mode is this one's mirror image in the plane of the base; -1 where none is.
+    paths, far, lost : int
+        Complex solutions that were followed, how many of them went to infinity (entries of R
+        beyond 100 000), and how many were lost; 0 where the machine has no start system.
+    """
+
+    poses: FloatArray
+    certified: BoolArray
+    error: FloatArray
+    unique: FloatArray
+    complete: bool
+    reason: str
+    sign: Signs
+    mirror: Int32Array
+    paths: int
+    far: int
+    lost: int
+    _apart: Callable[[FloatArray], FloatArray] = field(repr=False)
+    _feasible: Callable[[], BoolArray] = field(repr=False)
+    _led: Callable[[FloatArray, ArrayLike | None, int], FloatArray] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    @cached_property
+    def feasible(self) -> BoolArray:
+        """Which modes keep the strokes and cones of the robot file (k,), when asked for."""
+        return self._feasible()
+
+    def nearest(self, pose: ArrayLike) -> int:
+        """Index of the mode nearest to a pose (6,), rotations counted as their arc.
+
+        Raises
+        ------
+        ValueError
+            No modes, or no pose.
+        """
+        rows, shape = as_rows("pose", pose, 6)
+        if shape != ():
+            raise ArgumentError(f"pose must have shape (6,), found {(*shape, 6)}")
+        if not len(self):
+            raise ArgumentError("there are no modes to choose from")
+        return int(np.argmin(self._apart(rows)))
+
+    def reached_from(
+        self, pose: ArrayLike, actuators: ArrayLike | None = None, steps: int = 200
+    ) -> int | None:
+        """The mode in which the machine arrives from a pose without crossing a type-2 singularity.
+
+        The actuators move in a straight line from where they are at the pose, and the sign of the
+        determinant is watched on the way.
+
+        Parameters
+        ----------
+        pose : array_like (6,)
+            Where the machine is now.
+        actuators : array_like (n,), optional
+            Its coordinates there; by default the inverse of the pose, which is on the robot
+            file's branches.
+        steps : int
+            How many stops the line has.
+
+        Returns
+        -------
+        int or None
+            Index of the mode; None where the way is cut by a singularity, or not all of it can be
+            assembled.
+        """
+        rows, shape = as_rows("pose", pose, 6)
+        if shape != ():
+            raise ArgumentError(f"pose must have shape (6,), found {(*shape, 6)}")
+        end = self._led(rows[0], actuators, whole("steps", steps, 1))
+        if not np.isfinite(end).all() or not len(self):
+            return None
+        apart = self._apart(end[None])
+        best = int(np.argmin(apart))
+        return best if apart[best] <= 1e-6 + 10.0 * np.nan_to_num(self.error[best]) else None
+
+    def __str__(self) -> str:
+        lines = [
+            f"{len(self)} assembly modes, {int(self.certified.sum())} certified; "
+            + ("complete: " if self.complete else "not known to be complete: ")
+            + self.reason,
+            "       x mm        y mm        z mm     α deg     β deg     γ deg"
+            "  det  mirror  error mm",
+        ]
+        for k, p in enumerate(self.poses):
+            mm = "".join(f"{v:12.4f}" for v in p[:3])
+            deg = "".join(f"{v:10.4f}" for v in np.degrees(p[3:]))
+            error = f"{self.error[k]:9.0e}" if self.certified[k] else "     none"
+            mirror = str(self.mirror[k]) if self.mirror[k] >= 0 else "-"
+            lines.append(f"{mm}{deg}  {'0+-'[int(self.sign[k])]:>3}  {mirror:>6} {error}")
+        return "\n".join(lines)

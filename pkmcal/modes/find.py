@@ -1,0 +1,303 @@
+"""Find every assembly mode: paths from a start system, random starts, proofs, mirror images."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array
+from pkmcal.core import screws
+from pkmcal.core.machine import Machine
+from pkmcal.modes.assemblies import Assemblies, Signs
+from pkmcal.modes.certificate import Certificate, Closures, certify, newton
+from pkmcal.modes.homotopy import Endpoints, endpoints, start_system
+
+NEARLY_REAL = 1e-3  # with smaller imaginary parts a solution counts as real unless proven otherwise
+FLAT = 1e-9  # points this near a plane, beside their spread, are in it
+CLOSED = 1e-10  # of the terms of a closure: what Newton's method did not bring there is no mode
+BLURRED = 1e-4  # rad, or lengths: near a singularity poses without a proof are not known better
+AT_ONCE = 2000  # certificates: 12 x 12 matrices in memory
+STARTS = 2000  # random ones, where the paths prove nothing
+
+
+class Subject(NamedTuple):
+    """A machine at given actuator coordinates.
+
+    Attributes
+    ----------
+    machine : Machine
+        In the core.
+    map : str
+        Its pose map.
+    rows : list of tuple of str
+        Of each limb, its rows beside the sphere.
+    levers : list of float
+        Of the couple rows, mm.
+    length : float
+        Characteristic length, mm.
+    slots, q : ndarray
+        Geometry (limbs, SLOTS), and coordinates (n,), or (N, n) for `proofs`.
+    """
+
+    machine: Machine
+    map: str
+    rows: list[tuple[str, ...]]
+    levers: list[float]
+    length: float
+    slots: FloatArray
+    q: FloatArray
+
+    def spheres(self) -> FloatArray:
+        """The limbs (limbs, 13), or of each row."""
+        rows = np.ascontiguousarray(self.q.reshape(-1, self.q.shape[-1]))
+        spheres: FloatArray = self.machine.spheres(self.slots, rows)
+        return spheres if self.q.ndim > 1 else spheres[0]
+
+    def closures(self) -> Closures:
+        """The closures as quadratic equations."""
+        size = self.machine.struct.size
+        return Closures(self.map, self.rows, self.spheres(), self.length, size, self.levers)
+
+
+class Found(NamedTuple):
+    """Modes of a machine in its own frame, before they are put in order."""
+
+    poses: FloatArray
+    proof: Certificate
+    complete: bool
+    reason: str
+    ends: Endpoints | None
+
+
+def frames_of(poses: FloatArray) -> FloatArray:
+    """R row by row and p, (N, 12), of poses (N, 6)."""
+    motions = screws.joint_motions(np.ascontiguousarray(poses), np.zeros((len(poses), 3)))
+    motions = motions.reshape(-1, 4, 4)
+    frames: FloatArray = np.hstack([motions[:, :3, :3].reshape(-1, 9), motions[:, :3, 3]])
+    return frames
+
+
+def poses_of(map: str, frames: FloatArray) -> FloatArray:
+    """Poses (N, 6) of a map from R row by row and p, (N, 12)."""
+    poses = np.zeros((len(frames), 6))
+    poses[:, :3] = frames[:, 9:]
+    if map == "2tpr2tps":  # γ = 0, and β on the whole circle
+        poses[:, 3] = np.arctan2(-frames[:, 5], frames[:, 4])
+        poses[:, 4] = np.arctan2(-frames[:, 6], frames[:, 0])
+    elif map == "planar":
+        poses[:, 2] = 0.0
+        poses[:, 5] = np.arctan2(frames[:, 3], frames[:, 0])
+    elif map == "spatial":
+        motions = np.zeros((len(frames), 4, 4))
+        motions[:, :3, :3] = frames[:, :9].reshape(-1, 3, 3)
+        motions[:, :3, 3], motions[:, 3, 3] = frames[:, 9:], 1.0
+        poses = screws.pose(motions.reshape(-1, 16))
+    return poses
+
+
+def find(subject: Subject, starts: int | None) -> Found:
+    """All modes by paths; by random starts where paths leave a doubt or `starts` says so."""
+    square = subject.machine.rows == subject.machine.m
+    spheres = subject.spheres()
+    start = start_system(subject.map, subject.rows, spheres) if square else None
+    ends, real, reason, all_proven = None, np.empty((0, 12)), "", False
+    if not np.isfinite(spheres).all():
+        nothing = np.empty(0)
+        proof = Certificate(np.empty(0, dtype=bool), nothing, nothing)
+        return Found(np.empty((0, 6)), proof, False, "a limb has no positive finite length", None)
+    if not square:
+        reason = "more closures than free coordinates"
+    elif start is None:
+        reason = "no start system for such limbs"
+    else:
+        ends = endpoints(subject.machine, start, subject.map, spheres)
+        real, all_proven = _real_ones(subject, ends)
+        if ends.lost > 0:
+            reason = f"{ends.lost} of {ends.paths} paths lost"
+        elif ends.lost:
+            reason = f"of {ends.paths} paths not as many end alike by two ways around"
+    expected = len(real)
+    if starts is None:
+        starts = STARTS if reason else 0
+    if starts:
+        real = np.concatenate([real, _from_starts(subject, spheres, starts)])
+    poses, proof = _checked(subject, real)
+    if not reason and not proof.ok.all():
+        reason = f"{np.sum(~proof.ok)} modes not certified"
+    if not reason and len(poses) != expected:
+        reason = f"{expected} paths to real poses, but {len(poses)} modes"
+    complete = not reason
+    if ends and complete:
+        reason = f"all {ends.paths} complex solutions followed"
+        if ends.far:
+            reason += f", {ends.far} of them to infinity or nearly"
+        elif all_proven:
+            reason = f"all {ends.paths} complex solutions certified, and there are no more"
+    return Found(poses, proof, complete, reason, ends)
+
+
+def _real_ones(subject: Subject, ends: Endpoints) -> tuple[FloatArray, bool]:
+    """The frames among the ends of paths that are real, or not proven to be otherwise.
+
+    And whether all ends, complex ones too, are certified to be as many different solutions.
+    """
+    closures = subject.closures()
+    u = newton(closures, _scaled(ends.frames, subject.length), 1)
+    proof = certify(closures, u)
+    imaginary = np.abs(u.imag).max(axis=1, initial=0.0)
+    with np.errstate(invalid="ignore"):
+        complex_ones = (imaginary > NEARLY_REAL) | (imaginary * subject.length > proof.error)
+    frames: FloatArray = newton(closures, np.ascontiguousarray(u.real[~complex_ones]), 3)
+    frames[:, 9:] *= subject.length
+    apart = np.abs(u[:, None] - u[None]).max(axis=2, initial=0.0) * subject.length
+    alike = apart <= proof.error + proof.error[:, None]
+    return frames, bool(proof.ok.all() and np.sum(alike) == len(u))
+
+
+def _scaled(frames: Any, length: float) -> Any:
+    """(R, p) as the certificate counts them."""
+    u = frames.copy()
+    u[:, 9:] /= length
+    return u
+
+
+def _from_starts(subject: Subject, spheres: FloatArray, starts: int) -> FloatArray:
+    """Frames found by Newton's method from random orientations, on the sphere of some limb."""
+    rng = np.random.default_rng(0)
+    quaternion = rng.normal(size=(starts, 4))
+    w, x, y, z = (quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True)).T
+    guess = np.zeros((starts, 6))
+    guess[:, 3] = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    guess[:, 4] = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    guess[:, 5] = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+    if subject.map == "2tpr2tps":
+        guess[:, 4] = rng.uniform(-np.pi, np.pi, starts)
+    turned = frames_of(guess)[:, :9].reshape(-1, 3, 3)
+    limb = rng.integers(len(spheres), size=starts)
+    way = rng.normal(size=(starts, 3))
+    way *= spheres[limb, 6, None] / np.linalg.norm(way, axis=1, keepdims=True)
+    guess[:, :3] = spheres[limb, 3:6] + way - np.einsum("nij,nj->ni", turned, spheres[limb, 0:3])
+    q = np.ascontiguousarray(np.broadcast_to(subject.q, (starts, len(subject.q))))
+    poses, status, _, _ = subject.machine.forward(subject.slots, q, guess, threads=None)
+    return frames_of(poses[status == 0])
+
+
+def _checked(subject: Subject, frames: FloatArray) -> tuple[FloatArray, Certificate]:
+    """Poses of real frames, each once, and their certificates."""
+    poses = poses_of(subject.map, frames[np.isfinite(frames).all(axis=1)])
+    u = _scaled(frames_of(poses), subject.length)
+    if subject.machine.rows == subject.machine.m:
+        closures = subject.closures()
+        f, _, f_abs, _, _ = closures(u)
+        closed = (np.abs(f) <= CLOSED * f_abs).all(axis=1)
+        poses, u = poses[closed], u[closed]
+        proof = certify(closures, u)
+    else:
+        nothing = np.full(len(u), np.nan)
+        proof = Certificate(np.zeros(len(u), dtype=bool), nothing, nothing)
+    kept: list[int] = []
+    for k in np.lexsort((~proof.ok,)):
+        apart = np.abs(u[kept] - u[k]).max(axis=1, initial=0.0) * subject.length
+        reach = np.where(proof.ok[kept], proof.unique[kept], BLURRED * subject.length)
+        # the same solution: within the ball in which there is only one, its own error included
+        if not (apart + np.nan_to_num(proof.error[k]) < reach).any():
+            kept.append(int(k))
+    return poses[kept], Certificate(proof.ok[kept], proof.error[kept], proof.unique[kept])
+
+
+def proofs(subject: Subject, poses: FloatArray) -> Certificate:
+    """Certificates of poses (N, 6), each at its own coordinates: `subject.q` is (N, n)."""
+    ok, error, unique = np.zeros(len(poses), dtype=bool), *np.full((2, len(poses)), np.nan)
+    solved = np.isfinite(poses).all(axis=1)
+    if subject.machine.rows == subject.machine.m:
+        for part in np.array_split(np.flatnonzero(solved), 1 + solved.sum() // AT_ONCE):
+            u = _scaled(frames_of(poses[part]), subject.length)
+            proof = certify(subject._replace(q=subject.q[part]).closures(), u)
+            ok[part], error[part], unique[part] = proof.ok, proof.error, proof.unique
+    return Certificate(ok, error, unique)
+
+
+def distance(poses: FloatArray, pose: FloatArray, length: float) -> FloatArray:
+    """How far poses (N, 6) are from one (1, 6), mm: p, and R as its largest entry times length."""
+    difference = _scaled(frames_of(poses) - frames_of(pose), length)
+    return np.asarray(np.abs(difference).max(axis=1, initial=0.0) * length)
+
+
+def signs(subject: Subject, poses: FloatArray) -> Signs:
+    """Sign of the closures' determinant at poses (N, 6); 0 where it has none."""
+    if subject.machine.rows != subject.machine.m:
+        return np.zeros(len(poses), dtype=np.int8)
+    q = np.ascontiguousarray(np.broadcast_to(subject.q, (len(poses), len(subject.q))))
+    steps = subject.machine.closure(subject.slots, poses, q).by_step
+    return np.asarray(np.sign(np.linalg.det(steps)), dtype=np.int8)
+
+
+def mirrored(subject: Subject, poses: FloatArray) -> Int32Array:
+    """Of each pose which other is its mirror image in the plane of the anchors; -1 for none."""
+    none = np.full(len(poses), -1, dtype=np.int32)
+    spheres, frames = subject.spheres(), frames_of(poses)
+    b, c = spheres[:, 0:3], spheres[:, 3:6]
+    if subject.map == "planar" or not len(poses):
+        return none
+    if subject.map == "translation":
+        b, c = np.zeros_like(b), c - b
+    base, platform = _plane(c), _plane(b)
+    if base is None or platform is None:
+        return none
+    flip, turn = (np.eye(3) - 2.0 * np.outer(axis, axis) for axis, _ in (base, platform))
+    at, over = base[1], 2.0 * platform[1] * platform[0]
+    R, p = frames[:, :9].reshape(-1, 3, 3), frames[:, 9:]
+    image = frames.copy()
+    if subject.map != "translation":
+        image[:, :9] = (flip @ R @ turn).reshape(-1, 9)
+    image[:, 9:] = p @ flip + 2.0 * at * base[0] + (R @ over) @ flip
+    near = np.abs(_scaled(image[:, None] - frames[None], subject.length)).max(axis=2)
+    which = near.argmin(axis=1)
+    return np.where(near.min(axis=1) < 1e-7, which, none).astype(np.int32)
+
+
+def led(subject: Subject, pose: FloatArray, begin: FloatArray, steps: int) -> FloatArray:
+    """The pose (1, 6) after the actuators went from `begin` (1, n) at `pose` to `q`, straight.
+
+    NaN where a type-2 singularity is on the way.
+    """
+    machine, slots = subject.machine, subject.slots
+    at, side = pose, 0.0
+    for k in range(steps + 1):
+        q = begin + (subject.q - begin) * (k / steps)
+        at, status, _, _ = machine.forward(slots, q, at, threads=1)
+        if status[0]:
+            return np.full((1, 6), np.nan)
+        if machine.rows == machine.m:
+            now = np.sign(np.linalg.det(machine.closure(slots, at, q).by_step[0]))
+            if now * side < 0:
+                return np.full((1, 6), np.nan)
+            side = now
+    return at
+
+
+def _plane(points: FloatArray) -> tuple[FloatArray, float] | None:
+    """Unit normal and distance from the origin of the plane of points, if they have just one."""
+    middle = points.mean(axis=0)
+    if not np.ptp(points, axis=0).any():  # joints in one point: any plane through it will do
+        return np.array([0.0, 0.0, 1.0]), float(middle[2])
+    _, spread, axes = np.linalg.svd(points - middle)
+    if spread[1] <= FLAT * spread[0] or spread[-1] > FLAT * spread[0]:
+        return None
+    return axes[-1], float(axes[-1] @ middle)
+
+
+def assemblies(
+    subject: Subject, found: Found, outward: FloatArray, order: NDArray[np.intp], **calls: object
+) -> Assemblies:
+    """The result: modes in `order`, their poses in the user's frames `outward`."""
+    proof, ends = found.proof, found.ends
+    own = found.poses[order]
+    counts = (ends.paths, ends.far, ends.lost) if ends else (0, 0, 0)
+    certified: BoolArray = proof.ok[order]
+    return Assemblies(
+        outward, certified, proof.error[order], proof.unique[order], found.complete, found.reason,
+        signs(subject, own), mirrored(subject, own), *counts, **calls,  # type: ignore[arg-type]
+    )  # fmt: skip

@@ -1,0 +1,124 @@
+"""Limits and singularities that a move meets, with their times."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.kinematics.limits import Feasibility
+from pkmcal.kinematics.workspace import dexterity
+
+if TYPE_CHECKING:
+    from pkmcal.moves.move import Move
+
+_STEPS = 2000  # along a move
+_HALVINGS = 50  # of a step, to the time a limit is met
+_THIRDS = 40  # taken off two steps, to where a margin is least
+_NEAR = 4.0  # times what a margin falls by in a step: no dip between steps goes deeper
+_STILL = 1e-9  # mm, rad or share: what a margin at rest changes by
+
+
+@dataclass(frozen=True)
+class Event:
+    """A limit that a move meets.
+
+    Attributes
+    ----------
+    time : float
+        s; when it is first broken.
+    until : float
+        s; when it is kept again, or the end of the move.
+    what : str
+        The limit: "reach", "stroke", "base_cone", "platform_cone" or "singularity".
+    limb : int or None
+        Which limb, counted from 1; None for the machine as a whole.
+    """
+
+    time: float
+    until: float
+    what: str
+    limb: int | None
+
+
+def events(move: Move) -> list[Event]:
+    """Limits that are broken and singularities that are met, with their times, in order.
+
+    Strokes, joint cones and reach of every limb; a singularity is met where the determinant of
+    the closures changes its sign, and from there the machine is on its other side. (With more
+    closures than free coordinates there is no determinant: `conditioning` tells.)
+
+    Each limit's margin is looked at 2001 times and followed to its least between them, so that
+    a limit is found however briefly it is broken. What can be missed lasts less than 1/1000 of
+    the duration, in a margin that has more than one minimum in that time or falls more than four
+    times as far as from one look to the next; or it goes less than 1e-9 mm or rad too far.
+    """
+    times = np.linspace(0.0, move.duration, _STEPS + 1)
+    times = np.unique(np.concatenate([times, _dips(move, times)]))
+    states = _margins(move, times) < 0.0
+    found = []
+    for column, (what, limb) in enumerate(_names(move)):
+        broken = states[:, column]
+        edges = np.flatnonzero(broken[1:] != broken[:-1]).tolist()
+        turns = [_turn(move, times[k], times[k + 1], column, bool(broken[k])) for k in edges]
+        if broken[0]:
+            turns.insert(0, 0.0)
+        if len(turns) % 2:
+            turns.append(move.duration)
+        pairs = zip(turns[::2], turns[1::2], strict=True)
+        found += [Event(first, last, what, limb) for first, last in pairs]
+    return sorted(found, key=lambda event: event.time)
+
+
+def _names(move: Move) -> list[tuple[str, int | None]]:
+    limbs = range(1, len(move.robot.model.limbs) + 1)
+    names: list[tuple[str, int | None]] = [
+        (what, limb) for what in Feasibility.LIMITS for limb in limbs
+    ]
+    return [*names, ("singularity", None)]
+
+
+def _margins(move: Move, times: FloatArray) -> FloatArray:
+    """How far inside each limit at times, (N, limits); below 0 where it is broken.
+
+    Reach is left where a limb's actuator can no longer move it: where its transmission is 0.
+    """
+    pose = move.sample(times).pose
+    feasible = move.robot.feasible(pose)
+    there = dexterity(move.robot, np.vstack([move.start, pose]))
+    found = [np.where(feasible.reach, np.nan_to_num(there.transmission[1:, None]), -1.0)]
+    for what in Feasibility.LIMITS[1:]:
+        margin = np.maximum(getattr(feasible, f"{what}_margin"), 0.0)
+        found.append(np.where(getattr(feasible, what), margin, -1.0))
+    side = there.determinant[1:] * np.sign(there.determinant[0])
+    return np.hstack([*found, np.where(np.isnan(side), np.inf, side)[:, None]])
+
+
+def _dips(move: Move, times: FloatArray) -> FloatArray:
+    """Where margins that may vanish between times (N,) are least."""
+    margins = _margins(move, times)
+    before, here, after = margins[:-2], margins[1:-1], margins[2:]
+    with np.errstate(invalid="ignore"):  # limits not stated are infinitely far
+        fall = np.maximum(before - here, after - here)
+        least = (here >= 0) & (here <= before) & (here <= after)
+        rows, columns = np.nonzero(least & (fall > _STILL) & (here < _NEAR * fall))
+    low, high = times[rows], times[rows + 2]
+    own = np.arange(len(rows)), columns
+    for _ in range(_THIRDS if len(rows) else 0):
+        left, right = low + (high - low) / 3, high - (high - low) / 3
+        falls = _margins(move, left)[own] > _margins(move, right)[own]
+        low, high = np.where(falls, left, low), np.where(falls, high, right)
+    return (low + high) / 2
+
+
+def _turn(move: Move, low: float, high: float, column: int, before: bool) -> float:
+    """When a limit changes between two times."""
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        if bool(_margins(move, np.array([middle]))[0, column] < 0) == before:
+            low = middle
+        else:
+            high = middle
+    return (low + high) / 2

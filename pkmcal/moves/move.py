@@ -1,0 +1,343 @@
+"""Moves of a machine: straight in space or straight in its actuators, and what they break."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal import display
+from pkmcal.arguments import number, word
+from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.core.library import POSE
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.complete import complete, completed_rates
+from pkmcal.kinematics.perturbed import ON_THE_MANIFOLD
+from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.kinematics.workspace import dexterity, moved_coordinates
+from pkmcal.moves import derivatives
+from pkmcal.moves.events import Event, events
+from pkmcal.moves.time_laws import (
+    CUBIC,
+    QUINTIC,
+    JerkLimited,
+    Polynomial,
+    jerk_limited,
+    limit,
+    seconds,
+)
+from pkmcal.screw import from_pose, to_pose
+
+_LAWS = {"cubic": CUBIC, "quintic": QUINTIC}
+_STEPS = 2000  # along a move, in search of peaks
+
+Space = Literal["pose", "coordinates", "joint"]
+
+
+@dataclass(frozen=True, eq=False)
+class MoveSample:
+    """A machine at N times of a move; every array has the shape of the times first.
+
+    Attributes
+    ----------
+    time : ndarray (...)
+        s.
+    pose : ndarray (..., 6)
+        x y z in mm, α β γ in rad.
+    twist : ndarray (..., 6)
+        (ω, v) in rad/s and mm/s, v that of the platform's origin; base axes.
+    twist_rate : ndarray (..., 6)
+        Its derivative by time.
+    actuators, velocities, accelerations : ndarray (..., n)
+        mm or rad, and s.
+    """
+
+    time: FloatArray
+    pose: FloatArray
+    twist: FloatArray
+    twist_rate: FloatArray
+    actuators: FloatArray
+    velocities: FloatArray
+    accelerations: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Move:
+    """A move of a machine from rest to rest, made by `move`.
+
+    Attributes
+    ----------
+    robot : Robot
+        The machine.
+    start, end : ndarray (6,)
+        Poses.
+    space : str
+        What is straight: "pose", "coordinates" or "joint".
+    law : Polynomial or JerkLimited
+        Of the actuators in joint space, else of the share of the way.
+    """
+
+    robot: Robot
+    start: FloatArray
+    end: FloatArray
+    space: Space
+    law: Polynomial | JerkLimited
+
+    @property
+    def duration(self) -> float:
+        """How long it takes, s."""
+        return self.law.duration
+
+    def sample(self, t: ArrayLike) -> MoveSample:
+        """Position, velocity and acceleration of platform and actuators at times.
+
+        Parameters
+        ----------
+        t : array_like (...)
+            s.
+        """
+        times = seconds(t)
+        made = {
+            "pose": self._in_pose,
+            "coordinates": self._in_coordinates,
+            "joint": self._in_joint,
+        }
+        motion, actuators = made[self.space](times.reshape(-1))
+        twist, twist_rate = derivatives.twists(motion)
+        found = (to_pose(motion[:, 0]), twist, twist_rate, *actuators)
+        return MoveSample(times, *(each.reshape(*times.shape, -1) for each in found))
+
+    def events(self) -> list[Event]:
+        """Limits that are broken and singularities that are met, in order of time (`events`)."""
+        return events(self)
+
+    def conditioning(self, t: ArrayLike) -> FloatArray:
+        """How well the pose is held at times (...): 1 best, 0 at a singularity."""
+        return dexterity(self.robot, self.sample(t).pose).conditioning
+
+    def __str__(self) -> str:
+        at = self.sample(np.linspace(0.0, self.duration, _STEPS + 1))
+        rows = []
+        for i, unit in enumerate(self.robot.actuator_units):
+            factor, unit = display.displayed(1.0, unit)
+            numbers = (at.actuators[0, i], at.actuators[-1, i], np.abs(at.velocities[:, i]).max(),
+                       np.abs(at.accelerations[:, i]).max())  # fmt: skip
+            rows.append([f"q{i + 1} [{unit}]", *(f"{number * factor:.4g}" for number in numbers)])
+        title = (
+            f"{self.robot.name}: straight in {self._straight}, {self.duration:.4g} s,"
+            f" conditioning {np.min(self.conditioning(at.time)):.3g} at least"
+        )
+        head = ["actuator", "from", "to", "top speed [/s]", "top acceleration [/s²]"]
+        lines = [title, str(display.Table(head, rows, left=1))]
+        for event in self.events():
+            limb = "" if event.limb is None else f"limb {event.limb}: "
+            broken = "met" if event.what == "singularity" else "broken"
+            lines.append(
+                f"{event.time:.4f} to {event.until:.4f} s  {limb}{event.what.replace('_', ' ')}"
+                f" {broken}"
+            )
+        return "\n".join(lines)
+
+    # --------------------------------------------------------------------------------------------
+
+    def _in_pose(self, times: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+        position, velocity, acceleration = self.law.sample(times)
+        motion = derivatives.straight(self.start, self.end, (position, velocity, acceleration))
+        pose = to_pose(motion[:, 0])
+        return motion, (self.robot.inverse(pose), *self.robot.rates(motion))
+
+    def _in_joint(self, times: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+        robot, frames, slots = self.robot, self.robot._frames, self.robot._slots
+        q, velocity, acceleration = self.law.sample(times)
+        way = self.law.end - self.law.start
+        share = (q - self.law.start) @ way / max(float(way @ way), 1e-300)
+        still = np.zeros_like(share)
+        guess = to_pose(derivatives.straight(self.start, self.end, (share, still, still))[:, 0])
+        own = np.ascontiguousarray(frames.inward(robot.forward(q, guess=guess).pose))
+        actuators = (q, velocity, acceleration)
+        motion = robot._machine.motion(slots, own, *map(np.ascontiguousarray, actuators))[0]
+        return frames.motion_outward(motion), actuators
+
+    def _in_coordinates(self, times: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+        robot, frames, slots = self.robot, self.robot._frames, self.robot._slots
+        share, speed, bend = (each[:, None] for each in self.law.sample(times))
+        first, last = frames.inward(np.stack([self.start, self.end]))
+        matched = [POSE.index(name) for name in moved_coordinates(robot)]
+        way = (last - first)[matched]
+        own, q = complete(
+            robot._machine, robot.model.map, slots, first + share * (last - first), matched
+        )
+        velocity, acceleration = completed_rates(
+            robot._machine, robot.model.map, slots, own, q, matched, (speed * way, bend * way)
+        )
+        motion = robot._machine.motion(slots, own, q, velocity, acceleration)[0]
+        return frames.motion_outward(motion), (q, velocity, acceleration)
+
+    @property
+    def _straight(self) -> str:
+        if self.space == "coordinates":
+            return " ".join(moved_coordinates(self.robot))
+        return f"{self.space} space"
+
+
+def move(
+    robot: Robot,
+    start: ArrayLike,
+    end: ArrayLike,
+    duration: float | None = None,
+    law: Literal["cubic", "quintic", "jerk-limited"] = "quintic",
+    space: Space = "pose",
+    velocity: ArrayLike | None = None,
+    acceleration: ArrayLike | None = None,
+    jerk: ArrayLike | None = None,
+) -> Move:
+    """A move of a machine from rest to rest between two poses.
+
+    Parameters
+    ----------
+    robot : Robot
+        The machine.
+    start, end : array_like (6,)
+        x y z in mm, α β γ in rad.
+    duration : float, optional
+        s; by default the shortest within the limits.
+    law : str
+        "quintic", "cubic", or in joint space "jerk-limited".
+    space : str
+        "pose": the platform's origin goes straight and the platform turns about one axis (SLERP);
+        "coordinates": those that the robot file declares to match, or else its free coordinates,
+        go straight, and the machine determines the others, as by `Robot.complete`;
+        "joint": the actuators go straight.
+    velocity, acceleration, jerk : array_like () or (n,), optional
+        Limits of the actuators, mm or rad, and s; without `duration` at least one is needed.
+
+    Returns
+    -------
+    Move
+        ``.sample(t)``, ``.events()``, ``.duration``; ``print`` shows peaks and broken limits.
+
+    Raises
+    ------
+    ValueError
+        An end that the machine cannot take, a straight path that it cannot follow, no duration and
+        no limits, limits that are not positive.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> robot = pk.load("rbt-6t03p")
+    >>> way = pk.trajectory.move(robot, robot.home, [0, 0, 30, 0, 0, 0.1], velocity=50.0)
+    >>> bool(abs(way.sample(way.duration / 2).velocities).max() <= 50.0)
+    True
+    """
+    require_parallel(robot)
+    ends = [_pose(robot, "start", start), _pose(robot, "end", end)]
+    word("space", space, ("pose", "coordinates", "joint"))
+    word("law", law, (*_LAWS, "jerk-limited"))
+    if duration is not None:
+        number("duration", duration, above=0)
+    n = robot.n_actuators
+    limits = {
+        name: limit(name, value, n)
+        for name, value in (("velocity", velocity), ("acceleration", acceleration), ("jerk", jerk))
+        if value is not None
+    }
+    q = robot.inverse(np.stack(ends))
+    if law == "jerk-limited":
+        if space != "joint" or duration is not None or len(limits) < 3:
+            raise ArgumentError(
+                "a jerk-limited move is straight in joint space and takes velocity, acceleration"
+                " and jerk, no duration"
+            )
+        smooth = jerk_limited(q[0], q[1], **limits)
+        return _followed(Move(robot, ends[0], ends[1], space, smooth))
+    if "jerk" in limits:
+        raise ArgumentError("jerk is limited by the law 'jerk-limited' alone")
+    sides = (q[0], q[1]) if space == "joint" else (np.array(0.0), np.array(1.0))
+
+    def lasting(seconds: float) -> Move:
+        made = Polynomial(sides[0], sides[1], seconds, _LAWS[law])
+        return Move(robot, ends[0], ends[1], space, made)
+
+    unit = _followed(lasting(1.0))
+    return lasting(duration if duration is not None else _fastest(unit, limits))
+
+
+def _pose(robot: Robot, name: str, pose: ArrayLike) -> FloatArray:
+    rows, shape = as_rows(name, pose, 6)
+    if shape != ():
+        raise ArgumentError(f"{name} must be one pose (6,), found {(*shape, 6)}")
+    off = float(robot.violation(rows[0]))
+    if not off <= ON_THE_MANIFOLD:
+        why = f"its closures miss by {off:.3g} mm" if np.isfinite(off) else "out of reach"
+        raise ArgumentError(
+            f"{name}: {robot.name} cannot take this pose, {why}; robot.complete(pose) makes one"
+        )
+    pose_given: FloatArray = rows[0]
+    return pose_given
+
+
+def _followed(made: Move) -> Move:
+    """The move; raises ValueError where the machine cannot follow the straight path."""
+    if made.space == "pose":
+        pose = made.sample(np.linspace(0.0, made.duration, 101)).pose
+        off = made.robot.violation(pose)
+        worst = float(np.nan_to_num(off).max())
+        if worst > ON_THE_MANIFOLD:
+            raise ArgumentError(
+                f"{made.robot.name} cannot follow the straight path: its closures miss by"
+                f" {worst:.3g} mm on the way; use space='coordinates' or 'joint'"
+            )
+    if made.space == "coordinates":
+        names = " ".join(moved_coordinates(made.robot))
+        t = np.linspace(0.0, made.duration, 101)
+        pose = made.sample(t).pose
+        lost = np.flatnonzero(~np.isfinite(pose).all(axis=1))
+        if lost.size:
+            raise ArgumentError(
+                f"{made.robot.name} cannot follow the path: no pose has its {names}"
+                f" {t[lost[0]]:.4g} s after the start"
+            )
+        off = np.abs(from_pose(pose[[0, -1]]) - from_pose(np.stack([made.start, made.end]))).max()
+        if off > ON_THE_MANIFOLD:
+            raise ArgumentError(
+                f"{made.robot.name}: the path of {names} does not"
+                f" lead from start to end but to another assembly mode"
+            )
+    return made
+
+
+def _fastest(unit: Move, limits: dict[str, FloatArray]) -> float:
+    """The shortest duration within limits: speeds go with 1/T and accelerations with 1/T²."""
+    if not limits:
+        raise ArgumentError("give a duration, or limits of velocity or acceleration")
+    parts: dict[str, Callable[[MoveSample], FloatArray]] = {
+        "velocity": lambda at: at.velocities,
+        "acceleration": lambda at: at.accelerations,
+    }
+    shortest = 0.0
+    for name, most in limits.items():
+        order = 1 if name == "velocity" else 2
+        peaks = _peaks(unit, parts[name])
+        if not np.isfinite(peaks).all():
+            raise ArgumentError(
+                "the path leaves the machine's reach or is singular: no fastest move"
+            )
+        shortest = max(shortest, float(((peaks / most) ** (1 / order)).max()))
+    if shortest == 0.0:
+        raise ArgumentError("start and end are the same pose: give a duration")
+    return shortest
+
+
+def _peaks(unit: Move, part: Callable[[MoveSample], FloatArray]) -> FloatArray:
+    """The largest size of each actuator's velocity or acceleration, looked at again closely."""
+    coarse = np.linspace(0.0, 1.0, _STEPS + 1)
+    sizes = np.abs(part(unit.sample(coarse)))
+    peaks = sizes.max(axis=0)
+    for i, k in enumerate(sizes.argmax(axis=0).tolist()):
+        near = np.linspace(coarse[max(k - 1, 0)], coarse[min(k + 1, _STEPS)], _STEPS + 1)
+        peaks[i] = max(peaks[i], np.abs(part(unit.sample(near)))[:, i].max())
+    return np.asarray(peaks)

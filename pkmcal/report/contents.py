@@ -1,0 +1,298 @@
+"""What a calibration report says, as numbers and sentences; `pkmcal.report` gives it its looks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pkmcal import display
+from pkmcal.arrays import FloatArray
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.identification import Identification
+from pkmcal.core.library import POSE
+from pkmcal.files.provenance import printable
+from pkmcal.kinematics.workspace import reach, sample_poses, workspace
+from pkmcal.measurements.calibratable import ArmMachine, as_machine
+from pkmcal.measurements.iso9283 import performance
+from pkmcal.measurements.lack_of_fit import groups
+
+_WORST = 10  # rows that are listed
+_SPREAD = 3.0  # deviations by which held-out points may miss what is expected
+_GAIN = 0.9  # of the misfit that must not be left for a calibration to be worth it
+_CELLS, _DRAWN = 30, 500  # of the map of the workspace along an axis; of poses for its quantiles
+_SHARE = 0.9  # of the way from home to the ends of the workspace
+_TOLD, _ALONE = 0.5, 0.99  # of the prior's deviation: to what measurements narrow it down
+_ELSEWHERE = 1.0  # mm
+_NOTHING = 1e-3  # share of a parameter in what cannot be told that does not count
+
+
+@dataclass(frozen=True, eq=False)
+class WorkspaceAccuracy:
+    """How far off the calibrated machine is expected to be, one standard deviation, mm.
+
+    Attributes
+    ----------
+    poses : ndarray (N, 6)
+        Where, mm and rad; of an arm joint coordinates (N, n).
+    positions : ndarray (N, 3)
+        Of the tool there, mm.
+    accuracy : ndarray (N,)
+        inf where the measurements do not tell.
+    where : str
+        How the poses were chosen.
+    """
+
+    poses: FloatArray
+    positions: FloatArray
+    accuracy: FloatArray
+    where: str
+
+    @property
+    def told(self) -> FloatArray:
+        """Those that are finite."""
+        return self.accuracy[np.isfinite(self.accuracy)]
+
+
+@dataclass(frozen=True, eq=False)
+class Slice:
+    """The accuracy over two coordinates, NaN out of the workspace; `axes` names them."""
+
+    axes: tuple[str, str]
+    values: tuple[FloatArray, FloatArray]
+    accuracy: FloatArray
+
+
+def verdict(found: Identification) -> tuple[str, str]:
+    """How it went: "good", "doubtful" or "bad", and one sentence."""
+    if not found.converged:
+        return "bad", "Not to be trusted: the least squares did not converge."
+    if found.warnings:
+        return "bad", f"Not to be trusted: {printable(found.warnings[0], 1000)}"
+    if not np.isfinite(found.holdout_rms):
+        said = f"the misfit of the {len(found.rows)} fitted points {_falls(found, 'rms')}"
+        if found.rms > _GAIN * found.rms_before:
+            return "doubtful", f"Little gained: {said}."
+        return "good", f"Calibrated: {said}; no points were held out to confirm it."
+    count = int(np.isfinite(found.holdout_off).sum())
+    said = f"the error of {count} points that were not fitted {_falls(found, 'holdout_rms')}"
+    if found.holdout_rms > found.holdout_expected * (1 + _SPREAD / np.sqrt(2 * count)):
+        return "doubtful", f"Doubtful: {said}, but {_mm(found.holdout_expected)} was expected."
+    if found.holdout_rms > _GAIN * found.holdout_rms_before:
+        return "doubtful", f"Little gained: {said}."
+    return "good", f"Calibrated: {said}; {_mm(found.holdout_expected)} was expected."
+
+
+def _falls(found: Identification, name: str) -> str:
+    """What a misfit does."""
+    before, after = getattr(found, f"{name}_before"), getattr(found, name)
+    return f"{'falls' if after < before else 'goes'} from {_mm(before)} to {_mm(after)} rms"
+
+
+def instrument_sought(found: Identification) -> bool:
+    """Whether a frame or points of the instrument are among the parameters."""
+    return len(found.free) > len(found._equations.parameters.places)
+
+
+def directions(found: Identification) -> list[dict[str, Any]]:
+    """Residuals of each measured component: mean, rms and largest, before and after; mm and rad."""
+    names: dict[str, tuple[str, list[FloatArray], list[FloatArray]]] = {}
+    parts = zip(found._equations.sets, found._start.residuals, found.residuals, strict=True)
+    for measured, first, last in parts:
+        pairs = zip(measured.components, measured.units, strict=True)
+        for k, (name, unit) in enumerate(pairs):
+            entry = names.setdefault(name, (unit, [], []))
+            entry[1].append(first[:, k])
+            entry[2].append(last[:, k])
+    rows = []
+    for name, (unit, firsts, lasts) in names.items():
+        row: dict[str, Any] = {"name": name, "unit": unit}
+        for when, values in (("before", np.concatenate(firsts)), ("after", np.concatenate(lasts))):
+            row[f"mean_{when}"] = float(values.mean())
+            row[f"rms_{when}"] = float(np.sqrt((values**2).mean()))
+            row[f"largest_{when}"] = float(np.abs(values).max())
+        rows.append(row)
+    return rows
+
+
+def points(found: Identification) -> list[dict[str, Any]]:
+    """Every fitted row: its number, where the machine is, how far off before and after, mm."""
+    equations = found._equations
+    off_before = equations.distances(found._start)
+    off = equations.distances(found._estimate.point)
+    place = np.concatenate(equations.pose_of)
+    at = found._estimate.point.pose[place]
+    return [
+        {
+            "row": int(row),
+            "pose": [float(number) for number in pose],
+            "before": float(first),
+            "after": float(last),
+            "outlier": int(row) in found.outliers,
+        }
+        for row, pose, first, last in zip(found.rows, at, off_before, off, strict=True)
+    ]
+
+
+def worst(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The rows that are furthest off after the calibration."""
+    return sorted(rows, key=lambda row: -row["after"])[:_WORST]
+
+
+def moved(rows: list[dict[str, Any]]) -> list[tuple[int, str, str, int]]:
+    """The coordinates that are not always 0: place, name, unit, and decimals that are shown."""
+    some = np.any([row["pose"] for row in rows], axis=0)
+    units = [("mm", 1)] * 3 + [("rad", 2)] * 3
+    return [(k, POSE[k], *units[k]) for k in range(len(POSE)) if some[k]]
+
+
+def parameters(found: Identification) -> list[dict[str, Any]]:
+    """Each parameter before and after, and in words how well it is known."""
+    untold = _share_untold(found)
+    rows = []
+    for i in range(len(found.free)):
+        prior = float(found._equations.parameters.prior[i])
+        rows.append({
+            "name": printable(found.free[i]),
+            "unit": found.units[i],
+            "before": float(found.start[i]),
+            "after": float(found.values[i]),
+            "stderr": float(found.stderr[i]),
+            "told": bool(np.isfinite(found.stderr[i])),
+            "prior": prior,
+            "knowledge": _knowledge(found, i, prior, float(untold[i])),
+        })  # fmt: skip
+    return rows
+
+
+def _share_untold(found: Identification) -> FloatArray:
+    """How much of each parameter lies along combinations that measurements do not tell, 0 to 1."""
+    share: FloatArray = np.linalg.norm(found._estimate.setting.told.untold, axis=1)
+    return share
+
+
+def _knowledge(found: Identification, i: int, prior: float, untold: float) -> str:
+    if found.free[i] in found.at_bounds:
+        return "stopped at its bound"
+    sigma = float(found.stderr[i])
+    if not np.isfinite(sigma):
+        return "not told"
+    if np.isfinite(prior) and sigma > _ALONE * prior:
+        return "the prior alone"
+    if np.isfinite(prior) and sigma > _TOLD * prior:
+        return "mostly the prior"
+    return "well told" if untold < _NOTHING or np.isfinite(prior) else "told in part"
+
+
+def correlation(found: Identification) -> FloatArray:
+    """Correlations (n, n); NaN beside parameters that are not told."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scale = np.where(np.isfinite(found.stderr) & (found.stderr > 0), found.stderr, np.nan)
+        matrix: FloatArray = found.covariance / np.outer(scale, scale)
+    return matrix
+
+
+def iso9283(found: Identification) -> list[dict[str, Any]]:
+    """AP, RP and AD of every set of positions or poses, before and after the calibration."""
+    equations = found._equations
+    scores = []
+    for i, measured in enumerate(equations.sets):
+        if measured.kind not in ("position", "pose"):
+            continue
+        group, values = groups(measured), measured.values[:, :3]
+        first = performance(values, found._start.predicted[i].values[:, :3], group)
+        last = performance(values, values - found.residuals[i][:, :3], group)
+        scores.append({
+            "set": i + 1,
+            "poses": len(first.repeats),
+            "repeats": [int(first.repeats.min()), int(first.repeats.max())],
+            "accuracy_before": first.accuracy.tolist(),
+            "accuracy": last.accuracy.tolist(),
+            "accuracy_mean_before": float(first.accuracy.mean()),
+            "accuracy_mean": float(last.accuracy.mean()),
+            "repeatability": last.repeatability.tolist(),
+            "repeatability_largest": _largest(last.repeatability),
+            "distance_before": _rms(first.distance_accuracy),
+            "distance": _rms(last.distance_accuracy),
+            "distance_largest_before": _largest(first.distance_accuracy),
+            "distance_largest": _largest(last.distance_accuracy),
+        })  # fmt: skip
+    return scores
+
+
+def expected(found: Identification, places: FloatArray) -> FloatArray:
+    """Standard deviation of the tool, mm (N,), at poses (N, 6), of an arm at joints (N, n).
+
+    Where the instrument's frame or targets were sought, that of the first target as the
+    instrument sees it: in the base frame it holds what nobody can know of where the base is.
+    """
+    return as_seen(found, places) if instrument_sought(found) else found.accuracy(places)
+
+
+def as_seen(found: Identification, places: FloatArray) -> FloatArray:
+    """Standard deviation of the first row's target in the instrument's frame, as `expected`."""
+    known = found._equations
+    at, q, _ = as_machine(found.robot).visited(places)
+    like = known.shares[0]
+    rows = np.zeros(len(q), dtype=np.intp)
+    measured = replace(like.measured.select(rows), actuators=q, group=np.arange(len(q)))
+    equations = Equations([replace(like, measured=measured, rows=rows)], known.parameters)
+    point = equations.at(found._estimate.point.theta)
+    jacobian = equations.jacobian(point)[0][:, :3]
+    jacobian *= known.parameters.scale
+    covariance = found._estimate.covariance
+    variance = np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian, optimize=True)
+    untold = jacobian @ found._untold_here()
+    sure = np.linalg.norm(untold, axis=(1, 2)) < _NOTHING
+    off = np.abs(point.pose[equations.pose_of[0]] - at)[:, :3].max(axis=1)
+    sure &= off < _ELSEWHERE  # another assembly mode is another place
+    return np.where(sure, np.sqrt(variance), np.inf)
+
+
+def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice | None] | str:
+    """The accuracy that the covariance predicts over the workspace, or why there is none."""
+    machine = as_machine(found.robot)
+    if isinstance(machine, ArmMachine):
+        q = found._equations.actuators
+        shape = (_DRAWN, q.shape[1])
+        random = np.random.default_rng(0).uniform(q.min(axis=0), q.max(axis=0), shape)
+        positions = machine.forward(random).pose[:, :3]
+        where = f"{_DRAWN} joint positions drawn within the range that was measured"
+        return WorkspaceAccuracy(random, positions, expected(found, random), where), None
+    try:
+        poses = sample_poses(machine, _DRAWN, share=_SHARE)
+        ends = reach(machine)
+    except ValueError as error:
+        return str(error)
+    where = f"{_DRAWN} poses drawn in the workspace, {100 * _SHARE:.0f} % of the way to its ends"
+    sampled = WorkspaceAccuracy(poses, poses[:, :3], expected(found, poses), where)
+    axes = [name for name in ends if name in "xyz" and ends[name][0] < ends[name][1]][:2]
+    if len(axes) < 2:
+        return sampled, None
+    grid = workspace(machine, {name: (*ends[name], _CELLS) for name in axes})
+    inside = grid.inside
+    accuracy = np.full(inside.shape, np.nan)
+    accuracy[inside] = expected(found, grid.poses[inside])
+    accuracy[~np.isfinite(accuracy)] = np.nan
+    return sampled, Slice((axes[0], axes[1]), (grid.values[0], grid.values[1]), accuracy)
+
+
+def _mm(value: float) -> str:
+    return f"{value:.3g} mm"
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt((values**2).mean())) if values.size else float("nan")
+
+
+def _largest(values: FloatArray) -> float:
+    told = np.abs(values[np.isfinite(values)])
+    return float(told.max()) if told.size else float("nan")
+
+
+def shown(value: float, unit: str, sigma: float) -> str:
+    """A number in the unit people read, to the digits that `sigma` supports."""
+    number, _ = display.displayed(value, unit)
+    deviation, _ = display.displayed(sigma, unit)
+    return display.fixed(number, display.decimals(deviation) if np.isfinite(deviation) else 4)

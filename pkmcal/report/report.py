@@ -1,0 +1,157 @@
+"""A calibration as one HTML file that needs nothing else, and the same as data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pkmcal import display
+from pkmcal.arms.arm import SerialArm
+from pkmcal.calibration.identification import Identification
+from pkmcal.files.atomic import write_whole
+from pkmcal.files.provenance import checksums, comment, printable, version
+from pkmcal.report import contents as data
+from pkmcal.report.as_json import as_json
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_SMALL = 1e-3  # below which numbers are written with a power of ten
+_TEMPLATE = "report.html.jinja"
+
+
+def write(found: Identification, folder: Path, files: Mapping[str, bytes]) -> list[Path]:
+    """Write ``report.html``, ``report.json`` and ``robot.toml``, the same for the same inputs.
+
+    Parameters
+    ----------
+    found : Identification
+        What is reported.
+    folder : Path
+        It is there.
+    files : mapping of str to bytes
+        What was read, by name: the report states the checksums.
+
+    Raises
+    ------
+    OSError
+        The folder cannot be written.
+    """
+    facts = gather(found, files)
+    page, numbers, robot = (folder / name for name in ("report.html", "report.json", "robot.toml"))
+    found.robot.save(robot, comment(files))
+    write_whole(numbers, as_json(_as_data(facts)) + "\n")
+    write_whole(page, html(facts))
+    return [page, numbers, robot]
+
+
+def gather(found: Identification, files: Mapping[str, bytes]) -> dict[str, Any]:
+    """Everything that the report says; the calibration itself is ``found``."""
+    state, sentence = data.verdict(found)
+    points = data.points(found)
+    predicted = data.over_the_workspace(found)
+    return {
+        "state": state,
+        "verdict": sentence,
+        "found": found,
+        "points": points,
+        "worst": data.worst(points),
+        "moved": data.moved(points),
+        "directions": data.directions(found),
+        "parameters": data.parameters(found),
+        "correlation": data.correlation(found),
+        "iso9283": data.iso9283(found),
+        "accuracy": None if isinstance(predicted, str) else predicted[0],
+        "slice": None if isinstance(predicted, str) else predicted[1],
+        "no_accuracy": predicted if isinstance(predicted, str) else "",
+        "inputs": checksums(files),
+        "instrument_sought": data.instrument_sought(found),
+        "arm": isinstance(found.robot, SerialArm),
+        "version": version(),
+    }
+
+
+def html(facts: Mapping[str, Any]) -> str:
+    """The page. Names come from files that anybody may have written: all text is escaped."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=PackageLoader("pkmcal.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {
+        "short": _short,
+        "shown": data.shown,
+        "fixed": lambda value, unit, places: display.fixed(
+            display.displayed(value, unit)[0], places
+        ),
+        "unit": lambda unit: display.displayed(0.0, unit)[1],
+        "printable": printable,
+    }
+    figures = {
+        name: Markup(svg)  # matplotlib escapes the texts in it
+        for name, svg in _figures(facts).items()
+    }
+    return environment.get_template(_TEMPLATE).render(**facts, figures=figures)
+
+
+def _as_data(facts: Mapping[str, Any]) -> dict[str, Any]:
+    """What goes into the JSON file: the facts, and every attribute of the calibration."""
+    left_out = ("found", "worst", "moved", "arm")
+    kept = {name: value for name, value in facts.items() if name not in left_out}
+    return kept | {"calibration": facts["found"]}
+
+
+def _figures(facts: Mapping[str, Any]) -> dict[str, str]:
+    """SVG elements by name."""
+    from pkmcal.report import figures as draw
+    from pkmcal.report import residual_figure
+    from pkmcal.report.svg import inline_svg, style
+
+    found: Identification = facts["found"]
+    fitted = np.array([[row["before"], row["after"]] for row in facts["points"]]).T
+    groups = {f"fitted, {len(found.rows)} points": (fitted[0], fitted[1])}
+    held = int(np.isfinite(found.holdout_off).sum())
+    if held:
+        pair = (found.holdout_off_before, found.holdout_off)
+        groups = {f"held out, {held} points": pair} | groups
+    wanted: dict[str, tuple[Callable[[], Figure | None], str]] = {
+        "points": (lambda: draw.before_after(groups), "Distances before and after"),
+        "residuals": (lambda: residual_figure.residuals(found), "Residuals by row and direction"),
+        "machine": (lambda: draw.machine(found), "The machine with exaggerated errors"),
+        "correlation": (
+            lambda: draw.correlation(facts["correlation"], found.free),
+            "Correlations of the parameters",
+        ),
+        "convergence": (lambda: draw.convergence(found.history), "Misfit after each step"),
+    }
+    if facts["accuracy"] is not None and facts["accuracy"].told.size:
+        wanted["accuracy"] = (
+            lambda: draw.accuracy(facts["accuracy"], facts["slice"]),
+            "Expected accuracy over the workspace",
+        )
+    for k, score in enumerate(facts["iso9283"]):
+        wanted[f"iso{k}"] = (lambda score=score: draw.poses(score), "Accuracy of each pose")  # type: ignore[misc]
+    drawn = {}
+    for name, (figure, text) in wanted.items():
+        with style():
+            made = figure()
+        if made is not None:
+            drawn[name] = inline_svg(made, name, text)
+    return drawn
+
+
+def _short(value: float) -> str:
+    """Three digits that mean something."""
+    if not np.isfinite(value):
+        return "–"
+    return (
+        f"{value:.3g}" if abs(value) < _SMALL else display.fixed(value, display.decimals(value, 3))
+    )

@@ -1,0 +1,145 @@
+"""What a calibration left over, as a picture: by row, over the workspace, as quantiles."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pkmcal.display import displayed
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.atomic import write_whole
+from pkmcal.files.provenance import printable
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from pkmcal.calibration.identification import Identification
+
+
+_LOOKS = {
+    "x": ("#0072b2", "o"),
+    "y": ("#d55e00", "s"),
+    "z": ("#009e73", "^"),
+    "distance": ("#cc79a7", "D"),
+    "alpha": ("#0072b2", "o"),
+    "beta": ("#d55e00", "s"),
+    "gamma": ("#009e73", "^"),
+}
+_FORMATS = {".png": {"Software": None}, ".svg": {"Date": None, "Creator": None}}
+
+
+def write(found: Identification, path: Path) -> None:
+    """Write `residuals` as PNG or SVG, by the ending of the path.
+
+    Raises
+    ------
+    ValueError
+        Another ending.
+    OSError
+        The file cannot be written.
+    """
+    import matplotlib
+
+    ending = path.suffix.lower()
+    if ending not in _FORMATS:
+        raise ArgumentError(f"path must end in {' or '.join(_FORMATS)}, found {str(path)!r}")
+    picture = io.BytesIO()
+    with matplotlib.rc_context(
+        {"svg.hashsalt": "pkmcal", "svg.fonttype": "none", "text.parse_math": False}
+    ):
+        residuals(found).savefig(picture, format=ending[1:], dpi=110, metadata=_FORMATS[ending])
+    write_whole(path, picture.getvalue())
+
+
+def residuals(found: Identification) -> Figure:
+    """Residuals row by row, over the workspace with their direction, and as quantiles."""
+    from matplotlib.figure import Figure
+
+    units = [unit for unit in ("mm", "rad") if any(unit in m.units for m in found._equations.sets)]
+    figure = Figure(figsize=(11.0, 3.0 * len(units) + 4.2), layout="constrained")
+    heights = [3.0] * len(units) + [4.2]
+    grid = figure.add_gridspec(len(units) + 1, 2, height_ratios=heights)
+    for k, unit in enumerate(units):
+        _by_row(figure.add_subplot(grid[k, :]), found, unit)
+    _over_the_workspace(figure.add_subplot(grid[-1, 0]), found)
+    _quantiles(figure.add_subplot(grid[-1, 1]), found)
+    figure.suptitle(f"{printable(found.robot.name)}: what the identified geometry leaves over")
+    return figure
+
+
+def _by_row(panel: Axes, found: Identification, unit: str) -> None:
+    """One mark per row and component, rows that are outliers ringed."""
+    equations, seen = found._equations, set()
+    shown = displayed(0.0, unit)[1]
+    for i, (measured, residual) in enumerate(zip(equations.sets, found.residuals, strict=True)):
+        rows = found.rows[equations.set_of == i]
+        odd = np.isin(rows, found.outliers)
+        for k, name in enumerate(measured.components):
+            if measured.units[k] != unit:
+                continue
+            colour, mark = _LOOKS[name]
+            values = displayed(1.0, unit)[0] * residual[:, k]
+            label = None if name in seen else name
+            panel.plot(rows, values, ls="", marker=mark, ms=3.5, color=colour, label=label)
+            panel.plot(rows[odd], values[odd], ls="", marker="o", ms=11, mfc="none", color="0.2")
+            seen.add(name)
+    panel.axhline(0.0, color="0.6", lw=0.8)
+    panel.grid(axis="y", color="0.88")
+    panel.set_axisbelow(True)
+    panel.set(xlabel="row", ylabel=f"measured − predicted [{shown}]")
+    panel.legend(loc="upper right", ncols=len(seen), frameon=False)
+
+
+def _over_the_workspace(panel: Axes, found: Identification) -> None:
+    """Arrows for residuals in x and y, colours for the other one, at the poses they belong to."""
+    equations, pose = found._equations, found._estimate.point.pose
+    at, along, other = [], [], []
+    for place, residual in zip(equations.pose_of, found.residuals, strict=True):
+        at.append(pose[place, :2])
+        flat = residual.shape[1] == 1  # a height or a distance has no direction across
+        along.append(np.zeros((len(residual), 2)) if flat else residual[:, :2])
+        other.append(residual[:, 0] if flat else residual[:, 2])
+    (x, y), (dx, dy) = np.concatenate(at).T, np.concatenate(along).T
+    colour = np.concatenate(other)
+    most = max(float(np.abs(colour).max()), 1e-12)
+    marks = panel.scatter(x, y, c=colour, cmap="coolwarm", vmin=-most, vmax=most, s=26, zorder=3)
+    long = float(np.quantile(np.hypot(dx, dy), 0.9))
+    if long > 0:
+        arrows = panel.quiver(
+            *(x, y, dx, dy),
+            angles="xy",
+            scale_units="width",
+            scale=long / 0.1,
+            width=0.004,
+            color="0.25",
+            zorder=2,
+        )
+        panel.quiverkey(arrows, 0.12, 0.96, long, f"{long:.2g} mm", labelpos="E")
+    panel.figure.colorbar(marks, ax=panel, label="z, height or distance [mm]")
+    panel.set(xlabel="x [mm]", ylabel="y [mm]")
+    panel.margins(0.15)
+
+
+def _quantiles(panel: Axes, found: Identification) -> None:
+    """Residuals in units of their own deviation: on the line if noise is normal and as stated."""
+    from scipy.special import ndtri
+
+    estimate = found._estimate
+    weighted = (
+        estimate.jacobian
+        * np.sqrt(np.repeat(estimate.weights, found._equations.components))[:, None]
+    )
+    left = 1.0 - np.einsum("ij,jk,ik->i", weighted, estimate.covariance, weighted)
+    told = left > 1e-6
+    scaled = np.sort(estimate.residual[told] / np.sqrt(left[told]))
+    normal = ndtri((np.arange(len(scaled)) + 0.5) / max(len(scaled), 1))
+    panel.plot(normal, scaled, ls="", marker="o", ms=3.5, color="#0072b2")
+    ends = np.array([-3.0, 3.0])
+    panel.plot(ends, ends, color="0.5", lw=0.8)
+    panel.grid(color="0.88")
+    panel.set_axisbelow(True)
+    panel.set(xlabel="normal quantile", ylabel="residual over its standard deviation")

@@ -1,0 +1,151 @@
+"""A machine as lines in space, and the same machine with its errors made large enough to see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal.arms.arm import SerialArm
+from pkmcal.arrays import FloatArray
+from pkmcal.calibration.parameters import Parameters
+from pkmcal.core.instruments import seen_points
+from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.calibratable import ArmMachine, as_given, as_machine
+
+_SEEN = 0.06  # of the machine's size: how far the most displaced joint is drawn off
+_MOST = 0.2
+_STEPS = tuple(a * 10**b for b in range(6) for a in (1, 2, 5))
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """Polylines (k, 3) in mm, in the base frame.
+
+    Attributes
+    ----------
+    limbs : tuple of ndarray
+        From base to platform, joint by joint; of an arm the one chain.
+    base, platform : ndarray
+        Outlines through the joints, closed; empty for an arm.
+    """
+
+    limbs: tuple[FloatArray, ...]
+    base: FloatArray
+    platform: FloatArray
+
+    @property
+    def joints(self) -> FloatArray:
+        """All joints, in the same order for the same machine."""
+        return np.concatenate([*self.limbs, self.platform])
+
+
+def skeleton(robot: Robot | SerialArm, q: FloatArray, guess: FloatArray) -> Skeleton | None:
+    """Where a machine's joints are at actuator coordinates (n,); None where it has no pose.
+
+    Parameters
+    ----------
+    robot : Robot or SerialArm
+        The machine.
+    q : ndarray (n,)
+        mm and rad.
+    guess : ndarray (6,)
+        Near its pose.
+    """
+    machine = as_machine(robot)
+    if isinstance(machine, ArmMachine):
+        return Skeleton((_chain(machine.arm, q),), np.empty((0, 3)), np.empty((0, 3)))
+    solved = machine.forward(q, guess)
+    if not solved.ok:
+        return None
+    own, _ = machine._own_rows(solved.pose)
+    slots = machine._slots
+    _, towards, _ = machine._machine.limbs(slots, own)
+    base, platform = np.ascontiguousarray(slots[:, :3]), np.ascontiguousarray(slots[:, 3:6])
+    ends = seen_points(own[0], platform)[0]
+    lines = []
+    for i, limb in enumerate(machine.model.limbs):
+        kind = KINDS[limb.kind]
+        line = [base[i], ends[i]]
+        if kind.driver != "length":  # the joint that the slider or crank carries
+            rod = machine.geometry[f"rod{i + 1}"]
+            line.insert(1, ends[i] - rod * towards[0, i])
+        lines.append(np.array(line))
+    frame = machine.model.base_frame
+    outward = np.zeros(6) if frame is None else frame
+    return Skeleton(
+        tuple(_in_frame(outward, line) for line in lines),
+        _in_frame(outward, base[_around(base)]),
+        _in_frame(outward, ends[_around(platform)]),
+    )
+
+
+def exaggerated(
+    parameters: Parameters, before: FloatArray, after: FloatArray, q: FloatArray, guess: FloatArray
+) -> tuple[Skeleton, Skeleton, int] | None:
+    """A machine twice at the same commands, the second time with its change made large.
+
+    Parameters
+    ----------
+    parameters : Parameters
+        Of the calibration.
+    before, after : ndarray (p,)
+        Two values of them, mm and rad.
+    q : ndarray (n,)
+        The commands, mm and rad.
+    guess : ndarray (6,)
+        Near the pose.
+
+    Returns
+    -------
+    (Skeleton, Skeleton, int) or None
+        Before, after, and by how much the change is multiplied; None where there is no pose.
+    """
+
+    def drawn(theta: FloatArray) -> Skeleton | None:
+        machine = parameters.robot.replace(parameters.values_at(theta))
+        return skeleton(as_given(machine), q, guess)
+
+    one = drawn(before)
+    if one is None:
+        return None
+    size = float(np.ptp(one.joints, axis=0).max())
+    best = None
+    for times in _STEPS:
+        other = drawn(before + times * (after - before))
+        off = np.inf if other is None else np.linalg.norm(other.joints - one.joints, axis=1).max()
+        if other is None or off > _MOST * size:
+            break
+        best = (one, other, times)
+        if off > _SEEN * size:
+            break
+    return best
+
+
+def _chain(arm: SerialArm, q: FloatArray) -> FloatArray:
+    """Base, a point on every joint's axis, and the tool."""
+    at = [np.zeros(3)]
+    for i in range(1, arm.n_joints + 1):
+        home = np.eye(4)
+        home[:3, 3] = arm.points[i - 1]
+        part = SerialArm(
+            arm.axes[:i], arm.points[:i], home, arm.kinds[:i], joint_errors=arm.joint_errors[:i]
+        )
+        at.append(part.forward(q[:i])[:3, 3])
+    at.append(arm.forward(q)[:3, 3])
+    return np.array(at)
+
+
+def _around(joints: FloatArray) -> NDArray[np.intp]:
+    """Order of the joints around their middle, the first once more at the end."""
+    x, y = (joints[:, :2] - joints[:, :2].mean(axis=0)).T
+    order = np.argsort(np.arctan2(y, x), kind="stable")
+    closed: NDArray[np.intp] = np.append(order, order[0])
+    return closed
+
+
+def _in_frame(frame: FloatArray, line: FloatArray) -> FloatArray:
+    """Points of the machine's own frame in the robot's base frame."""
+    return seen_points(np.ascontiguousarray(frame), np.ascontiguousarray(line))[0]
