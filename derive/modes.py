@@ -24,7 +24,7 @@ import sympy as sp
 from . import limbs, posemaps
 
 ROOT = Path(__file__).parent.parent
-FILE = (ROOT / "pkmcal" if (ROOT / "pkmcal").is_dir() else ROOT) / "modes.json"
+FILE = (ROOT / "pkmcal" if (ROOT / "pkmcal").is_dir() else ROOT) / "modes" / "modes.json"
 Array = Any  # of complex numbers
 SPHERE = 13  # numbers of a limb: joint b, anchor c, length, axis at base, axis at platform
 UNIT = {"spatial": ([3, 4, 5, 6],), "planar": ([2, 3],), "2tpr2tps": ([2, 3], [4, 5])}

@@ -1,0 +1,444 @@
+"""The command line: what it prints and writes, its exit codes, and one line for wrong input."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import pkmcal as pk
+from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.identify import identify
+from pkmcal.cli import calibrate as cli_calibrate
+from pkmcal.cli import main as cli
+from pkmcal.cli.calibrate import read_deviations
+from pkmcal.cli.demonstration import demonstrate
+from pkmcal.files import atomic as whole_file
+from pkmcal.measurements.measurements import Measurements
+
+ROOT = Path(__file__).resolve().parents[2]
+DELTA = ROOT / "examples" / "linear-delta"
+ROBOT, PROBE = str(DELTA / "robot.toml"), str(DELTA / "probe.csv")
+VERBS = sorted(typer.main.get_group(cli.app).commands)
+
+
+@pytest.fixture(autouse=True)
+def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def run(*arguments: str | Path) -> Any:
+    """Run the command line; a traceback of the program goes through."""
+    result = CliRunner().invoke(cli.app, [str(a) for a in arguments], prog_name="pkmcal")
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    return result
+
+
+def refused(*arguments: str | Path) -> str:
+    """Return the one line on stderr with which wrong input is refused."""
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert re.fullmatch(r"pkmcal: [^\n]+\n", result.stderr), result.stderr
+    return result.stderr[len("pkmcal: ") : -1]
+
+
+def files_below(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+# --- the command itself --------------------------------------------------------------------------
+
+
+def test_command_is_installed_under_its_name() -> None:
+    (entry,) = metadata.entry_points(group="console_scripts", name="pkmcal")
+    assert entry.load() is cli.main
+
+
+def test_version_is_that_of_the_package() -> None:
+    assert run("--version").stdout == f"pkmcal {metadata.version('pkmcal')}\n"
+
+
+def test_without_a_verb_the_verbs_are_listed() -> None:
+    result = run()
+    assert result.exit_code == 0
+    assert all(verb in result.stdout for verb in VERBS)
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_shows_an_example_that_runs(verb: str, tmp_path: Path) -> None:
+    for folder in (DELTA, DELTA.parent / "2tpr2tps-compensation"):
+        shutil.copytree(folder, tmp_path / "examples" / folder.name)
+    words = " ".join(run(verb, "--help").stdout.split())
+    match = re.search(r"Example: (pkmcal .*?) [╭+]", words)
+    assert match
+    command, *arguments = match[1].split()
+    assert (command, arguments[0]) == ("pkmcal", verb)
+    assert run(*arguments).exit_code == 0
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_help_shows_the_units_of_columns(verb: str) -> None:
+    words = " ".join(run(verb, "--help").stdout.replace("│", " ").split())
+    for column in re.findall(r"'(?:x|y|z|alpha) [^']*'", words):
+        assert "[" in column, column
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_explains_itself_and_speaks_json(verb: str) -> None:
+    words = " ".join(run(verb, "--help").stdout.split())
+    assert f"Example: pkmcal {verb}" in words and "--json" in words
+
+
+def test_shell_completion_knows_the_verbs() -> None:
+    asked = {"_PKMCAL_COMPLETE": "complete_bash", "COMP_WORDS": "pkmcal cal", "COMP_CWORD": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", "from pkmcal.cli import main; main()"],
+        env=os.environ | asked,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout.split() == ["calibrate"]
+
+
+def test_process_refuses_in_one_line_and_with_exit_code_2(tmp_path: Path) -> None:
+    code = "from pkmcal.cli import main; main()"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "calibrate", "hexapd", "x.csv"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "pkmcal: unknown machine 'hexapd'; did you mean 'hexapod'?\n"
+
+
+def test_process_prints_to_a_terminal_that_lacks_letters(tmp_path: Path) -> None:
+    code = (
+        "import sys; from pkmcal import cli\n"
+        "sys.stdout.reconfigure(encoding='cp437')\n"
+        "cli.main()"
+    )  # fmt: skip
+    arguments = ["calibrate", ROBOT, PROBE, "--frame", "unknown"]  # a range: offset1 … offset3
+    done = subprocess.run(
+        [sys.executable, "-c", code, *arguments], cwd=tmp_path, capture_output=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"offset1 ? offset3" in done.stdout
+
+
+# --- machines ------------------------------------------------------------------------------------
+
+
+def test_machines_lists_every_built_in_machine_with_what_it_frees() -> None:
+    lines = run("machines").stdout.splitlines()[1:]
+    assert [line.split()[0] for line in lines] == list(pk.machines())
+    parallel = [pk.load(name) for name in pk.machines() if name != "3r"]
+    free = [*(len(robot.model.free) for robot in parallel), 18]  # six errors of each joint
+    assert [int(line.split()[-1]) for line in lines] == free
+
+
+def test_machines_as_json() -> None:
+    listed = json.loads(run("machines", "--json").stdout)
+    assert listed["linear-delta"]["limbs"] == ["PUS", "PUS", "PUS"]
+    assert listed["2tpr2tps"]["coordinates"] == ["y", "z", "alpha", "beta"]
+
+
+# --- calibrate -----------------------------------------------------------------------------------
+
+
+def test_calibrate_prints_the_summary_of_identify() -> None:
+    robot = pk.load(ROBOT)
+    result = run("calibrate", ROBOT, PROBE)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout == identify(robot, pk.read_measurements(PROBE)).summary() + "\n"
+
+
+def test_calibrate_writes_the_robot_it_found(tmp_path: Path) -> None:
+    assert run("calibrate", ROBOT, PROBE, "--out", "new/folder").exit_code == 0
+    expected = identify(pk.load(ROBOT), pk.read_measurements(PROBE)).robot
+    written = pk.load(tmp_path / "new" / "folder" / "robot.toml")
+    np.testing.assert_array_equal(written.geometry.values, expected.geometry.values)
+    files = {"new/folder/robot.toml", "new/folder/residuals.png"}
+    assert files_below(tmp_path) == {"new", "new/folder", *files}
+
+
+def test_json_stands_alone_and_holds_the_attributes_of_the_result(tmp_path: Path) -> None:
+    result = run("calibrate", ROBOT, PROBE, "--json", "--out", ".")
+    found = json.loads(result.stdout)
+    expected = identify(pk.load(ROBOT), pk.read_measurements(PROBE))
+    assert found["rms"] == expected.rms
+    assert found["converged"] is True
+    assert found["gap"] is None  # infinite
+    names = ["radius", "angle1", "angle2", "offset1", "offset2", "offset3"]
+    assert list(found["parameters"]) == names
+    for name, value, stderr in zip(names, expected.values, expected.stderr, strict=True):
+        assert found["parameters"][name] == {"value": value, "stderr": stderr}
+    public = {name for name in vars(expected) if not name.startswith("_")}
+    assert public <= set(found)
+    assert found["robot"]["geometry"]["radius"] == expected.robot.geometry["radius"]
+    assert (tmp_path / "robot.toml").exists()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--free", "radius", "--free", "angle[12]", "--free", "offset*", "--free", "rod*"],
+        ["--free", "radius,angle[12],offset*,rod*"],
+    ],
+)
+def test_free_replaces_the_default_set(options: list[str]) -> None:
+    found = json.loads(run("calibrate", ROBOT, PROBE, "--json", *options).stdout)
+    assert found["free"] == [
+        *("radius", "angle1", "angle2", "offset1", "offset2", "offset3"),
+        *("rod1", "rod2", "rod3"),
+    ]
+
+
+def test_holdout_is_a_fraction_or_a_file(tmp_path: Path) -> None:
+    whole = pk.read_measurements(PROBE)
+    whole.select(slice(30)).write("fit.csv")
+    whole.select(slice(30, None)).write("held.csv")
+    fraction = json.loads(run("calibrate", ROBOT, PROBE, "--json", "--holdout", "0.2").stdout)
+    other = json.loads(run("calibrate", ROBOT, "fit.csv", "--json", "--holdout", "held.csv").stdout)
+    assert len(fraction["rows"]) == 33
+    assert len(other["rows"]) == 30
+    for found in (fraction, other):
+        assert 0 < found["holdout_rms"] < 2 * 0.03 < found["holdout_rms_before"]
+
+
+def test_prior_holds_what_is_given_a_small_sigma() -> None:
+    options = ["--free", "radius,angle1,offset*", "--json"]
+    priors = ["--prior", "angle1=0.001deg", "--prior", "offset*=1um"]
+    found = json.loads(run("calibrate", ROBOT, PROBE, *options, *priors).stdout)
+    assert found["parameters"]["angle1"]["stderr"] <= math.radians(0.001)
+    assert found["parameters"]["offset2"]["stderr"] <= 0.001
+    assert found["parameters"]["radius"]["stderr"] > 0.01
+
+
+def test_prior_units_are_those_of_the_number() -> None:
+    robot = pk.load(ROBOT)
+    free = ["radius", "angle1", "angle2", "offset1"]
+    assert read_deviations("--prior", [], robot, free) is None
+    assert read_deviations("--prior", ["0.5"], robot, free) == 0.5
+    assert read_deviations("--prior", ["500um"], robot, free) == 0.5
+    assert read_deviations("--prior", ["radius = 2e-1", "angle*=90deg"], robot, free) == {
+        "radius": 0.2,
+        "angle*": math.pi / 2,
+    }
+    assert read_deviations("--prior", ["frame.alpha=2mrad"], robot, free) == {"frame.alpha": 0.002}
+
+
+def test_result_with_a_warning_is_not_to_be_trusted() -> None:
+    pk.read_measurements(PROBE).select([0, 1, 2, 3]).write("few.csv")
+    result = run("calibrate", ROBOT, "few.csv")
+    assert result.exit_code == 1
+    assert "4 equations for 6 parameters" in result.stdout
+    assert result.stderr == ""
+    assert run("calibrate", ROBOT, "few.csv", "--json").exit_code == 1
+
+
+def test_result_that_did_not_converge_is_not_to_be_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gave_up(*arguments: Any, **settings: Any) -> Identification:
+        return dataclasses.replace(identify(*arguments, **settings), converged=False)
+
+    monkeypatch.setattr(sys.modules["pkmcal.identify"], "identify", gave_up)
+    result = run("calibrate", ROBOT, PROBE)
+    assert result.exit_code == 1
+    assert "not converged" in result.stdout
+
+
+# --- wrong input ---------------------------------------------------------------------------------
+
+HEADER = "q1 [mm],q2 [mm],q3 [mm],z [mm]\n"
+ROWS = "-330,-330,-330,0.6\n-347,-317,-332,0.8\n"
+
+
+@pytest.mark.parametrize(
+    ("csv", "said"),
+    [
+        ("q1 [mm],q2 [mm],z [mm]\n-330,-330,0.6\n", "m.csv, line 1: 2 actuator columns, q1 to q2"),
+        ("q1 [mm],q3 [mm],z [mm]\n-330,-330,0.6\n", "m.csv, line 1: missing column 'q2'"),
+        ("q1 [mm],q2 [mm],q3 [mm]\n-330,-330,-330\n", "m.csv, line 1: nothing measured"),
+        ("q1 [mm],q2 [mm],q3 [mm],z\n-330,-330,-330,0.6\n", "line 1: column 'z' has no unit"),
+        ("q1 [mm],q2 [mm],q3 [deg],z [mm]\n-330,-330,-330,0.6\n", "column 'q3' is an angle"),
+        (HEADER + "-330,-330,low,0.6\n", "m.csv, line 2, column 'q3': expected a number"),
+        (HEADER + ROWS + "-330,-330,nan,0.6\n", "line 4, column 'q3': expected a finite number"),
+        (HEADER + ROWS + "-330,-330,-330\n", "m.csv, line 4: 3 cells under 4 column names"),
+        (HEADER, "m.csv: no rows"),
+        ("", "m.csv: the file is empty"),
+    ],
+)
+def test_mistake_in_measurements_is_named_with_file_row_and_column(csv: str, said: str) -> None:
+    Path("m.csv").write_text(csv)
+    assert said in refused("calibrate", ROBOT, "m.csv", "--out", "new")
+    assert not Path("new").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("radius = 170.0", "radius = nan", "finite"),
+        ("radius = 170.0", 'radius = "wide"', "radius"),
+        ("rod = 340.0 ", "rood = 340.0 ", "'rood'"),
+        ('length = "mm"', 'length = "ft"', "ft"),
+        ('map = "translation"', 'map = "translatoin"', "did you mean 'translation'"),
+        ('"offset1"', '"ofset1"', "did you mean 'offset1'"),
+        ("slider = [0, 0, 1]", "slider = [0, 1]", "slider"),
+    ],
+)
+def test_mistake_in_a_robot_file_is_named_with_the_file(old: str, new: str, said: str) -> None:
+    text = Path(ROBOT).read_text(encoding="utf-8")
+    assert old in text
+    Path("robot.toml").write_text(text.replace(old, new, 1), encoding="utf-8")
+    message = refused("calibrate", "robot.toml", PROBE)
+    assert message.startswith("robot.toml")
+    assert said in message
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ([], "Missing argument 'ROBOT'"),
+        (["linear-delt", PROBE], "unknown machine 'linear-delt'; did you mean 'linear-delta'?"),
+        (["none.toml", PROBE], "none.toml"),
+        ([ROBOT, "none.csv"], "none.csv: No such file"),
+        (["hexapod", PROBE], "3 actuator columns, q1 to q3; the robot has 6"),
+        ([ROBOT, PROBE, "--free", "radus"], "--free: no number of the geometry matches 'radus'"),
+        ([ROBOT, PROBE, "--free", "base1.x"], "--free: base1.x is driven by the parameters radius"),
+        ([ROBOT, PROBE, "--free", ""], "--free: no number of the geometry matches ''"),
+        ([ROBOT, PROBE, "--prior", "radus=1"], "prior: no free parameter matches 'radus'"),
+        ([ROBOT, PROBE, "--prior", "radius"], "--prior radius: expected NAME=NUMBER"),
+        ([ROBOT, PROBE, "--prior", "radius=1.2.3"], "--prior radius=1.2.3"),
+        ([ROBOT, PROBE, "--prior", "radius=-1"], "prior of radius must be positive"),
+        ([ROBOT, PROBE, "--prior", "radius=1deg"], "expected one of mm, "),
+        ([ROBOT, PROBE, "--prior", "angle1=1"], "angle1 is an angle; give it a unit"),
+        ([ROBOT, PROBE, "--prior", "*=1"], "--prior *=1: covers lengths, angles"),
+        ([ROBOT, PROBE, "--prior", "1", "--prior", "radius=2"], "--prior 1: a number without"),
+        ([ROBOT, PROBE, "--free", "gain*", "--prior", "gain*=1mm"], "unit 'mm'; expected none"),
+        ([ROBOT, PROBE, "--holdout", "1.5"], "holdout must be a fraction between 0 and 1"),
+        ([ROBOT, PROBE, "--holdout", "none.csv"], "none.csv: No such file"),
+        ([ROBOT, PROBE, "--loss", "hubr"], "loss must be one of linear, huber, cauchy"),
+        ([ROBOT, PROBE, "--frame", "unkown"], "frame must be one of known, unknown"),
+        ([ROBOT, PROBE, "--target", "unkown"], "target must be one of known, unknown"),
+        ([ROBOT, PROBE, "--los", "huber"], "No such option"),
+        ([ROBOT, PROBE, "--out", PROBE], "this is not a folder"),
+        ([ROBOT, PROBE, "--out", str(DELTA)], "would replace"),
+        (["rbt-6t03p-printed", "six.csv"], "free: RBT-6T03P"),
+    ],
+)
+def test_wrong_argument_is_named(arguments: list[str], said: str, tmp_path: Path) -> None:
+    if "six.csv" in arguments:
+        robot = pk.load("rbt-6t03p-printed")
+        Measurements([robot.inverse(robot.home)], [robot.home[2]], "height").write("six.csv")
+    before = files_below(tmp_path)
+    assert said in refused("calibrate", *arguments)
+    assert files_below(tmp_path) == before
+
+
+def test_unknown_verb_is_named() -> None:
+    assert "calibrat" in refused("calibrat")
+
+
+def test_wrong_seed_is_named() -> None:
+    assert "--seed" in refused("demo", "--seed", "one")
+    assert "--seed" in refused("demo", "--seed", "-1")
+
+
+def test_mistake_of_the_program_is_not_taken_for_wrong_input(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def broken(*arguments: Any) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(cli_calibrate, "read_measurements", broken)
+    with pytest.raises(ZeroDivisionError):
+        run("calibrate", ROBOT, PROBE)
+
+
+def test_ctrl_c_ends_the_command_without_a_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stopped(*arguments: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli_calibrate, "read_measurements", stopped)
+    result = run("calibrate", ROBOT, PROBE)
+    assert result.exit_code == 130
+    assert "Traceback" not in result.output
+
+
+def test_full_disk_leaves_nothing_half_written(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def full(source: str, destination: str) -> None:
+        raise OSError(28, "No space left on device", destination)
+
+    (tmp_path / "robot.toml").write_text("what was there")
+    monkeypatch.setattr(whole_file.os, "replace", full)
+    assert "No space left on device" in refused("calibrate", ROBOT, PROBE, "--out", ".")
+    assert (tmp_path / "robot.toml").read_text() == "what was there"
+    assert files_below(tmp_path) == {"robot.toml"}
+
+
+# --- demo ----------------------------------------------------------------------------------------
+
+
+def test_demo_tells_its_story_and_lists_what_it_wrote(tmp_path: Path) -> None:
+    result = run("demo", "--out", "tour", "--seed", "3")
+    assert (result.exit_code, result.stderr) == (0, "")
+    story, _, files = result.stdout.rpartition("\n\n")
+    assert story == str(demonstrate(3))
+    assert {line.split()[0] for line in files.splitlines()} == {
+        f"tour/{path.name}" for path in (tmp_path / "tour").iterdir()
+    }
+
+
+def test_demo_as_json() -> None:
+    found = json.loads(run("demo", "--json").stdout)
+    assert found["seed"] == 1
+    assert len(found["after"]) == 100
+    assert found["identification"]["rank"] == 25
+
+
+def test_check_says_at_which_rows_the_machine_has_no_pose(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("q1 [mm],q2 [mm],q3 [mm],z [mm]\n-330,-330,-330,0\n9000,-330,-330,0\n")
+    result = run("check", ROBOT, log)
+    assert result.exit_code == 1
+    assert "no pose at the actuators of 1 of them (rows 1)" in result.stdout
+
+
+# --- completion ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("line", "names"),
+    [
+        ("check lin", ["linear-delta", "linear-delta-6"]),
+        ("new 6", ["6-rus"]),
+        ("forward 3r", ["3rps", "3rrr-planar", "3r"]),
+        ("inverse 3r", ["3rps", "3rrr-planar"]),  # which takes no arm
+        ("check my-", []),  # then the shell goes on with files
+    ],
+)
+def test_shells_complete_the_names_of_machines(line: str, names: list[str]) -> None:
+    typed = {"COMP_WORDS": f"pkmcal {line}", "COMP_CWORD": "2"}
+    result = CliRunner().invoke(
+        cli.app, [], prog_name="pkmcal", env={"_PKMCAL_COMPLETE": "complete_bash", **typed}
+    )
+    assert result.stdout.split() == names

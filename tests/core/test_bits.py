@@ -1,0 +1,155 @@
+"""Screws, arms and readings give the same bits on every ISA, and in every lane and tail.
+
+What the core does with machines is in `test_core`, swarms are in `test_pso`, normal numbers in
+`test_normals`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal import screw
+from pkmcal.core import instruments, library, screws
+from pkmcal.core import poses as core_poses
+from pkmcal.core.screws import Arm
+from pkmcal.kinematics.limb_residual import LimbResidual
+
+ISAS = range(library.lib.pkm_best_isa() + 1)
+ROWS = 37
+TAILS = [*(slice(0, n) for n in range(1, 18)), slice(3, ROWS), slice(0, ROWS)]
+ELSEWHERE = {
+    *("inverse", "forward", "jacobian", "forward_jacobian", "error_jacobian", "closure", "limbs"),
+    *("rates", "motion", "compose", "invert", "compose_rates", "compose_twists", "normals"),
+    *("swarm_start", "swarm_judge", "swarm_move", "swarm_eq18"),
+}
+
+rng = np.random.default_rng(20)
+POSES = rng.uniform(-1, 1, (ROWS, 6)) * [300, 300, 300, 3, 1.5, 3]
+TWISTS = np.hstack([rng.normal(0, 1, (ROWS, 3)), rng.normal(0, 300, (ROWS, 3))])
+TWISTS[:9, :3] *= np.array([0, 1e-300, 1e-200, 1e-160, 1e-9, 1e-4, 1e-2, 30, 1e4])[:, None]
+TWISTS[9, :3] = [np.pi, 0, 0]
+MOTIONS = screws.exp(TWISTS, 0)
+POINTS = rng.normal(0, 300, (ROWS, 3))
+SIZE = np.array([140.0, 80, 200, 294.2, 384.7, 278.5])  # a ... f of the 2TPR&2TPS
+FREE = np.array([0, 400, 0, 0]) + rng.uniform(-1, 1, (ROWS, 4)) * [20, 20, 0.1, 0.1]
+
+ARM = pk.SerialArm(
+    rng.normal(size=(7, 3)),
+    rng.normal(0, 500, (7, 3)),
+    screw.from_pose([800, 100, 500, 1, 2, 3]),
+    ["revolute", "revolute", "prismatic", "revolute", "prismatic", "revolute", "revolute"],
+)
+THETA = rng.uniform(-2, 2, (ROWS, 7))
+ERRORS = rng.normal(0, 1, (ROWS, 7, 6)) * [1, 1, 1, 0.01, 0.01, 0.01]
+
+Case = Callable[[int, slice], list[np.ndarray]]
+
+
+def closed_forms(isa: int, part: slice, call: Callable[..., None], shape: tuple[int, ...]) -> list:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(core_poses, "ISA", isa)
+        out = np.empty((len(FREE[part]), *shape))
+        call(SIZE, np.ascontiguousarray(FREE[part]), out)
+    return [out]
+
+
+def points(isa: int, part: slice) -> list[np.ndarray]:
+    one_target = instruments.points(POSES[part], POINTS[0], isa)
+    return [*instruments.points(POSES[part], POINTS[part], isa), *one_target]
+
+
+def distances(isa: int, part: slice) -> list[np.ndarray]:
+    ends = POINTS[::-1][part].copy()
+    own = instruments.distances(POSES[part], POINTS[part], ends, isa)
+    return [*own, *instruments.distances(POSES[part], POINTS[0], POINTS[1], isa)]
+
+
+def closure_cost(isa: int, part: slice) -> list[np.ndarray]:
+    robot = pk.load("rotary-delta")
+    robot._machine.isa = isa
+    at = robot.home + np.random.default_rng(21).uniform(-20, 20, (23, 6)) * [1, 1, 1, 0, 0, 0]
+    cost = LimbResidual(robot, at, robot.inverse(at))
+    values = cost.nominal + np.random.default_rng(22).normal(0, 0.01, (ROWS, len(cost.free)))
+    return [cost(values[part])]
+
+
+def spheres(isa: int, part: slice) -> list[np.ndarray]:
+    """Of cranks, and of legs whose lengths are not all positive."""
+    found = []
+    for name, size in (("rotary-delta", 1.0), ("3rps", 900.0)):
+        robot = pk.load(name)
+        robot._machine.isa = isa
+        q = size * np.random.default_rng(23).normal(1.0, 1.0, (ROWS, robot.n_actuators))
+        found.append(robot._machine.spheres(robot._slots, q[part]))
+    return found
+
+
+def arm(isa: int, part: slice, call: str) -> list[np.ndarray]:
+    """With links that all rows share, and with links of each row."""
+    made = Arm(*ARM._arm.arrays, isa)
+    found = []
+    for errors in (ERRORS[0], ERRORS[part]):
+        links, theta = made.links(errors), THETA[part]
+        if call == "links" and errors.ndim == 3:
+            found.append(links.numbers)
+        if call == "forward":
+            found.append(made.forward(theta, links, 1))
+        if call in ("jacobian", "error_jacobian"):
+            found += [getattr(made, call)(theta, links, frame) for frame in range(3)]
+    return found
+
+
+def by_rows(call: Callable[..., np.ndarray], *given: np.ndarray) -> Case:
+    return lambda isa, part: [call(*(rows[part] for rows in given), isa=isa)]
+
+
+def exp_jacobian(isa: int, part: slice) -> list[np.ndarray]:
+    return [screws.exp_jacobian(TWISTS[part], inverse, isa) for inverse in (False, True)]
+
+
+CASES: dict[str, Case] = {
+    "points": points,
+    "seen_points": lambda isa, part: [*instruments.seen_points(POSES[0], POINTS[part], isa)],
+    "seen_poses": lambda isa, part: [instruments.seen_pose_rates(POSES[0], POSES[part], isa)],
+    "distances": distances,
+    "tpr2tps_lengths": lambda isa, part: closed_forms(isa, part, core_poses.tpr2tps_lengths, (4,)),
+    "tpr2tps_jacobian": lambda isa, part: closed_forms(
+        isa, part, core_poses.tpr2tps_jacobian, (4, 4)
+    ),
+    "closure_cost": closure_cost,
+    "spheres": spheres,
+    "exp": by_rows(screws.exp, TWISTS),
+    "log": by_rows(screws.log, MOTIONS),
+    "adjoint": by_rows(screws.adjoint, MOTIONS),
+    "motion_pose": by_rows(screws.pose, MOTIONS),
+    "exp_jacobian": exp_jacobian,
+    "joint_motions": by_rows(screws.joint_motions, ERRORS[:, 0].copy(), POINTS),
+    "arm_links": lambda isa, part: arm(isa, part, "links"),
+    "arm_forward": lambda isa, part: arm(isa, part, "forward"),
+    "arm_jacobian": lambda isa, part: arm(isa, part, "jacobian"),
+    "arm_error_jacobian": lambda isa, part: arm(isa, part, "error_jacobian"),
+}
+
+
+@pytest.mark.parametrize("call", CASES)
+def test_bits_are_the_same_on_every_isa_and_in_every_tail(call: str) -> None:
+    expected = CASES[call](0, slice(0, ROWS))
+    assert expected and all(len(array) == ROWS for array in expected)
+    for isa in ISAS:
+        for part in TAILS:
+            found = CASES[call](isa, part)
+            for array, whole in zip(found, expected, strict=True):
+                assert array.tobytes() == whole[part].tobytes()
+
+
+def test_every_call_that_takes_an_isa_is_looked_at() -> None:
+    header = (Path(__file__).parents[2] / "csrc" / "pkmcal.h").read_text(encoding="utf-8")
+    declared = re.findall(r"^int pkm_(\w+)\([^;]*\bint isa\b[^;]*;", header, re.MULTILINE)
+    assert len(declared) > 20
+    assert {*CASES} | ELSEWHERE == {*declared}

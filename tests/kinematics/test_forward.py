@@ -1,0 +1,151 @@
+"""What `forward` says of its poses beside the numbers: conditioning, same side, status, text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+
+from .. import twin
+from ..workspaces import WORKSPACE, poses
+
+SQUARE = [name for name in WORKSPACE if name != "linear-delta-6"]
+every = pytest.mark.parametrize("name", WORKSPACE)
+
+
+def stepped(robot: pk.Robot, pose: np.ndarray) -> tuple[Callable[[np.ndarray], np.ndarray], int]:
+    """The pose after a step of the machine's free motion in mm, and how many steps it has.
+
+    A turn counts as its arc at the characteristic length. Spatial: a twist at the platform's
+    origin. 2tpr2tps: y, the distance w = z / cos(beta), alpha and beta, as in eq. 7.
+    """
+    R, length, map = twin.rotation(pose), robot.length, robot.model.map
+
+    def spatial(step: np.ndarray) -> np.ndarray:
+        x, y, z = step[3:] / length
+        turned = (np.eye(3) + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])) @ R
+        return np.concatenate([pose[:3] + step[:3], angles(turned)])
+
+    def planar(step: np.ndarray) -> np.ndarray:
+        return pose + np.array([step[0], step[1], 0, 0, 0, step[2] / length])
+
+    def tpr(step: np.ndarray) -> np.ndarray:
+        alpha, beta = pose[3] + step[2] / length, pose[4] + step[3] / length
+        w = pose[2] / np.cos(pose[4]) + step[1]
+        return np.array([w * np.sin(beta), pose[1] + step[0], w * np.cos(beta), alpha, beta, 0.0])
+
+    ways = {"spatial": (spatial, 6), "planar": (planar, 3), "2tpr2tps": (tpr, 4)}
+    ways["translation"] = (lambda step: pose + np.concatenate([step, np.zeros(3)]), 3)
+    return ways[map]
+
+
+def angles(R: np.ndarray) -> np.ndarray:
+    """Alpha, beta and gamma of R = Rz(gamma) Ry(beta) Rx(alpha), also a complex step away."""
+
+    def arc(y: complex, x: complex) -> complex:
+        turn = (x.real * y.imag - y.real * x.imag) / (x.real**2 + y.real**2)
+        return complex(np.arctan2(y.real, x.real), turn)
+
+    level = np.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
+    return np.array([arc(R[2, 1], R[2, 2]), arc(-R[2, 0], level), arc(R[1, 0], R[0, 0])])
+
+
+def derivative(robot: pk.Robot, pose: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """The twin's d closures / d step, (rows, m)."""
+    step, count = stepped(robot, pose)
+    return twin.complex_step(
+        lambda some: twin.closures(robot.model, step(some.astype(complex)), q), np.zeros(count)
+    )
+
+
+@every
+def test_conditioning_is_the_ratio_of_the_twins_singular_values(name: str) -> None:
+    robot, at = pk.load(name), poses(name, 5, seed=20)
+    q = robot.inverse(at)
+    found = robot.forward(q)
+    for i, pose in enumerate(found.pose):
+        sigma = np.linalg.svd(derivative(robot, pose, q[i]), compute_uv=False)
+        # the core divides each sphere row by its length, rounded to a float
+        assert found.conditioning[i] == pytest.approx(sigma[-1] / sigma[0], rel=2e-7)
+
+
+def test_conditioning_does_not_depend_on_the_angles_that_describe_a_pose() -> None:
+    """At beta near 90 degrees Euler rates are singular; the machine need not be."""
+    robot, ratio = pk.load("hexapod"), {}
+    for beta in (0.0, 1.2, 1.5706):
+        pose = robot.home
+        pose[4] = beta
+        found = robot.forward(robot.inverse(pose), guess=pose)
+        sigma = np.linalg.svd(derivative(robot, pose, robot.inverse(pose)), compute_uv=False)
+        ratio[beta] = found.conditioning
+        assert found.conditioning == pytest.approx(sigma[-1] / sigma[0], rel=1e-6)
+    assert 1e-3 < ratio[1.5706] < ratio[0.0]
+
+
+def test_conditioning_falls_to_zero_towards_a_singularity() -> None:
+    robot, ratios = pk.load("hexapod"), []
+    for degrees in (0, 45, 80, 89, 89.9):
+        pose = robot.home
+        pose[5] = np.radians(degrees)
+        ratios.append(float(robot.forward(robot.inverse(pose), guess=pose).conditioning))
+    assert np.all(np.diff(ratios) < 0) and ratios[-1] < 1e-2 * ratios[0]
+
+
+def test_conditioning_and_sides_are_those_of_single_rows_in_any_shape() -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(poses("hexapod", 6, seed=21))
+    q[4] = np.nan
+    found, shaped = robot.forward(q), robot.forward(q.reshape(2, 3, 6))
+    assert np.array_equal(shaped.conditioning.ravel(), found.conditioning, equal_nan=True)
+    assert np.flatnonzero(np.isnan(found.conditioning)).tolist() == [4]
+    assert found.same_side.tolist() == shaped.same_side.ravel().tolist()
+    assert found.same_side.tolist() == [True, True, True, True, False, True]
+    one = robot.forward(q[2])
+    assert one.conditioning.shape == one.same_side.shape == ()
+    assert float(one.conditioning) == pytest.approx(found.conditioning[2], rel=1e-12)
+
+
+@pytest.mark.parametrize("name", SQUARE)
+def test_same_side_is_whether_the_twins_determinants_agree(name: str) -> None:
+    robot, rng = pk.load(name), np.random.default_rng(22)
+    at = poses(name, 300, seed=22)
+    q, guess = robot.inverse(at), at + 5.0 * rng.uniform(-1, 1, at.shape) * WORKSPACE[name]
+    found = robot.forward(q, guess)
+    signs = []
+    for i in np.flatnonzero(found.ok):
+        there, start = found.pose[i], on_the_map(robot, guess[i])
+        determinants = [np.linalg.det(derivative(robot, p, q[i])) for p in (there, start)]
+        signs.append(np.sign(determinants[0]) == np.sign(determinants[1]))
+    assert found.same_side[found.ok].tolist() == signs
+    assert not found.same_side[~found.ok].any() and len(signs) > 30
+
+
+def on_the_map(robot: pk.Robot, pose: np.ndarray) -> np.ndarray:
+    """The pose that the map makes of a pose's free coordinates."""
+    free = pose[twin.free_columns(robot.model)]
+    return twin.pose_of_free(robot.model, free)
+
+
+def test_another_assembly_mode_is_a_solution_and_said_to_be_on_the_other_side() -> None:
+    robot, rng = pk.load("hexapod"), np.random.default_rng(23)
+    q = np.broadcast_to(robot.inverse(robot.home), (400, 6))
+    guess = robot.home + rng.uniform(-1, 1, (400, 6)) * [200, 200, 200, 1.0, 1.0, 2.0]
+    found = robot.forward(q, guess)
+    other = found.ok & (np.abs(found.pose - robot.home).max(axis=1) > 1.0)
+    assert other.sum() > 10 and (found.ok & ~other).sum() > 10
+    for pose in found.pose[other]:
+        assert np.abs(twin.closures(robot.model, pose, q[0])).max() < 1e-9
+    assert (~found.same_side[found.ok]).sum() > 10
+
+
+def test_forward_is_a_table_that_ends() -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(poses("hexapod", 30))
+    q[1] = np.nan
+    lines = str(robot.forward(q)).splitlines()
+    assert len(lines) == 22 and lines[-1] == "... 10 more rows"
+    assert lines[1].endswith("ok") and lines[2].endswith("invalid input")
+    assert str(robot.forward(q[0])).splitlines() == lines[:2]

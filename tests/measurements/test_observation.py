@@ -1,0 +1,120 @@
+"""Derivatives of what instruments read are those of its differences, through the whole machine."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.parameters import Share, parameters
+from pkmcal.core import instruments
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.observation import difference, predict
+
+from .. import twin
+from ..simulated import hexapod_poses
+
+KINDS = ("pose", "position", "height", "distance")
+SHAPES = {"position": (12, 3), "height": (12,), "distance": (12,)}
+
+
+def measured(robot: Robot, kind: str, rng: np.random.Generator) -> Measurements:
+    """Readings that the machine does not explain, of two targets in turn."""
+    poses = hexapod_poses(robot, 12, rng)
+    q = robot.inverse(poses)
+    if kind == "pose":
+        return Measurements(q, poses + rng.normal(0, 0.01, poses.shape), kind)
+    values = rng.normal(0, 3, SHAPES[kind])
+    two = np.array([[60.0, -20.0, 35.0], [300.0, 200.0, -50.0]])
+    ends = two[:, ::-1] if kind == "distance" else None
+    index = np.arange(12) % 2
+    return Measurements(q, values, kind, target=two, target_index=index, attachment=ends)
+
+
+def differences(equations: Equations, theta: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    columns = []
+    for j, s in enumerate(scale):
+        step = np.zeros(len(theta))
+        step[j] = 1e-3 * s
+        ahead, back = equations.at(theta + step), equations.at(theta - step)
+        columns.append((ahead.predicted[0].values - back.predicted[0].values) / (2e-3 * s))
+    return np.stack(columns, axis=-1)
+
+
+@pytest.mark.parametrize("unknown", [False, True], ids=["known", "unknown frame and target"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_analytic_jacobian_equals_differences(kind: str, unknown: bool) -> None:
+    rng = np.random.default_rng(7)
+    robot = pk.load("hexapod")
+    readings = measured(robot, kind, rng)
+    share = Share(readings, np.arange(12), unknown and kind != "distance", unknown, unknown)
+    chosen = parameters(robot, [share], ["base*", "offset*", "gain*"], None, None)
+    equations = Equations([share], chosen)
+    theta = chosen.start.copy()
+    if chosen.frame is not None:
+        theta[chosen.frame : chosen.frame + 6] = [400, -200, 90, 0.4, -0.7, 2.0]
+    (jacobian,) = equations.jacobian(equations.at(theta))
+    expected = differences(equations, theta, chosen.scale)
+    np.testing.assert_allclose(
+        jacobian * chosen.scale, expected * chosen.scale, rtol=0, atol=2e-7 * np.abs(expected).max()
+    )
+
+
+def test_jacobian_passes_through_ties() -> None:
+    robot = pk.load("examples/linear-delta/robot.toml")
+    poses = np.array([[10.0, 20, 100, 0, 0, 0], [-40.0, 5, 80, 0, 0, 0], [0, -50.0, 120, 0, 0, 0]])
+    readings = Measurements(robot.inverse(poses), poses[:, 2], "height")
+    share = Share(readings, np.arange(3), False, False)
+    chosen = parameters(robot, [share], None, None, None)
+    equations = Equations([share], chosen)
+    (jacobian,) = equations.jacobian(equations.at(chosen.start))
+    expected = differences(equations, chosen.start, chosen.scale)
+    np.testing.assert_allclose(jacobian, expected, rtol=1e-5, atol=1e-7)
+
+
+def test_points_and_distances_are_those_of_the_twin() -> None:
+    rng = np.random.default_rng(3)
+    pose, target, anchor = rng.normal(0, 1, (9, 6)), rng.normal(0, 9, (9, 3)), rng.normal(0, 9, 3)
+    expected = np.array([p[:3] + twin.rotation(p) @ t for p, t in zip(pose, target, strict=True)])
+    np.testing.assert_allclose(instruments.points(pose, target)[0], expected, rtol=0, atol=1e-13)
+    lengths = np.linalg.norm(expected - anchor, axis=1)
+    np.testing.assert_allclose(
+        instruments.distances(pose, target, anchor)[0], lengths, rtol=0, atol=1e-13
+    )
+
+
+def test_a_distance_of_zero_has_no_derivative_and_no_nan() -> None:
+    pose = np.array([[1.0, 2, 3, 0.1, 0.2, 0.3], [1, 2, 4, 0, 0, 0]])
+    seen = predict("distance", pose, anchor=np.array([1.0, 2, 3]))
+    np.testing.assert_array_equal(seen.values[:, 0], [0, 1])
+    assert (seen.by_twist[0] == 0).all() and np.isfinite(seen.by_twist).all()
+
+
+def test_a_frame_moves_points_as_the_pose_of_the_base_in_it() -> None:
+    rng = np.random.default_rng(1)
+    pose, frame = rng.normal(0, 0.5, (5, 6)), rng.normal(0, 0.5, 6)
+    target = rng.normal(0, 50, (5, 3))
+    seen = predict("position", pose, target, frame=frame).values
+    inner = predict("position", pose, target).values
+    outer = instruments.seen_points(frame, inner)[0]
+    again = predict("position", np.tile(frame, (5, 1)), inner).values
+    np.testing.assert_allclose(again, outer, atol=1e-12)
+    np.testing.assert_allclose(seen, outer, atol=1e-12)
+
+
+def test_poses_in_a_frame_carry_points_there() -> None:
+    rng = np.random.default_rng(2)
+    pose, frame = rng.normal(0, 0.5, (5, 6)), rng.normal(0, 0.5, 6)
+    target = rng.normal(0, 50, (5, 3))
+    composed = predict("pose", pose, frame=frame).values
+    there = predict("position", composed, target).values
+    expected = predict("position", pose, target, frame=frame).values
+    np.testing.assert_allclose(there, expected, atol=1e-12)
+
+
+def test_angles_differ_the_short_way_round() -> None:
+    one = np.array([[0, 0, 0, np.pi - 0.01, 0, 0]])
+    other = np.array([[0, 0, 0, -np.pi + 0.01, 0, 0]])
+    np.testing.assert_allclose(difference("pose", one, other)[0, 3], -0.02, atol=1e-12)

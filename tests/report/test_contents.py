@@ -1,0 +1,63 @@
+"""What a report expects of the calibrated machine, against other ways to the same numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pkmcal as pk
+from pkmcal.report.contents import as_seen, expected, instrument_sought
+
+from ..simulated import hexapod_poses
+
+
+def euler(angles: np.ndarray) -> Rotation:
+    return Rotation.from_euler("xyz", angles)
+
+
+def test_accuracy_as_seen_is_that_of_the_point_where_all_of_the_instrument_is_known() -> None:
+    robot, point = pk.load("hexapod"), np.array([30.0, -20.0, 50.0])
+    q = robot.inverse(hexapod_poses(robot, 30, np.random.default_rng(0)))
+    measured = pk.VirtualMachine(robot, noise=0.02).measure(q, target=point)
+    found = pk.identify(robot, measured, free=["offset*", "base*.z"], prior=0.5)
+    places = hexapod_poses(robot, 10, np.random.default_rng(1))
+    assert not instrument_sought(found)
+    np.testing.assert_allclose(
+        as_seen(found, places), found.accuracy(places, target=point), rtol=1e-9
+    )
+
+
+def test_machine_is_as_far_off_as_expected_where_the_instrument_stands_anywhere() -> None:
+    robot, random = pk.load("hexapod"), np.random.default_rng(4)
+    free = ["base*", "platform*", "offset*"]
+    true = robot.replace(
+        {n: robot.geometry[n] + random.normal(0, 0.3) for n in robot.geometry.match(free)}
+    )
+    frame, shift = euler(np.array([0.1, -0.2, 1.0])), np.array([2000.0, -500.0, 300.0])
+    targets = np.array([[80.0, 0, -20], [-60, 70, 0], [-40, -90, 10]])
+
+    def seen(q: np.ndarray, target: np.ndarray) -> np.ndarray:
+        at = true.forward(q).pose
+        return frame.apply(at[:, :3] + euler(at[:, 3:]).apply(target)) + shift
+
+    q = np.repeat(robot.inverse(hexapod_poses(robot, 40, random)), 3, axis=0)
+    index = np.tile(np.arange(3), 40)
+    values = np.concatenate([seen(q[i : i + 1], targets[i % 3]) for i in range(len(q))])
+    values += random.normal(0, 0.02, values.shape)
+    found = pk.identify(
+        robot,
+        pk.Measurements(q, values, sigma=0.02, target_index=index),
+        free=free, frame="unknown", target="unknown",
+    )  # fmt: skip
+    assert instrument_sought(found)
+
+    places = hexapod_poses(robot, 60, np.random.default_rng(9))
+    commands = found.robot.inverse(places)
+    value = {name: p["value"] for name, p in found.parameters.items()}
+    placed = np.array([value[f"frame.{k}"] for k in ("x", "y", "z", "alpha", "beta", "gamma")])
+    target = np.array([value[f"target1.{k}"] for k in "xyz"])
+    points = places[:, :3] + euler(places[:, 3:]).apply(target)
+    off = seen(commands, targets[0]) - (euler(placed[3:]).apply(points) + placed[:3])
+    ratio = np.linalg.norm(off, axis=1) / expected(found, places)
+    assert np.sqrt(np.mean(ratio**2)) == pytest.approx(1.0, abs=0.45)
