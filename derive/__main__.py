@@ -34,7 +34,6 @@ def headers() -> dict[str, str]:
 
 def _names() -> str:
     """What C and Python call the numbers of a limb, its drivers and rows, and the pose maps."""
-
     def enum(prefix: str, names: Iterable[str]) -> str:
         return "enum { " + ", ".join(prefix + name.upper() for name in names) + " };"
 

@@ -70,7 +70,9 @@ def _rates() -> Function:
     rates = rates.applyfunc(lambda e: sp.expand(e).subs(sb / cb, tangent).subs(1 / cb, secant))
     angles = rates * spin
     along = -(Ra * skew(arm) * E)
-    matrix = sp.Matrix.vstack(sp.Matrix.hstack(Ra, along), sp.Matrix.hstack(sp.zeros(3, 3), angles))
+    matrix = sp.Matrix.vstack(
+        sp.Matrix.hstack(Ra, along), sp.Matrix.hstack(sp.zeros(3, 3), angles)
+    )
     f.output("rates", matrix, "6 x 6, row by row")
     return f
 

@@ -156,14 +156,12 @@ TPR2TPS = PoseMap(
     free=("y", "z", "alpha", "beta"),
     from_pose=_2tpr2tps_from_pose,
     frame=_2tpr2tps_frame,
-    retract=lambda f, s, delta: sp.Matrix(
-        [
-            s[0] + delta[0],
-            s[1] + delta[1],
-            *turned(f, s[2], s[3], delta[2], "a"),
-            *turned(f, s[4], s[5], delta[3], "b"),
-        ]
-    ),
+    retract=lambda f, s, delta: sp.Matrix([
+        s[0] + delta[0],
+        s[1] + delta[1],
+        *turned(f, s[2], s[3], delta[2], "a"),
+        *turned(f, s[4], s[5], delta[3], "b"),
+    ]),
     angles=lambda R, s: [(s[3], s[2]), (s[5], s[4]), (sp.S.Zero, sp.S.One)],
 )
 
