@@ -33,8 +33,14 @@ FASTER = ["-fcx-limited-range", "-fno-tree-loop-distribute-patterns"]
 
 
 def flags() -> list[str]:
-    """Return what the C compiler is called with: `FLAGS`, and what it knows of `FASTER`."""
-    return FLAGS + [flag for flag in FASTER if _known(flag)]
+    """Return what the C compiler is called with: `FLAGS`, and what it knows of `FASTER`.
+
+    Without line numbers for debuggers, which Python's own flags ask for and which make up nine
+    tenths of the extension, unless ``CFLAGS`` asks for them too.
+    """
+    debugging = any(flag.startswith("-g") for flag in shlex.split(os.environ.get("CFLAGS", "")))
+    found = [*FLAGS, *(flag for flag in FASTER if _known(flag))]
+    return found if debugging else [*found, "-g0"]
 
 
 def _known(flag: str) -> bool:

@@ -104,7 +104,7 @@ static void core_tpr2tps(ptrdiff_t n, const double *size, const double *free, do
 }
 
 /* The closure rows' derivatives at home (rows x m, limb by limb): what pkm_order_rows eliminates. */
-static int core_home(const pkm_machine *machine, const double *geometry, const double *home,
+RARE int core_home(const pkm_machine *machine, const double *geometry, const double *home,
                      double *jacobian)
 {
     limb_numbers limb[PKM_MAX_LIMBS];
@@ -120,9 +120,9 @@ static int core_home(const pkm_machine *machine, const double *geometry, const d
     case MAP_##NAME:                                                                              \
         map_from_pose(MAP_##NAME, pose, state);                                                   \
         FN(map_frame)(MAP_##NAME, state, R, p);                                                   \
-        inverse_at(machine, limb, R, p, q);                                                       \
+        inverse_once(machine, limb, R, p, q);                                                     \
         spheres_at(machine, limb, q, sphere);                                                     \
-        rows = FN(closure_rows)(MAP_##NAME, SCALED, machine, sphere, state, phi, A);              \
+        rows = scaled_rows(MAP_##NAME, machine, sphere, state, phi, A);                           \
         for (int k = 0; k < rows * M; k++) jacobian[k] = A[k][0];                                 \
         break;
         EACH_MAP(CASE)

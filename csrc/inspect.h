@@ -29,7 +29,7 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
         map_from_pose(map, lane_pose, state);
         FN(map_frame)(map, state, R, p);
         spheres_at(machine, limb, lane_q, sphere);
-        const int rows = FN(closure_rows)(map, SCALED, machine, sphere, state, residual, jacobian);
+        const int rows = scaled_rows(map, machine, sphere, state, residual, jacobian);
         for (int i = 0, r = 0; i < machine->limbs; i++) {
             const int limb_rows = 1 + __builtin_popcount((unsigned)machine->rows[i]);
             for (int k = 0; k < limb_rows; k++, r++) {
@@ -43,8 +43,8 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
                 map_free(map, state, step, free);
                 scatter_row(free, m, by_free, rows * m, row, count);
                 if (k == 0)
-                    sphere_derivatives(machine, i, &limb[i], R, p, lane_q[machine->actuator[i]],
-                                       &by_q, by_g);
+                    sphere_derivatives_called(machine, i, &limb[i], R, p,
+                                              lane_q[machine->actuator[i]], &by_q, by_g);
                 by_q *= rough_reciprocal(sphere[i].rho) * machine->weight[r];
                 for (int a = 0; a < actuators; a++)
                     scatter(a == machine->actuator[i] ? by_q : fill(0.0),
@@ -72,7 +72,7 @@ INLINE void limb_rows(const pkm_machine *machine, ptrdiff_t n, const double *geo
             real qt, by_q, by_g[SLOTS], square = fill(0.0);
             const real q = limb_inverse(machine, i, &limb[i], R, p);
             FN(limb_drive)(q, limb[i].g, &qt);
-            sphere_derivatives(machine, i, &limb[i], R, p, q, &by_q, by_g);
+            sphere_derivatives_called(machine, i, &limb[i], R, p, q, &by_q, by_g);
             for (int k = 0; k < 3; k++) square += by_g[BASE_X + k] * by_g[BASE_X + k];
             const real scale = 1.0 / FN(root)(square); /* ∂Φ/∂base = -d, ∂Φ/∂platform = Rᵀ d */
             scatter(qt, drive + i, limbs, row, count);

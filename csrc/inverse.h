@@ -48,6 +48,13 @@ INLINE void inverse_at(const pkm_machine *machine, const limb_numbers *limb, con
     whole_or_nan(q, machine->actuators);
 }
 
+/* The same at a home or a guess, once a call. */
+RARE void inverse_once(const pkm_machine *machine, const limb_numbers *limb, const real *R,
+                       const real *p, real *q)
+{
+    inverse_at(machine, limb, R, p, q);
+}
+
 INLINE void inverse_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                          ptrdiff_t geometry_stride, const double *pose, double *q)
 {

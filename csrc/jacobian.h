@@ -20,7 +20,14 @@ INLINE void sphere_derivatives(const pkm_machine *machine, int i, const limb_num
         FN(crank_derivatives)(R, p, q, limb->g, F, by_q, by_g);
 }
 
-INLINE void constraint_derivatives(const pkm_machine *machine, int i, int kind,
+/* The same out of line, where it is not the innermost loop. */
+SHARED void sphere_derivatives_called(const pkm_machine *machine, int i, const limb_numbers *limb,
+                                      const real *R, const real *p, real q, real *by_q, real *by_g)
+{
+    sphere_derivatives(machine, i, limb, R, p, q, by_q, by_g);
+}
+
+SHARED void constraint_derivatives(const pkm_machine *machine, int i, int kind,
                                    const limb_numbers *limb, const real *R, const real *p, real *by_g)
 {
     real F[9], P[9];
@@ -67,12 +74,12 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
 
 /* How the map's step answers a residual in each row, -Φ⁻¹ (m x rows), per unit of the scaled rows;
  * NaN where they are singular. */
-INLINE int step_response(int map, const pkm_machine *machine, const FN(limb_sphere) *sphere,
+SHARED int step_response(int map, const pkm_machine *machine, const FN(limb_sphere) *sphere,
                          const real *state, real *response)
 {
     const int m = map_m(map);
     real residual[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6], A[36], pivot;
-    const int rows = FN(closure_rows)(map, SCALED, machine, sphere, state, residual, jacobian);
+    const int rows = scaled_rows(map, machine, sphere, state, residual, jacobian);
     normal_system(m, rows, rows == m ? m : rows, jacobian, residual, A, response);
     solve(m, rows, A, response, &pivot);
     const mask known = pivot > fill(1e-14);

@@ -70,7 +70,7 @@ INLINE void rates_rows(const pkm_machine *machine, ptrdiff_t n, const double *ge
 
 /* d²Φ/dt² of a limb's rows where the platform moves as T says and the actuator with q1 and q2; each in
  * the size of the scaled rows. Returns how many rows it has. */
-INLINE int limb_bends(const pkm_machine *machine, int i, const limb_numbers *limb,
+SHARED int limb_bends(const pkm_machine *machine, int i, const limb_numbers *limb,
                       const FN(limb_sphere) *sphere, const double *weight, const real T[3][12],
                       real q, real q1, real q2, real *bend)
 {
@@ -136,7 +136,7 @@ INLINE void motion_at(int map, const pkm_machine *machine, const limb_numbers *l
     for (int j = 0; j < m; j++) step[j] = fill(0.0);
     for (int i = 0, r = 0; i < machine->limbs; i++) {
         real by_q, by_g[SLOTS];
-        sphere_derivatives(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
+        sphere_derivatives_called(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
         by_q *= rough_reciprocal(sphere[i].rho) * machine->weight[r];
         for (int j = 0; j < m; j++)
             step[j] += response[j * rows + machine->order[r]] * by_q * q1[machine->actuator[i]];

@@ -147,7 +147,7 @@ INLINE double relative(int map, const real *state, const real *step)
 
 /* Newton's method from a predicted state; the factors of its last matrix stay. Returns the first
  * correction, or infinity where it did not settle. */
-INLINE double correct(int map, const homotopy *path, const FN(limb_sphere) *limb, int iterations,
+static double correct(int map, const homotopy *path, const FN(limb_sphere) *limb, int iterations,
                       double settled, real *state, real *A, int *row)
 {
     const int m = map_m(map);
@@ -172,7 +172,7 @@ INLINE double correct(int map, const homotopy *path, const FN(limb_sphere) *limb
     return INFINITY;
 }
 
-INLINE void velocity_at(int map, const homotopy *path, const FN(limb_sphere) *limb, const real *state,
+static void velocity_at(int map, const homotopy *path, const FN(limb_sphere) *limb, const real *state,
                         const real *A, const int *row, real *velocity)
 {
     real rate[PKM_MAX_ROWS];
