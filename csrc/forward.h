@@ -168,4 +168,20 @@ INLINE void forward_map(int map, const forward_call *call)
     }
 }
 
+int CALL(forward)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                  ptrdiff_t geometry_stride, const double *q, const double *guess,
+                  ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
+                  double *residual)
+{
+    const forward_call call = {machine, n, geometry, geometry_stride, q, guess, guess_stride,
+                               pose, status, iterations, residual};
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    switch (machine->map) {
+#define CASE(NAME, name, M) case MAP_##NAME: forward_map(MAP_##NAME, &call); break;
+        EACH_MAP(CASE)
+#undef CASE
+    }
+    return 0;
+}
+
 #endif

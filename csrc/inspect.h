@@ -54,11 +54,27 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
     }
 }
 
+int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                  const double *pose, const double *q, double *residual, double *by_step,
+                  double *by_free, double *by_q)
+{
+    const closure_out out = {residual, by_step, by_free, by_q};
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    switch (machine->map) {
+#define CASE(NAME, name, M)                                                                       \
+    case MAP_##NAME: closure_map(MAP_##NAME, machine, n, geometry, pose, q, &out); break;
+        EACH_MAP(CASE)
+#undef CASE
+    }
+    return 0;
+}
+
 /* Of each limb at a pose as given: q̃ (NaN out of reach), and the unit vector from its anchor to the
  * platform joint in base and in platform axes. */
-INLINE void limb_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                      const double *pose, double *drive, double *on_base, double *on_platform)
+int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry, const double *pose,
+                double *drive, double *on_base, double *on_platform)
 {
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     const int limbs = machine->limbs;
     limb_numbers limb[PKM_MAX_LIMBS];
     for (ptrdiff_t first = 0; first < n; first += LANES) {
@@ -82,12 +98,14 @@ INLINE void limb_rows(const pkm_machine *machine, ptrdiff_t n, const double *geo
             }
         }
     }
+    return 0;
 }
 
 /* The limbs (n, limbs, PKM_SPHERE) at actuator coordinates. */
-INLINE void sphere_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                        const double *q, double *out)
+int CALL(spheres)(const pkm_machine *machine, ptrdiff_t n, const double *geometry, const double *q,
+                  double *out)
 {
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     limb_numbers limb[PKM_MAX_LIMBS];
     FN(limb_sphere) sphere[PKM_MAX_LIMBS];
     const int width = machine->limbs * PKM_SPHERE;
@@ -112,6 +130,7 @@ INLINE void sphere_rows(const pkm_machine *machine, ptrdiff_t n, const double *g
             scatter_row(numbers, PKM_SPHERE, out + i * PKM_SPHERE, width, row, count);
         }
     }
+    return 0;
 }
 
 #endif

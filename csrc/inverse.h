@@ -55,9 +55,10 @@ RARE void inverse_once(const pkm_machine *machine, const limb_numbers *limb, con
     inverse_at(machine, limb, R, p, q);
 }
 
-INLINE void inverse_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                         ptrdiff_t geometry_stride, const double *pose, double *q)
+int CALL(inverse)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                  ptrdiff_t geometry_stride, const double *pose, double *q)
 {
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     enum { BLOCKS_INVERSE = 2 }; /* side by side: the processor overlaps them */
     limb_numbers limb[PKM_MAX_LIMBS];
     for (ptrdiff_t first = 0; first < n; first += BLOCKS_INVERSE * LANES) {
@@ -78,6 +79,7 @@ INLINE void inverse_rows(const pkm_machine *machine, ptrdiff_t n, const double *
         for (int t = 0; t < BLOCKS_INVERSE; t++)
             scatter_row(lane_q[t], machine->actuators, q, machine->actuators, row[t], count[t]);
     }
+    return 0;
 }
 
 #endif

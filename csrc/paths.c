@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core_table.h"
+#include "pkmcal.h"
 #include "names.h"
 
 #define INLINE static inline __attribute__((always_inline, unused))
@@ -237,10 +237,11 @@ INLINE int follow(int map, const homotopy *path, double accuracy, real *x, int32
     return PKM_ARRIVED;
 }
 
-void paths_follow(const pkm_machine *machine, ptrdiff_t n, const double *start,
-                  const double *target, double *state, double accuracy, double *frame,
-                  int32_t *status, int32_t *steps, double *reached)
+int pkm_paths(const pkm_machine *machine, ptrdiff_t n, const double *start, const double *target,
+              double *state, double accuracy, double *frame, int32_t *status, int32_t *steps,
+              double *reached)
 {
+    if (pkm_closure_count(machine) != map_m(machine->map)) return PKM_BAD_MACHINE;
     pkm_machine unit = *machine;
     homotopy path = {&unit, (const real *)start, (const real *)target};
     unit.length = unit.size = 1.0;
@@ -256,4 +257,5 @@ void paths_follow(const pkm_machine *machine, ptrdiff_t n, const double *start,
 #undef CASE
         }
     }
+    return 0;
 }

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -58,7 +57,27 @@ def _default_isa() -> int:
     return ISAS.index(wanted)
 
 
+def _functions(isa: str) -> dict[str, Any]:
+    """The functions compiled for an ISA, by their names in ``csrc/calls.h``."""
+    prefix = f"pkm_{isa}_"
+    return {name[len(prefix) :]: getattr(lib, name) for name in dir(lib) if name.startswith(prefix)}
+
+
+def _row_call(line: str) -> tuple[str, tuple[list[tuple[int, str]], list[tuple[int, ...]]]]:
+    """Name, widths and kinds of inputs, and shapes of outputs; see ``derive/calls.py``."""
+    before, _, after = line.partition(" -> ")
+    name, *inputs = before.split()
+    widths = [each.split(":")[1] for each in inputs]
+    shapes = [each.split(":")[1].split(",") for each in after.split()]
+    return name, (
+        [(int(width.rstrip("*!")), width.lstrip("0123456789")) for width in widths],
+        [tuple(int(size) for size in shape if size) for shape in shapes],
+    )
+
+
 ISA = _default_isa()
+FUNCTIONS = [_functions(isa) for isa in ISAS[: lib.pkm_best_isa() + 1]]
+ROW_CALLS = dict(map(_row_call, _text(lib.pkm_row_calls()).splitlines()))
 
 
 def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:
@@ -104,9 +123,17 @@ def as_doubles(given: NDArray[Any]) -> FloatArray:
     return doubles if doubles.flags.aligned else doubles.copy()
 
 
-# C pointer to a contiguous array of float64, or int32; it keeps the array alive.
-pointer: Callable[[FloatArray], Any] = partial(ffi.from_buffer, "double *")
-int_pointer: Callable[[IntArray], Any] = partial(ffi.from_buffer, "int32_t *")
+# By the type of its numbers, as `array.dtype.char` has it.
+_POINTERS = {
+    kind: ffi.typeof(f"{name} *")
+    for kinds, name in (("dD", "double"), ("i", "int32_t"), ("l", "int64_t"), ("L", "uint64_t"))
+    for kind in kinds
+}
+
+
+def pointer(array: NDArray[Any]) -> Any:
+    """C pointer to a contiguous array; it keeps the array alive."""
+    return ffi.from_buffer(_POINTERS[array.dtype.char], array)
 
 
 def ensure(code: int) -> None:
@@ -115,13 +142,76 @@ def ensure(code: int) -> None:
         raise ValueError(f"the core refused the call (code {code})")
 
 
-def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) -> None:
-    """Run ``call(start, stop)`` over contiguous parts of the rows, in threads.
+def call(function: str, *arguments: Any, isa: int | None = None) -> None:
+    """Call a function of the core, with arrays as pointers to their numbers.
 
     Parameters
     ----------
-    call : callable
-        Returns the core's code: 0, or negative for a bad call.
+    function : str
+        Its name in ``csrc/calls.h``.
+    *arguments : ndarray, int, float or C data
+        As declared there; arrays contiguous.
+    isa : int, optional
+        Index into `ISAS`.
+
+    Raises
+    ------
+    ValueError
+        The core refuses the call, or the processor has no such ISA.
+    """
+    try:
+        chosen = FUNCTIONS[ISA if isa is None else isa][function]
+    except IndexError:
+        raise ValueError(f"this processor has no ISA {isa}") from None
+    code = chosen(*[pointer(a) if isinstance(a, np.ndarray) else a for a in arguments])
+    if code < 0:
+        ensure(code)
+
+
+def rows(function: str, *arrays: FloatArray, isa: int | None = None) -> list[FloatArray]:
+    """Call a function of the core that is one formula a row.
+
+    Parameters
+    ----------
+    function : str
+        Its name in ``generated/row_calls.h``.
+    *arrays : ndarray (N, width), or (width,) where declared
+        Its inputs.
+    isa : int, optional
+        Index into `ISAS`.
+
+    Returns
+    -------
+    list of ndarray (N, ...)
+        Its outputs.
+
+    Raises
+    ------
+    ValueError
+        An input of another width or number of rows.
+    """
+    inputs, outputs = ROW_CALLS[function]
+    n = next((len(a) for a in arrays if a.ndim > 1), 1)
+    arguments: list[Any] = [n]
+    for (width, given), array in zip(inputs, arrays, strict=True):
+        each = array.ndim > 1 or given == ""
+        if array.size != (n * width if each else width) or (each and given == "!"):
+            raise ValueError(f"{function}: {array.shape} are not {n} rows of {width} numbers")
+        arguments.append(array)
+        if given == "*":
+            arguments.append(width if each else 0)
+    made = [np.empty((n, *shape)) for shape in outputs]
+    call(function, *arguments, *made, isa=isa)
+    return made
+
+
+def in_threads(run: Callable[[int, int], None], rows: int, threads: int | None) -> None:
+    """Run ``run(start, stop)`` over contiguous parts of the rows, in threads.
+
+    Parameters
+    ----------
+    run : callable
+        May raise, which becomes the call's own error.
     rows : int
         Number of rows.
     threads : int or None
@@ -133,14 +223,17 @@ def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) 
     else:
         threads = min(whole("threads", threads, 1, note=" or None"), max(rows, 1))
     if threads == 1:
-        return ensure(call(0, rows))
+        return run(0, rows)
     count = min(rows, PARTS_PER_THREAD * threads)
     parts = pairwise([rows * k // count for k in range(count + 1)])
-    codes: list[int] = []
+    raised: list[Exception] = []
 
     def work() -> None:
-        for start, stop in parts:  # whoever is free takes the next
-            codes.append(call(start, stop))
+        try:
+            for start, stop in parts:  # whoever is free takes the next
+                run(start, stop)
+        except Exception as error:
+            raised.append(error)
 
     others = [threading.Thread(target=work) for _ in range(threads - 1)]
     for thread in others:
@@ -148,34 +241,34 @@ def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) 
     work()
     for thread in others:
         thread.join()
-    ensure(min(codes))
+    if raised:
+        raise raised[0]
+
+
+def part(array: NDArray[Any], start: int, stop: int) -> NDArray[Any]:
+    """Rows of an array; all of them without the price of a slice."""
+    return array if stop - start == len(array) else array[start:stop]
 
 
 def tpr2tps_lengths(size: FloatArray, free: FloatArray, out: FloatArray) -> None:
     """Eq. 8 in closed form: `free` (N, 4) to lengths `out` (N, 4)."""
-    lib.pkm_tpr2tps_lengths(ISA, len(free), pointer(size), pointer(free), pointer(out))
+    call("tpr2tps_lengths", len(free), size, free, out)
 
 
 def tpr2tps_jacobian(size: FloatArray, free: FloatArray, out: FloatArray) -> None:
     """Eq. 12 in closed form: `free` (N, 4) to derivatives `out` (N, 4, 4)."""
-    lib.pkm_tpr2tps_jacobian(ISA, len(free), pointer(size), pointer(free), pointer(out))
+    call("tpr2tps_jacobian", len(free), size, free, out)
 
 
 def compose(a: FloatArray, b: FloatArray) -> FloatArray:
     """Pose A followed by pose B: (6,) and (N, 6), or (N, 6) and (6,), to (N, 6)."""
-    n = len(b) if b.ndim == 2 else len(a)
-    out = np.empty((n, 6))
-    if n:
-        strides = (6 if a.ndim == 2 else 0, 6 if b.ndim == 2 else 0)
-        lib.pkm_compose(ISA, n, pointer(a), strides[0], pointer(b), strides[1], pointer(out))
-    return out
+    return rows("compose", a, b)[0]
 
 
 def invert(a: FloatArray) -> FloatArray:
     """The inverse of a pose (6,)."""
-    out = np.empty(6)
-    lib.pkm_invert(ISA, 1, pointer(a), pointer(out))
-    return out
+    inverse: FloatArray = rows("invert", a)[0][0]
+    return inverse
 
 
 def compose_rates(
@@ -185,24 +278,9 @@ def compose_rates(
 
     A is (6,); C is (6,) or (N, 6).
     """
-    n, out = len(pose), np.empty((len(pose), 6, 6))
-    if n:
-        lib.pkm_compose_rates(
-            ISA,
-            n,
-            pointer(a),
-            pointer(pose),
-            pointer(c),
-            6 if c.ndim == 2 else 0,
-            pointer(composed),
-            pointer(out),
-        )
-    return out
+    return rows("compose_rates", a, pose, c, composed)[0]
 
 
 def compose_twists(a: FloatArray, pose: FloatArray, c: FloatArray) -> FloatArray:
     """Twists (N, 6, 6) of A T C by those of T, for T = `pose` (N, 6); A and C are (6,)."""
-    n, out = len(pose), np.empty((len(pose), 6, 6))
-    if n:
-        lib.pkm_compose_twists(ISA, n, pointer(a), pointer(pose), pointer(c), pointer(out))
-    return out
+    return rows("compose_twists", a, pose, c)[0]

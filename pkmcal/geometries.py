@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal._core import lib
-from pkmcal.core import FloatArray, as_rows, int_pointer, pointer
+from pkmcal.core import FloatArray, as_rows, ensure, pointer
 from pkmcal.geometry import Geometry
 from pkmcal.robot import Robot
 from pkmcal.ties import Term, Tie
@@ -100,17 +100,10 @@ class Geometries:
         Tied numbers follow their parameters exactly.
         """
         geometry, slots = self._geometry, self._slots[: len(errors)]
-        code = lib.pkm_with_errors(
-            len(errors),
-            len(self._own),
-            pointer(np.ascontiguousarray(errors[:, : len(self._own)])),
-            int_pointer(self._own),
-            slots.shape[1],
-            pointer(geometry.slots),
-            pointer(slots),
-        )
-        if code < 0:
-            raise ValueError(f"the core refused the call (code {code})")
+        own = np.ascontiguousarray(errors[:, : len(self._own)])
+        size, ideal = slots.shape[1], pointer(geometry.slots)
+        arrays = (pointer(own), pointer(self._own), size, ideal, pointer(slots))
+        ensure(lib.pkm_with_errors(*own.shape, *arrays))
         changed = {
             name: geometry[name] + errors[:, column] for name, column in self._parameters.items()
         }

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal._core import lib
-from pkmcal.core import FloatArray, as_rows, pointer
+from pkmcal.core import FloatArray, as_rows, call
 from pkmcal.geometries import Geometries
 from pkmcal.robot import Robot
 
@@ -105,18 +104,8 @@ class LimbResidual:
         """Residual (N,) of geometries as `geometries` returns them, mm."""
         machine = self._robot._machine
         cost = np.empty(len(slots))
-        if len(slots):
-            code = lib.pkm_closure_cost(
-                machine.struct,
-                machine.isa,
-                len(slots),
-                pointer(slots),
-                len(self._poses),
-                pointer(self._poses),
-                pointer(self._actuators),
-                pointer(cost),
-            )
-            if code < 0:
-                raise ValueError(f"the core refused the call (code {code})")
+        poses, q = self._poses, self._actuators
+        given = (machine.struct, len(slots), slots, len(poses), poses, q)
+        call("closure_cost", *given, cost, isa=machine.isa)
         residual: FloatArray = np.sqrt(cost / (len(self._poses) * machine.rows))
         return residual

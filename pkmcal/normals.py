@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal._core import ffi, lib
-from pkmcal.core import ISA, FloatArray, pointer
+from pkmcal.core import ISA, FloatArray, call
 
 _GENERATORS = 8  # of xoshiro256+, four words each
 
@@ -37,9 +36,5 @@ class Normals:
 
     def fill(self, out: FloatArray) -> FloatArray:
         """Fill a contiguous array of any shape, and return it."""
-        code = lib.pkm_normals(
-            self._isa, out.size, ffi.from_buffer("uint64_t *", self._state), pointer(out)
-        )
-        if code < 0:
-            raise ValueError(f"the core refused the call (code {code})")
+        call("normals", out.size, self._state, out, isa=self._isa)
         return out

@@ -288,9 +288,9 @@ def test_the_core_refuses_what_it_cannot_take() -> None:
     struct = core.ffi.new("pkm_swarm *", {"particles": 0, "dims": 2})
     null = core.ffi.NULL
     assert core.lib.pkm_swarm_size(struct) == 0
-    assert core.lib.pkm_swarm_judge(struct, 0, null) == core.lib.PKM_BAD_SWARM
-    struct.particles = 5
-    assert core.lib.pkm_swarm_judge(struct, 99, null) == core.lib.PKM_BAD_ISA
+    assert core.lib.pkm_base_swarm_judge(struct, null) == core.lib.PKM_BAD_SWARM
+    with pytest.raises(ValueError, match="the core refused the call"):
+        core.call("swarm_judge", struct, null)
 
 
 # --- order-2 stability -------------------------------------------------------------------------
