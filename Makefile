@@ -11,7 +11,7 @@ SOURCES := $(wildcard csrc/*.c csrc/*.h csrc/build.py generated/*.h) pyproject.t
 PREREQUISITES := @sh .ci/prerequisites $(PYTHON)
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-SANITIZE := -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
+SANITIZE := -g -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer
 SANITIZED := build/sanitized
 
 # NumPy's many threads make small systems slower, and much slower on a busy machine.
@@ -86,11 +86,13 @@ $(BIN)/pip:
 
 $(PACKAGE): $(SOURCES) | $(BIN)/pip
 	$(PREREQUISITES)
+	@echo "installing pkmcal in $(VENV) and compiling its core: about half a minute"
 	$(PIP) install --editable .
 	@touch $@
 
 $(TESTS): $(SOURCES) | $(BIN)/pip
 	$(PREREQUISITES)
+	@echo "installing pkmcal and its tests in $(VENV) and compiling its core: about a minute"
 	$(PIP) install --editable ".[test,lint]"
 	@touch $@ $(PACKAGE)
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from cffi import FFI
 
-from csrc.build import CSRC, GENERATED, HEADER, declarations
+from csrc.build import CSRC, GENERATED, declarations
 from csrc.build import flags as core_flags
-from pkmcal.core import library, machine
+from pkmcal.core import library
 from pkmcal.core.library import ISAS
 
 HERE = Path(__file__).parent
@@ -72,7 +73,7 @@ def lane_units(folder: Path, isa: str) -> Compiled:
 
 
 class OneLane:
-    """The core of csrc/ compiled with LANES 1, in the place of `machine.lib` while entered.
+    """The core of csrc/ compiled with LANES 1, whose `forward` replaces the core's while entered.
 
     The same source, the same flags and the same three ISAs; only the number of lanes differs. In one
     thread only.
@@ -100,24 +101,25 @@ class OneLane:
         sources.append(HERE / "flush_denormals.c")
         own = [f"-I{CSRC}", f"-I{GENERATED}", f"-DJOINED={joined}"]
         own += [flag for flag in core_flags() if "visibility" not in flag]
-        declared = declarations(HEADER) + "void flush_denormals(int on);"
+        declared = declarations() + "void flush_denormals(int on);"
         self._here = compiled(folder, f"one_lane_{joined}", declared, sources, own)
-        self._lib = machine.lib
+        self._replaced = [functions["forward"] for functions in library.FUNCTIONS]
 
     def __enter__(self) -> OneLane:
-        machine.lib = self
+        for isa, functions in zip(ISAS, library.FUNCTIONS, strict=False):
+            functions["forward"] = partial(self._forward, f"pkm_{isa}_forward")
         return self
 
     def __exit__(self, *_: object) -> None:
-        machine.lib = self._lib
+        for functions, forward in zip(library.FUNCTIONS, self._replaced, strict=True):
+            functions["forward"] = forward
 
     def flush_denormals(self, on: bool) -> None:
         """Count numbers too small for full precision as 0 in this thread, or not."""
         self._here.lib.flush_denormals(on)
 
-    def pkm_forward(self, *arguments: Any) -> int:
-        """As the core's, which it hands all arguments to."""
-        return int(self._here.lib.pkm_forward(*map(self._own, arguments)))
+    def _forward(self, name: str, *arguments: Any) -> int:
+        return int(getattr(self._here.lib, name)(*map(self._own, arguments)))
 
     def _own(self, argument: Any) -> Any:
         if isinstance(argument, library.ffi.CData):

@@ -4,6 +4,7 @@ setup.py names this file; it is run from the project's root, and its paths are r
 """
 
 import os
+import re
 import shlex
 import subprocess
 import sysconfig
@@ -14,6 +15,7 @@ from cffi import FFI
 CSRC = Path(__file__).parent
 GENERATED = CSRC.parent / "generated"
 HEADER = CSRC / "pkmcal.h"
+CALLS = (CSRC / "calls.h", GENERATED / "row_calls.h")  # declared once, compiled for each ISA
 BEGIN, END = "/* cffi begin */", "/* cffi end */"
 
 # Contraction off: every ISA gives the same bits.
@@ -33,32 +35,51 @@ FASTER = ["-fcx-limited-range", "-fno-tree-loop-distribute-patterns"]
 
 
 def flags() -> list[str]:
-    """Return what the C compiler is called with: `FLAGS`, and what it knows of `FASTER`."""
-    return FLAGS + [flag for flag in FASTER if _known(flag)]
+    """Return what the C compiler is called with: `FLAGS`, and what it knows of `FASTER`.
+
+    Without line numbers for debuggers, which Python's own flags ask for and which make up nine
+    tenths of the extension, unless ``CFLAGS`` asks for them too.
+    """
+    debugging = any(flag.startswith("-g") for flag in shlex.split(os.environ.get("CFLAGS", "")))
+    found = [*FLAGS, *(flag for flag in FASTER if _known(flag))]
+    return found if debugging else [*found, "-g0"]
 
 
 def _known(flag: str) -> bool:
+    return _compiles("", flag)
+
+
+def _compiles(text: str, *given: str) -> bool:
+    """Whether the C compiler takes this text."""
     compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")
-    trial = [*compiler, "-Werror", flag, "-fsyntax-only", "-x", "c", os.devnull]
+    trial = [*compiler, "-Werror", *given, "-fsyntax-only", "-x", "c", "-"]
     try:
-        return subprocess.run(trial, capture_output=True).returncode == 0
+        return subprocess.run(trial, input=text.encode(), capture_output=True).returncode == 0
     except OSError:
         return False  # no compiler: the build itself says so
 
 
-def declarations(header: Path) -> str:
-    """Return what `header` declares between its two marker lines, without preprocessor lines."""
-    lines = header.read_text(encoding="utf-8").splitlines()
+def isas() -> tuple[str, ...]:
+    """Return the ISAs that the calls are compiled for, as their names in C have them."""
+    wide = _compiles("#ifndef __x86_64__\n#error\n#endif\n")
+    return ("base", "avx2", "avx512") if wide else ("base",)
+
+
+def declarations() -> str:
+    """Return all that the core offers: what pkmcal.h marks, and the calls for each ISA."""
+    lines = HEADER.read_text(encoding="utf-8").splitlines()
     if lines.count(BEGIN) != 1 or lines.count(END) != 1:
-        raise ValueError(f"{header}: expected one line {BEGIN!r} and one line {END!r}")
-    declared = lines[lines.index(BEGIN) + 1 : lines.index(END)]
-    return "\n".join(line for line in declared if not line.lstrip().startswith("#"))
+        raise ValueError(f"{HEADER}: expected one line {BEGIN!r} and one line {END!r}")
+    parts = ["\n".join(lines[lines.index(BEGIN) + 1 : lines.index(END)])]
+    calls = "".join(path.read_text(encoding="utf-8") for path in CALLS)
+    parts += [re.sub(r"CALL\((\w+)\)", rf"pkm_{isa}_\1", calls) for isa in isas()]
+    return re.sub("^ *#.*$", "", "\n".join(parts), flags=re.MULTILINE)
 
 
 def ffibuilder() -> FFI:
     """Return the builder of ``pkmcal._core``: every C file of this folder in one extension."""
     builder = FFI()
-    builder.cdef(declarations(HEADER))
+    builder.cdef(declarations())
     builder.set_source(
         "pkmcal._core",
         f'#include "{HEADER.name}"',

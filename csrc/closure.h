@@ -66,7 +66,7 @@ INLINE void fill_frame(const double *frame, real F[9])
     for (int k = 0; k < 9; k++) F[k] = fill(frame[k]);
 }
 
-INLINE void prepare_limbs(const pkm_machine *machine, const double *geometry, ptrdiff_t stride,
+SHARED void prepare_limbs(const pkm_machine *machine, const double *geometry, ptrdiff_t stride,
                           const ptrdiff_t *row, limb_numbers *limb)
 {
     for (int i = 0; i < machine->limbs; i++) {
@@ -130,6 +130,28 @@ INLINE mask spheres_at(const pkm_machine *machine, const limb_numbers *limb, con
         sphere_at(machine->driver[i], &limb[i], q[machine->actuator[i]], &sphere[i], &reachable);
     }
     return reachable;
+}
+
+/* The scaled system of any map. */
+#define SCALED_ROWS(NAME, name, M)                                                                \
+    SHARED int scaled_##name(const pkm_machine *machine, const FN(limb_sphere) *limb,             \
+                             const real *state, real *residual, real *jacobian)                   \
+    {                                                                                             \
+        return FN(closure_rows)(MAP_##NAME, SCALED, machine, limb, state, residual, jacobian);    \
+    }
+EACH_MAP(SCALED_ROWS)
+#undef SCALED_ROWS
+
+INLINE int scaled_rows(int map, const pkm_machine *machine, const FN(limb_sphere) *limb,
+                       const real *state, real *residual, real *jacobian)
+{
+    switch (map) {
+#define CASE(NAME, name, M)                                                                       \
+    case MAP_##NAME: return scaled_##name(machine, limb, state, residual, jacobian);
+    EACH_MAP(CASE)
+#undef CASE
+    }
+    return 0;
 }
 
 /* Square systems as they are; more rows than m become the normal equations of least squares.

@@ -1,4 +1,5 @@
 /* The core for x86-64-v3 (AVX2): 256-bit lanes. Empty elsewhere. */
+#include "pkmcal.h"
 #ifdef __x86_64__
 #ifdef __clang__
 #pragma clang attribute push(__attribute__((target("arch=x86-64-v3"))), apply_to = function)
@@ -6,7 +7,7 @@
 #pragma GCC target("arch=x86-64-v3")
 #endif
 #define LANES 4
-#define CORE pkm_v3
+#define ISA avx2
 #include "core.h"
 #ifdef __clang__
 #pragma clang attribute pop

@@ -1,4 +1,5 @@
 /* The core for x86-64-v4 (AVX-512): 512-bit lanes. Empty elsewhere. */
+#include "pkmcal.h"
 #ifdef __x86_64__
 #ifdef __clang__
 #pragma clang attribute push(__attribute__((target("arch=x86-64-v4"))), apply_to = function)
@@ -6,7 +7,7 @@
 #pragma GCC target("arch=x86-64-v4")
 #endif
 #define LANES 8
-#define CORE pkm_v4
+#define ISA avx512
 #include "core.h"
 #ifdef __clang__
 #pragma clang attribute pop

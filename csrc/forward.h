@@ -18,7 +18,7 @@ typedef struct {
     double *residual;
 } forward_call;
 
-INLINE void load_rows(const forward_call *call, const limb_numbers *limb, const ptrdiff_t *row,
+SHARED void load_rows(const forward_call *call, const limb_numbers *limb, const ptrdiff_t *row,
                       int once, rows_in *in)
 {
     const pkm_machine *machine = call->machine;
@@ -33,7 +33,7 @@ INLINE void load_rows(const forward_call *call, const limb_numbers *limb, const 
 }
 
 /* Rows with a number that is not finite, in what came in or in their own geometry. */
-INLINE mask invalid_rows(const forward_call *call, const limb_numbers *limb, const rows_in *in)
+SHARED mask invalid_rows(const forward_call *call, const limb_numbers *limb, const rows_in *in)
 {
     mask valid = fill_mask(-1);
     for (int a = 0; a < call->machine->actuators; a++) valid &= finite(in->q[a]);
@@ -75,6 +75,15 @@ INLINE void newton_rows(int map, const forward_call *call, const limb_numbers *s
     status = select_mask(invalid_rows(call, limb, &in), fill_mask(PKM_INVALID), status);
     store_rows(map, call, state, status, iterations, worst, row, count);
 }
+
+#define NEWTON_ROWS(NAME, name, M)                                                                \
+    SHARED void newton_##name(const forward_call *call, const limb_numbers *shared,               \
+                              const ptrdiff_t *row, int count)                                    \
+    {                                                                                             \
+        newton_rows(MAP_##NAME, call, shared, row, count);                                        \
+    }
+EACH_MAP(NEWTON_ROWS)
+#undef NEWTON_ROWS
 
 /* A batch of rows the quick way; those that are not solved are appended to `lost`. */
 INLINE int quick_rows(int map, const forward_call *call, const limb_numbers *shared,
@@ -127,7 +136,11 @@ INLINE void forward_map(int map, const forward_call *call)
     if (shared) prepare_limbs(machine, call->geometry, 0, zero, numbers);
     start.known = 0;
     if (shared && square && !call->guess_stride)
-        predict(map, machine, shared, call->guess, &start);
+        switch (map) {
+#define CASE(NAME, name, M) case MAP_##NAME: predict_##name(machine, shared, call->guess, &start); break;
+            EACH_MAP(CASE)
+#undef CASE
+        }
     memset(all.state, 0, sizeof all.state);
     memset(all.fine, 0, sizeof all.fine);
     memset(all.factors, 0, sizeof all.factors);
@@ -144,11 +157,31 @@ INLINE void forward_map(int map, const forward_call *call)
             ptrdiff_t row[LANES];
             const int count = losses - k < LANES ? losses - k : LANES;
             for (int l = 0; l < LANES; l++) row[l] = lost[k + (l < count ? l : 0)];
-            newton_rows(map, call, shared, row, count);
+            switch (map) {
+#define CASE(NAME, name, M) case MAP_##NAME: newton_##name(call, shared, row, count); break;
+                EACH_MAP(CASE)
+#undef CASE
+            }
         }
         losses -= whole;
         memmove(lost, lost + whole, (size_t)losses * sizeof *lost);
     }
+}
+
+int CALL(forward)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                  ptrdiff_t geometry_stride, const double *q, const double *guess,
+                  ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
+                  double *residual)
+{
+    const forward_call call = {machine, n, geometry, geometry_stride, q, guess, guess_stride,
+                               pose, status, iterations, residual};
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    switch (machine->map) {
+#define CASE(NAME, name, M) case MAP_##NAME: forward_map(MAP_##NAME, &call); break;
+        EACH_MAP(CASE)
+#undef CASE
+    }
+    return 0;
 }
 
 #endif

@@ -29,7 +29,7 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
         map_from_pose(map, lane_pose, state);
         FN(map_frame)(map, state, R, p);
         spheres_at(machine, limb, lane_q, sphere);
-        const int rows = FN(closure_rows)(map, SCALED, machine, sphere, state, residual, jacobian);
+        const int rows = scaled_rows(map, machine, sphere, state, residual, jacobian);
         for (int i = 0, r = 0; i < machine->limbs; i++) {
             const int limb_rows = 1 + __builtin_popcount((unsigned)machine->rows[i]);
             for (int k = 0; k < limb_rows; k++, r++) {
@@ -43,8 +43,8 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
                 map_free(map, state, step, free);
                 scatter_row(free, m, by_free, rows * m, row, count);
                 if (k == 0)
-                    sphere_derivatives(machine, i, &limb[i], R, p, lane_q[machine->actuator[i]],
-                                       &by_q, by_g);
+                    sphere_derivatives_called(machine, i, &limb[i], R, p,
+                                              lane_q[machine->actuator[i]], &by_q, by_g);
                 by_q *= rough_reciprocal(sphere[i].rho) * machine->weight[r];
                 for (int a = 0; a < actuators; a++)
                     scatter(a == machine->actuator[i] ? by_q : fill(0.0),
@@ -54,11 +54,27 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
     }
 }
 
+int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                  const double *pose, const double *q, double *residual, double *by_step,
+                  double *by_free, double *by_q)
+{
+    const closure_out out = {residual, by_step, by_free, by_q};
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    switch (machine->map) {
+#define CASE(NAME, name, M)                                                                       \
+    case MAP_##NAME: closure_map(MAP_##NAME, machine, n, geometry, pose, q, &out); break;
+        EACH_MAP(CASE)
+#undef CASE
+    }
+    return 0;
+}
+
 /* Of each limb at a pose as given: q̃ (NaN out of reach), and the unit vector from its anchor to the
  * platform joint in base and in platform axes. */
-INLINE void limb_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                      const double *pose, double *drive, double *on_base, double *on_platform)
+int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry, const double *pose,
+                double *drive, double *on_base, double *on_platform)
 {
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     const int limbs = machine->limbs;
     limb_numbers limb[PKM_MAX_LIMBS];
     for (ptrdiff_t first = 0; first < n; first += LANES) {
@@ -72,7 +88,7 @@ INLINE void limb_rows(const pkm_machine *machine, ptrdiff_t n, const double *geo
             real qt, by_q, by_g[SLOTS], square = fill(0.0);
             const real q = limb_inverse(machine, i, &limb[i], R, p);
             FN(limb_drive)(q, limb[i].g, &qt);
-            sphere_derivatives(machine, i, &limb[i], R, p, q, &by_q, by_g);
+            sphere_derivatives_called(machine, i, &limb[i], R, p, q, &by_q, by_g);
             for (int k = 0; k < 3; k++) square += by_g[BASE_X + k] * by_g[BASE_X + k];
             const real scale = 1.0 / FN(root)(square); /* ∂Φ/∂base = -d, ∂Φ/∂platform = Rᵀ d */
             scatter(qt, drive + i, limbs, row, count);
@@ -82,12 +98,14 @@ INLINE void limb_rows(const pkm_machine *machine, ptrdiff_t n, const double *geo
             }
         }
     }
+    return 0;
 }
 
 /* The limbs (n, limbs, PKM_SPHERE) at actuator coordinates. */
-INLINE void sphere_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                        const double *q, double *out)
+int CALL(spheres)(const pkm_machine *machine, ptrdiff_t n, const double *geometry, const double *q,
+                  double *out)
 {
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     limb_numbers limb[PKM_MAX_LIMBS];
     FN(limb_sphere) sphere[PKM_MAX_LIMBS];
     const int width = machine->limbs * PKM_SPHERE;
@@ -112,6 +130,7 @@ INLINE void sphere_rows(const pkm_machine *machine, ptrdiff_t n, const double *g
             scatter_row(numbers, PKM_SPHERE, out + i * PKM_SPHERE, width, row, count);
         }
     }
+    return 0;
 }
 
 #endif

@@ -48,9 +48,17 @@ INLINE void inverse_at(const pkm_machine *machine, const limb_numbers *limb, con
     whole_or_nan(q, machine->actuators);
 }
 
-INLINE void inverse_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                         ptrdiff_t geometry_stride, const double *pose, double *q)
+/* The same at a home or a guess, once a call. */
+RARE void inverse_once(const pkm_machine *machine, const limb_numbers *limb, const real *R,
+                       const real *p, real *q)
 {
+    inverse_at(machine, limb, R, p, q);
+}
+
+int CALL(inverse)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                  ptrdiff_t geometry_stride, const double *pose, double *q)
+{
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     enum { BLOCKS_INVERSE = 2 }; /* side by side: the processor overlaps them */
     limb_numbers limb[PKM_MAX_LIMBS];
     for (ptrdiff_t first = 0; first < n; first += BLOCKS_INVERSE * LANES) {
@@ -71,6 +79,7 @@ INLINE void inverse_rows(const pkm_machine *machine, ptrdiff_t n, const double *
         for (int t = 0; t < BLOCKS_INVERSE; t++)
             scatter_row(lane_q[t], machine->actuators, q, machine->actuators, row[t], count[t]);
     }
+    return 0;
 }
 
 #endif

@@ -20,7 +20,14 @@ INLINE void sphere_derivatives(const pkm_machine *machine, int i, const limb_num
         FN(crank_derivatives)(R, p, q, limb->g, F, by_q, by_g);
 }
 
-INLINE void constraint_derivatives(const pkm_machine *machine, int i, int kind,
+/* The same out of line, where it is not the innermost loop. */
+SHARED void sphere_derivatives_called(const pkm_machine *machine, int i, const limb_numbers *limb,
+                                      const real *R, const real *p, real q, real *by_q, real *by_g)
+{
+    sphere_derivatives(machine, i, limb, R, p, q, by_q, by_g);
+}
+
+SHARED void constraint_derivatives(const pkm_machine *machine, int i, int kind,
                                    const limb_numbers *limb, const real *R, const real *p, real *by_g)
 {
     real F[9], P[9];
@@ -67,12 +74,12 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
 
 /* How the map's step answers a residual in each row, -Φ⁻¹ (m x rows), per unit of the scaled rows;
  * NaN where they are singular. */
-INLINE int step_response(int map, const pkm_machine *machine, const FN(limb_sphere) *sphere,
+SHARED int step_response(int map, const pkm_machine *machine, const FN(limb_sphere) *sphere,
                          const real *state, real *response)
 {
     const int m = map_m(map);
     real residual[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6], A[36], pivot;
-    const int rows = FN(closure_rows)(map, SCALED, machine, sphere, state, residual, jacobian);
+    const int rows = scaled_rows(map, machine, sphere, state, residual, jacobian);
     normal_system(m, rows, rows == m ? m : rows, jacobian, residual, A, response);
     solve(m, rows, A, response, &pivot);
     const mask known = pivot > fill(1e-14);
@@ -176,6 +183,57 @@ INLINE void response_map(int map, const pkm_machine *machine, ptrdiff_t n, const
         response_block(map, machine, limb, lane_pose, lane_q, column, columns, twists, out);
         scatter_row(out, width, jacobian, width, row, count);
     }
+}
+
+int CALL(jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                   ptrdiff_t geometry_stride, const double *pose, double *jacobian)
+{
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    switch (machine->map) {
+#define CASE(NAME, name, M)                                                                       \
+    case MAP_##NAME:                                                                              \
+        jacobian_map(MAP_##NAME, machine, n, geometry, geometry_stride, pose, jacobian);          \
+        break;
+        EACH_MAP(CASE)
+#undef CASE
+    }
+    return 0;
+}
+
+SHARED void responses(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                      ptrdiff_t geometry_stride, const double *pose, const double *q,
+                      const int32_t *column, int columns, int twists, double *jacobian)
+{
+    switch (machine->map) {
+#define CASE(NAME, name, M)                                                                       \
+    case MAP_##NAME:                                                                              \
+        response_map(MAP_##NAME, machine, n, geometry, geometry_stride, pose, q, column, columns, \
+                     twists, jacobian);                                                           \
+        break;
+        EACH_MAP(CASE)
+#undef CASE
+    }
+}
+
+int CALL(forward_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                           ptrdiff_t geometry_stride, const double *pose, const double *q,
+                           double *jacobian)
+{
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    responses(machine, n, geometry, geometry_stride, pose, q, NULL, machine->actuators, 0, jacobian);
+    return 0;
+}
+
+int CALL(error_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                         ptrdiff_t geometry_stride, const double *pose, const double *q,
+                         const int32_t *column, int columns, int twists, double *jacobian)
+{
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    for (int c = 0; c < columns; c++)
+        if (column[c] < 0 || column[c] >= SLOTS * machine->limbs || (c && column[c] <= column[c - 1]))
+            return PKM_BAD_COLUMN;
+    responses(machine, n, geometry, geometry_stride, pose, q, column, columns, twists, jacobian);
+    return 0;
 }
 
 #endif

@@ -37,9 +37,10 @@ INLINE void limb_rates(const pkm_machine *machine, int i, const limb_numbers *li
 }
 
 /* Limbs that share an actuator are averaged, as by the inverse. */
-INLINE void rates_rows(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                       const double *motion, double *q1, double *q2)
+int CALL(rates)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                const double *motion, double *q1, double *q2)
 {
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     const int actuators = machine->actuators;
     double sharing[PKM_MAX_LIMBS] = {0};
     limb_numbers limb[PKM_MAX_LIMBS];
@@ -66,11 +67,12 @@ INLINE void rates_rows(const pkm_machine *machine, ptrdiff_t n, const double *ge
         scatter_row(rate, actuators, q1, actuators, row, count);
         scatter_row(bend, actuators, q2, actuators, row, count);
     }
+    return 0;
 }
 
 /* d²Φ/dt² of a limb's rows where the platform moves as T says and the actuator with q1 and q2; each in
  * the size of the scaled rows. Returns how many rows it has. */
-INLINE int limb_bends(const pkm_machine *machine, int i, const limb_numbers *limb,
+SHARED int limb_bends(const pkm_machine *machine, int i, const limb_numbers *limb,
                       const FN(limb_sphere) *sphere, const double *weight, const real T[3][12],
                       real q, real q1, real q2, real *bend)
 {
@@ -136,7 +138,7 @@ INLINE void motion_at(int map, const pkm_machine *machine, const limb_numbers *l
     for (int j = 0; j < m; j++) step[j] = fill(0.0);
     for (int i = 0, r = 0; i < machine->limbs; i++) {
         real by_q, by_g[SLOTS];
-        sphere_derivatives(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
+        sphere_derivatives_called(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
         by_q *= rough_reciprocal(sphere[i].rho) * machine->weight[r];
         for (int j = 0; j < m; j++)
             step[j] += response[j * rows + machine->order[r]] * by_q * q1[machine->actuator[i]];
@@ -185,6 +187,22 @@ INLINE void motion_map(int map, const pkm_machine *machine, ptrdiff_t n, const d
         }
         scatter_row(rates, 12, pose_rates, 12, row, count);
     }
+}
+
+int CALL(motion)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                 const double *pose, const double *q, const double *q1, const double *q2,
+                 double *motion, double *pose_rates)
+{
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    switch (machine->map) {
+#define CASE(NAME, name, M)                                                                       \
+    case MAP_##NAME:                                                                              \
+        motion_map(MAP_##NAME, machine, n, geometry, pose, q, q1, q2, motion, pose_rates);        \
+        break;
+        EACH_MAP(CASE)
+#undef CASE
+    }
+    return 0;
 }
 
 #endif

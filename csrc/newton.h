@@ -35,7 +35,7 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
     *iterations = zero;
     memcpy(trial, state, sizeof(real) * MAX_STATE);
     for (int k = 0; k <= MAX_ITERATIONS && any(running); k++) {
-        const int rows = FN(closure_rows)(map, SCALED, machine, limb, trial, phi, jacobian);
+        const int rows = scaled_rows(map, machine, limb, trial, phi, jacobian);
         real squares = zero, trial_worst = zero;
         for (int r = 0; r < rows; r++) {
             squares += phi[r] * phi[r];
@@ -83,7 +83,7 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
     const mask flat = ~(pivot > fill(LEAST_PIVOT));
     *status = select_mask(lost & ((worst <= closed) | flat), fill_mask(PKM_SINGULAR), *status);
     /* of the pose itself, and without the weights */
-    const int rows = FN(closure_rows)(map, SCALED, machine, limb, state, phi, NULL);
+    const int rows = scaled_rows(map, machine, limb, state, phi, NULL);
     *residual = zero;
     for (int r = 0; r < rows; r++)
         *residual = larger(*residual, absolute(phi[machine->order[r]]) * (1.0 / machine->weight[r]));

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "core_table.h"
+#include "pkmcal.h"
 #include "names.h"
 
 #define INLINE static inline __attribute__((always_inline, unused))
@@ -147,7 +147,7 @@ INLINE double relative(int map, const real *state, const real *step)
 
 /* Newton's method from a predicted state; the factors of its last matrix stay. Returns the first
  * correction, or infinity where it did not settle. */
-INLINE double correct(int map, const homotopy *path, const FN(limb_sphere) *limb, int iterations,
+static double correct(int map, const homotopy *path, const FN(limb_sphere) *limb, int iterations,
                       double settled, real *state, real *A, int *row)
 {
     const int m = map_m(map);
@@ -172,7 +172,7 @@ INLINE double correct(int map, const homotopy *path, const FN(limb_sphere) *limb
     return INFINITY;
 }
 
-INLINE void velocity_at(int map, const homotopy *path, const FN(limb_sphere) *limb, const real *state,
+static void velocity_at(int map, const homotopy *path, const FN(limb_sphere) *limb, const real *state,
                         const real *A, const int *row, real *velocity)
 {
     real rate[PKM_MAX_ROWS];
@@ -237,10 +237,11 @@ INLINE int follow(int map, const homotopy *path, double accuracy, real *x, int32
     return PKM_ARRIVED;
 }
 
-void paths_follow(const pkm_machine *machine, ptrdiff_t n, const double *start,
-                  const double *target, double *state, double accuracy, double *frame,
-                  int32_t *status, int32_t *steps, double *reached)
+int pkm_paths(const pkm_machine *machine, ptrdiff_t n, const double *start, const double *target,
+              double *state, double accuracy, double *frame, int32_t *status, int32_t *steps,
+              double *reached)
 {
+    if (pkm_closure_count(machine) != map_m(machine->map)) return PKM_BAD_MACHINE;
     pkm_machine unit = *machine;
     homotopy path = {&unit, (const real *)start, (const real *)target};
     unit.length = unit.size = 1.0;
@@ -256,4 +257,5 @@ void paths_follow(const pkm_machine *machine, ptrdiff_t n, const double *start,
 #undef CASE
         }
     }
+    return 0;
 }

@@ -22,7 +22,7 @@ INLINE uint64_t split(uint64_t *counter)
 /* Where the parts of a swarm's state are: see pkm_swarm. */
 typedef struct {
     ptrdiff_t width; /* particles, rounded up to whole lanes of any ISA */
-    double *x, *v, *best, *best_value, *random, *values, *leader, *leader_value;
+    double *x, *v, *best, *best_value, *random, *values, *global_best, *global_value;
 } swarm_parts;
 
 INLINE swarm_parts parts_of(const pkm_swarm *swarm, double *state)
@@ -36,25 +36,25 @@ INLINE swarm_parts parts_of(const pkm_swarm *swarm, double *state)
     part.best_value = part.best + block;
     part.random = part.best_value + width;
     part.values = part.random + 4 * width;
-    part.leader = part.values + width;
-    part.leader_value = part.leader + swarm->dims;
+    part.global_best = part.values + width;
+    part.global_value = part.global_best + swarm->dims;
     return part;
 }
 
-INLINE generator wake(const double *random, ptrdiff_t width)
+INLINE generator load_rng(const double *random, ptrdiff_t width)
 {
     generator g;
     for (int k = 0; k < 4; k++) memcpy(&g.s[k], random + k * width, sizeof g.s[k]);
     return g;
 }
 
-INLINE void keep(const generator *g, double *random, ptrdiff_t width)
+INLINE void store_rng(const generator *g, double *random, ptrdiff_t width)
 {
     for (int k = 0; k < 4; k++) memcpy(random + k * width, &g->s[k], sizeof g->s[k]);
 }
 
 /* Particles anywhere within the bounds, at rest. `stream` tells swarms of one seed apart. */
-INLINE void swarm_start(const pkm_swarm *swarm, uint64_t seed, uint64_t stream,
+SHARED void start_swarm(const pkm_swarm *swarm, uint64_t seed, uint64_t stream,
                         const double *lower, const double *upper, double *state)
 {
     const swarm_parts part = parts_of(swarm, state);
@@ -66,7 +66,7 @@ INLINE void swarm_start(const pkm_swarm *swarm, uint64_t seed, uint64_t stream,
             memcpy(part.random + k * part.width + i, &word, sizeof word);
         }
     for (ptrdiff_t i = 0; i < part.width; i += LANES) {
-        generator g = wake(part.random + i, part.width);
+        generator g = load_rng(part.random + i, part.width);
         for (int d = 0; d < swarm->dims; d++) {
             const ptrdiff_t at = d * part.width + i;
             const real x = lower[d] + (upper[d] - lower[d]) * draw(&g);
@@ -76,21 +76,21 @@ INLINE void swarm_start(const pkm_swarm *swarm, uint64_t seed, uint64_t stream,
         }
         store(fill(INFINITY), part.best_value + i);
         store(fill(INFINITY), part.values + i);
-        keep(&g, part.random + i, part.width);
+        store_rng(&g, part.random + i, part.width);
     }
-    for (int d = 0; d < swarm->dims; d++) part.leader[d] = part.x[d * part.width];
-    *part.leader_value = INFINITY;
+    for (int d = 0; d < swarm->dims; d++) part.global_best[d] = part.x[d * part.width];
+    *part.global_value = INFINITY;
 }
 
 /* pBest and gBest after the particles' `values` are known; NaN is never the best. */
-INLINE void swarm_judge(const pkm_swarm *swarm, double *state)
+SHARED void update_best(const pkm_swarm *swarm, double *state)
 {
     const swarm_parts part = parts_of(swarm, state);
     mask found = fill_mask(0);
     for (ptrdiff_t i = 0; i < part.width; i += LANES) {
         const real value = load(part.values + i), best = load(part.best_value + i);
         const mask better = value < best;
-        found |= value < fill(*part.leader_value);
+        found |= value < fill(*part.global_value);
         store(select(better, value, best), part.best_value + i);
         for (int d = 0; d < swarm->dims; d++) {
             double *kept = part.best + d * part.width + i;
@@ -99,47 +99,48 @@ INLINE void swarm_judge(const pkm_swarm *swarm, double *state)
     }
     if (!any(found)) return;
     for (int i = 0; i < swarm->particles; i++)
-        if (part.values[i] < *part.leader_value) {
-            *part.leader_value = part.values[i];
-            for (int d = 0; d < swarm->dims; d++) part.leader[d] = part.x[d * part.width + i];
+        if (part.values[i] < *part.global_value) {
+            *part.global_value = part.values[i];
+            for (int d = 0; d < swarm->dims; d++) part.global_best[d] = part.x[d * part.width + i];
         }
 }
 
 /* Eq. 19. A particle that would leave stops at the bound: it loses that component of its velocity. */
-INLINE void swarm_move(const pkm_swarm *swarm, const double *lower, const double *upper,
+SHARED void move_swarm(const pkm_swarm *swarm, const double *lower, const double *upper,
                        double *state)
 {
     const swarm_parts part = parts_of(swarm, state);
     for (ptrdiff_t i = 0; i < part.width; i += LANES) {
-        generator g = wake(part.random + i, part.width);
+        generator g = load_rng(part.random + i, part.width);
         for (int d = 0; d < swarm->dims; d++) {
             const ptrdiff_t at = d * part.width + i;
             const real x = load(part.x + at), rand1 = draw(&g), rand2 = draw(&g);
             const real v = swarm->inertia * load(part.v + at)
                            + swarm->cognitive * rand1 * (load(part.best + at) - x)
-                           + swarm->social * rand2 * (part.leader[d] - x);
+                           + swarm->social * rand2 * (part.global_best[d] - x);
             const real moved = x + v;
             const mask below = moved < fill(lower[d]), above = moved > fill(upper[d]);
             store(select(below, fill(lower[d]), select(above, fill(upper[d]), moved)), part.x + at);
             store(select(below | above, fill(0.0), v), part.v + at);
         }
-        keep(&g, part.random + i, part.width);
+        store_rng(&g, part.random + i, part.width);
     }
 }
 
 /* Eq. 18 for n sets of `rows` poses with one correction each, by a swarm each. `off` holds L* - L;
  * E is the root mean square over the poses of ‖L* - L - ΔL‖. */
-INLINE void swarm_eq18(const pkm_swarm *swarm, int iterations, uint64_t seed, ptrdiff_t start,
-                       ptrdiff_t n, ptrdiff_t rows, const double *off, const double *lower,
-                       const double *upper, double *state, double *correction, double *history)
+int CALL(swarm_eq18)(const pkm_swarm *swarm, int iterations, uint64_t seed, ptrdiff_t start,
+                     ptrdiff_t n, ptrdiff_t rows, const double *off, const double *lower,
+                     const double *upper, double *state, double *correction, double *history)
 {
+    if (!pkm_swarm_size(swarm) || iterations < 0 || rows < 1) return PKM_BAD_SWARM;
     const int dims = swarm->dims;
     const swarm_parts part = parts_of(swarm, state);
     for (ptrdiff_t s = 0; s < n; s++) {
         const double *aim = off + s * rows * dims;
-        swarm_start(swarm, seed, (uint64_t)(start + s), lower, upper, state);
+        start_swarm(swarm, seed, (uint64_t)(start + s), lower, upper, state);
         for (int k = 0; k <= iterations; k++) {
-            if (k) swarm_move(swarm, lower, upper, state);
+            if (k) move_swarm(swarm, lower, upper, state);
             for (ptrdiff_t i = 0; i < part.width; i += LANES) {
                 real sum = fill(0.0);
                 for (ptrdiff_t r = 0; r < rows; r++)
@@ -149,11 +150,35 @@ INLINE void swarm_eq18(const pkm_swarm *swarm, int iterations, uint64_t seed, pt
                     }
                 store(FN(root)(sum / (double)rows), part.values + i);
             }
-            swarm_judge(swarm, state);
-            history[s * (iterations + 1) + k] = *part.leader_value;
+            update_best(swarm, state);
+            history[s * (iterations + 1) + k] = *part.global_value;
         }
-        memcpy(correction + s * dims, part.leader, sizeof(double) * dims);
+        memcpy(correction + s * dims, part.global_best, sizeof(double) * dims);
     }
+    return 0;
+}
+
+int CALL(swarm_start)(const pkm_swarm *swarm, uint64_t seed, const double *lower,
+                      const double *upper, double *state)
+{
+    if (!pkm_swarm_size(swarm)) return PKM_BAD_SWARM;
+    start_swarm(swarm, seed, 0, lower, upper, state);
+    return 0;
+}
+
+int CALL(swarm_judge)(const pkm_swarm *swarm, double *state)
+{
+    if (!pkm_swarm_size(swarm)) return PKM_BAD_SWARM;
+    update_best(swarm, state);
+    return 0;
+}
+
+int CALL(swarm_move)(const pkm_swarm *swarm, const double *lower, const double *upper,
+                     double *state)
+{
+    if (!pkm_swarm_size(swarm)) return PKM_BAD_SWARM;
+    move_swarm(swarm, lower, upper, state);
+    return 0;
 }
 
 /* A machine at one pose and its actuator coordinates: the same for every particle. */
@@ -261,10 +286,10 @@ INLINE real squared_closures(const pkm_machine *machine, const limb_numbers *lim
 /* Of each geometry (a particle) the sum over poses of the squared closures [mm²]. What depends on
  * the pose alone is computed once for all particles, what depends on the particle once for a batch
  * of poses. */
-INLINE void closure_cost_rows(const pkm_machine *machine, ptrdiff_t particles,
-                              const double *geometry, ptrdiff_t n, const double *pose,
-                              const double *q, double *cost)
+int CALL(closure_cost)(const pkm_machine *machine, ptrdiff_t particles, const double *geometry,
+                       ptrdiff_t n, const double *pose, const double *q, double *cost)
 {
+    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     posture at[POSTURES];
     limb_numbers limb[PKM_MAX_LIMBS];
     for (ptrdiff_t i = 0; i < particles; i++) cost[i] = 0.0;
@@ -280,6 +305,7 @@ INLINE void closure_cost_rows(const pkm_machine *machine, ptrdiff_t particles,
             scatter(sum, cost, 1, row, count);
         }
     }
+    return 0;
 }
 
 #endif

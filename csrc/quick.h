@@ -62,7 +62,7 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
     for (int k = 0; k < 6; k++) pose[k] = fill(guess[k]);
     map_from_pose(map, pose, state);
     FN(map_frame)(map, state, R, p);
-    inverse_at(machine, limb, R, p, start->q);
+    inverse_once(machine, limb, R, p, start->q);
     mask usable = spheres_at(machine, limb, start->q, sphere);
     for (int k = 0; k < m * actuators; k++) slope[k] = fill(0.0);
     FN(closure_rows)(map, PLAIN, machine, sphere, state, phi, A[0]);
@@ -70,7 +70,7 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
     for (int i = 0, r = 0; i < machine->limbs; i++) {
         const int a = machine->actuator[i];
         real by_q;
-        sphere_derivatives(machine, i, &limb[i], R, p, start->q[a], &by_q, by_g);
+        sphere_derivatives_called(machine, i, &limb[i], R, p, start->q[a], &by_q, by_g);
         for (int j = 0; j < m; j++) X[0][j] = fill(0.0);
         X[0][machine->order[r]] = by_q;
         FN(substitute)(m, 1, A, X);
@@ -86,6 +86,15 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
     start->sign = determinant_sign(m, factors);
     start->known = usable[0] != 0;
 }
+
+#define PREDICT(NAME, name, M)                                                                    \
+    RARE void predict_##name(const pkm_machine *machine, const limb_numbers *limb,                \
+                             const double *guess, prediction *start)                              \
+    {                                                                                             \
+        predict(MAP_##NAME, machine, limb, guess, start);                                         \
+    }
+EACH_MAP(PREDICT)
+#undef PREDICT
 
 /* Where the rows of a block start, in floats: predicted, or at their own guesses. */
 INLINE void start_states(int map, const pkm_machine *machine, const rows_in *first,

@@ -59,7 +59,7 @@ INLINE void draw_normals(generator *g, real *first, real *second)
 }
 
 /* n normal numbers of as many generators whatever the lanes: each adds two to every sixteen. */
-INLINE void normal_numbers(ptrdiff_t n, uint64_t *state, double *out)
+int CALL(normals)(ptrdiff_t n, uint64_t *state, double *out)
 {
     for (int k = 0; k < GENERATORS; k += LANES) {
         generator g;
@@ -80,6 +80,7 @@ INLINE void normal_numbers(ptrdiff_t n, uint64_t *state, double *out)
         }
         for (int i = 0; i < 4; i++) memcpy(state + i * GENERATORS + k, &g.s[i], sizeof g.s[i]);
     }
+    return 0;
 }
 
 #endif

@@ -18,11 +18,10 @@ INLINE motion unmoved(void)
     return one;
 }
 
-INLINE motion gather_motion(const double *matrix, ptrdiff_t stride, const ptrdiff_t *row)
+/* Of the first three rows of a matrix, row by row. */
+INLINE motion motion_of(const real rows[12])
 {
-    real rows[12];
     motion T;
-    gather_row(matrix, stride, 12, row, rows);
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) T.R[3 * i + j] = rows[4 * i + j];
         T.p[i] = rows[4 * i + 3];
@@ -41,19 +40,17 @@ INLINE motion fill_motion(const double *matrix)
     return T;
 }
 
-/* Where one number is not known, all sixteen are NaN. */
-INLINE void scatter_motion(const motion *T, double *matrix, const ptrdiff_t *row, int count)
+/* The matrix of a motion; if any number is not finite, all sixteen become NaN. */
+INLINE void matrix_of(const motion *T, real rows[16])
 {
     const real *p = T->p;
     const real zero = ((p[0] - p[0]) + (p[1] - p[1])) + ((p[2] - p[2]) + (T->R[0] - T->R[0]));
-    real rows[16];
     for (int i = 0; i < 3; i++) {
         for (int j = 0; j < 3; j++) rows[4 * i + j] = T->R[3 * i + j] + zero;
         rows[4 * i + 3] = p[i] + zero;
         rows[12 + i] = zero;
     }
     rows[15] = zero + 1.0;
-    scatter_row(rows, 16, matrix, 16, row, count);
 }
 
 INLINE motion composed(const motion *a, const motion *b)
@@ -82,26 +79,14 @@ INLINE void angle_functions(real x, real c[6])
 
 INLINE real dot3(const real a[3], const real b[3]) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
-INLINE void gather_twist(const double *twist, const ptrdiff_t *row, real w[3], real v[3])
+/* The lanes of one block of rows of the calls that are named so: see derive/calls.py. */
+INLINE void exp_row(const real twist[6], real matrix[16])
 {
-    real whole[6];
-    gather_row(twist, 6, 6, row, whole);
-    memcpy(w, whole, sizeof(real) * 3);
-    memcpy(v, whole + 3, sizeof(real) * 3);
-}
-
-INLINE void exp_rows(ptrdiff_t n, const double *twist, double *matrix)
-{
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        real w[3], v[3], c[6];
-        motion T;
-        const int count = block_rows(first, n, row);
-        gather_twist(twist, row, w, v);
-        angle_functions(dot3(w, w), c);
-        FN(screw_exp)(w, v, c, T.R, T.p);
-        scatter_motion(&T, matrix, row, count);
-    }
+    real c[6];
+    motion T;
+    angle_functions(dot3(twist, twist), c);
+    FN(screw_exp)(twist, twist + 3, c, T.R, T.p);
+    matrix_of(&T, matrix);
 }
 
 /* ω of a rotation, 0 to π: of the four copies of its quaternion the one with the largest entry,
@@ -126,82 +111,55 @@ INLINE void rotation_log(const real R[9], real w[3])
     for (int k = 0; k < 3; k++) w[k] = 2.0 * ratio * q[1 + k];
 }
 
-INLINE void log_rows(ptrdiff_t n, const double *matrix, double *twist)
+INLINE void log_row(const real matrix[12], real twist[6])
 {
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        real whole[6], c[6];
-        real *const w = whole, *const v = whole + 3;
-        const int count = block_rows(first, n, row);
-        const motion T = gather_motion(matrix, 16, row);
-        rotation_log(T.R, w);
-        angle_functions(dot3(w, w), c);
-        FN(screw_log)(w, T.p, c, v);
-        whole_or_nan(whole, 6);
-        scatter_row(whole, 6, twist, 6, row, count);
-    }
+    real c[6];
+    const motion T = motion_of(matrix);
+    rotation_log(T.R, twist);
+    angle_functions(dot3(twist, twist), c);
+    FN(screw_log)(twist, T.p, c, twist + 3);
+    whole_or_nan(twist, 6);
 }
 
-/* Of the exponential (`inverse` 0) or the logarithm (1), both at the twist. */
-INLINE void exp_jacobian_rows(int inverse, ptrdiff_t n, const double *twist, double *jacobian)
+INLINE void exp_jacobian_row(const real twist[6], real jacobian[36])
 {
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        real w[3], v[3], c[6], D[36];
-        const int count = block_rows(first, n, row);
-        gather_twist(twist, row, w, v);
-        angle_functions(dot3(w, w), c);
-        if (inverse)
-            FN(screw_log_jacobian)(w, v, c, D);
-        else
-            FN(screw_exp_jacobian)(w, v, c, D);
-        whole_or_nan(D, 36);
-        scatter_row(D, 36, jacobian, 36, row, count);
-    }
+    real c[6];
+    angle_functions(dot3(twist, twist), c);
+    FN(screw_exp_jacobian)(twist, twist + 3, c, jacobian);
+    whole_or_nan(jacobian, 36);
 }
 
-INLINE void adjoint_rows(ptrdiff_t n, const double *matrix, double *adjoint)
+INLINE void log_jacobian_row(const real twist[6], real jacobian[36])
 {
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        real A[36];
-        const int count = block_rows(first, n, row);
-        const motion T = gather_motion(matrix, 16, row);
-        FN(motion_adjoint)(T.R, T.p, A);
-        whole_or_nan(A, 36);
-        scatter_row(A, 36, adjoint, 36, row, count);
-    }
+    real c[6];
+    angle_functions(dot3(twist, twist), c);
+    FN(screw_log_jacobian)(twist, twist + 3, c, jacobian);
+    whole_or_nan(jacobian, 36);
 }
 
-/* x y z α β γ of motions. */
-INLINE void pose_rows(ptrdiff_t n, const double *matrix, double *pose)
+INLINE void adjoint_row(const real matrix[12], real adjoint[36])
 {
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        real sine[2], cosine[2], out[6];
-        const int count = block_rows(first, n, row);
-        const motion T = gather_motion(matrix, 16, row);
-        memcpy(out, T.p, sizeof T.p);
-        out[5] = arctangent2(T.R[3], T.R[0]);
-        FN(rotation_tilts)(T.R, out[5], sine, cosine);
-        for (int k = 0; k < 2; k++) out[3 + k] = arctangent2(sine[k], cosine[k]);
-        scatter_row(out, 6, pose, 6, row, count);
-    }
+    const motion T = motion_of(matrix);
+    FN(motion_adjoint)(T.R, T.p, adjoint);
+    whole_or_nan(adjoint, 36);
 }
 
-/* The motion by each of n joint errors (n, 6) at points (n, 3), in the base. */
-INLINE void joint_error_rows(ptrdiff_t n, const double *error, const double *point, double *matrix)
+/* x y z α β γ of a motion. */
+INLINE void motion_pose_row(const real matrix[12], real pose[6])
 {
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        real e[6], r[3];
-        motion E;
-        const int count = block_rows(first, n, row);
-        gather_row(error, 6, 6, row, e);
-        gather_row(point, 3, 3, row, r);
-        FN(joint_error)(e, r, E.R, E.p);
-        scatter_motion(&E, matrix, row, count);
-    }
+    real sine[2], cosine[2];
+    const motion T = motion_of(matrix);
+    memcpy(pose, T.p, sizeof T.p);
+    pose[5] = arctangent2(T.R[3], T.R[0]);
+    FN(rotation_tilts)(T.R, pose[5], sine, cosine);
+    for (int k = 0; k < 2; k++) pose[3 + k] = arctangent2(sine[k], cosine[k]);
+}
+
+INLINE void joint_motion_row(const real error[6], const real point[3], real matrix[16])
+{
+    motion E;
+    FN(joint_error)(error, point, E.R, E.p);
+    matrix_of(&E, matrix);
 }
 
 /* --- arms: T = C1 Z(q1) C2 Z(q2) ... C(n+1), which is B eq. 19 with exp(q S) = F Z(q) F^-1 for
@@ -223,8 +181,9 @@ INLINE joint_frame frame_of(const pkm_arm *arm, int joint)
 }
 
 /* Links (n, joints + 1, 12) of an arm with errors (n, joints, 6). */
-INLINE void arm_link_rows(const pkm_arm *arm, ptrdiff_t n, const double *error, double *link)
+int CALL(arm_links)(const pkm_arm *arm, ptrdiff_t n, const double *error, double *link)
 {
+    if (arm->joints < 1) return PKM_BAD_MACHINE;
     const int joints = arm->joints, stride = 12 * (joints + 1);
     const motion home = fill_motion(arm->home);
     for (ptrdiff_t first = 0; first < n; first += LANES) {
@@ -244,6 +203,7 @@ INLINE void arm_link_rows(const pkm_arm *arm, ptrdiff_t n, const double *error, 
             scatter_row(C.p, 3, link + 12 * i + 9, stride, row, count);
         }
     }
+    return 0;
 }
 
 /* Link i + 1, one for all rows or one a row. */
@@ -290,15 +250,19 @@ INLINE motion arm_tool(const pkm_arm *arm, const pkm_links *links, const double 
     return T;
 }
 
-INLINE void arm_forward_rows(const pkm_arm *arm, const pkm_links *links, ptrdiff_t n,
-                             const double *theta, double *matrix)
+int CALL(arm_forward)(const pkm_arm *arm, const pkm_links *links, ptrdiff_t n, const double *theta,
+                      double *motions)
 {
+    if (arm->joints < 1) return PKM_BAD_MACHINE;
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
         const int count = block_rows(first, n, row);
+        real matrix[16];
         const motion T = arm_tool(arm, links, theta, row);
-        scatter_motion(&T, matrix, row, count);
+        matrix_of(&T, matrix);
+        scatter_row(matrix, 16, motions, 16, row, count);
     }
+    return 0;
 }
 
 /* What moves a space twist into the frame that is asked for. */
@@ -331,9 +295,10 @@ INLINE void drop_unknown(const motion *T, double *rows, int width, const ptrdiff
         for (int k = 0; !known[l] && k < width; k++) rows[row[l] * width + k] = NAN;
 }
 
-INLINE void arm_jacobian_rows(const pkm_arm *arm, const pkm_links *links, int frame, ptrdiff_t n,
-                              const double *theta, double *jacobian)
+int CALL(arm_jacobian)(const pkm_arm *arm, const pkm_links *links, int frame, ptrdiff_t n,
+                       const double *theta, double *jacobian)
 {
+    if (arm->joints < 1) return PKM_BAD_MACHINE;
     const real still[3] = {fill(0.0), fill(0.0), fill(0.0)};
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
@@ -350,12 +315,14 @@ INLINE void arm_jacobian_rows(const pkm_arm *arm, const pkm_links *links, int fr
         }
         drop_unknown(&T, jacobian, 6 * arm->joints, row, count);
     }
+    return 0;
 }
 
 /* By joint errors (joints, 6), or (n, joints, 6) where links are by row. */
-INLINE void arm_error_jacobian_rows(const pkm_arm *arm, const pkm_links *links, const double *error,
-                                    int frame, ptrdiff_t n, const double *theta, double *jacobian)
+int CALL(arm_error_jacobian)(const pkm_arm *arm, const pkm_links *links, const double *error,
+                             int frame, ptrdiff_t n, const double *theta, double *jacobian)
 {
+    if (arm->joints < 1) return PKM_BAD_MACHINE;
     const int columns = 6 * arm->joints;
     const real still[3] = {fill(0.0), fill(0.0), fill(0.0)};
     for (ptrdiff_t first = 0; first < n; first += LANES) {
@@ -380,6 +347,7 @@ INLINE void arm_error_jacobian_rows(const pkm_arm *arm, const pkm_links *links, 
         }
         drop_unknown(&T, jacobian, 6 * columns, row, count);
     }
+    return 0;
 }
 
 #endif

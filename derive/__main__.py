@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from . import elementary, frames, limbs, measured, posemaps, rates, screws, tpr2tps
+from . import calls, elementary, frames, limbs, measured, posemaps, rates, screws, tpr2tps
 from .emit import Function
 
 HERE = Path(__file__).parent
@@ -20,7 +20,9 @@ PROGRAM = "python -m derive"
 def headers() -> dict[str, str]:
     """Name and text of every generated header."""
     return {
-        "names.h": _header("limbs", _names()),
+        "names.h": _header("limbs", _names() + calls.table()),
+        "row_calls.h": _header("calls", calls.prototypes()),
+        "row_loops.h": _header("calls", calls.loops()),
         "elementary.h": _header("elementary", elementary.emit()),
         "frames.h": _header("frames", _functions(frames.functions())),
         "limbs.h": _header("limbs", _functions(limbs.functions())),

@@ -45,7 +45,8 @@ def _invert() -> Function:
     return f
 
 
-def _rates() -> Function:
+def rates() -> Function:
+    """Derive the rates of A T C by those of T."""
     f = Function(
         "pose_compose_rates",
         "rates of A T C by those of T, all as x y z α β γ",
@@ -64,11 +65,11 @@ def _rates() -> Function:
     spin = f.let("spin", Ra * E, "ω' by the angles of T")
     sb, cb = f.sincos("d_b", moved[4])
     sg, cg = f.sincos("d_g", moved[5])
-    rates = sp.simplify(euler_rate_matrix(sb, cb, sg, cg).inv())
-    rates = rates.applyfunc(lambda e: sp.simplify(e.subs({sb**2: 1 - cb**2, sg**2: 1 - cg**2})))
+    inverse = sp.simplify(euler_rate_matrix(sb, cb, sg, cg).inv())
+    inverse = inverse.applyfunc(lambda e: sp.simplify(e.subs({sb**2: 1 - cb**2, sg**2: 1 - cg**2})))
     tangent, secant = f.let("tangent", sb / cb), f.let("secant", 1 / cb)
-    rates = rates.applyfunc(lambda e: sp.expand(e).subs(sb / cb, tangent).subs(1 / cb, secant))
-    angles = rates * spin
+    inverse = inverse.applyfunc(lambda e: sp.expand(e).subs(sb / cb, tangent).subs(1 / cb, secant))
+    angles = inverse * spin
     along = -(Ra * skew(arm) * E)
     matrix = sp.Matrix.vstack(
         sp.Matrix.hstack(Ra, along), sp.Matrix.hstack(sp.zeros(3, 3), angles)
@@ -77,7 +78,8 @@ def _rates() -> Function:
     return f
 
 
-def _twists() -> Function:
+def twists() -> Function:
+    """Derive the twist of A T C by that of T."""
     f = Function(
         "pose_compose_twists",
         "the twist (ω, v) of A T C by that of T, each of its own origin and in its own base axes",
@@ -96,4 +98,4 @@ def _twists() -> Function:
 
 def functions() -> list[Function]:
     """The emitted functions of frames."""
-    return [_compose(), _invert(), _rates(), _twists()]
+    return [_compose(), _invert(), rates(), twists()]

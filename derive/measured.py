@@ -15,7 +15,8 @@ from .posemaps import euler_rate_matrix
 from .rotation import skew
 
 
-def _point() -> Function:
+def point() -> Function:
+    """Derive a point that the platform carries."""
     f = Function("measured_point", "a point that the platform carries", "p + R t")
     _, R, p = posed(f, "pose", "of the platform")
     target = f.vector("target", 3, "t, in platform axes [mm]")
@@ -31,18 +32,20 @@ def _carried(lever: sp.Matrix) -> sp.Matrix:
     return sp.Matrix.hstack(-skew(lever), sp.eye(3))
 
 
-def _seen() -> Function:
+def seen() -> Function:
+    """Derive a point of the base as an instrument has it."""
     f = Function("seen_point", "a point of the base in the frame of an instrument", "pf + Rf x")
     frame, R, p = posed(f, "frame", "of the base, as the instrument has it")
     x = f.vector("x", 3, "in base axes [mm]")
-    seen = p + R * x
-    f.output("seen", seen, "in the instrument's axes [mm]")
-    f.output("by_frame", f.gradient(seen, frame), "∂seen/∂frame, 3 x 6 row by row")
+    inside = p + R * x
+    f.output("seen", inside, "in the instrument's axes [mm]")
+    f.output("by_frame", f.gradient(inside, frame), "∂seen/∂frame, 3 x 6 row by row")
     f.output("by_point", R, "∂seen/∂x, 3 x 3 row by row")
     return f
 
 
-def _distance() -> Function:
+def distance() -> Function:
+    """Derive the distance from a point of the base to one of the platform."""
     f = Function(
         "measured_distance", "from a point of the base to one of the platform", "‖p + R t - a‖"
     )
@@ -60,7 +63,8 @@ def _distance() -> Function:
     return f
 
 
-def _pose() -> Function:
+def pose() -> Function:
+    """Derive the rates of a pose as an instrument sees it."""
     f = Function(
         "measured_pose",
         "rates of a pose as an instrument sees it, by the twist (ω, v) of the platform",
@@ -80,4 +84,4 @@ def _pose() -> Function:
 
 def functions() -> list[Function]:
     """The emitted functions of what is measured."""
-    return [_point(), _seen(), _distance(), _pose()]
+    return [point(), seen(), distance(), pose()]

@@ -145,7 +145,8 @@ class _ClosedForm(Function):
         return self.limbs(front, back, "even", "odd", "terms of L_i²")
 
 
-def _lengths() -> Function:
+def lengths() -> Function:
+    """Derive the leg lengths, eq. 8."""
     made = _ClosedForm(
         "tpr2tps_lengths",
         "2TPR&2TPS: leg lengths",
@@ -156,7 +157,8 @@ def _lengths() -> Function:
     return made
 
 
-def _jacobian() -> Function:
+def by_free() -> Function:
+    """Derive their derivatives, eq. 12."""
     made = _ClosedForm(
         "tpr2tps_jacobian",
         "2TPR&2TPS: leg lengths by y z α β",
@@ -173,4 +175,4 @@ def _jacobian() -> Function:
 
 def functions() -> list[Function]:
     """The emitted closed forms, eq. 8 and eq. 12."""
-    return [_lengths(), _jacobian()]
+    return [lengths(), by_free()]

@@ -1,5 +1,5 @@
 /* Generated from derive/measured.py by `python -m derive`; never edited by hand.
- * derivation 6bef5a86ba9194fd
+ * derivation ffa6579e1882555c
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

@@ -18,3 +18,21 @@ enum { MAP_SPATIAL, MAP_TRANSLATION, MAP_PLANAR, MAP_2TPR2TPS };
 #define MAP_FREE "x y z alpha beta gamma;x y z;x y gamma;y z alpha beta"
 #define MAX_STATE 7
 #define EACH_MAP(X) X(SPATIAL, spatial, 6) X(TRANSLATION, translation, 3) X(PLANAR, planar, 3) X(2TPR2TPS, 2tpr2tps, 4)
+#define ROW_CALLS \
+    "compose a:6* b:6* -> out:6\n" \
+    "invert a:6 -> out:6\n" \
+    "compose_rates a:6! pose:6 c:6* composed:6 -> rates:6,6\n" \
+    "compose_twists a:6! pose:6 c:6! -> twists:6,6\n" \
+    "points pose:6 target:3* -> point:3 by_twist:3,6 by_target:3,3\n" \
+    "seen_points frame:6! point:3 -> seen:3 by_frame:3,6 by_point:3,3\n" \
+    "seen_poses frame:6! seen:6 -> by_twist:6,6\n" \
+    "distances pose:6 target:3* anchor:3* -> distance: by_twist:6 by_target:3 by_anchor:3\n" \
+    "tpr2tps_lengths size:6! free:4 -> lengths:4\n" \
+    "tpr2tps_jacobian size:6! free:4 -> jacobian:4,4\n" \
+    "exp twist:6 -> motion:4,4\n" \
+    "log motion:16 -> twist:6\n" \
+    "adjoint motion:16 -> adjoint:6,6\n" \
+    "motion_pose motion:16 -> pose:6\n" \
+    "exp_jacobian twist:6 -> jacobian:6,6\n" \
+    "log_jacobian twist:6 -> jacobian:6,6\n" \
+    "joint_motions error:6 point:3 -> motion:4,4\n"

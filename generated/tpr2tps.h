@@ -1,5 +1,5 @@
 /* Generated from derive/tpr2tps.py by `python -m derive`; never edited by hand.
- * derivation 39cbd8dd951c7d18
+ * derivation cac31466936f3c27
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

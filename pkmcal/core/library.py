@@ -1,17 +1,19 @@
-"""The compiled core as Python sees it: its names, its ISA, and rows in threads."""
+"""The compiled core as Python sees it: its names, its ISA, its calls, and rows in threads."""
 
 from __future__ import annotations
 
 import os
 import threading
 from collections.abc import Callable
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pkmcal._core import ffi, lib
 from pkmcal.arguments import whole
-from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentError
 
 
@@ -54,12 +56,40 @@ def _default_isa() -> int:
     return ISAS.index(wanted)
 
 
+def _functions(isa: str) -> dict[str, Any]:
+    """The functions compiled for an ISA, by their names in ``csrc/calls.h``."""
+    prefix = f"pkm_{isa}_"
+    return {name[len(prefix) :]: getattr(lib, name) for name in dir(lib) if name.startswith(prefix)}
+
+
+def _row_call(line: str) -> tuple[str, tuple[list[tuple[int, str]], list[tuple[int, ...]]]]:
+    """Name, widths and kinds of inputs, and shapes of outputs; see ``derive/calls.py``."""
+    before, _, after = line.partition(" -> ")
+    name, *inputs = before.split()
+    widths = [each.split(":")[1] for each in inputs]
+    shapes = [each.split(":")[1].split(",") for each in after.split()]
+    return name, (
+        [(int(width.rstrip("*!")), width.lstrip("0123456789")) for width in widths],
+        [tuple(int(size) for size in shape if size) for shape in shapes],
+    )
+
+
 ISA = _default_isa()
+FUNCTIONS = [_functions(isa) for isa in ISAS[: lib.pkm_best_isa() + 1]]
+ROW_CALLS = dict(map(_row_call, _text(lib.pkm_row_calls()).splitlines()))
 
 
-# C pointer to a contiguous array of float64, or int32; it keeps the array alive.
-pointer: Callable[[FloatArray], Any] = partial(ffi.from_buffer, "double *")
-int_pointer: Callable[[Int32Array], Any] = partial(ffi.from_buffer, "int32_t *")
+# By the type of its numbers, as `array.dtype.char` has it.
+_POINTERS = {
+    kind: ffi.typeof(f"{name} *")
+    for kinds, name in (("dD", "double"), ("i", "int32_t"), ("l", "int64_t"), ("L", "uint64_t"))
+    for kind in kinds
+}
+
+
+def pointer(array: NDArray[Any]) -> Any:
+    """C pointer to a contiguous array; it keeps the array alive."""
+    return ffi.from_buffer(_POINTERS[array.dtype.char], array)
 
 
 def ensure(code: int) -> None:
@@ -68,13 +98,76 @@ def ensure(code: int) -> None:
         raise ArgumentError(f"the core refused the call (code {code})")
 
 
-def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) -> None:
-    """Run ``call(start, stop)`` over contiguous parts of the rows, in threads.
+def call(function: str, *arguments: Any, isa: int | None = None) -> None:
+    """Call a function of the core, with arrays as pointers to their numbers.
 
     Parameters
     ----------
-    call : callable
-        Returns the core's code: 0, or negative for a bad call.
+    function : str
+        Its name in ``csrc/calls.h``.
+    *arguments : ndarray, int, float or C data
+        As declared there; arrays contiguous.
+    isa : int, optional
+        Index into `ISAS`.
+
+    Raises
+    ------
+    ValueError
+        The core refuses the call, or the processor has no such ISA.
+    """
+    try:
+        chosen = FUNCTIONS[ISA if isa is None else isa][function]
+    except IndexError:
+        raise ArgumentError(f"this processor has no ISA {isa}") from None
+    code = chosen(*[pointer(a) if isinstance(a, np.ndarray) else a for a in arguments])
+    if code < 0:
+        ensure(code)
+
+
+def rows(function: str, *arrays: FloatArray, isa: int | None = None) -> list[FloatArray]:
+    """Call a function of the core that is one formula a row.
+
+    Parameters
+    ----------
+    function : str
+        Its name in ``generated/row_calls.h``.
+    *arrays : ndarray (N, width), or (width,) where declared
+        Its inputs.
+    isa : int, optional
+        Index into `ISAS`.
+
+    Returns
+    -------
+    list of ndarray (N, ...)
+        Its outputs.
+
+    Raises
+    ------
+    ValueError
+        An input of another width or number of rows.
+    """
+    inputs, outputs = ROW_CALLS[function]
+    n = next((len(a) for a in arrays if a.ndim > 1), 1)
+    arguments: list[Any] = [n]
+    for (width, given), array in zip(inputs, arrays, strict=True):
+        each = array.ndim > 1 or given == ""
+        if array.size != (n * width if each else width) or (each and given == "!"):
+            raise ArgumentError(f"{function}: {array.shape} are not {n} rows of {width} numbers")
+        arguments.append(array)
+        if given == "*":
+            arguments.append(width if each else 0)
+    made = [np.empty((n, *shape)) for shape in outputs]
+    call(function, *arguments, *made, isa=isa)
+    return made
+
+
+def in_threads(run: Callable[[int, int], None], rows: int, threads: int | None) -> None:
+    """Run ``run(start, stop)`` over contiguous parts of the rows, in threads.
+
+    Parameters
+    ----------
+    run : callable
+        May raise, which becomes the call's own error.
     rows : int
         Number of rows.
     threads : int or None
@@ -86,14 +179,17 @@ def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) 
     else:
         threads = min(whole("threads", threads, 1, note=" or None"), max(rows, 1))
     if threads == 1:
-        return ensure(call(0, rows))
+        return run(0, rows)
     count = min(rows, PARTS_PER_THREAD * threads)
     parts = pairwise([rows * k // count for k in range(count + 1)])
-    codes: list[int] = []
+    raised: list[Exception] = []
 
     def work() -> None:
-        for start, stop in parts:  # whoever is free takes the next
-            codes.append(call(start, stop))
+        try:
+            for start, stop in parts:  # whoever is free takes the next
+                run(start, stop)
+        except Exception as error:
+            raised.append(error)
 
     others = [threading.Thread(target=work) for _ in range(threads - 1)]
     for thread in others:
@@ -101,4 +197,10 @@ def in_threads(call: Callable[[int, int], int], rows: int, threads: int | None) 
     work()
     for thread in others:
         thread.join()
-    ensure(min(codes))
+    if raised:
+        raise raised[0]
+
+
+def part(array: NDArray[Any], start: int, stop: int) -> NDArray[Any]:
+    """Rows of an array; all of them without the price of a slice."""
+    return array if stop - start == len(array) else array[start:stop]

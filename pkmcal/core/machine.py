@@ -8,7 +8,7 @@ import numpy as np
 
 from pkmcal._core import ffi, lib
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.core.library import DRIVERS, ISA, MAPS, ROWS, ensure, in_threads, int_pointer, pointer
+from pkmcal.core.library import DRIVERS, ISA, MAPS, ROWS, call, ensure, in_threads, part, pointer
 
 
 class Closure(NamedTuple):
@@ -88,12 +88,7 @@ class Machine:
     def inverse(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """Poses (N, 6) to actuator coordinates (N, n)."""
         q = np.empty((len(pose), self.actuators))
-        if len(pose):
-            ensure(
-                lib.pkm_inverse(
-                    self.struct, self.isa, len(pose), pointer(slots), 0, pointer(pose), pointer(q)
-                )
-            )
+        call("inverse", self.struct, len(pose), slots, 0, pose, q, isa=self.isa)
         return q
 
     def forward(
@@ -110,63 +105,36 @@ class Machine:
         (N, 6). What is found has the leading `shape` of N rows, by default (N,).
         """
         n, shape = len(q), (len(q),) if shape is None else shape
-        pose, residual = np.empty((*shape, 6)), np.empty(shape)
-        status, iterations = np.empty(shape, dtype=np.int32), np.empty(shape, dtype=np.int32)
-        slot_stride = slots[0].size if slots.ndim == 3 else 0
+        pose, residual = np.empty((n, 6)), np.empty(n)
+        status, iterations = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
+        stride = slots[0].size if slots.ndim == 3 else 0
         guess_stride = 6 if guess.ndim == 2 else 0
-        # made once and moved from row to row: a pointer costs as much as an array
-        to_slots, to_q, to_guess = pointer(slots), pointer(q), pointer(guess)
-        to_pose, to_residual = pointer(pose), pointer(residual)
-        to_status, to_iterations = int_pointer(status), int_pointer(iterations)
 
-        def call(start: int, stop: int) -> int:
-            code: int = lib.pkm_forward(
-                self.struct,
-                self.isa,
-                stop - start,
-                to_slots + start * slot_stride,
-                slot_stride,
-                to_q + start * self.actuators,
-                to_guess + start * guess_stride,
-                guess_stride,
-                to_pose + 6 * start,
-                to_status + start,
-                to_iterations + start,
-                to_residual + start,
-            )
-            return code
+        def run(start: int, stop: int) -> None:
+            geometry = part(slots, start, stop) if stride else slots
+            begin = part(guess, start, stop) if guess_stride else guess
+            found = [part(each, start, stop) for each in (pose, status, iterations, residual)]
+            given = (geometry, stride, part(q, start, stop), begin, guess_stride)
+            call("forward", self.struct, stop - start, *given, *found, isa=self.isa)
 
-        if n:
-            in_threads(call, n, threads)
-        return pose, status, iterations, residual
+        in_threads(run, n, threads)
+        return (
+            pose.reshape(*shape, 6),
+            status.reshape(shape),
+            iterations.reshape(shape),
+            residual.reshape(shape),
+        )
 
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m)."""
         out = np.empty((len(pose), self.actuators, self.m))
-        if len(pose):
-            ensure(
-                lib.pkm_jacobian(
-                    self.struct, self.isa, len(pose), pointer(slots), 0, pointer(pose), pointer(out)
-                )
-            )
+        call("jacobian", self.struct, len(pose), slots, 0, pose, out, isa=self.isa)
         return out
 
     def forward_jacobian(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
         """∂pose/∂q at poses (N, 6): (N, 6, n)."""
         out = np.empty((len(pose), 6, self.actuators))
-        if len(pose):
-            ensure(
-                lib.pkm_forward_jacobian(
-                    self.struct,
-                    self.isa,
-                    len(pose),
-                    pointer(slots),
-                    0,
-                    pointer(pose),
-                    pointer(q),
-                    pointer(out),
-                )
-            )
+        call("forward_jacobian", self.struct, len(pose), slots, 0, pose, q, out, isa=self.isa)
         return out
 
     def error_jacobian(
@@ -182,22 +150,8 @@ class Machine:
         Or of the twist (ω, v) of the platform by them.
         """
         out = np.empty((len(pose), 6, len(columns)))
-        if out.size:
-            ensure(
-                lib.pkm_error_jacobian(
-                    self.struct,
-                    self.isa,
-                    len(pose),
-                    pointer(slots),
-                    0,
-                    pointer(pose),
-                    pointer(q),
-                    int_pointer(columns),
-                    len(columns),
-                    twists,
-                    pointer(out),
-                )
-            )
+        given = (len(pose), slots, 0, pose, q, columns, len(columns), twists)
+        call("error_jacobian", self.struct, *given, out, isa=self.isa)
         return out
 
     def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -206,20 +160,9 @@ class Machine:
         `motion` (N, 3, 4, 4) is the platform's homogeneous matrix and its first and second
         derivative by time.
         """
-        n = len(motion)
-        velocity, acceleration = np.empty((n, self.actuators)), np.empty((n, self.actuators))
-        if n:
-            ensure(
-                lib.pkm_rates(
-                    self.struct,
-                    self.isa,
-                    n,
-                    pointer(slots),
-                    pointer(motion),
-                    pointer(velocity),
-                    pointer(acceleration),
-                )
-            )
+        velocity, acceleration = np.empty((2, len(motion), self.actuators))
+        given = (len(motion), slots, motion, velocity, acceleration)
+        call("rates", self.struct, *given, isa=self.isa)
         return velocity, acceleration
 
     def motion(
@@ -232,21 +175,7 @@ class Machine:
         """
         n = len(pose)
         motion, rates = np.empty((n, 3, 4, 4)), np.empty((n, 2, 6))
-        if n:
-            ensure(
-                lib.pkm_motion(
-                    self.struct,
-                    self.isa,
-                    n,
-                    pointer(slots),
-                    pointer(pose),
-                    pointer(q),
-                    pointer(q1),
-                    pointer(q2),
-                    pointer(motion),
-                    pointer(rates),
-                )
-            )
+        call("motion", self.struct, n, slots, pose, q, q1, q2, motion, rates, isa=self.isa)
         return motion, rates[:, 0], rates[:, 1]
 
     def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
@@ -258,21 +187,7 @@ class Machine:
             np.empty((n, self.rows, m)),
             np.empty((n, self.rows, self.actuators)),
         )
-        if n:
-            ensure(
-                lib.pkm_closure(
-                    self.struct,
-                    self.isa,
-                    n,
-                    pointer(slots),
-                    pointer(pose),
-                    pointer(q),
-                    pointer(out.residual),
-                    pointer(out.by_step),
-                    pointer(out.by_free),
-                    pointer(out.by_q),
-                )
-            )
+        call("closure", self.struct, n, slots, pose, q, *out, isa=self.isa)
         return out
 
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
@@ -282,12 +197,7 @@ class Machine:
         mm; lengths are NaN in rows where a limb has no positive one.
         """
         out = np.empty((len(q), self.struct.limbs, lib.PKM_SPHERE))
-        if len(q):
-            ensure(
-                lib.pkm_spheres(
-                    self.struct, self.isa, len(q), pointer(slots), pointer(q), pointer(out)
-                )
-            )
+        call("spheres", self.struct, len(q), slots, q, out, isa=self.isa)
         return out
 
     def limbs(
@@ -299,19 +209,24 @@ class Machine:
         platform joint in base and in platform axes (N, limbs, 3).
         """
         n, limbs = len(pose), slots.shape[-2]
-        drive = np.empty((n, limbs))
-        base, platform = np.empty((n, limbs, 3)), np.empty((n, limbs, 3))
-        if n:
-            ensure(
-                lib.pkm_limbs(
-                    self.struct,
-                    self.isa,
-                    n,
-                    pointer(slots),
-                    pointer(pose),
-                    pointer(drive),
-                    pointer(base),
-                    pointer(platform),
-                )
-            )
+        drive, base, platform = np.empty((n, limbs)), *np.empty((2, n, limbs, 3))
+        call("limbs", self.struct, n, slots, pose, drive, base, platform, isa=self.isa)
         return drive, base, platform
+
+    def closure_cost(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
+        """Sum of the squared closures over poses (M, 6) and coordinates (M, n), mm².
+
+        For each of N geometries (N, limbs, SLOTS); (N,).
+        """
+        cost = np.empty(len(slots))
+        given = (self.struct, len(slots), slots, len(pose), pose, q)
+        call("closure_cost", *given, cost, isa=self.isa)
+        return cost
+
+
+def with_errors(
+    errors: FloatArray, places: Int32Array, ideal: FloatArray, slots: FloatArray
+) -> None:
+    """Write the ideal slots with errors (N, k) at places (k,) to `slots` (N, size)."""
+    size, given = slots.shape[1], (pointer(errors), pointer(places))
+    ensure(lib.pkm_with_errors(*errors.shape, *given, size, pointer(ideal), pointer(slots)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from pkmcal._core import lib
 from pkmcal.arrays import ComplexArray, FloatArray, Int32Array
-from pkmcal.core.library import ensure, int_pointer, pointer
+from pkmcal.core.library import ensure, pointer
 from pkmcal.core.machine import Machine
 
 ARRIVED, LOST, FAR = lib.PKM_ARRIVED, lib.PKM_LOST, lib.PKM_FAR
@@ -55,19 +55,7 @@ def follow(
     frame = np.empty((n, 12), dtype=np.complex128)
     status, steps = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
     reached = np.empty(n)
-    if n:
-        ensure(
-            lib.pkm_paths(
-                machine.struct,
-                n,
-                pointer(np.ascontiguousarray(start, dtype=np.complex128).view(np.float64)),
-                pointer(np.ascontiguousarray(target, dtype=np.complex128).view(np.float64)),
-                pointer(x.view(np.float64)),
-                accuracy,
-                pointer(frame.view(np.float64)),
-                int_pointer(status),
-                int_pointer(steps),
-                pointer(reached),
-            )
-        )
+    limbs = [np.ascontiguousarray(each, dtype=np.complex128) for each in (start, target)]
+    arrays = [pointer(each) for each in (*limbs, x, frame, status, steps, reached)]
+    ensure(lib.pkm_paths(machine.struct, n, *arrays[:3], accuracy, *arrays[3:]))
     return Paths(x, frame, status, steps, reached)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal._core import ffi, lib
 from pkmcal.arrays import FloatArray
-from pkmcal.core.library import ISA, pointer
-from pkmcal.exceptions import ArgumentError
+from pkmcal.core.library import ISA, call
 
 _GENERATORS = 8  # of xoshiro256+, four words each
 
@@ -39,9 +37,5 @@ class Normals:
 
     def fill(self, out: FloatArray) -> FloatArray:
         """Fill a contiguous array of any shape, and return it."""
-        code = lib.pkm_normals(
-            self._isa, out.size, ffi.from_buffer("uint64_t *", self._state), pointer(out)
-        )
-        if code < 0:
-            raise ArgumentError(f"the core refused the call (code {code})")
+        call("normals", out.size, self._state, out, isa=self._isa)
         return out

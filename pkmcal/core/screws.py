@@ -2,62 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from pkmcal._core import ffi, lib
+from pkmcal._core import ffi
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.core.library import ISA, ensure, in_threads, int_pointer, pointer
+from pkmcal.core.library import ISA, call, in_threads, part, pointer, rows
 
 FRAMES = ("space", "body", "tip")  # PKM_SPACE, ...
 
 
-def _rows(call: Callable[..., int], given: FloatArray, width: int, isa: int) -> FloatArray:
-    """``call(isa, n, in, out)`` over rows (N, k), to (N, width)."""
-    out = np.empty((len(given), width))
-    if len(given):
-        ensure(call(isa, len(given), pointer(given), pointer(out)))
-    return out
-
-
-def exp(twist: FloatArray, isa: int = ISA) -> FloatArray:
+def exp(twist: FloatArray, isa: int | None = None) -> FloatArray:
     """Twists (N, 6) to motions (N, 16)."""
-    return _rows(lib.pkm_exp, twist, 16, isa)
+    return rows("exp", twist, isa=isa)[0].reshape(-1, 16)
 
 
-def log(motion: FloatArray, isa: int = ISA) -> FloatArray:
+def log(motion: FloatArray, isa: int | None = None) -> FloatArray:
     """Motions (N, 16) to twists (N, 6)."""
-    return _rows(lib.pkm_log, motion, 6, isa)
+    return rows("log", motion, isa=isa)[0]
 
 
-def adjoint(motion: FloatArray, isa: int = ISA) -> FloatArray:
+def adjoint(motion: FloatArray, isa: int | None = None) -> FloatArray:
     """Motions (N, 16) to their adjoints (N, 36)."""
-    return _rows(lib.pkm_adjoint, motion, 36, isa)
+    return rows("adjoint", motion, isa=isa)[0].reshape(-1, 36)
 
 
-def pose(motion: FloatArray, isa: int = ISA) -> FloatArray:
+def pose(motion: FloatArray, isa: int | None = None) -> FloatArray:
     """Motions (N, 16) to poses x y z α β γ (N, 6)."""
-    return _rows(lib.pkm_motion_pose, motion, 6, isa)
+    return rows("motion_pose", motion, isa=isa)[0]
 
 
-def exp_jacobian(twist: FloatArray, inverse: bool, isa: int = ISA) -> FloatArray:
+def exp_jacobian(twist: FloatArray, inverse: bool, isa: int | None = None) -> FloatArray:
     """At twists (N, 6): how the motion follows the twist, or inversely, (N, 36)."""
-
-    def call(isa: int, n: int, given: Any, out: Any) -> int:
-        return int(lib.pkm_exp_jacobian(isa, int(inverse), n, given, out))
-
-    return _rows(call, twist, 36, isa)
+    name = "log_jacobian" if inverse else "exp_jacobian"
+    return rows(name, twist, isa=isa)[0].reshape(-1, 36)
 
 
-def joint_motions(errors: FloatArray, points: FloatArray, isa: int = ISA) -> FloatArray:
+def joint_motions(errors: FloatArray, points: FloatArray, isa: int | None = None) -> FloatArray:
     """Errors (N, 6) at points (N, 3) to motions in the base (N, 16)."""
-
-    def call(isa: int, n: int, given: Any, out: Any) -> int:
-        return int(lib.pkm_joint_motions(isa, n, given, pointer(points), out))
-
-    return _rows(call, errors, 16, isa)
+    return rows("joint_motions", errors, points, isa=isa)[0].reshape(-1, 16)
 
 
 class Links(NamedTuple):
@@ -74,13 +58,12 @@ class Links(NamedTuple):
     errors: FloatArray
     numbers: FloatArray
 
-    def start(self, first: int) -> tuple[Any, Any]:
-        """C arguments for the rows from `first`: the links, and a pointer to the errors."""
-        by_row = self.numbers.ndim == 3
-        first = first if by_row else 0
-        numbers = pointer(self.numbers[first:])  # kept as long as it is used
-        links = ffi.new("pkm_links *", (by_row, numbers))
-        return (links, numbers), pointer(self.errors[first:])
+    def part(self, start: int, stop: int) -> tuple[Any, FloatArray]:
+        """C arguments for some rows: the links, and the errors."""
+        if self.numbers.ndim < 3:
+            return ffi.new("pkm_links *", (False, pointer(self.numbers))), self.errors
+        own = pointer(part(self.numbers, start, stop))
+        return ffi.new("pkm_links *", (True, own)), part(self.errors, start, stop)
 
 
 class Arm:
@@ -111,7 +94,7 @@ class Arm:
         struct = ffi.new("pkm_arm *")
         struct.joints = len(axes)
         self.arrays = (prismatic, axes, points, home)
-        self._held = (int_pointer(prismatic), *map(pointer, self.arrays[1:]))
+        self._held = tuple(pointer(array) for array in self.arrays)
         struct.prismatic, struct.axes, struct.point, struct.home = self._held
         self.struct = struct
         self.joints = len(axes)
@@ -122,73 +105,42 @@ class Arm:
         by_row = errors.ndim == 3
         rows = len(errors) if by_row else 1
         numbers = np.empty((rows, self.joints + 1, 12))
-        if rows:
-            given = pointer(errors)
-            ensure(lib.pkm_arm_links(self.struct, self.isa, rows, given, pointer(numbers)))
+        call("arm_links", self.struct, rows, errors, numbers, isa=self.isa)
         return Links(errors, numbers if by_row else numbers[0])
 
     def forward(self, theta: FloatArray, links: Links, threads: int | None) -> FloatArray:
         """Coordinates (N, n) to the tool (N, 4, 4)."""
         out = np.empty((len(theta), 4, 4))
 
-        def call(start: int, stop: int) -> int:
-            held, _ = links.start(start)
-            return int(
-                lib.pkm_arm_forward(
-                    self.struct,
-                    held[0],
-                    self.isa,
-                    stop - start,
-                    pointer(theta[start:]),
-                    pointer(out[start:]),
-                )
-            )
+        def run(start: int, stop: int) -> None:
+            own, _ = links.part(start, stop)
+            given, found = part(theta, start, stop), part(out, start, stop)
+            call("arm_forward", self.struct, own, stop - start, given, found, isa=self.isa)
 
-        if len(theta):
-            in_threads(call, len(theta), threads)
+        in_threads(run, len(theta), threads)
         return out
 
     def jacobian(self, theta: FloatArray, links: Links, frame: int) -> FloatArray:
         """Coordinates (N, n) to twists by them, (N, 6, n)."""
         out = np.empty((len(theta), 6, self.joints))
 
-        def call(start: int, stop: int) -> int:
-            held, _ = links.start(start)
-            return int(
-                lib.pkm_arm_jacobian(
-                    self.struct,
-                    held[0],
-                    self.isa,
-                    frame,
-                    stop - start,
-                    pointer(theta[start:]),
-                    pointer(out[start:]),
-                )
-            )
+        def run(start: int, stop: int) -> None:
+            own, _ = links.part(start, stop)
+            given, found = part(theta, start, stop), part(out, start, stop)
+            call("arm_jacobian", self.struct, own, frame, stop - start, given, found, isa=self.isa)
 
-        if len(theta):
-            in_threads(call, len(theta), None)
+        in_threads(run, len(theta), None)
         return out
 
     def error_jacobian(self, theta: FloatArray, links: Links, frame: int) -> FloatArray:
         """Coordinates (N, n) to twists by the joint errors, (N, 6, 6 n)."""
         out = np.empty((len(theta), 6, 6 * self.joints))
 
-        def call(start: int, stop: int) -> int:
-            held, errors = links.start(start)
-            return int(
-                lib.pkm_arm_error_jacobian(
-                    self.struct,
-                    held[0],
-                    errors,
-                    self.isa,
-                    frame,
-                    stop - start,
-                    pointer(theta[start:]),
-                    pointer(out[start:]),
-                )
-            )
+        def run(start: int, stop: int) -> None:
+            own, errors = links.part(start, stop)
+            given, found = part(theta, start, stop), part(out, start, stop)
+            arguments = (self.struct, own, errors, frame, stop - start, given, found)
+            call("arm_error_jacobian", *arguments, isa=self.isa)
 
-        if len(theta):
-            in_threads(call, len(theta), None)
+        in_threads(run, len(theta), None)
         return out

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal._core import ffi, lib
+from pkmcal._core import lib
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import pointer
 
@@ -76,15 +76,9 @@ class Stream:
         off = values - mean[:, None]
         squares = np.einsum("ij,ij->i", off, off)
         self._combine(n, mean, squares, values.min(axis=1), values.max(axis=1))
-        lib.pkm_count(
-            k,
-            n,
-            pointer(np.ascontiguousarray(values)),
-            pointer(self.bins.low),
-            pointer(self.bins.width),
-            BINS,
-            ffi.from_buffer("int64_t *", self._in_bin),
-        )
+        values = np.ascontiguousarray(values)
+        bins, count = (self.bins.low, self.bins.width), self._in_bin
+        lib.pkm_count(k, n, pointer(values), *map(pointer, bins), BINS, pointer(count))
 
     def merge(self, other: Stream) -> None:
         """Take what another stream with the same bins has taken."""

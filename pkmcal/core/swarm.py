@@ -11,7 +11,7 @@ import numpy as np
 from pkmcal._core import ffi, lib
 from pkmcal.arguments import number, whole
 from pkmcal.arrays import FloatArray
-from pkmcal.core.library import ISA, ensure, in_threads, pointer
+from pkmcal.core.library import ISA, call, in_threads, part
 
 SWARMS_PER_THREAD = 16  # fewer do not pay for a thread
 
@@ -99,11 +99,7 @@ class Swarm:
         dims, width = len(lower), -(-settings.particles // 8) * 8
         self._x = self._state[: dims * width].reshape(dims, width)[:, : settings.particles]
         self._values = self._state[-dims - 1 - width : -dims - 1][: settings.particles]
-        ensure(
-            lib.pkm_swarm_start(
-                self._struct, isa, seed, pointer(lower), pointer(upper), pointer(self._state)
-            )
-        )
+        call("swarm_start", self._struct, seed, lower, upper, self._state, isa=isa)
 
     @property
     def positions(self) -> FloatArray:
@@ -120,12 +116,11 @@ class Swarm:
     def judge(self, values: FloatArray) -> None:
         """Take the particles' values (particles,), which decide pBest and gBest."""
         self._values[:] = values
-        ensure(lib.pkm_swarm_judge(self._struct, self._isa, pointer(self._state)))
+        call("swarm_judge", self._struct, self._state, isa=self._isa)
 
     def move(self) -> None:
         """Eq. 19. A particle that would leave the bounds stops there, at rest in that direction."""
-        lower, upper = map(pointer, self._bounds)
-        ensure(lib.pkm_swarm_move(self._struct, self._isa, lower, upper, pointer(self._state)))
+        call("swarm_move", self._struct, *self._bounds, self._state, isa=self._isa)
 
 
 def minimise_eq18(
@@ -167,29 +162,16 @@ def minimise_eq18(
     off = np.ascontiguousarray(off)
     lower, upper = np.ascontiguousarray(-half_width), np.ascontiguousarray(half_width)
 
-    def call(start: int, stop: int) -> int:
+    def run(start: int, stop: int) -> None:
         state = np.empty(lib.pkm_swarm_size(struct))
-        code: int = lib.pkm_swarm_eq18(
-            struct,
-            isa,
-            settings.iterations,
-            seed,
-            start,
-            stop - start,
-            rows,
-            pointer(off[start:]),
-            pointer(lower),
-            pointer(upper),
-            pointer(state),
-            pointer(correction[start:]),
-            pointer(history[start:]),
-        )
-        return code
+        own = [part(each, start, stop) for each in (off, correction, history)]
+        size = (settings.iterations, seed, start, stop - start, rows)
+        call("swarm_eq18", struct, *size, own[0], lower, upper, state, *own[1:], isa=isa)
 
     if sets:
         if threads is None:
             threads = max(1, min(len(os.sched_getaffinity(0)), sets // SWARMS_PER_THREAD))
-        in_threads(call, sets, threads)
+        in_threads(run, sets, threads)
     lost = ~np.isfinite(off).all(axis=(1, 2))
     correction[lost] = np.nan
     history[lost] = np.nan

@@ -7,9 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal._core import lib
 from pkmcal.arrays import FloatArray, as_rows
-from pkmcal.core.library import pointer
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import Geometries
 from pkmcal.kinematics.robot import Robot
@@ -106,19 +104,6 @@ class LimbResidual:
     def of_slots(self, slots: FloatArray) -> FloatArray:
         """Residual (N,) of geometries as `geometries` returns them, mm."""
         machine = self._robot._machine
-        cost = np.empty(len(slots))
-        if len(slots):
-            code = lib.pkm_closure_cost(
-                machine.struct,
-                machine.isa,
-                len(slots),
-                pointer(slots),
-                len(self._poses),
-                pointer(self._poses),
-                pointer(self._actuators),
-                pointer(cost),
-            )
-            if code < 0:
-                raise ArgumentError(f"the core refused the call (code {code})")
+        cost = machine.closure_cost(slots, self._poses, self._actuators)
         residual: FloatArray = np.sqrt(cost / (len(self._poses) * machine.rows))
         return residual

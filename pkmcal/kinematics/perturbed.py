@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pkmcal._core import lib
 from pkmcal.arrays import FloatArray, as_rows
-from pkmcal.core.library import int_pointer, pointer
+from pkmcal.core.machine import with_errors
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.ties import Term, Tie
@@ -102,17 +101,8 @@ class Geometries:
         Tied numbers follow their parameters exactly.
         """
         geometry, slots = self._geometry, self._slots[: len(errors)]
-        code = lib.pkm_with_errors(
-            len(errors),
-            len(self._own),
-            pointer(np.ascontiguousarray(errors[:, : len(self._own)])),
-            int_pointer(self._own),
-            slots.shape[1],
-            pointer(geometry.slots),
-            pointer(slots),
-        )
-        if code < 0:
-            raise ArgumentError(f"the core refused the call (code {code})")
+        own = np.ascontiguousarray(errors[:, : len(self._own)])
+        with_errors(own, self._own, geometry.slots, slots)
         changed = {
             name: geometry[name] + errors[:, column] for name, column in self._parameters.items()
         }

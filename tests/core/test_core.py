@@ -107,7 +107,7 @@ def test_poses_are_composed_and_inverted_with_the_same_bits_on_every_isa(
     a, b = np.random.default_rng(10).uniform(-2.0, 2.0, (2, 41, 6))
     found = []
     for isa in AVAILABLE:
-        monkeypatch.setattr(core_poses, "ISA", isa)
+        monkeypatch.setattr(library, "ISA", isa)
         composed = core_poses.compose(a, b)
         for n in range(1, 18):
             assert same_bits(core_poses.compose(a[:n], b[:n]), composed[:n])

@@ -1,0 +1,102 @@
+/* Every call that is compiled for each ISA, declared once; pkmcal.h includes this for each of them.
+ *
+ * A call takes n rows, contiguous, row by row. It returns 0, or a negative number for a bad call, in
+ * which case nothing was written. No memory is allocated and no state is kept. `geometry` holds
+ * limbs x SLOTS numbers; `geometry_stride` is 0 where all rows share it, else the distance from one
+ * row's geometry to the next.
+ */
+
+/* pose (n, 6) -> q (n, actuators); a row a limb cannot reach is NaN. */
+int CALL(inverse)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                  ptrdiff_t geometry_stride, const double *pose, double *q);
+
+/* q (n, actuators), guess (6 or n x 6 by guess_stride) -> pose (n, 6), status, iterations and the
+ * closure residual [mm] of each row. */
+int CALL(forward)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                  ptrdiff_t geometry_stride, const double *q, const double *guess,
+                  ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
+                  double *residual);
+
+/* pose (n, 6) -> dq/dfree (n, actuators, m), limb by limb. */
+int CALL(jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                   ptrdiff_t geometry_stride, const double *pose, double *jacobian);
+
+/* pose (n, 6), q (n, actuators) -> dpose/dq (n, 6, actuators). */
+int CALL(forward_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                           ptrdiff_t geometry_stride, const double *pose, const double *q,
+                           double *jacobian);
+
+/* pose (n, 6), q (n, actuators) -> dpose/d(numbers) (n, 6, columns) at held actuators, or with
+ * `twists` the twist (omega, v) of the platform's origin in base axes by them; columns are indices
+ * into limbs x SLOTS. */
+int CALL(error_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                         ptrdiff_t geometry_stride, const double *pose, const double *q,
+                         const int32_t *column, int columns, int twists, double *jacobian);
+
+/* pose (n, 6), q (n, actuators) -> the closure rows, limb by limb and the sphere first: residual
+ * (n, rows) [mm]; their derivatives by a scaled twist (n, rows, m), by the free coordinates
+ * (n, rows, m) and by q (n, rows, actuators). */
+int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                  const double *pose, const double *q, double *residual, double *by_step,
+                  double *by_free, double *by_q);
+
+/* q (n, actuators) -> the limbs (n, limbs, PKM_SPHERE); lengths are NaN where one of them is not
+ * positive. */
+int CALL(spheres)(const pkm_machine *machine, ptrdiff_t n, const double *geometry, const double *q,
+                  double *sphere);
+
+/* pose (n, 6) as given -> of each limb its drive coordinate (n, limbs), NaN out of reach, and the
+ * unit vector from its anchor to the platform joint in base and platform axes (n, limbs, 3). */
+int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry, const double *pose,
+                double *drive, double *on_base, double *on_platform);
+
+/* motion (n, 3, 4, 4), the platform's homogeneous matrix with its first and second derivative by time
+ * -> velocity and acceleration of the actuators, (n, actuators) each; NaN out of reach. */
+int CALL(rates)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                const double *motion, double *q1, double *q2);
+
+/* pose (n, 6), q and its first and second derivative by time (n, actuators) -> motion (n, 3, 4, 4) as
+ * above, and the first and second derivative of the pose (n, 2, 6); NaN where singular. */
+int CALL(motion)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                 const double *pose, const double *q, const double *q1, const double *q2,
+                 double *motion, double *pose_rates);
+
+/* Standard normal numbers (n), of one state the same bits with every isa. The state, any bits but
+ * zeros alone, is 4 words of each of eight generators (4, 8) and moves on; what is left of the last
+ * sixteen numbers is dropped. */
+int CALL(normals)(ptrdiff_t n, uint64_t *state, double *out);
+
+/* A swarm step by step: start within the bounds; set the particles' values in the state and judge
+ * (pBest, gBest); move (eq. 19); judge again. Of one seed the same bits with every isa. */
+int CALL(swarm_start)(const pkm_swarm *swarm, uint64_t seed, const double *lower,
+                      const double *upper, double *state);
+int CALL(swarm_judge)(const pkm_swarm *swarm, double *state);
+int CALL(swarm_move)(const pkm_swarm *swarm, const double *lower, const double *upper,
+                     double *state);
+
+/* Eq. 18 by swarms start, start + 1, ... start + n - 1 of a seed, one for each set of `rows` poses:
+ * off (n, rows, dims) = L* - L -> the correction of each set (n, dims) and its best E after each
+ * iteration (n, iterations + 1). */
+int CALL(swarm_eq18)(const pkm_swarm *swarm, int iterations, uint64_t seed, ptrdiff_t start,
+                     ptrdiff_t n, ptrdiff_t rows, const double *off, const double *lower,
+                     const double *upper, double *state, double *correction, double *history);
+
+/* geometry (particles, limbs, SLOTS), pose (n, 6), q (n, actuators) -> of each geometry the sum over
+ * the poses of its squared closures (particles) [mm²]. */
+int CALL(closure_cost)(const pkm_machine *machine, ptrdiff_t particles, const double *geometry,
+                       ptrdiff_t n, const double *pose, const double *q, double *cost);
+
+/* Joint errors (n, joints, 6) -> links (n, joints + 1, 12). */
+int CALL(arm_links)(const pkm_arm *arm, ptrdiff_t n, const double *error, double *link);
+
+/* theta (n, joints) -> the tool (n, 16); its twist by theta (n, 6, joints); its twist by the joint
+ * errors (n, 6, 6 joints), which are those the links were made of. */
+int CALL(arm_forward)(const pkm_arm *arm, const pkm_links *links, ptrdiff_t n, const double *theta,
+                      double *motion);
+int CALL(arm_jacobian)(const pkm_arm *arm, const pkm_links *links, int frame, ptrdiff_t n,
+                       const double *theta, double *jacobian);
+int CALL(arm_error_jacobian)(const pkm_arm *arm, const pkm_links *links, const double *error,
+                             int frame, ptrdiff_t n, const double *theta, double *jacobian);
+
+/* Calls that are one formula a row. */
+#include "row_calls.h"

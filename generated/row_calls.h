@@ -1,0 +1,69 @@
+/* Generated from derive/calls.py by `python -m derive`; never edited by hand.
+ * derivation 7adae37a7e002da7
+ * `real` is a number or a lane of numbers, FN(name) the function for that type. */
+
+/* a (n, 6) or (6), b (n, 6) or (6) -> out (n, 6): A followed by B. */
+int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
+                  ptrdiff_t b_stride, double *out);
+
+/* a (n, 6) -> out (n, 6): the inverse of A. */
+int CALL(invert)(ptrdiff_t n, const double *a, double *out);
+
+/* a (6), pose (n, 6), c (n, 6) or (6), composed (n, 6) -> rates (n, 6, 6): rates of A T C by
+ * those of T. */
+int CALL(compose_rates)(ptrdiff_t n, const double *a, const double *pose, const double *c,
+                        ptrdiff_t c_stride, const double *composed, double *rates);
+
+/* a (6), pose (n, 6), c (6) -> twists (n, 6, 6): twists of A T C by those of T. */
+int CALL(compose_twists)(ptrdiff_t n, const double *a, const double *pose, const double *c,
+                         double *twists);
+
+/* pose (n, 6), target (n, 3) or (3) -> point (n, 3), by_twist (n, 3, 6), by_target (n, 3, 3):
+ * targets of the platform as points of the base, with their derivatives by the twist and by the
+ * target. */
+int CALL(points)(ptrdiff_t n, const double *pose, const double *target, ptrdiff_t target_stride,
+                 double *point, double *by_twist, double *by_target);
+
+/* frame (6), point (n, 3) -> seen (n, 3), by_frame (n, 3, 6), by_point (n, 3, 3): points of the
+ * base in a frame, with their derivatives by the frame and by the point. */
+int CALL(seen_points)(ptrdiff_t n, const double *frame, const double *point, double *seen,
+                      double *by_frame, double *by_point);
+
+/* frame (6), seen (n, 6) -> by_twist (n, 6, 6): rates of poses as seen from a frame by the
+ * twist of the platform. */
+int CALL(seen_poses)(ptrdiff_t n, const double *frame, const double *seen, double *by_twist);
+
+/* pose (n, 6), target (n, 3) or (3), anchor (n, 3) or (3) -> distance (n), by_twist (n, 6),
+ * by_target (n, 3), by_anchor (n, 3): distances from anchors of the base to targets of the
+ * platform, with their derivatives by the twist, the target and the anchor. */
+int CALL(distances)(ptrdiff_t n, const double *pose, const double *target, ptrdiff_t target_stride,
+                    const double *anchor, ptrdiff_t anchor_stride, double *distance,
+                    double *by_twist, double *by_target, double *by_anchor);
+
+/* size (6), free (n, 4) -> lengths (n, 4): 2TPR&2TPS: eq. 8. */
+int CALL(tpr2tps_lengths)(ptrdiff_t n, const double *size, const double *free, double *lengths);
+
+/* size (6), free (n, 4) -> jacobian (n, 4, 4): 2TPR&2TPS: eq. 12. */
+int CALL(tpr2tps_jacobian)(ptrdiff_t n, const double *size, const double *free, double *jacobian);
+
+/* twist (n, 6) -> motion (n, 4, 4): the motion by a twist (omega, v). */
+int CALL(exp)(ptrdiff_t n, const double *twist, double *motion);
+
+/* motion (n, 16) -> twist (n, 6): the twist of a motion. */
+int CALL(log)(ptrdiff_t n, const double *motion, double *twist);
+
+/* motion (n, 16) -> adjoint (n, 6, 6): how twists move along. */
+int CALL(adjoint)(ptrdiff_t n, const double *motion, double *adjoint);
+
+/* motion (n, 16) -> pose (n, 6): x y z alpha beta gamma of a motion. */
+int CALL(motion_pose)(ptrdiff_t n, const double *motion, double *pose);
+
+/* twist (n, 6) -> jacobian (n, 6, 6): dT T^-1 by dtwist, at the twist. */
+int CALL(exp_jacobian)(ptrdiff_t n, const double *twist, double *jacobian);
+
+/* twist (n, 6) -> jacobian (n, 6, 6): dtwist by dT T^-1, at the twist. */
+int CALL(log_jacobian)(ptrdiff_t n, const double *twist, double *jacobian);
+
+/* error (n, 6), point (n, 3) -> motion (n, 4, 4): the motion by joint errors dx dy dz dphi
+ * dtheta dpsi at a point. */
+int CALL(joint_motions)(ptrdiff_t n, const double *error, const double *point, double *motion);

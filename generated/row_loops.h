@@ -1,0 +1,261 @@
+/* Generated from derive/calls.py by `python -m derive`; never edited by hand.
+ * derivation 7adae37a7e002da7
+ * `real` is a number or a lane of numbers, FN(name) the function for that type. */
+
+int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
+                  ptrdiff_t b_stride, double *out)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_a[6], lane_b[6], lane_out[6];
+        const int count = block_rows(first, n, row);
+        gather_row(a, a_stride, 6, row, lane_a);
+        gather_row(b, b_stride, 6, row, lane_b);
+        compose_row(lane_a, lane_b, lane_out);
+        scatter_row(lane_out, 6, out, 6, row, count);
+    }
+    return 0;
+}
+
+int CALL(invert)(ptrdiff_t n, const double *a, double *out)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_a[6], lane_out[6];
+        const int count = block_rows(first, n, row);
+        gather_row(a, 6, 6, row, lane_a);
+        invert_row(lane_a, lane_out);
+        scatter_row(lane_out, 6, out, 6, row, count);
+    }
+    return 0;
+}
+
+int CALL(compose_rates)(ptrdiff_t n, const double *a, const double *pose, const double *c,
+                        ptrdiff_t c_stride, const double *composed, double *rates)
+{
+    real lane_a[6];
+    for (int k = 0; k < 6; k++) lane_a[k] = fill(a[k]);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], lane_c[6], lane_composed[6], lane_rates[36];
+        const int count = block_rows(first, n, row);
+        gather_row(pose, 6, 6, row, lane_pose);
+        gather_row(c, c_stride, 6, row, lane_c);
+        gather_row(composed, 6, 6, row, lane_composed);
+        FN(pose_compose_rates)(lane_a, lane_pose, lane_c, lane_composed, lane_rates);
+        scatter_row(lane_rates, 36, rates, 36, row, count);
+    }
+    return 0;
+}
+
+int CALL(compose_twists)(ptrdiff_t n, const double *a, const double *pose, const double *c,
+                         double *twists)
+{
+    real lane_a[6];
+    for (int k = 0; k < 6; k++) lane_a[k] = fill(a[k]);
+    real lane_c[6];
+    for (int k = 0; k < 6; k++) lane_c[k] = fill(c[k]);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], lane_twists[36];
+        const int count = block_rows(first, n, row);
+        gather_row(pose, 6, 6, row, lane_pose);
+        FN(pose_compose_twists)(lane_a, lane_pose, lane_c, lane_twists);
+        scatter_row(lane_twists, 36, twists, 36, row, count);
+    }
+    return 0;
+}
+
+int CALL(points)(ptrdiff_t n, const double *pose, const double *target, ptrdiff_t target_stride,
+                 double *point, double *by_twist, double *by_target)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], lane_target[3], lane_point[3], lane_by_twist[18], lane_by_target[9];
+        const int count = block_rows(first, n, row);
+        gather_row(pose, 6, 6, row, lane_pose);
+        gather_row(target, target_stride, 3, row, lane_target);
+        FN(measured_point)(lane_pose, lane_target, lane_point, lane_by_twist, lane_by_target);
+        scatter_row(lane_point, 3, point, 3, row, count);
+        scatter_row(lane_by_twist, 18, by_twist, 18, row, count);
+        scatter_row(lane_by_target, 9, by_target, 9, row, count);
+    }
+    return 0;
+}
+
+int CALL(seen_points)(ptrdiff_t n, const double *frame, const double *point, double *seen,
+                      double *by_frame, double *by_point)
+{
+    real lane_frame[6];
+    for (int k = 0; k < 6; k++) lane_frame[k] = fill(frame[k]);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_point[3], lane_seen[3], lane_by_frame[18], lane_by_point[9];
+        const int count = block_rows(first, n, row);
+        gather_row(point, 3, 3, row, lane_point);
+        FN(seen_point)(lane_frame, lane_point, lane_seen, lane_by_frame, lane_by_point);
+        scatter_row(lane_seen, 3, seen, 3, row, count);
+        scatter_row(lane_by_frame, 18, by_frame, 18, row, count);
+        scatter_row(lane_by_point, 9, by_point, 9, row, count);
+    }
+    return 0;
+}
+
+int CALL(seen_poses)(ptrdiff_t n, const double *frame, const double *seen, double *by_twist)
+{
+    real lane_frame[6];
+    for (int k = 0; k < 6; k++) lane_frame[k] = fill(frame[k]);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_seen[6], lane_by_twist[36];
+        const int count = block_rows(first, n, row);
+        gather_row(seen, 6, 6, row, lane_seen);
+        FN(measured_pose)(lane_frame, lane_seen, lane_by_twist);
+        scatter_row(lane_by_twist, 36, by_twist, 36, row, count);
+    }
+    return 0;
+}
+
+int CALL(distances)(ptrdiff_t n, const double *pose, const double *target, ptrdiff_t target_stride,
+                    const double *anchor, ptrdiff_t anchor_stride, double *distance,
+                    double *by_twist, double *by_target, double *by_anchor)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], lane_target[3], lane_anchor[3], lane_distance[1], lane_by_twist[6],
+             lane_by_target[3], lane_by_anchor[3];
+        const int count = block_rows(first, n, row);
+        gather_row(pose, 6, 6, row, lane_pose);
+        gather_row(target, target_stride, 3, row, lane_target);
+        gather_row(anchor, anchor_stride, 3, row, lane_anchor);
+        FN(measured_distance)(lane_pose, lane_target, lane_anchor, lane_distance, lane_by_twist,
+                              lane_by_target, lane_by_anchor);
+        scatter_row(lane_distance, 1, distance, 1, row, count);
+        scatter_row(lane_by_twist, 6, by_twist, 6, row, count);
+        scatter_row(lane_by_target, 3, by_target, 3, row, count);
+        scatter_row(lane_by_anchor, 3, by_anchor, 3, row, count);
+    }
+    return 0;
+}
+
+int CALL(tpr2tps_lengths)(ptrdiff_t n, const double *size, const double *free, double *lengths)
+{
+    real lane_size[6];
+    for (int k = 0; k < 6; k++) lane_size[k] = fill(size[k]);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_free[4], lane_lengths[4];
+        const int count = block_rows(first, n, row);
+        gather_row(free, 4, 4, row, lane_free);
+        FN(tpr2tps_lengths)(lane_size, lane_free, lane_lengths);
+        scatter_row(lane_lengths, 4, lengths, 4, row, count);
+    }
+    return 0;
+}
+
+int CALL(tpr2tps_jacobian)(ptrdiff_t n, const double *size, const double *free, double *jacobian)
+{
+    real lane_size[6];
+    for (int k = 0; k < 6; k++) lane_size[k] = fill(size[k]);
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_free[4], lane_jacobian[16];
+        const int count = block_rows(first, n, row);
+        gather_row(free, 4, 4, row, lane_free);
+        FN(tpr2tps_jacobian)(lane_size, lane_free, lane_jacobian);
+        scatter_row(lane_jacobian, 16, jacobian, 16, row, count);
+    }
+    return 0;
+}
+
+int CALL(exp)(ptrdiff_t n, const double *twist, double *motion)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_twist[6], lane_motion[16];
+        const int count = block_rows(first, n, row);
+        gather_row(twist, 6, 6, row, lane_twist);
+        exp_row(lane_twist, lane_motion);
+        scatter_row(lane_motion, 16, motion, 16, row, count);
+    }
+    return 0;
+}
+
+int CALL(log)(ptrdiff_t n, const double *motion, double *twist)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_motion[12], lane_twist[6];
+        const int count = block_rows(first, n, row);
+        gather_row(motion, 16, 12, row, lane_motion);
+        log_row(lane_motion, lane_twist);
+        scatter_row(lane_twist, 6, twist, 6, row, count);
+    }
+    return 0;
+}
+
+int CALL(adjoint)(ptrdiff_t n, const double *motion, double *adjoint)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_motion[12], lane_adjoint[36];
+        const int count = block_rows(first, n, row);
+        gather_row(motion, 16, 12, row, lane_motion);
+        adjoint_row(lane_motion, lane_adjoint);
+        scatter_row(lane_adjoint, 36, adjoint, 36, row, count);
+    }
+    return 0;
+}
+
+int CALL(motion_pose)(ptrdiff_t n, const double *motion, double *pose)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_motion[12], lane_pose[6];
+        const int count = block_rows(first, n, row);
+        gather_row(motion, 16, 12, row, lane_motion);
+        motion_pose_row(lane_motion, lane_pose);
+        scatter_row(lane_pose, 6, pose, 6, row, count);
+    }
+    return 0;
+}
+
+int CALL(exp_jacobian)(ptrdiff_t n, const double *twist, double *jacobian)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_twist[6], lane_jacobian[36];
+        const int count = block_rows(first, n, row);
+        gather_row(twist, 6, 6, row, lane_twist);
+        exp_jacobian_row(lane_twist, lane_jacobian);
+        scatter_row(lane_jacobian, 36, jacobian, 36, row, count);
+    }
+    return 0;
+}
+
+int CALL(log_jacobian)(ptrdiff_t n, const double *twist, double *jacobian)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_twist[6], lane_jacobian[36];
+        const int count = block_rows(first, n, row);
+        gather_row(twist, 6, 6, row, lane_twist);
+        log_jacobian_row(lane_twist, lane_jacobian);
+        scatter_row(lane_jacobian, 36, jacobian, 36, row, count);
+    }
+    return 0;
+}
+
+int CALL(joint_motions)(ptrdiff_t n, const double *error, const double *point, double *motion)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_error[6], lane_point[3], lane_motion[16];
+        const int count = block_rows(first, n, row);
+        gather_row(error, 6, 6, row, lane_error);
+        gather_row(point, 3, 3, row, lane_point);
+        joint_motion_row(lane_error, lane_point, lane_motion);
+        scatter_row(lane_motion, 16, motion, 16, row, count);
+    }
+    return 0;
+}
