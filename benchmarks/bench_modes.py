@@ -69,9 +69,9 @@ def bench_starts(report: Report) -> None:
     """How often random starts lead to the rarest of 40 modes."""
     robot = dietmaier.hexapod()
     found = robot.forward_all(dietmaier.LENGTHS)
-    subject = robot._subject(np.array(dietmaier.LENGTHS))
+    problem = robot.assembly_problem(np.array(dietmaier.LENGTHS))
     begin = time.process_time()
-    frames = modes._from_starts(subject, subject.spheres(), STARTS)
+    frames = modes._from_starts(problem, problem.spheres(), STARTS)
     each = (time.process_time() - begin) / STARTS
     own = modes.frames_of(found.poses)
     hits = np.zeros(len(own), dtype=int)

@@ -55,7 +55,7 @@ class Forward:
         Rotations count as their arc at ``robot.length``; 0 is a type-2 singularity, 1 is isotropic.
         NaN where the row was not solved.
         """
-        steps = self._steps(self._own)
+        steps = self._closure_by_twist(self._own)
         out = np.full(steps.shape[:-2], np.nan)
         ok = np.isfinite(steps).all(axis=(-2, -1))
         sigma = np.linalg.svd(steps[ok], compute_uv=False)
@@ -69,11 +69,11 @@ class Forward:
         False means that the pose is another assembly mode than the guess's, with a singularity
         between. True where it cannot be told: more closures than free coordinates.
         """
-        steps = self._steps(self._own)
+        steps = self._closure_by_twist(self._own)
         if steps.shape[-2] != steps.shape[-1]:
             return np.asarray(self.ok)
         same = np.array(self.ok)
-        there, at_guess = steps[same], self._steps(self._guess)[same]
+        there, at_guess = steps[same], self._closure_by_twist(self._guess)[same]
         same[same] = np.sign(np.linalg.det(there)) == np.sign(np.linalg.det(at_guess))
         return same
 
@@ -85,13 +85,13 @@ class Forward:
         the only one within `unique`. Not ok with more closures than free coordinates, near a
         singularity, and where the row was not solved. It costs some 12 µs a row.
         """
-        subject = self._kinematics._subject(self._q)
-        return proofs(subject, self._own.reshape(-1, 6)).reshape(self.status.shape)
+        problem = self._kinematics.assembly_problem(self._q)
+        return proofs(problem, self._own.reshape(-1, 6)).reshape(self.status.shape)
 
-    def _steps(self, own: FloatArray) -> FloatArray:
+    def _closure_by_twist(self, own: FloatArray) -> FloatArray:
         """Closure rows by a scaled twist (..., rows, m), at a pose for each row or one for all."""
         rows = np.ascontiguousarray(np.broadcast_to(own.reshape(-1, 6), (len(self._q), 6)))
-        steps = self._kinematics._steps(rows, self._q)
+        steps = self._kinematics.closure_by_twist(rows, self._q)
         return steps.reshape(*self.status.shape, *steps.shape[1:])
 
     def failures(self) -> str:

@@ -78,7 +78,7 @@ class LimbResidual:
         self._ascending = np.argsort(places)
         self._places = places[self._ascending]
         self._robot = robot
-        self._poses = np.ascontiguousarray(robot._frames.inward(rows))
+        self._poses = np.ascontiguousarray(robot.frames.inward(rows))
         self._actuators = q
 
     def __call__(self, values: ArrayLike) -> FloatArray:
@@ -105,7 +105,7 @@ class LimbResidual:
 
     def of_slots(self, slots: FloatArray) -> FloatArray:
         """Residual (N,) of geometries as `geometries` returns them, mm."""
-        machine = self._robot._machine
+        machine = self._robot.machine
         cost = np.empty(len(slots))
         if len(slots):
             code = lib.pkm_closure_cost(

@@ -155,9 +155,9 @@ def forward_of(
         NaN where a machine has no pose near the guess.
     """
     q = np.repeat(actuators[None], len(slots), axis=0)
-    start = robot._frames.inward(guess[None])[0]
-    own = robot._machine.forward(slots, q, start, threads=1)[0]
-    return robot._frames.outward(own)
+    start = robot.frames.inward(guess[None])[0]
+    own = robot.machine.forward(slots, q, start, threads=1)[0]
+    return robot.frames.outward(own)
 
 
 def off(poses: FloatArray, from_poses: FloatArray) -> FloatArray:

@@ -92,9 +92,9 @@ def dexterity(robot: Robot, poses: ArrayLike) -> Dexterity:
 
 def _dexterity(robot: Robot, poses: FloatArray) -> FloatArray:
     """The five measures, one per row (5, N)."""
-    own, _ = robot._own_rows(poses)
-    slots = robot._slots
-    closure = robot._machine.closure(slots, own, robot._machine.inverse(slots, own))
+    own, _ = robot.own_rows(poses)
+    slots = robot.slots
+    closure = robot.machine.closure(slots, own, robot.machine.inverse(slots, own))
     out = np.full((5, len(own)), np.nan)
     numbers = np.concatenate([closure.by_step, closure.by_q], axis=-1)
     good = np.isfinite(numbers).all(axis=(1, 2))

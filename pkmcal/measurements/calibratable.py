@@ -99,7 +99,7 @@ class ArmMachine:
         """With other joint errors (6 n,), mm and rad."""
         return ArmMachine(self.arm.replace(np.reshape(values, (-1, 6))))
 
-    _nudged = replace
+    _with_values = replace
 
     def forward(self, q: ArrayLike, guess: ArrayLike | None = None) -> ArmPoses:
         """Poses at joint coordinates (N, n); an arm needs no guess."""

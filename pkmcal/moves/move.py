@@ -150,7 +150,7 @@ class Move:
         return motion, (self.robot.inverse(pose), *self.robot.rates(motion))
 
     def _in_joint(self, times: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-        robot, frames, slots = self.robot, self.robot._frames, self.robot._slots
+        robot, frames, slots = self.robot, self.robot.frames, self.robot.slots
         q, velocity, acceleration = self.law.sample(times)
         way = self.law.end - self.law.start
         share = (q - self.law.start) @ way / max(float(way @ way), 1e-300)
@@ -158,22 +158,22 @@ class Move:
         guess = to_pose(derivatives.straight(self.start, self.end, (share, still, still))[:, 0])
         own = np.ascontiguousarray(frames.inward(robot.forward(q, guess=guess).pose))
         actuators = (q, velocity, acceleration)
-        motion = robot._machine.motion(slots, own, *map(np.ascontiguousarray, actuators))[0]
+        motion = robot.machine.motion(slots, own, *map(np.ascontiguousarray, actuators))[0]
         return frames.motion_outward(motion), actuators
 
     def _in_coordinates(self, times: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-        robot, frames, slots = self.robot, self.robot._frames, self.robot._slots
+        robot, frames, slots = self.robot, self.robot.frames, self.robot.slots
         share, speed, bend = (each[:, None] for each in self.law.sample(times))
         first, last = frames.inward(np.stack([self.start, self.end]))
         matched = [POSE.index(name) for name in moved_coordinates(robot)]
         way = (last - first)[matched]
         own, q = complete(
-            robot._machine, robot.model.map, slots, first + share * (last - first), matched
+            robot.machine, robot.model.map, slots, first + share * (last - first), matched
         )
         velocity, acceleration = completed_rates(
-            robot._machine, robot.model.map, slots, own, q, matched, (speed * way, bend * way)
+            robot.machine, robot.model.map, slots, own, q, matched, (speed * way, bend * way)
         )
-        motion = robot._machine.motion(slots, own, q, velocity, acceleration)[0]
+        motion = robot.machine.motion(slots, own, q, velocity, acceleration)[0]
         return frames.motion_outward(motion), (q, velocity, acceleration)
 
     @property

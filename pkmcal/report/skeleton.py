@@ -60,9 +60,9 @@ def skeleton(robot: Robot | SerialArm, q: FloatArray, guess: FloatArray) -> Skel
     solved = machine.forward(q, guess)
     if not solved.ok:
         return None
-    own, _ = machine._own_rows(solved.pose)
-    slots = machine._slots
-    _, towards, _ = machine._machine.limbs(slots, own)
+    own, _ = machine.own_rows(solved.pose)
+    slots = machine.slots
+    _, towards, _ = machine.machine.limbs(slots, own)
     base, platform = np.ascontiguousarray(slots[:, :3]), np.ascontiguousarray(slots[:, 3:6])
     ends = seen_points(own[0], platform)[0]
     lines = []

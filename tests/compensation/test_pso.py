@@ -351,7 +351,7 @@ def test_limb_residual_has_the_same_bits_on_every_isa() -> None:
     values = cost.nominal + rng.normal(0, 0.01, (21, len(cost.free)))
     found = []
     for isa in ISAS:
-        robot._machine.isa = isa
+        robot.machine.isa = isa
         found.append(cost(values).tobytes())
     assert len(set(found)) == 1
 

@@ -25,7 +25,7 @@ def solved(name: str) -> tuple[certificate.Closures, np.ndarray]:
     q = q + np.random.default_rng(0).normal(size=q.shape) * (0.02 * np.abs(q) + 0.01)
     u = modes.frames_of(robot.forward(q).pose[None])
     u[:, 9:] /= robot.length
-    closures = robot._subject(q).closures()
+    closures = robot.assembly_problem(q).closures()
     return closures, certificate.newton(closures, u, 2)
 
 
@@ -70,7 +70,7 @@ def test_forty_digits_lie_within_the_error():
     robot = pk.load("linear-delta")
     q = robot.inverse(robot.home) + np.array([1.0, -2.0, 3.0])
     found = robot.forward_all(q)
-    spheres = robot._machine.spheres(robot._slots, q[None])[0]
+    spheres = robot.machine.spheres(robot.slots, q[None])[0]
     with mpmath.workdps(40):
         limbs = [[mpmath.mpf(float(v)) for v in limb] for limb in spheres]
 
