@@ -16,10 +16,11 @@ from pkmcal.compensation.pso import SwarmResult, pso
 from pkmcal.error_model.allocation import Allocation, allocate_tolerance
 from pkmcal.error_model.sensitivity import Sensitivity, sensitivity
 from pkmcal.error_model.tolerance import Tolerance, tolerance
+from pkmcal.kinematics.dexterity import Dexterity, dexterity
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.limits import Feasibility
 from pkmcal.kinematics.robot import Robot
-from pkmcal.kinematics.workspace import Dexterity, Workspace, dexterity, sample_poses, workspace
+from pkmcal.kinematics.workspace import Workspace, sample_poses, workspace
 from pkmcal.loading import load, machines
 from pkmcal.measurements.measurement_csv import read_measurements
 from pkmcal.measurements.measurements import Measurements

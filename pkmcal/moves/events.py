@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.limits import Feasibility
 from pkmcal.kinematics.robot import Robot
-from pkmcal.kinematics.workspace import dexterity
+from pkmcal.result import Result
 
 _STEPS = 2000  # along a move
 _HALVINGS = 50  # of a step, to the time a limit is met
@@ -46,8 +48,8 @@ class Sampled(Protocol):
         """The machine at times (N,)."""
 
 
-@dataclass(frozen=True)
-class Event:
+@dataclass(frozen=True, repr=False)
+class Event(Result):
     """A limit that a move meets.
 
     Attributes
@@ -56,8 +58,8 @@ class Event:
         s; when it is first broken.
     until : float
         s; when it is kept again, or the end of the move.
-    what : str
-        The limit: "reach", "stroke", "base_cone", "platform_cone" or "singularity".
+    what : {"reach", "stroke", "base_cone", "platform_cone", "singularity"}
+        The limit.
     limb : int or None
         Which limb, counted from 1; None for the machine as a whole.
     """
@@ -66,6 +68,12 @@ class Event:
     until: float
     what: str
     limb: int | None
+
+    def _parts(self) -> Iterator[str]:
+        limb = "" if self.limb is None else f"limb {self.limb}: "
+        broken = "met" if self.what == "singularity" else "broken"
+        what = self.what.replace("_", " ")
+        yield f"{self.time:.4f} to {self.until:.4f} s  {limb}{what} {broken}"
 
 
 def events(move: Sampled) -> list[Event]:
