@@ -81,5 +81,5 @@ class RowResult(Result):
         """How many rows have which status."""
         codes, counts = np.unique(self.status, return_counts=True)
         parts = (f"{n} {self.STATUS[int(code)]}" for code, n in zip(codes, counts, strict=True))
-        total = f"{np.size(self.status)} rows"
+        total = "1 row" if np.size(self.status) == 1 else f"{np.size(self.status)} rows"
         return f"{total}: {', '.join(parts)}" if codes.size else total
