@@ -75,7 +75,7 @@ class Forward(RowResult):
         """Whether the determinant has the sign it has at the guess (...), computed when asked for.
 
         False means that the pose is another assembly mode than the guess's, with a singularity
-        between. True where it cannot be told: more closures than free coordinates.
+        between. True where it is unknown: with more closures than free coordinates.
         """
         steps = self._closure_by_twist(self._own)
         if steps.shape[-2] != steps.shape[-1]:

@@ -81,7 +81,7 @@ def events(move: Sampled) -> list[Event]:
 
     Strokes, joint cones and reach of every limb; a singularity is met where the determinant of
     the closures changes its sign, and from there the machine is on its other side. (With more
-    closures than free coordinates there is no determinant: `conditioning` tells.)
+    closures than free coordinates there is no determinant: see `Move.conditioning`.)
 
     Each limit's margin is looked at 2001 times and followed to its least between them, so that
     a limit is found however briefly it is broken. What can be missed lasts less than 1/1000 of
