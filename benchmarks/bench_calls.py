@@ -93,7 +93,7 @@ def bench_inverse(report: Report) -> None:
             cases = {}
             for isa in native.available():
                 same = pk.load(name)
-                same._machine.isa = native.ISAS.index(isa)
+                same.machine.isa = native.ISAS.index(isa)
                 cases[isa] = lambda same=same, at=at: same.inverse(at)
             took = medians(cases, 25, time.thread_time, warm=True)
             limbs = count * len(robot.model.limbs)

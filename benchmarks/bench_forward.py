@@ -32,7 +32,7 @@ def hexapod_rows(robot: pk.Robot) -> tuple[np.ndarray, np.ndarray]:
 def forward(name: str, isa: str) -> Callable[[np.ndarray], pk.Forward]:
     """A machine's forward kinematics on one ISA, one thread, cold from home."""
     robot = pk.load(name)
-    robot._machine.isa = native.ISAS.index(isa)
+    robot.machine.isa = native.ISAS.index(isa)
     return lambda q: robot.forward(q, threads=1)
 
 

@@ -46,7 +46,7 @@ def digest(result: object) -> str:
 def of_machine(name: str) -> Iterator[Call]:
     """Every call of a parallel machine, a twentieth of the rows out of reach or not finite."""
     robot = pk.load(name)
-    machine, slots, model = robot._machine, robot._slots, robot.model
+    machine, slots, model = robot.machine, robot.slots, robot.model
     rng = np.random.default_rng(1)
     spread = np.array([30.0, 30.0, 30.0, 0.2, 0.2, 0.2])
     free = np.isin(library.POSE, library.MAPS[model.map])

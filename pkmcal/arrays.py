@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -60,3 +61,26 @@ def as_doubles(given: NDArray[Any]) -> FloatArray:
     """The same numbers as the core reads them: float64, one behind the other, aligned."""
     doubles = np.ascontiguousarray(given, dtype=np.float64)
     return doubles if doubles.flags.aligned else doubles.copy()
+
+
+def mm_per_unit(units: Sequence[str], length: float) -> FloatArray:
+    """Factors (n,) to mm of numbers in these units: a rotation counts as its arc at `length`.
+
+    Examples
+    --------
+    >>> mm_per_unit(("mm", "rad"), 250.0)
+    array([  1., 250.])
+    """
+    return np.array([length if unit == "rad" else 1.0 for unit in units])
+
+
+def whole_turns(angles: FloatArray) -> FloatArray:
+    """The whole turns in angles, rad: what is to be taken off to go the short way round.
+
+    Examples
+    --------
+    >>> angles = np.array([0.5, 2 * np.pi - 0.5])
+    >>> (angles - whole_turns(angles)).round(12)
+    array([ 0.5, -0.5])
+    """
+    return np.asarray(2 * np.pi * np.rint(angles / (2 * np.pi)))

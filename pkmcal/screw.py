@@ -7,15 +7,20 @@ those of the paper on joint structure errors, DOI 10.3969/j.issn.1673-9833.2020.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import number
 from pkmcal.arrays import FloatArray, as_doubles, as_numbers, as_rows
-from pkmcal.core import screws as core_serial
+from pkmcal.core import screws
 from pkmcal.exceptions import ArgumentError
+from pkmcal.result import Result
+
+ErrorKind = Literal["helical", "rotation", "translation", "none"]
 
 _RIGID = 1e-6  # by so much a matrix may miss being a motion
 _NO_SLIDE = 1e-13  # mm along the axis per mm of v: a rotation, up to rounding
@@ -62,7 +67,7 @@ def exp(twist: ArrayLike, angle: ArrayLike = 1.0) -> FloatArray:
     given = np.asarray(twist, dtype=np.float64)  # before the product: small integers overflow
     with np.errstate(over="ignore", invalid="ignore"):  # such a row is NaN
         rows, shape = as_rows("twist", given * factor[..., None].astype(np.float64), 6)
-    return core_serial.exp(rows).reshape(*shape, 4, 4)
+    return screws.exp(rows).reshape(*shape, 4, 4)
 
 
 def log(motion: ArrayLike) -> FloatArray:
@@ -90,7 +95,7 @@ def log(motion: ArrayLike) -> FloatArray:
     [1e-09, 5.0]
     """
     rows, shape = as_motions("motion", motion)
-    return core_serial.log(rows).reshape(*shape, 6)
+    return screws.log(rows).reshape(*shape, 6)
 
 
 def adjoint(motion: ArrayLike) -> FloatArray:
@@ -119,7 +124,7 @@ def adjoint(motion: ArrayLike) -> FloatArray:
     [0.0, 0.0, 1.0, 0.0, -100.0, 0.0]
     """
     rows, shape = as_motions("motion", motion)
-    return core_serial.adjoint(rows).reshape(*shape, 6, 6)
+    return screws.adjoint(rows).reshape(*shape, 6, 6)
 
 
 def exp_jacobian(twist: ArrayLike) -> FloatArray:
@@ -141,7 +146,7 @@ def exp_jacobian(twist: ArrayLike) -> FloatArray:
         A wrong shape, or no numbers.
     """
     rows, shape = as_rows("twist", twist, 6)
-    return core_serial.exp_jacobian(rows, inverse=False).reshape(*shape, 6, 6)
+    return screws.exp_jacobian(rows, inverse=False).reshape(*shape, 6, 6)
 
 
 def log_jacobian(twist: ArrayLike) -> FloatArray:
@@ -164,7 +169,7 @@ def log_jacobian(twist: ArrayLike) -> FloatArray:
         A wrong shape, or no numbers.
     """
     rows, shape = as_rows("twist", twist, 6)
-    return core_serial.exp_jacobian(rows, inverse=True).reshape(*shape, 6, 6)
+    return screws.exp_jacobian(rows, inverse=True).reshape(*shape, 6, 6)
 
 
 def from_pose(pose: ArrayLike) -> FloatArray:
@@ -213,11 +218,11 @@ def to_pose(motion: ArrayLike) -> FloatArray:
     [1.0, 2.0, 3.0, 0.1, 0.2, 0.3]
     """
     rows, shape = as_motions("motion", motion)
-    return core_serial.pose(rows).reshape(*shape, 6)
+    return screws.pose(rows).reshape(*shape, 6)
 
 
-@dataclass(frozen=True, eq=False)
-class JointError:
+@dataclass(frozen=True, eq=False, repr=False)
+class JointError(Result):
     """The error of a joint as one screw motion (eq. 6 to 9 and 17).
 
     Attributes
@@ -227,7 +232,7 @@ class JointError:
         motion from the joint's nominal place to its actual one.
     magnitude : float
         Angle in rad, or way in mm for a translation.
-    kind : str
+    kind : {"helical", "rotation", "translation", "none"}
         What the error does to the joint's axis, by the motion that brings it there:
         "helical" (the axes are skew; eq. 6), "rotation" (they intersect; eq. 7), "translation"
         (they are parallel, or the joint is shifted along its axis; eq. 8 and 9), or "none".
@@ -235,7 +240,7 @@ class JointError:
 
     twist: FloatArray
     magnitude: float
-    kind: str
+    kind: ErrorKind
 
     @property
     def pitch(self) -> float:
@@ -262,18 +267,20 @@ class JointError:
             raise ArgumentError(f"frame must have shape (4, 4), found {np.shape(frame)}")
         if not np.isfinite(rows).all():
             raise ArgumentError("frame must be finite")
-        return replace(self, twist=core_serial.adjoint(rows).reshape(6, 6) @ self.twist)
+        return replace(self, twist=screws.adjoint(rows).reshape(6, 6) @ self.twist)
 
-    def __str__(self) -> str:
-        if self.kind == "none":
-            return "no error"
+    def _parts(self) -> Iterator[str]:
         w, v = (
             "({:.6g}, {:.6g}, {:.6g})".format(*part) for part in (self.twist[:3], self.twist[3:])
         )
-        if self.kind == "translation":
-            return f"translation by {self.magnitude:.6g} mm along {v}"
-        text = f"{self.kind} of {math.degrees(self.magnitude):.6g}° about {w}, v {v}"
-        return text + (f", pitch {self.pitch:.6g} mm/rad" if self.kind == "helical" else "")
+        if self.kind == "none":
+            yield "no error"
+        elif self.kind == "translation":
+            yield f"translation by {self.magnitude:.6g} mm along {v}"
+        else:
+            pitch = f", pitch {self.pitch:.6g} mm/rad" if self.kind == "helical" else ""
+            turn = f"{self.kind} of {math.degrees(self.magnitude):.6g}°"
+            yield f"{turn} about {w}, v {v}{pitch}"
 
 
 def joint_error(
@@ -314,6 +321,7 @@ def joint_error(
         number(name, value)
     twist = log(from_pose(list(given.values())))
     angle, way = math.hypot(*twist[:3]), math.hypot(*twist[3:])
+    kind: ErrorKind
     if angle == 0.0:
         kind, magnitude = ("translation", way) if way else ("none", 0.0)
     else:
@@ -329,7 +337,7 @@ def joint_error(
 
 def at_points(errors: FloatArray, points: FloatArray) -> FloatArray:
     """Motions (N, 4, 4) by joint errors (N, 6) that act at points (N, 3), mm and rad."""
-    return core_serial.joint_motions(errors, points).reshape(-1, 4, 4)
+    return screws.joint_motions(errors, points).reshape(-1, 4, 4)
 
 
 def as_motions(name: str, motion: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:

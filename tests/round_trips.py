@@ -93,8 +93,8 @@ def own_geometry(robot: pk.Robot, name: str, rows: int, seed: int) -> Trip:
     slots[:, robot.geometry.slot_index] += errors(robot, rng, rows)
     slots = slots.reshape(rows, *robot.geometry.slots.shape)
     q = robot.inverse(at)
-    wanted = robot._machine.forward(slots, q, at, None)[0]
-    pose, status, _, _ = robot._machine.forward(slots, q, robot.home, None)
+    wanted = robot.machine.forward(slots, q, at, None)[0]
+    pose, status, _, _ = robot.machine.forward(slots, q, robot.home, None)
     return Trip(slots, q, wanted, pose, status)
 
 

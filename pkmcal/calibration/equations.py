@@ -102,7 +102,7 @@ class Equations:
 
     def at(self, theta: FloatArray) -> Point:
         """The equations at `theta` (n,)."""
-        robot = self.parameters.robot._nudged(self.parameters.values_at(theta))
+        robot = self.parameters.robot._with_values(self.parameters.values_at(theta))
         solved = robot.forward(self.actuators, self._guess)
         frame = self.parameters.frame_at(theta)
         predicted, residuals = [], []

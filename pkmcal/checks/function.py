@@ -11,9 +11,9 @@ from pkmcal.checks.finding import Finding, named
 from pkmcal.checks.joint_layout import joints, size
 from pkmcal.core.library import POSE, SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.perturbed import completed
 from pkmcal.kinematics.robot import Robot
-from pkmcal.kinematics.workspace import dexterity
 
 _FULL_TURN = 2 * np.pi
 _STEEP = 0.5  # rad: no axis is tilted so far from its reference by error
@@ -117,7 +117,7 @@ def _mended(robot: Robot) -> Iterator[Finding]:
     mended = []
     for name in _sizes(robot):
         for factor, unit in _FACTORS:
-            slots, home, stroke = robot._slots.copy(), robot.model.home[None].copy(), 1.0
+            slots, home, stroke = robot.slots.copy(), robot.model.home[None].copy(), 1.0
             if name in _LENGTHS:
                 columns = [SLOTS.index(slot) for slot in _LENGTHS[name]]
                 slots[:, columns] *= factor
@@ -125,7 +125,7 @@ def _mended(robot: Robot) -> Iterator[Finding]:
                 home[:, :3] *= factor
             else:
                 stroke = factor
-            drive = robot._machine.limbs(slots, home)[0][0]
+            drive = robot.machine.limbs(slots, home)[0][0]
             if _in_strokes(robot, drive, stroke):
                 mended.append(f"the {name} in {unit}" if name != "home" else f"home in {unit}")
     if mended:

@@ -19,7 +19,7 @@ from pkmcal.geometry.model import Limb, Model
 from pkmcal.kinematics.complete import complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
-from pkmcal.modes import find as modes
+from pkmcal.modes.find import AssemblyProblem
 
 Match = bool | str | Sequence[str] | None
 
@@ -31,23 +31,36 @@ class Kinematics:
     ----------
     model : Model
         Read from a robot file.
+
+    Attributes
+    ----------
+    model : Model
+        What the robot file says.
+    machine : pkmcal.core.machine.Machine
+        The compiled machine. Its calls take `slots` and poses in the machine's own frames.
+    slots : ndarray (limbs, SLOTS)
+        The numbers of the geometry as the compiled machine takes them, mm and rad.
+    frames : Frames
+        From the user's frames to the machine's own (`inward`) and back (`outward`).
+    own_home : ndarray (6,)
+        The home pose in the machine's own frames, mm and rad.
     """
 
     def __init__(self, model: Model) -> None:
         self.model = instance("model", model, Model, " (see pkmcal.load)")
-        self._slots = np.ascontiguousarray(model.geometry.slots)
-        self._frames = Frames(model.base_frame, model.tool_frame)
-        self._own_home = np.ascontiguousarray(model.home, dtype=np.float64)
+        self.slots = np.ascontiguousarray(model.geometry.slots)
+        self.frames = Frames(model.base_frame, model.tool_frame)
+        self.own_home = np.ascontiguousarray(model.home, dtype=np.float64)
         limbs = [_limb(limb) for limb in model.limbs]
         if sum(len(limb["weights"]) for limb in limbs) == len(self.coordinates):
             for limb in limbs:  # nothing to weigh: all closures hold
                 limb["weights"] = [1.0] * len(limb["weights"])
-        self._machine = Machine(model.map, limbs, self.length, self._slots, self._own_home)
+        self.machine = Machine(model.map, limbs, self.length, self.slots, self.own_home)
 
     @property
     def home(self) -> FloatArray:
         """Home pose (6,), mm and rad: in the middle of the workspace."""
-        home: FloatArray = self._frames.outward(self._own_home[None])[0].copy()
+        home: FloatArray = self.frames.outward(self.own_home[None])[0].copy()
         return home
 
     @property
@@ -58,7 +71,7 @@ class Kinematics:
     @property
     def n_actuators(self) -> int:
         """Number of actuator coordinates, n."""
-        return self._machine.actuators
+        return self.machine.actuators
 
     @cached_property
     def length(self) -> float:
@@ -67,10 +80,10 @@ class Kinematics:
         The root mean square distance of the platform joints from their centre, or of the base
         points where the platform joints coincide.
         """
-        for joints in (self._slots[:, 3:6], self._slots[:, 0:3]):
+        for joints in (self.slots[:, 3:6], self.slots[:, 0:3]):
             spread = joints - joints.mean(axis=0)
             radius = float(np.sqrt((spread**2).sum(axis=1).mean()))
-            if radius > 1e-9 * (1.0 + float(np.abs(self._slots[:, :6]).max())):
+            if radius > 1e-9 * (1.0 + float(np.abs(self.slots[:, :6]).max())):
                 return radius
         return 1.0
 
@@ -101,9 +114,9 @@ class Kinematics:
         -----
         Length limbs: eq. 3 of the 2TPR&2TPS paper, ‖p + R b - base‖.
         """
-        rows, shape = self._own_rows(pose)
+        rows, shape = self.own_rows(pose)
         if match is None:
-            q = self._machine.inverse(self._slots, rows)
+            q = self.machine.inverse(self.slots, rows)
         else:
             q = self._completed(rows, match)[1]
         return q.reshape(*shape, self.n_actuators)
@@ -135,9 +148,9 @@ class Kinematics:
         """
         rows, shape = as_rows("q", q, self.n_actuators)
         if guess is None:
-            start = self._own_home
+            start = self.own_home
         else:
-            start, guess_shape = self._own_rows(guess, "guess")
+            start, guess_shape = self.own_rows(guess, "guess")
             if guess_shape == ():
                 start = start[0]
             elif guess_shape != shape:
@@ -149,10 +162,10 @@ class Kinematics:
                         f"guess must be (6,) or broadcast to {wanted}, found {found}"
                     ) from None
                 start = np.ascontiguousarray(start).reshape(-1, 6)
-        own, status, iterations, residual = self._machine.forward(
-            self._slots, rows, start, threads, shape
+        own, status, iterations, residual = self.machine.forward(
+            self.slots, rows, start, threads, shape
         )
-        pose = self._frames.outward(own)
+        pose = self.frames.outward(own)
         return Forward(pose, status, iterations, residual, self, own, rows, start)
 
     def jacobian(self, pose: ArrayLike) -> FloatArray:
@@ -171,9 +184,9 @@ class Kinematics:
             right angles to its slider, or in line with its crank. The coordinates are those of the
             machine's own frames, without the base and tool frames that its file may state.
         """
-        rows, shape = self._own_rows(pose)
+        rows, shape = self.own_rows(pose)
         n, m = self.n_actuators, len(self.coordinates)
-        return self._machine.jacobian(self._slots, rows).reshape(*shape, n, m)
+        return self.machine.jacobian(self.slots, rows).reshape(*shape, n, m)
 
     def forward_jacobian(self, pose: ArrayLike) -> FloatArray:
         """∂(free coordinates)/∂q.
@@ -189,9 +202,9 @@ class Kinematics:
             NaN at a type-2 singularity. The coordinates are those of the machine's own frames,
             without the base and tool frames that its file may state.
         """
-        rows, shape = self._own_rows(pose)
-        q = self._machine.inverse(self._slots, rows)
-        by_q = self._machine.forward_jacobian(self._slots, rows, q)
+        rows, shape = self.own_rows(pose)
+        q = self.machine.inverse(self.slots, rows)
+        by_q = self.machine.forward_jacobian(self.slots, rows, q)
         free = [POSE.index(name) for name in self.coordinates]
         return by_q[:, free].reshape(*shape, len(free), self.n_actuators)
 
@@ -231,40 +244,43 @@ class Kinematics:
         if given.shape[-3:] != (3, 4, 4):
             raise ArgumentError(f"motion must have shape (..., 3, 4, 4), found {given.shape}")
         rows, _ = as_rows("motion", given, 4)
-        own = self._frames.motion_inward(rows.reshape(-1, 3, 4, 4))
-        velocity, acceleration = self._machine.rates(self._slots, np.ascontiguousarray(own))
+        own = self.frames.motion_inward(rows.reshape(-1, 3, 4, 4))
+        velocity, acceleration = self.machine.rates(self.slots, np.ascontiguousarray(own))
         shape = (*given.shape[:-3], self.n_actuators)
         return velocity.reshape(shape), acceleration.reshape(shape)
 
     # ----------------------------------------------------------------------------------------------
 
-    def _own_rows(self, pose: ArrayLike, name: str = "pose") -> tuple[FloatArray, tuple[int, ...]]:
-        """Poses of the user as rows of the machine's own, and the batch's shape."""
+    def own_rows(self, pose: ArrayLike, name: str = "pose") -> tuple[FloatArray, tuple[int, ...]]:
+        """Poses in the user's frames (..., 6) as rows (N, 6) in the machine's own, and the shape.
+
+        What the compiled `machine` takes.
+        """
         rows, shape = as_rows(name, pose, 6)
-        return self._frames.inward(rows), shape
+        return self.frames.inward(rows), shape
 
     def _completed(self, rows: FloatArray, match: Match) -> tuple[FloatArray, FloatArray]:
         if match is None:
             raise ArgumentError("match must be True or names of coordinates, found None")
         places = matched_coordinates(match, self.model.match, self.coordinates)
-        return complete(self._machine, self.model.map, self._slots, rows, places)
+        return complete(self.machine, self.model.map, self.slots, rows, places)
 
-    def _subject(self, q: FloatArray) -> modes.Subject:
-        """What certificates and searches for modes need, at coordinates (n,) or (N, n)."""
+    def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
+        """The closures at coordinates (n,) or (N, n), for certificates and searches for modes."""
         limbs = self.model.limbs
-        return modes.Subject(
-            self._machine,
+        return AssemblyProblem(
+            self.machine,
             self.model.map,
             [KINDS[limb.kind].all_rows(limb.couple > 0) for limb in limbs],
             [limb.couple for limb in limbs],
             self.length,
-            self._slots,
+            self.slots,
             q,
         )
 
-    def _steps(self, own: FloatArray, q: FloatArray) -> FloatArray:
-        """Closure rows by a scaled twist, (N, rows, m)."""
-        return self._machine.closure(self._slots, own, q).by_step
+    def closure_by_twist(self, own: FloatArray, q: FloatArray) -> FloatArray:
+        """Closure rows by a scaled twist, (N, rows, m), at own poses (N, 6) and q (N, n)."""
+        return self.machine.closure(self.slots, own, q).by_step
 
 
 def _limb(limb: Limb) -> dict[str, Any]:

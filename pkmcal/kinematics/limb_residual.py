@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import Geometries
-from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.robot import Robot, require_parallel
 
 
 class LimbResidual:
@@ -48,7 +48,7 @@ class LimbResidual:
     >>> import pkmcal as pk
     >>> robot = pk.load("hexapod")
     >>> poses = robot.home + 10.0 * np.eye(6)[:3]
-    >>> cost = LimbResidual(robot, poses, robot.inverse(poses), ["offset*"])
+    >>> cost = LimbResidual(robot, poses, robot.inverse(poses), free=["offset*"])
     >>> cost(cost.nominal + [[0.0] * 6, [0.1] * 6]).round(6)
     array([0. , 0.1])
     """
@@ -58,8 +58,10 @@ class LimbResidual:
         robot: Robot,
         poses: ArrayLike,
         actuators: ArrayLike,
+        *,
         free: Sequence[str] | None = None,
     ) -> None:
+        require_parallel(robot)
         rows, shape = as_rows("poses", poses, 6)
         q, q_shape = as_rows("actuators", actuators, robot.n_actuators)
         if len(shape) != 1 or shape != q_shape or not len(rows):
@@ -76,7 +78,7 @@ class LimbResidual:
         self._ascending = np.argsort(places)
         self._places = places[self._ascending]
         self._robot = robot
-        self._poses = np.ascontiguousarray(robot._frames.inward(rows))
+        self._poses = np.ascontiguousarray(robot.frames.inward(rows))
         self._actuators = q
 
     def __call__(self, values: ArrayLike) -> FloatArray:
@@ -103,7 +105,7 @@ class LimbResidual:
 
     def of_slots(self, slots: FloatArray) -> FloatArray:
         """Residual (N,) of geometries as `geometries` returns them, mm."""
-        machine = self._robot._machine
+        machine = self._robot.machine
         cost = machine.closure_cost(slots, self._poses, self._actuators)
         residual: FloatArray = np.sqrt(cost / (len(self._poses) * machine.rows))
         return residual

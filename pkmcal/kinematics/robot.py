@@ -19,8 +19,8 @@ from pkmcal.geometry.model import Model
 from pkmcal.kinematics import overconstrained
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
-from pkmcal.modes import find as modes
 from pkmcal.modes.assemblies import Assemblies
+from pkmcal.modes.find import assemblies, continue_path, find_modes, pose_distance
 
 
 class Robot(Kinematics):
@@ -87,8 +87,8 @@ class Robot(Kinematics):
         >>> bool(abs(pose[0] - 400 * np.tan(0.2)) < 1e-9)
         True
         """
-        rows, shape = self._own_rows(pose)
-        return self._frames.outward(self._completed(rows, match)[0]).reshape(*shape, 6)
+        rows, shape = self.own_rows(pose)
+        return self.frames.outward(self._completed(rows, match)[0]).reshape(*shape, 6)
 
     def violation(self, pose: ArrayLike) -> FloatArray:
         """How far a pose is from one the machine can take.
@@ -104,9 +104,9 @@ class Robot(Kinematics):
             The largest closure error that is left with the limbs at their inverse, mm. Near 0
             where six numbers are free, or where they fit.
         """
-        rows, shape = self._own_rows(pose)
-        q = self._machine.inverse(self._slots, rows)
-        residual = self._machine.closure(self._slots, rows, q).residual
+        rows, shape = self.own_rows(pose)
+        q = self.machine.inverse(self.slots, rows)
+        residual = self.machine.closure(self.slots, rows, q).residual
         return np.asarray(np.abs(residual).max(axis=1)).reshape(shape)
 
     def feasible(self, pose: ArrayLike) -> Feasibility:
@@ -122,8 +122,8 @@ class Robot(Kinematics):
         Feasibility
             ``.ok`` for each pose; reach, stroke and joint cones for each limb.
         """
-        rows, shape = self._own_rows(pose)
-        drive, on_base, on_platform = self._machine.limbs(self._slots, rows)
+        rows, shape = self.own_rows(pose)
+        drive, on_base, on_platform = self.machine.limbs(self.slots, rows)
         found = feasibility(self.model.limbs, drive, on_base, on_platform)
         return Feasibility(
             *(
@@ -169,30 +169,31 @@ class Robot(Kinematics):
             raise ArgumentError(f"q must have shape ({self.n_actuators},), found {np.shape(q)}")
         if starts is not None:
             whole("starts", starts, 0, note=" or None")
-        subject = self._subject(rows[0])
-        found = modes.find(subject, starts)
-        apart = modes.distance(found.poses, self._own_home[None], self.length)
-        own = np.ascontiguousarray(found.poses[np.argsort(apart)])
-        poses = self._frames.outward(own)
+        problem = self.assembly_problem(rows[0])
+        found = find_modes(problem, starts)
+        apart = pose_distance(found.poses, self.own_home[None], self.length)
+        order = np.argsort(apart)
+        own = np.ascontiguousarray(found.poses[order])
+        poses = self.frames.outward(own)
 
-        def led(pose: FloatArray, actuators: ArrayLike | None, steps: int) -> FloatArray:
-            own = self._frames.inward(pose[None])
+        def continued(pose: FloatArray, actuators: ArrayLike | None, steps: int) -> FloatArray:
+            own = self.frames.inward(pose[None])
             if actuators is None:
-                begin = self._machine.inverse(self._slots, own)
+                begin = self.machine.inverse(self.slots, own)
             else:
                 begin = as_rows("actuators", actuators, self.n_actuators)[0]
-            end = modes.led(subject, own, begin, steps)
-            outward: FloatArray = self._frames.outward(end)[0]
+            end = continue_path(problem, own, begin, steps)
+            outward: FloatArray = self.frames.outward(end)[0]
             return outward
 
-        return modes.assemblies(
-            subject,
+        return assemblies(
+            problem,
             found,
-            poses,
-            np.argsort(apart),
-            _apart=lambda pose: modes.distance(own, self._frames.inward(pose), self.length),
-            _feasible=lambda: self.feasible(poses).ok,
-            _led=led,
+            order,
+            poses=poses,
+            distance=lambda pose: pose_distance(own, self.frames.inward(pose), self.length),
+            feasible=lambda: self.feasible(poses).ok,
+            continued=continued,
         )
 
     # errors of its geometry -----------------------------------------------------------------------
@@ -215,9 +216,9 @@ class Robot(Kinematics):
             NaN at a type-2 singularity. With more closures than free coordinates it is that of the
             pose which misses them least.
         """
-        given, own, q, shape = self._visited(pose, actuators)
+        given, own, q, shape = self._commanded(pose, actuators)
         errors = self._by_numbers(own, q, twists=False)
-        errors = self._through_ties(self._frames.rates_outward(own, given, errors))
+        errors = self._through_ties(self.frames.rates_outward(own, given, errors))
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def error_twists(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
@@ -243,24 +244,26 @@ class Robot(Kinematics):
         >>> bool(abs(twists[[3, 4, 5, 0, 1, 2]] - rates).max() < 1e-12)
         True
         """
-        _, own, q, shape = self._visited(pose, actuators)
+        _, own, q, shape = self._commanded(pose, actuators)
         errors = self._by_numbers(own, q, twists=True)
-        errors = self._through_ties(self._frames.twists_outward(own, errors))
+        errors = self._through_ties(self.frames.twists_outward(own, errors))
         return errors.reshape(*shape, 6, len(self.geometry))
 
-    def visited(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+    def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Pose, actuator coordinates and batch shape of poses (..., 6)."""
-        rows, _, q, shape = self._visited(places, None)
+        rows, _, q, shape = self._commanded(places, None)
         return rows, q, shape
 
-    def _visited(
+    visited = commanded
+
+    def _commanded(
         self, pose: ArrayLike, actuators: ArrayLike | None
     ) -> tuple[FloatArray, FloatArray, FloatArray, tuple[int, ...]]:
         """Poses as given and the machine's own, their actuators, and the batch's shape."""
         given, shape = as_rows("pose", pose, 6)
-        own = self._frames.inward(given)
+        own = self.frames.inward(given)
         if actuators is None:
-            return given, own, self._machine.inverse(self._slots, own), shape
+            return given, own, self.machine.inverse(self.slots, own), shape
         q, q_shape = as_rows("actuators", actuators, self.n_actuators)
         if q_shape != shape:
             raise ArgumentError(f"actuators are a batch {q_shape}, poses a batch {shape}")
@@ -269,12 +272,12 @@ class Robot(Kinematics):
     def _by_numbers(self, own: FloatArray, q: FloatArray, twists: bool) -> FloatArray:
         """How the machine's own pose follows each number of each limb, (N, 6, numbers)."""
         columns = self.geometry.slot_index.astype(np.int32)
-        if self._machine.rows > self._machine.m:
+        if self.machine.rows > self.machine.m:
             units = self.geometry.units[: len(columns)]
             return overconstrained.error_jacobian(
-                self._machine, self._slots, own, q, columns, units, twists
+                self.machine, self.slots, own, q, columns, units, twists
             )
-        return self._machine.error_jacobian(self._slots, own, q, columns, twists)
+        return self.machine.error_jacobian(self.slots, own, q, columns, twists)
 
     def _through_ties(self, errors: FloatArray) -> FloatArray:
         """The same (N, 6, p) with the columns of named parameters after those of the numbers."""
@@ -301,15 +304,15 @@ class Robot(Kinematics):
         """
         return Robot(replace(self.model, geometry=self.geometry.replace(changes)))
 
-    def _nudged(self, values: FloatArray) -> Robot:
+    def _with_values(self, values: FloatArray) -> Robot:
         """`replace` for numbers (p,) near the present ones, without ordering the elimination anew.
 
         Three times as fast, for machines that live as long as one step of a search.
         """
-        nudged = copy(self)
-        nudged.model = replace(self.model, geometry=self.geometry.replace(values))
-        nudged._slots = np.ascontiguousarray(nudged.model.geometry.slots)
-        return nudged
+        changed = copy(self)
+        changed.model = replace(self.model, geometry=self.geometry.replace(values))
+        changed.slots = np.ascontiguousarray(changed.model.geometry.slots)
+        return changed
 
     def save(self, path: str | PathLike[str], comment: str = "") -> None:
         """Write the robot file; `load` reads it back to the last bit.

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal.arguments import did_you_mean, instance, words
-from pkmcal.arms.arm import ERRORS, SerialArm
+from pkmcal.arms.arm import SerialArm
+from pkmcal.arms.inputs import ERRORS
 from pkmcal.arrays import FloatArray, Int32Array, as_rows
 from pkmcal.core import screws
 from pkmcal.exceptions import ArgumentError
@@ -99,7 +100,7 @@ class ArmMachine:
         """With other joint errors (6 n,), mm and rad."""
         return ArmMachine(self.arm.replace(np.reshape(values, (-1, 6))))
 
-    _nudged = replace
+    _with_values = replace
 
     def forward(self, q: ArrayLike, guess: ArrayLike | None = None) -> ArmPoses:
         """Poses at joint coordinates (N, n); an arm needs no guess."""

@@ -1,13 +1,14 @@
-"""Find every assembly mode: paths from a start system, random starts, proofs, mirror images."""
+"""Find every assembly mode: by paths and random starts, with certificates and mirror images."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core import screws
 from pkmcal.core.machine import Machine
 from pkmcal.modes.assemblies import Assemblies, Signs
@@ -22,7 +23,7 @@ AT_ONCE = 2000  # certificates: 12 x 12 matrices in memory
 STARTS = 2000  # random ones, where the paths prove nothing
 
 
-class Subject(NamedTuple):
+class AssemblyProblem(NamedTuple):
     """A machine at given actuator coordinates.
 
     Attributes
@@ -38,7 +39,7 @@ class Subject(NamedTuple):
     length : float
         Characteristic length, mm.
     slots, q : ndarray
-        Geometry (limbs, SLOTS), and coordinates (n,), or (N, n) for `proofs`.
+        Geometry (limbs, SLOTS), and coordinates (n,), or (N, n) for `certify_rows`.
     """
 
     machine: Machine
@@ -62,7 +63,7 @@ class Subject(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Modes of a machine in its own frame, before they are put in order."""
+    """Modes in the machine's own frame, not yet in order."""
 
     poses: FloatArray
     proof: Certificate
@@ -97,11 +98,11 @@ def poses_of(map: str, frames: FloatArray) -> FloatArray:
     return poses
 
 
-def find(subject: Subject, starts: int | None) -> Found:
-    """All modes by paths; by random starts where paths leave a doubt or `starts` says so."""
-    square = subject.machine.rows == subject.machine.m
-    spheres = subject.spheres()
-    start = start_system(subject.map, subject.rows, spheres) if square else None
+def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
+    """Find all modes by paths; by random starts where paths prove nothing, or with `starts`."""
+    square = problem.machine.rows == problem.machine.m
+    spheres = problem.spheres()
+    start = start_system(problem.map, problem.rows, spheres) if square else None
     ends, real, reason, all_proven = None, np.empty((0, 12)), "", False
     if not np.isfinite(spheres).all():
         nothing = np.empty(0)
@@ -112,8 +113,8 @@ def find(subject: Subject, starts: int | None) -> Found:
     elif start is None:
         reason = "no start system for such limbs"
     else:
-        ends = endpoints(subject.machine, start, subject.map, spheres)
-        real, all_proven = _real_ones(subject, ends)
+        ends = endpoints(problem.machine, start, problem.map, spheres)
+        real, all_proven = _real_solutions(problem, ends)
         if ends.lost > 0:
             reason = f"{ends.lost} of {ends.paths} paths lost"
         elif ends.lost:
@@ -122,8 +123,8 @@ def find(subject: Subject, starts: int | None) -> Found:
     if starts is None:
         starts = STARTS if reason else 0
     if starts:
-        real = np.concatenate([real, _from_starts(subject, spheres, starts)])
-    poses, proof = _checked(subject, real)
+        real = np.concatenate([real, _from_random_starts(problem, spheres, starts)])
+    poses, proof = _certified(problem, real)
     if not reason and not proof.ok.all():
         reason = f"{np.sum(~proof.ok)} modes not certified"
     if not reason and len(poses) != expected:
@@ -138,20 +139,20 @@ def find(subject: Subject, starts: int | None) -> Found:
     return Found(poses, proof, complete, reason, ends)
 
 
-def _real_ones(subject: Subject, ends: Endpoints) -> tuple[FloatArray, bool]:
-    """The frames among the ends of paths that are real, or not proven to be otherwise.
+def _real_solutions(problem: AssemblyProblem, ends: Endpoints) -> tuple[FloatArray, bool]:
+    """Frames at the ends of paths that are real, or not proven to be otherwise.
 
     And whether all ends, complex ones too, are certified to be as many different solutions.
     """
-    closures = subject.closures()
-    u = newton(closures, _scaled(ends.frames, subject.length), 1)
+    closures = problem.closures()
+    u = newton(closures, _scaled(ends.frames, problem.length), 1)
     proof = certify(closures, u)
     imaginary = np.abs(u.imag).max(axis=1, initial=0.0)
     with np.errstate(invalid="ignore"):
-        complex_ones = (imaginary > NEARLY_REAL) | (imaginary * subject.length > proof.error)
+        complex_ones = (imaginary > NEARLY_REAL) | (imaginary * problem.length > proof.error)
     frames: FloatArray = newton(closures, np.ascontiguousarray(u.real[~complex_ones]), 3)
-    frames[:, 9:] *= subject.length
-    apart = np.abs(u[:, None] - u[None]).max(axis=2, initial=0.0) * subject.length
+    frames[:, 9:] *= problem.length
+    apart = np.abs(u[:, None] - u[None]).max(axis=2, initial=0.0) * problem.length
     alike = apart <= proof.error + proof.error[:, None]
     return frames, bool(proof.ok.all() and np.sum(alike) == len(u))
 
@@ -163,7 +164,7 @@ def _scaled(frames: Any, length: float) -> Any:
     return u
 
 
-def _from_starts(subject: Subject, spheres: FloatArray, starts: int) -> FloatArray:
+def _from_random_starts(problem: AssemblyProblem, spheres: FloatArray, starts: int) -> FloatArray:
     """Frames found by Newton's method from random orientations, on the sphere of some limb."""
     rng = np.random.default_rng(0)
     quaternion = rng.normal(size=(starts, 4))
@@ -172,24 +173,24 @@ def _from_starts(subject: Subject, spheres: FloatArray, starts: int) -> FloatArr
     guess[:, 3] = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
     guess[:, 4] = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
     guess[:, 5] = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    if subject.map == "2tpr2tps":
+    if problem.map == "2tpr2tps":
         guess[:, 4] = rng.uniform(-np.pi, np.pi, starts)
     turned = frames_of(guess)[:, :9].reshape(-1, 3, 3)
     limb = rng.integers(len(spheres), size=starts)
     way = rng.normal(size=(starts, 3))
     way *= spheres[limb, 6, None] / np.linalg.norm(way, axis=1, keepdims=True)
     guess[:, :3] = spheres[limb, 3:6] + way - np.einsum("nij,nj->ni", turned, spheres[limb, 0:3])
-    q = np.ascontiguousarray(np.broadcast_to(subject.q, (starts, len(subject.q))))
-    poses, status, _, _ = subject.machine.forward(subject.slots, q, guess, threads=None)
+    q = np.ascontiguousarray(np.broadcast_to(problem.q, (starts, len(problem.q))))
+    poses, status, _, _ = problem.machine.forward(problem.slots, q, guess, threads=None)
     return frames_of(poses[status == 0])
 
 
-def _checked(subject: Subject, frames: FloatArray) -> tuple[FloatArray, Certificate]:
+def _certified(problem: AssemblyProblem, frames: FloatArray) -> tuple[FloatArray, Certificate]:
     """Poses of real frames, each once, and their certificates."""
-    poses = poses_of(subject.map, frames[np.isfinite(frames).all(axis=1)])
-    u = _scaled(frames_of(poses), subject.length)
-    if subject.machine.rows == subject.machine.m:
-        closures = subject.closures()
+    poses = poses_of(problem.map, frames[np.isfinite(frames).all(axis=1)])
+    u = _scaled(frames_of(poses), problem.length)
+    if problem.machine.rows == problem.machine.m:
+        closures = problem.closures()
         f, _, f_abs, _, _ = closures(u)
         closed = (np.abs(f) <= CLOSED * f_abs).all(axis=1)
         poses, u = poses[closed], u[closed]
@@ -199,49 +200,49 @@ def _checked(subject: Subject, frames: FloatArray) -> tuple[FloatArray, Certific
         proof = Certificate(np.zeros(len(u), dtype=bool), nothing, nothing)
     kept: list[int] = []
     for k in np.lexsort((~proof.ok,)):
-        apart = np.abs(u[kept] - u[k]).max(axis=1, initial=0.0) * subject.length
-        reach = np.where(proof.ok[kept], proof.unique[kept], BLURRED * subject.length)
+        apart = np.abs(u[kept] - u[k]).max(axis=1, initial=0.0) * problem.length
+        reach = np.where(proof.ok[kept], proof.unique[kept], BLURRED * problem.length)
         # the same solution: within the ball in which there is only one, its own error included
         if not (apart + np.nan_to_num(proof.error[k]) < reach).any():
             kept.append(int(k))
     return poses[kept], Certificate(proof.ok[kept], proof.error[kept], proof.unique[kept])
 
 
-def proofs(subject: Subject, poses: FloatArray) -> Certificate:
-    """Certificates of poses (N, 6), each at its own coordinates: `subject.q` is (N, n)."""
+def certify_rows(problem: AssemblyProblem, poses: FloatArray) -> Certificate:
+    """Certify poses (N, 6), each at its own coordinates: `problem.q` is (N, n)."""
     ok, error, unique = np.zeros(len(poses), dtype=bool), *np.full((2, len(poses)), np.nan)
     solved = np.isfinite(poses).all(axis=1)
-    if subject.machine.rows == subject.machine.m:
+    if problem.machine.rows == problem.machine.m:
         for part in np.array_split(np.flatnonzero(solved), 1 + solved.sum() // AT_ONCE):
-            u = _scaled(frames_of(poses[part]), subject.length)
-            proof = certify(subject._replace(q=subject.q[part]).closures(), u)
+            u = _scaled(frames_of(poses[part]), problem.length)
+            proof = certify(problem._replace(q=problem.q[part]).closures(), u)
             ok[part], error[part], unique[part] = proof.ok, proof.error, proof.unique
     return Certificate(ok, error, unique)
 
 
-def distance(poses: FloatArray, pose: FloatArray, length: float) -> FloatArray:
-    """How far poses (N, 6) are from one (1, 6), mm: p, and R as its largest entry times length."""
+def pose_distance(poses: FloatArray, pose: FloatArray, length: float) -> FloatArray:
+    """Distance of poses (N, 6) from one (1, 6), mm: of p, and largest entry of R times length."""
     difference = _scaled(frames_of(poses) - frames_of(pose), length)
     return np.asarray(np.abs(difference).max(axis=1, initial=0.0) * length)
 
 
-def signs(subject: Subject, poses: FloatArray) -> Signs:
+def signs(problem: AssemblyProblem, poses: FloatArray) -> Signs:
     """Sign of the closures' determinant at poses (N, 6); 0 where it has none."""
-    if subject.machine.rows != subject.machine.m:
+    if problem.machine.rows != problem.machine.m:
         return np.zeros(len(poses), dtype=np.int8)
-    q = np.ascontiguousarray(np.broadcast_to(subject.q, (len(poses), len(subject.q))))
-    steps = subject.machine.closure(subject.slots, poses, q).by_step
+    q = np.ascontiguousarray(np.broadcast_to(problem.q, (len(poses), len(problem.q))))
+    steps = problem.machine.closure(problem.slots, poses, q).by_step
     return np.asarray(np.sign(np.linalg.det(steps)), dtype=np.int8)
 
 
-def mirrored(subject: Subject, poses: FloatArray) -> Int32Array:
-    """Of each pose which other is its mirror image in the plane of the anchors; -1 for none."""
+def mirror_images(problem: AssemblyProblem, poses: FloatArray) -> Int32Array:
+    """Index of each pose's mirror image in the plane of the anchors; -1 where none is."""
     none = np.full(len(poses), -1, dtype=np.int32)
-    spheres, frames = subject.spheres(), frames_of(poses)
+    spheres, frames = problem.spheres(), frames_of(poses)
     b, c = spheres[:, 0:3], spheres[:, 3:6]
-    if subject.map == "planar" or not len(poses):
+    if problem.map == "planar" or not len(poses):
         return none
-    if subject.map == "translation":
+    if problem.map == "translation":
         b, c = np.zeros_like(b), c - b
     base, platform = _plane(c), _plane(b)
     if base is None or platform is None:
@@ -250,23 +251,25 @@ def mirrored(subject: Subject, poses: FloatArray) -> Int32Array:
     at, over = base[1], 2.0 * platform[1] * platform[0]
     R, p = frames[:, :9].reshape(-1, 3, 3), frames[:, 9:]
     image = frames.copy()
-    if subject.map != "translation":
+    if problem.map != "translation":
         image[:, :9] = (flip @ R @ turn).reshape(-1, 9)
     image[:, 9:] = p @ flip + 2.0 * at * base[0] + (R @ over) @ flip
-    near = np.abs(_scaled(image[:, None] - frames[None], subject.length)).max(axis=2)
+    near = np.abs(_scaled(image[:, None] - frames[None], problem.length)).max(axis=2)
     which = near.argmin(axis=1)
     return np.where(near.min(axis=1) < 1e-7, which, none).astype(np.int32)
 
 
-def led(subject: Subject, pose: FloatArray, begin: FloatArray, steps: int) -> FloatArray:
-    """The pose (1, 6) after the actuators went from `begin` (1, n) at `pose` to `q`, straight.
+def continue_path(
+    problem: AssemblyProblem, pose: FloatArray, begin: FloatArray, steps: int
+) -> FloatArray:
+    """Follow a pose (1, 6) while the actuators go straight from `begin` (1, n) to `problem.q`.
 
-    NaN where a type-2 singularity is on the way.
+    The pose there; NaN where a type-2 singularity is on the way.
     """
-    machine, slots = subject.machine, subject.slots
+    machine, slots = problem.machine, problem.slots
     at, side = pose, 0.0
     for k in range(steps + 1):
-        q = begin + (subject.q - begin) * (k / steps)
+        q = begin + (problem.q - begin) * (k / steps)
         at, status, _, _ = machine.forward(slots, q, at, threads=1)
         if status[0]:
             return np.full((1, 6), np.nan)
@@ -290,14 +293,31 @@ def _plane(points: FloatArray) -> tuple[FloatArray, float] | None:
 
 
 def assemblies(
-    subject: Subject, found: Found, outward: FloatArray, order: NDArray[np.intp], **calls: object
+    problem: AssemblyProblem,
+    found: Found,
+    order: IntArray,
+    *,
+    poses: FloatArray,
+    distance: Callable[[FloatArray], FloatArray],
+    feasible: Callable[[], BoolArray],
+    continued: Callable[[FloatArray, ArrayLike | None, int], FloatArray],
 ) -> Assemblies:
-    """The result: modes in `order`, their poses in the user's frames `outward`."""
+    """Collect modes in `order` with their `poses` in the user's frames; calls as `Assemblies`'."""
     proof, ends = found.proof, found.ends
     own = found.poses[order]
-    counts = (ends.paths, ends.far, ends.lost) if ends else (0, 0, 0)
-    certified: BoolArray = proof.ok[order]
     return Assemblies(
-        outward, certified, proof.error[order], proof.unique[order], found.complete, found.reason,
-        signs(subject, own), mirrored(subject, own), *counts, **calls,  # type: ignore[arg-type]
-    )  # fmt: skip
+        poses=poses,
+        certified=np.asarray(proof.ok[order]),
+        error=proof.error[order],
+        unique=proof.unique[order],
+        complete=found.complete,
+        reason=found.reason,
+        sign=signs(problem, own),
+        mirror=mirror_images(problem, own),
+        paths=ends.paths if ends else 0,
+        far=ends.far if ends else 0,
+        lost=ends.lost if ends else 0,
+        _distance=distance,
+        _feasible=feasible,
+        _continued=continued,
+    )

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.limits import Feasibility
-from pkmcal.kinematics.workspace import dexterity
-
-if TYPE_CHECKING:
-    from pkmcal.moves.move import Move
+from pkmcal.kinematics.robot import Robot
+from pkmcal.result import Result
 
 _STEPS = 2000  # along a move
 _HALVINGS = 50  # of a step, to the time a limit is met
@@ -21,8 +21,35 @@ _NEAR = 4.0  # times what a margin falls by in a step: no dip between steps goes
 _STILL = 1e-9  # mm, rad or share: what a margin at rest changes by
 
 
-@dataclass(frozen=True)
-class Event:
+class Sample(Protocol):
+    """A machine at times of a move."""
+
+    @property
+    def pose(self) -> FloatArray:
+        """Poses (N, 6)."""
+
+
+class Sampled(Protocol):
+    """What is asked of a move; `Move` describes each."""
+
+    @property
+    def robot(self) -> Robot:
+        """The machine."""
+
+    @property
+    def start(self) -> FloatArray:
+        """Its first pose (6,)."""
+
+    @property
+    def duration(self) -> float:
+        """How long it takes, s."""
+
+    def sample(self, t: FloatArray) -> Sample:
+        """The machine at times (N,)."""
+
+
+@dataclass(frozen=True, repr=False)
+class Event(Result):
     """A limit that a move meets.
 
     Attributes
@@ -31,8 +58,8 @@ class Event:
         s; when it is first broken.
     until : float
         s; when it is kept again, or the end of the move.
-    what : str
-        The limit: "reach", "stroke", "base_cone", "platform_cone" or "singularity".
+    what : {"reach", "stroke", "base_cone", "platform_cone", "singularity"}
+        The limit.
     limb : int or None
         Which limb, counted from 1; None for the machine as a whole.
     """
@@ -42,13 +69,19 @@ class Event:
     what: str
     limb: int | None
 
+    def _parts(self) -> Iterator[str]:
+        limb = "" if self.limb is None else f"limb {self.limb}: "
+        broken = "met" if self.what == "singularity" else "broken"
+        what = self.what.replace("_", " ")
+        yield f"{self.time:.4f} to {self.until:.4f} s  {limb}{what} {broken}"
 
-def events(move: Move) -> list[Event]:
+
+def events(move: Sampled) -> list[Event]:
     """Limits that are broken and singularities that are met, with their times, in order.
 
     Strokes, joint cones and reach of every limb; a singularity is met where the determinant of
     the closures changes its sign, and from there the machine is on its other side. (With more
-    closures than free coordinates there is no determinant: `conditioning` tells.)
+    closures than free coordinates there is no determinant: see `Move.conditioning`.)
 
     Each limit's margin is looked at 2001 times and followed to its least between them, so that
     a limit is found however briefly it is broken. What can be missed lasts less than 1/1000 of
@@ -72,7 +105,7 @@ def events(move: Move) -> list[Event]:
     return sorted(found, key=lambda event: event.time)
 
 
-def _names(move: Move) -> list[tuple[str, int | None]]:
+def _names(move: Sampled) -> list[tuple[str, int | None]]:
     limbs = range(1, len(move.robot.model.limbs) + 1)
     names: list[tuple[str, int | None]] = [
         (what, limb) for what in Feasibility.LIMITS for limb in limbs
@@ -80,7 +113,7 @@ def _names(move: Move) -> list[tuple[str, int | None]]:
     return [*names, ("singularity", None)]
 
 
-def _margins(move: Move, times: FloatArray) -> FloatArray:
+def _margins(move: Sampled, times: FloatArray) -> FloatArray:
     """How far inside each limit at times, (N, limits); below 0 where it is broken.
 
     Reach is left where a limb's actuator can no longer move it: where its transmission is 0.
@@ -96,7 +129,7 @@ def _margins(move: Move, times: FloatArray) -> FloatArray:
     return np.hstack([*found, np.where(np.isnan(side), np.inf, side)[:, None]])
 
 
-def _dips(move: Move, times: FloatArray) -> FloatArray:
+def _dips(move: Sampled, times: FloatArray) -> FloatArray:
     """Where margins that may vanish between times (N,) are least."""
     margins = _margins(move, times)
     before, here, after = margins[:-2], margins[1:-1], margins[2:]
@@ -113,7 +146,7 @@ def _dips(move: Move, times: FloatArray) -> FloatArray:
     return (low + high) / 2
 
 
-def _turn(move: Move, low: float, high: float, column: int, before: bool) -> float:
+def _turn(move: Sampled, low: float, high: float, column: int, before: bool) -> float:
     """When a limit changes between two times."""
     for _ in range(_HALVINGS):
         middle = (low + high) / 2

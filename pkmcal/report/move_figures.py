@@ -81,7 +81,7 @@ def in_space(robot: Robot, poses: ArrayLike, labels: Sequence[str], title: str) 
         Above all.
     """
     rows, _ = as_rows("poses", poses, 6)
-    own = np.ascontiguousarray(robot._frames.inward(rows))
+    own = np.ascontiguousarray(robot.frames.inward(rows))
     base, anchors, joints = places(robot, own)
     figure = _figure(0.4 + 3.7 * len(rows), 4.3, None)  # layouts leave no room for 3-D labels
     figure.subplots_adjust(left=0.01, right=0.95, bottom=0.05, top=0.88, wspace=0.02)
@@ -115,8 +115,8 @@ def in_space(robot: Robot, poses: ArrayLike, labels: Sequence[str], title: str) 
 
 def places(robot: Robot, own: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Base joints (limbs, 3), anchors and platform joints (N, limbs, 3) at own poses (N, 6)."""
-    slots = robot._slots
-    drive, direction, _ = robot._machine.limbs(slots, own)
+    slots = robot.slots
+    drive, direction, _ = robot.machine.limbs(slots, own)
     platform = np.column_stack([slots[:, 3:6], np.ones(len(slots))])
     joints = (screw.from_pose(own) @ platform.T).transpose(0, 2, 1)[..., :3]
     rods = slots[:, SLOTS.index("rod")]

@@ -60,9 +60,9 @@ def skeleton(robot: Robot | SerialArm, q: FloatArray, guess: FloatArray) -> Skel
     solved = machine.forward(q, guess)
     if not solved.ok:
         return None
-    own, _ = machine._own_rows(solved.pose)
-    slots = machine._slots
-    _, towards, _ = machine._machine.limbs(slots, own)
+    own, _ = machine.own_rows(solved.pose)
+    slots = machine.slots
+    _, towards, _ = machine.machine.limbs(slots, own)
     base, platform = np.ascontiguousarray(slots[:, :3]), np.ascontiguousarray(slots[:, 3:6])
     ends = seen_points(own[0], platform)[0]
     lines = []
@@ -131,7 +131,11 @@ def _chain(arm: SerialArm, q: FloatArray) -> FloatArray:
         home = np.eye(4)
         home[:3, 3] = arm.points[i - 1]
         part = SerialArm(
-            arm.axes[:i], arm.points[:i], home, arm.kinds[:i], joint_errors=arm.joint_errors[:i]
+            arm.axes[:i],
+            arm.points[:i],
+            home,
+            kinds=arm.kinds[:i],
+            joint_errors=arm.joint_errors[:i],
         )
         at.append(part.forward(q[:i])[:3, 3])
     at.append(arm.forward(q)[:3, 3])

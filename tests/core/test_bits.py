@@ -73,7 +73,7 @@ def distances(isa: int, part: slice) -> list[np.ndarray]:
 
 def closure_cost(isa: int, part: slice) -> list[np.ndarray]:
     robot = pk.load("rotary-delta")
-    robot._machine.isa = isa
+    robot.machine.isa = isa
     at = robot.home + np.random.default_rng(21).uniform(-20, 20, (23, 6)) * [1, 1, 1, 0, 0, 0]
     cost = LimbResidual(robot, at, robot.inverse(at))
     values = cost.nominal + np.random.default_rng(22).normal(0, 0.01, (ROWS, len(cost.free)))
@@ -85,9 +85,9 @@ def spheres(isa: int, part: slice) -> list[np.ndarray]:
     found = []
     for name, size in (("rotary-delta", 1.0), ("3rps", 900.0)):
         robot = pk.load(name)
-        robot._machine.isa = isa
+        robot.machine.isa = isa
         q = size * np.random.default_rng(23).normal(1.0, 1.0, (ROWS, robot.n_actuators))
-        found.append(robot._machine.spheres(robot._slots, q[part]))
+        found.append(robot.machine.spheres(robot.slots, q[part]))
     return found
 
 

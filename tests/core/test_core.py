@@ -27,7 +27,7 @@ FOUND = ("pose", "status", "iterations", "residual")
 
 def on(isa: int, name: str) -> pk.Robot:
     robot = pk.load(name)
-    robot._machine.isa = isa
+    robot.machine.isa = isa
     return robot
 
 
@@ -75,11 +75,11 @@ def test_the_other_calls_give_the_same_bits_on_every_isa_and_in_every_tail(name:
     at = poses(name, 203, seed=9)
     q = on(0, name).inverse(at)
     speed, bend = np.random.default_rng(9).normal(size=(2, *q.shape))
-    motion = on(0, name)._machine.motion(on(0, name)._slots, at, q, speed, bend)[0]
+    motion = on(0, name).machine.motion(on(0, name).slots, at, q, speed, bend)[0]
     expected: dict[str, np.ndarray] = {}
     for isa in AVAILABLE:
         robot = on(isa, name)
-        slots, machine = robot._slots, robot._machine
+        slots, machine = robot.slots, robot.machine
         calls: dict[str, Callable[[slice], Any]] = {
             "inverse": lambda part, r=robot: r.inverse(at[part]),
             "jacobian": lambda part, r=robot: r.jacobian(at[part]),
@@ -144,7 +144,7 @@ def test_a_geometry_in_every_row_is_as_many_robots(name: str) -> None:
     robots = [robot.replace(each) for each in values]
     slots = np.array([each.geometry.slots for each in robots])
     for isa in AVAILABLE:
-        machine = on(isa, name)._machine
+        machine = on(isa, name).machine
         for guess in (robot.home, at):
             pose, status, _, residual = machine.forward(slots, q, guess, threads=1)
             assert not status.any() and residual.max() < 1e-9
@@ -184,20 +184,24 @@ def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
 
 def test_the_core_refuses_an_isa_a_machine_and_columns_it_does_not_have() -> None:
     robot = pk.load("hexapod")
-    machine, pose, q = robot._machine, robot.home[None], robot.inverse(robot.home)[None]
+    machine, pose, q = robot.machine, robot.home[None], robot.inverse(robot.home)[None]
     for columns in ([-1], [84], [3, 3], [4, 2]):
         with pytest.raises(ValueError, match="refused"):
-            machine.error_jacobian(robot._slots, pose, q, np.array(columns, dtype=np.int32))
+            machine.error_jacobian(robot.slots, pose, q, np.array(columns, dtype=np.int32))
     machine.isa = 3
     with pytest.raises(ValueError, match="refused"):
-        machine.forward(robot._slots, q, robot.home, None)
+        machine.forward(robot.slots, q, robot.home, None)
 
 
 # importing ----------------------------------------------------------------------------------------
 
 
-def test_importing_pkmcal_loads_nothing_heavy() -> None:
-    code = "import pkmcal, sys; print(*sorted({name.split('.')[0] for name in sys.modules}))"
+def test_a_robot_needs_numpy_and_the_core_alone() -> None:
+    code = (
+        "import pkmcal, sys; robot = pkmcal.load('hexapod');"
+        "robot.forward(robot.inverse(robot.home));"
+        "print(*sorted({name.split('.')[0] for name in sys.modules}))"
+    )
     loaded = set(run(code).stdout.split())
     assert "numpy" in loaded
     assert not loaded & {"sympy", "scipy", "matplotlib", "typer", "rich", "dask", "mpmath"}

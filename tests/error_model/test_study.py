@@ -122,7 +122,7 @@ def test_eight_rows_leave_0_12_mm_over() -> None:
 def test_the_constraints_of_two_tpr_limbs_have_rank_two_of_four() -> None:
     robot = model("eight")
     pose = model("paper").complete(POSE)[None]
-    closure = robot._machine.closure(robot._slots, pose, robot.inverse(pose))
+    closure = robot.machine.closure(robot.slots, pose, robot.inverse(pose))
     rows = closure.by_step[0, [3, 4, 6, 7]]  # plane and couple of limbs 3 and 4
     sigma = np.linalg.svd(rows, compute_uv=False)
     assert (sigma[:2] > 0.1).all() and (sigma[2:] < 1e-12).all()

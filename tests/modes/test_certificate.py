@@ -8,7 +8,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.modes import certificate
-from pkmcal.modes import find as modes
+from pkmcal.modes.find import frames_of
 
 from .. import dietmaier
 
@@ -23,9 +23,9 @@ def solved(name: str) -> tuple[certificate.Closures, np.ndarray]:
     robot = pk.load(name)
     q = robot.inverse(robot.home)
     q = q + np.random.default_rng(0).normal(size=q.shape) * (0.02 * np.abs(q) + 0.01)
-    u = modes.frames_of(robot.forward(q).pose[None])
+    u = frames_of(robot.forward(q).pose[None])
     u[:, 9:] /= robot.length
-    closures = robot._subject(q).closures()
+    closures = robot.assembly_problem(q).closures()
     return closures, certificate.newton(closures, u, 2)
 
 
@@ -70,7 +70,7 @@ def test_forty_digits_lie_within_the_error():
     robot = pk.load("linear-delta")
     q = robot.inverse(robot.home) + np.array([1.0, -2.0, 3.0])
     found = robot.forward_all(q)
-    spheres = robot._machine.spheres(robot._slots, q[None])[0]
+    spheres = robot.machine.spheres(robot.slots, q[None])[0]
     with mpmath.workdps(40):
         limbs = [[mpmath.mpf(float(v)) for v in limb] for limb in spheres]
 

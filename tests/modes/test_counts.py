@@ -108,7 +108,7 @@ def test_complex_modes_of_builtin_machines_are_as_documented(name, solutions):
     if not np.isfinite(q).all():  # the printed geometry cannot be assembled there
         q = np.full(q.shape, 200.0)
     q = q + np.random.default_rng(0).normal(size=q.shape) * (0.02 * np.abs(q) + 0.01)
-    spheres = robot._machine.spheres(robot._slots, q[None])[0]
+    spheres = robot.machine.spheres(robot.slots, q[None])[0]
     rows = [KINDS[limb.kind].all_rows(limb.couple > 0) for limb in robot.model.limbs]
     found = count(robot.model.map, rows, [[modulo(v) for v in limb] for limb in spheres])
     assert found == solutions
