@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
+from itertools import zip_longest
 
 _MOST_DECIMALS = 15  # a double has no digits beyond; also what an exact number is given
 
@@ -78,6 +79,17 @@ def displayed(value: float, unit: str) -> tuple[float, str]:
     return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
 
 
+def first_rows(rows: Sequence[int], most: int = 10) -> str:
+    """Row numbers for a message, the first `most` of them.
+
+    Examples
+    --------
+    >>> first_rows([3, 5, 8]), first_rows(range(100), 3)
+    ('3, 5, 8', '0, 1, 2, …')
+    """
+    return ", ".join(str(row) for row in rows[:most]) + (", …" if len(rows) > most else "")
+
+
 @dataclass(frozen=True)
 class Table:
     """Columns of text under their headings: as lines for a terminal, or as HTML.
@@ -90,6 +102,8 @@ class Table:
         Cells.
     left : int
         So many of the first columns are text and flush left; numbers are flush right.
+    columns : int
+        On a terminal the rows are set in so many columns side by side.
 
     Examples
     --------
@@ -101,15 +115,26 @@ class Table:
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
     left: int = 0
+    columns: int = 1
 
     def __str__(self) -> str:
+        count = -(-len(self.rows) // self.columns)
+        if self.columns > 1 and count:
+            parts = [self.rows[k : k + count] for k in range(0, len(self.rows), count)]
+            blocks = [str(Table(self.header, part, self.left)).splitlines() for part in parts]
+            widths = [max(map(len, block)) for block in blocks]
+            lined = (
+                "   ".join(line.ljust(width) for line, width in zip(lines, widths, strict=True))
+                for lines in zip_longest(*blocks, fillvalue="")
+            )
+            return "\n".join(map(str.rstrip, lined))
         lines = [list(self.header), *map(list, self.rows)]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         flush = [str.ljust] * self.left + [str.rjust] * (len(widths) - self.left)
         return "\n".join(
             "  ".join(
                 pad(cell, width) for pad, cell, width in zip(flush, line, widths, strict=True)
-            )
+            ).rstrip()
             for line in lines
         )
 

@@ -1,4 +1,4 @@
-"""Calibrations repeated on measurements that could as well have been: what the residuals say.
+"""Bootstrap of a calibration: the scatter of its parameters over resampled residuals.
 
 The wild bootstrap by pose: where the model says a pose is, the residuals of that pose are added
 again, corrected for what the fit has taken from them, with a sign drawn at random. Nothing is
@@ -21,8 +21,8 @@ from pkmcal import display
 from pkmcal.arguments import checked_seed, instance, whole
 from pkmcal.arguments import executor as checked_executor
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.equations import Equations, Point
-from pkmcal.calibration.estimator import Estimate
+from pkmcal.calibration.equations import Equations, Evaluation
+from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.least_squares import Search
 from pkmcal.exceptions import ArgumentError
@@ -42,7 +42,7 @@ class Bootstrap:
     values : ndarray (replicates, n)
         NaN where a replicate did not converge.
     stderr : ndarray (n,)
-        Standard deviation of the replicates; inf where nothing tells the parameter.
+        Standard deviation of the replicates; inf where the parameter is not determined.
     interval95 : ndarray (n, 2)
         Between these lie 95 % of the replicates.
     bias : ndarray (n,)
@@ -129,25 +129,25 @@ def bootstrap(
     """
     instance("found", found, Identification)
     whole("replicates", replicates, 2)
-    if not (found._estimate.freedom > 0).all() or not np.isfinite(found._told).all():
-        raise ArgumentError("found: no equation is left over whose residual could be drawn again")
+    if not (found.fit.estimate.freedom > 0).all() or not np.isfinite(found.fit.covariance).all():
+        raise ArgumentError("found: no degrees of freedom are left, so no residuals to draw from")
     seeds = np.random.SeedSequence(checked_seed(seed)).spawn(replicates)
     parts = [seeds[k : k + _TOGETHER] for k in range(0, replicates, _TOGETHER)]
     workers = checked_executor(executor)
-    replicate = Replicate(found._equations, found._estimate)
+    replicate = Replicate(found.fit)
     done: Iterable[FloatArray] = (workers.map if workers else map)(replicate, parts)
     values = np.concatenate(list(done))
     good = values[np.isfinite(values).all(axis=1)]
     if len(good) < 2:
         raise ArgumentError("found: its replicates do not converge, the fit is not to be trusted")
-    told = np.isfinite(found.stderr)
+    finite = np.isfinite(found.stderr)
     interval = np.quantile(good, (0.025, 0.975), axis=0).T
-    interval[~told] = -np.inf, np.inf
+    interval[~finite] = -np.inf, np.inf
     return Bootstrap(
         free=found.free,
         units=found.units,
         values=values,
-        stderr=np.where(told, good.std(axis=0, ddof=1), np.inf),
+        stderr=np.where(finite, good.std(axis=0, ddof=1), np.inf),
         interval95=interval,
         bias=good.mean(axis=0) - found.values,
         linear=found.stderr,
@@ -159,12 +159,12 @@ class Replicate:
 
     Parameters
     ----------
-    equations, estimate : Equations, Estimate
+    fit : Fit
         Of the calibration.
     """
 
-    def __init__(self, equations: Equations, estimate: Estimate) -> None:
-        self._equations, self._estimate = equations, estimate
+    def __init__(self, fit: Fit) -> None:
+        self._equations, self._estimate = equations, estimate = fit.equations, fit.estimate
         # rows of one pose take one sign
         edges = np.cumsum([0, *map(len, equations.sets)])
         self._pose = np.concatenate(equations.pose_of)
@@ -173,7 +173,7 @@ class Replicate:
                 mine = slice(edges[k], edges[k + 1])
                 self._pose[mine] = measured.pose_index + self._pose.max() + 1
         _, self._pose = np.unique(self._pose, return_inverse=True)
-        self._residuals = equations.coloured(self._corrected(), estimate.setting.noise)
+        self._residuals = equations.unwhiten(self._corrected(), estimate.state.noise)
 
     def _corrected(self) -> FloatArray:
         """Whitened residuals (M,) with the deviation that the noise has."""
@@ -195,7 +195,7 @@ class Replicate:
         return np.array([self._one(np.random.default_rng(seed)) for seed in seeds])
 
     def _one(self, random: np.random.Generator) -> FloatArray:
-        equations, at = self._equations, self._estimate.point
+        equations, at = self._equations, self._estimate.evaluation
         prior = equations.parameters.prior
         stated = np.isfinite(prior)
         centre = at.theta.copy()
@@ -206,12 +206,12 @@ class Replicate:
         values = [seen.values + r for seen, r in zip(at.predicted, drawn, strict=True)]
         return self._solved(equations.with_values(values, centre), replace(at, residuals=drawn))
 
-    def _solved(self, equations: Equations, at: Point) -> FloatArray:
-        setting = self._estimate.setting
+    def _solved(self, equations: Equations, at: Evaluation) -> FloatArray:
+        state = self._estimate.state
         search = Search(equations, at)
-        kept = setting.searched.untold
-        pins = setting.searched.singular[0] * kept.T
-        u = search.best(np.zeros(len(at.theta)), setting.noise, setting.loss, pins)
+        kept = state.fitted.unidentifiable
+        pins = state.fitted.singular[0] * kept.T
+        u = search.best(np.zeros(len(at.theta)), state.noise, state.loss, pins)
         theta = at.theta + search.scale * (u - kept @ (kept.T @ u))
         found = equations.parameters.reported(theta)
         return found if search.converged else np.full_like(found, np.nan)

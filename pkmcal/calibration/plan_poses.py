@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pkmcal import display
 from pkmcal.arguments import number, whole, word, words
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import FloatArray, IntArray, as_rows
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.identifiability import in_words, plain_basis
+from pkmcal.calibration.identifiability import as_sum, sparse_basis
 from pkmcal.calibration.optimal_design import CRITERIA, Design
-from pkmcal.calibration.parameters import Parameters, Prior, Share, parameters
+from pkmcal.calibration.parameters import FitData, Parameters, Prior, parameters
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import ideal
@@ -28,7 +28,7 @@ _DRAWS = 25  # of poses at random, to compare a plan with
 _ERROR = 0.5  # mm; what numbers may be off by that have no prior
 _TIMES, _MACHINES = 2.0, 16  # so many machines with so many times these errors must get there
 _FOUND = 1e-6  # mm, rad: how near to a pose forward kinematics must end
-_UNTOLD = 1e-3  # mm a pose moves per mm along a combination that cannot be told
+_UNIDENTIFIABLE = 1e-3  # mm a target moves per mm along an unidentifiable combination
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ class Plan:
             f"{left_out}",
             f"predicted error {self.predicted:.3g} mm rms; {_poses(len(self))} at random"
             f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g}",
-            *([] if np.isfinite(self.predicted) else ["too few: not all of them would be told"]),
+            *([] if np.isfinite(self.predicted) else ["too few to identify all of them"]),
             str(display.Table(heads, rows)),
         ])  # fmt: skip
 
@@ -120,7 +120,7 @@ def plan_poses(
     Parameters
     ----------
     robot : Robot or SerialArm
-        The machine as drawn, or as last calibrated.
+        The nominal machine, or as last calibrated.
     candidates : array_like (N, 6), for a serial arm (N, n)
         Poses that could be measured, mm and rad; of an arm its joint coordinates. Those that break
         the machine's limits are left out, and those that machines with twice the errors of the
@@ -158,7 +158,7 @@ def plan_poses(
     ------
     ValueError, TypeError
         An argument that does not fit; no candidate within limits; a wanted accuracy that not even
-        all candidates reach; parameters that move the targets and that no candidate tells.
+        all candidates reach; unidentifiable parameters that move the targets.
 
     Notes
     -----
@@ -210,7 +210,7 @@ def _poses(count: int) -> str:
 def _commanded(name: str, robot: Robot, places: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Poses and actuators of poses, or of an arm's joint coordinates; NaN where there are none."""
     if isinstance(robot, ArmMachine):
-        there, q, _ = robot.visited(as_rows(name, places, robot.n_actuators)[0])
+        there, q, _ = robot.commanded(as_rows(name, places, robot.n_actuators)[0])
     else:
         there, q, _ = ideal(robot, as_rows(name, places, 6)[0])
     return there, q
@@ -242,7 +242,7 @@ def _within_limits(
     return there[inside], q[inside], inside, len(there)
 
 
-def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> NDArray[np.bool_]:
+def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:
     """Which candidates machines with errors reach, too: none beside a singularity."""
     k = len(chosen.places)
     sigma = np.minimum(chosen.prior, _ERROR * chosen.scale)[:k]
@@ -286,22 +286,20 @@ def _equations(
     if several is not None:
         index = np.tile(np.arange(count), len(q))
         measured = replace(measured, target=several, target_index=index)
-    share = Share(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
-    return Equations([share], parameters(robot, [share], free, prior, None))
+    data = FitData(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
+    return Equations([data], parameters(robot, [data], free, prior, None))
 
 
 def _design(
     equations: Equations,
-    safe: NDArray[np.bool_],
+    safe: BoolArray,
     aims: FloatArray,
     aims_at: FloatArray,
     criterion: str,
 ) -> Design:
     chosen = equations.parameters
-    point = equations.start()
-    rows = equations.whitened(equations.jacobian(point), np.ones(1)) * chosen.scale
-    stated = np.isfinite(chosen.prior)
-    prior = np.diag(chosen.scale / chosen.prior)[stated]
+    start = equations.start()
+    rows = equations.whitened(equations.jacobian(start), np.ones(1)) * chosen.scale
     k = len(chosen.places)
     twists = chosen.robot.error_twists(aims, aims_at)
     by_geometry = twists[:, 3:, chosen.places] * chosen.scale[:k]
@@ -311,13 +309,13 @@ def _design(
             "candidates or targets: one is singular, where nothing holds the platform"
         )
     blocks = rows.reshape(len(safe), -1, len(chosen))[safe]
-    design = Design(blocks, prior, aimed, criterion, chosen.robot.length)
-    moving = np.abs(aimed @ design.untold).max(initial=0.0)
-    if moving > _UNTOLD:
-        words = [in_words(c, chosen.names) for c in plain_basis(design.untold, chosen.names).T]
+    design = Design(blocks, chosen.prior_rows, aimed, criterion, chosen.robot.length)
+    moving = np.abs(aimed @ design.unidentifiable).max(initial=0.0)
+    if moving > _UNIDENTIFIABLE:
+        basis = sparse_basis(design.unidentifiable, chosen.names)
         raise ArgumentError(
-            f"candidates: not even all of them tell {words[0]}, which moves the targets; offer"
-            " others, free fewer parameters or state a prior"
+            f"candidates: not even all of them identify {as_sum(basis[:, 0], chosen.names)}, which"
+            " moves the targets; offer others, free fewer parameters or state a prior"
         )
     return design
 

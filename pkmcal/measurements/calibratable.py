@@ -115,7 +115,7 @@ class ArmMachine:
         """
         return self.arm.error_jacobian(q, frame="tip")
 
-    def visited(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+    def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Pose, coordinates and batch shape of joint coordinates (..., n)."""
         q, shape = as_rows("poses", places, self.n_actuators)
         return self.forward(q).pose, q, shape

@@ -49,7 +49,7 @@ class Measurements:
         Actuator coordinates as commanded or read, mm or rad as the limbs say.
     values : (N, 6), (N, 3) or (N,) array
         What was measured, in mm and rad, in the base frame (or the instrument's, where
-        `identify` is told that the frame is unknown); see `kind`.
+        `identify` is given ``frame="unknown"``); see `kind`.
     kind : {"position", "pose", "height", "distance"}
         "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the target,
         (N, 3). "height": z of the target, (N,). "distance": from the target, which here is a

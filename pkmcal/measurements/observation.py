@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, wrapped
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose, compose_rates
 
@@ -109,7 +109,7 @@ def difference(kind: str, values: FloatArray, predicted: FloatArray) -> FloatArr
     """Measured less predicted, (N, k); angles the short way round."""
     residual: FloatArray = values.reshape(predicted.shape) - predicted
     if kind == "pose":
-        residual[:, 3:] = np.remainder(residual[:, 3:] + np.pi, 2 * np.pi) - np.pi
+        residual[:, 3:] = wrapped(residual[:, 3:])
     return residual
 
 

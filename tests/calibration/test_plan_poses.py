@@ -156,7 +156,7 @@ def test_what_is_unknown_of_the_instrument_is_found_along(hexapod: Robot) -> Non
 def test_too_few_poses_are_said_to_tell_too_little(hexapod: Robot, candidates: np.ndarray) -> None:
     plan = pk.plan_poses(hexapod, candidates, 5, kind="pose")
     assert plan.predicted == float("inf")
-    assert "too few: not all of them would be told" in str(plan)
+    assert "too few to identify all of them" in str(plan)
 
 
 def test_a_plan_pickles(twenty: Plan) -> None:

@@ -178,7 +178,7 @@ def test_fewer_equations_than_parameters_are_named(paper: Robot, points: Measure
 def test_no_equation_left_over_is_named(paper: Robot, points: Measurements) -> None:
     two = points.select(slice(0, 2))
     texts = said(paper, two, free=["offset*", "base1.x", "base2.y"])
-    assert any("nothing is left over" in text for text in texts)
+    assert any("no degrees of freedom are left" in text for text in texts)
 
 
 def test_no_equation_left_over_is_named_with_a_prior_that_leaves_the_frame_out(
@@ -186,7 +186,7 @@ def test_no_equation_left_over_is_named_with_a_prior_that_leaves_the_frame_out(
 ) -> None:
     three = points.select(slice(0, 3))
     (text,) = said(paper, three, prior=0.5, frame="unknown", target="unknown")
-    assert "9 equations for 9 combinations of parameters: nothing is left over" in text
+    assert "9 equations for 9 identifiable combinations: no degrees of freedom are left" in text
 
 
 @pytest.mark.parametrize(
@@ -209,7 +209,7 @@ def test_without_sigma_and_nothing_left_over_nothing_is_certain(
     paper: Robot, points: Measurements
 ) -> None:
     two = dataclasses.replace(points.select(slice(0, 2)), sigma=None)
-    with pytest.warns(UserWarning, match="nothing is left"):
+    with pytest.warns(UserWarning, match="no degrees of freedom"):
         found = identify(paper, two, free=["offset*", "base1.x", "base2.y"])
     assert np.isinf(found.stderr).all()
 
