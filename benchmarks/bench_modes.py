@@ -10,7 +10,7 @@ import numpy as np
 
 import pkmcal as pk
 from benchmarks.timing import Report
-from pkmcal.modes import find as modes
+from pkmcal.modes.find import _from_random_starts, frames_of
 from tests import dietmaier
 
 STARTS = 200_000
@@ -71,9 +71,9 @@ def bench_starts(report: Report) -> None:
     found = robot.forward_all(dietmaier.LENGTHS)
     problem = robot.assembly_problem(np.array(dietmaier.LENGTHS))
     begin = time.process_time()
-    frames = modes._from_starts(problem, problem.spheres(), STARTS)
+    frames = _from_random_starts(problem, problem.spheres(), STARTS)
     each = (time.process_time() - begin) / STARTS
-    own = modes.frames_of(found.poses)
+    own = frames_of(found.poses)
     hits = np.zeros(len(own), dtype=int)
     for part in np.array_split(frames, 20):
         apart = np.abs(part[:, None] - own).max(axis=2)

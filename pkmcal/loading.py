@@ -7,7 +7,7 @@ from typing import Literal, overload
 
 from pkmcal.arms import arm_file
 from pkmcal.arms.arm import SerialArm
-from pkmcal.exceptions import ArgumentError
+from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
 from pkmcal.kinematics.robot import Robot
@@ -45,7 +45,11 @@ def load(robot: str | PathLike[str]) -> Robot | SerialArm:
     content, place, file = robot_file.located(robot)
     source = Source(content, place)
     if arm_file.is_arm(source.data):
-        return arm_file.parse(source)
+        arguments = arm_file.parse(source)
+        try:
+            return SerialArm(**arguments)
+        except ArgumentError as error:  # numbers that are each right, and too large together
+            raise FileError(f"{source.place}: {error}") from None
     return Robot(robot_file.parse(source, file))
 
 

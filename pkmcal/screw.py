@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arguments import number
 from pkmcal.arrays import FloatArray, as_doubles, as_numbers, as_rows
-from pkmcal.core import screws as core_serial
+from pkmcal.core import screws
 from pkmcal.exceptions import ArgumentError
 
 _RIGID = 1e-6  # by so much a matrix may miss being a motion
@@ -62,7 +62,7 @@ def exp(twist: ArrayLike, angle: ArrayLike = 1.0) -> FloatArray:
     given = np.asarray(twist, dtype=np.float64)  # before the product: small integers overflow
     with np.errstate(over="ignore", invalid="ignore"):  # such a row is NaN
         rows, shape = as_rows("twist", given * factor[..., None].astype(np.float64), 6)
-    return core_serial.exp(rows).reshape(*shape, 4, 4)
+    return screws.exp(rows).reshape(*shape, 4, 4)
 
 
 def log(motion: ArrayLike) -> FloatArray:
@@ -90,7 +90,7 @@ def log(motion: ArrayLike) -> FloatArray:
     [1e-09, 5.0]
     """
     rows, shape = as_motions("motion", motion)
-    return core_serial.log(rows).reshape(*shape, 6)
+    return screws.log(rows).reshape(*shape, 6)
 
 
 def adjoint(motion: ArrayLike) -> FloatArray:
@@ -119,7 +119,7 @@ def adjoint(motion: ArrayLike) -> FloatArray:
     [0.0, 0.0, 1.0, 0.0, -100.0, 0.0]
     """
     rows, shape = as_motions("motion", motion)
-    return core_serial.adjoint(rows).reshape(*shape, 6, 6)
+    return screws.adjoint(rows).reshape(*shape, 6, 6)
 
 
 def exp_jacobian(twist: ArrayLike) -> FloatArray:
@@ -141,7 +141,7 @@ def exp_jacobian(twist: ArrayLike) -> FloatArray:
         A wrong shape, or no numbers.
     """
     rows, shape = as_rows("twist", twist, 6)
-    return core_serial.exp_jacobian(rows, inverse=False).reshape(*shape, 6, 6)
+    return screws.exp_jacobian(rows, inverse=False).reshape(*shape, 6, 6)
 
 
 def log_jacobian(twist: ArrayLike) -> FloatArray:
@@ -164,7 +164,7 @@ def log_jacobian(twist: ArrayLike) -> FloatArray:
         A wrong shape, or no numbers.
     """
     rows, shape = as_rows("twist", twist, 6)
-    return core_serial.exp_jacobian(rows, inverse=True).reshape(*shape, 6, 6)
+    return screws.exp_jacobian(rows, inverse=True).reshape(*shape, 6, 6)
 
 
 def from_pose(pose: ArrayLike) -> FloatArray:
@@ -213,7 +213,7 @@ def to_pose(motion: ArrayLike) -> FloatArray:
     [1.0, 2.0, 3.0, 0.1, 0.2, 0.3]
     """
     rows, shape = as_motions("motion", motion)
-    return core_serial.pose(rows).reshape(*shape, 6)
+    return screws.pose(rows).reshape(*shape, 6)
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,7 +262,7 @@ class JointError:
             raise ArgumentError(f"frame must have shape (4, 4), found {np.shape(frame)}")
         if not np.isfinite(rows).all():
             raise ArgumentError("frame must be finite")
-        return replace(self, twist=core_serial.adjoint(rows).reshape(6, 6) @ self.twist)
+        return replace(self, twist=screws.adjoint(rows).reshape(6, 6) @ self.twist)
 
     def __str__(self) -> str:
         if self.kind == "none":
@@ -329,7 +329,7 @@ def joint_error(
 
 def at_points(errors: FloatArray, points: FloatArray) -> FloatArray:
     """Motions (N, 4, 4) by joint errors (N, 6) that act at points (N, 3), mm and rad."""
-    return core_serial.joint_motions(errors, points).reshape(-1, 4, 4)
+    return screws.joint_motions(errors, points).reshape(-1, 4, 4)
 
 
 def as_motions(name: str, motion: ArrayLike) -> tuple[FloatArray, tuple[int, ...]]:

@@ -18,7 +18,7 @@ ARM = pk.SerialArm(
     [[0, 0, 1], [1, 0, 0], [0, 1, 0], [1, 1, 0]],
     [[0, 0, 0], [0, 0, 520], [0, 350, 520], [0, 600, 520]],
     [0, 800, 520, 0.1, 0.2, 0.3],
-    ["revolute", "revolute", "prismatic", "revolute"],
+    kinds=["revolute", "revolute", "prismatic", "revolute"],
 )
 FRAMES = ("space", "body", "tip")
 

@@ -1,25 +1,26 @@
-"""`SerialArm`: an open chain of revolute and prismatic joints, by its screws and joint errors."""
+"""`SerialArm`: an arm with its joint errors, and the files it comes from and goes to."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import screw
-from pkmcal.arguments import instance
-from pkmcal.arms import inputs as checked
-from pkmcal.arms.inverse import ArmInverse, damped_least_squares
-from pkmcal.arrays import FloatArray, as_rows
-from pkmcal.core.screws import Arm, Links
-from pkmcal.exceptions import ArgumentError
+from pkmcal.arms import arm_file
+from pkmcal.arms.chain import Chain
+from pkmcal.arms.denavit_hartenberg import Convention, screws_of
+from pkmcal.arms.inputs import motion
+from pkmcal.arrays import FloatArray
+from pkmcal.exceptions import FileError
 
-ERRORS = ("dx", "dy", "dz", "dphi", "dtheta", "dpsi")
+_SAME = 1e-9  # mm, and mm per rad: by so much the arm of a source may differ
 
 
-class SerialArm:
+class SerialArm(Chain):
     """A serial arm: immutable; `replace` gives one with other joint errors.
 
     The product of exponentials T = E₁ e^[θ₁S₁] … Eₙ e^[θₙSₙ] T₀ (eq. 5, with errors eq. 19 of the
@@ -58,28 +59,6 @@ class SerialArm:
     [-600.0, 0.0, 520.0]
     """
 
-    def __init__(
-        self,
-        axes: ArrayLike,
-        points: ArrayLike,
-        home: ArrayLike,
-        kinds: str | Sequence[str] | None = None,
-        name: str = "serial arm",
-        joint_errors: ArrayLike | None = None,
-    ) -> None:
-        self._name = instance("name", name, str)
-        self._axes, self._points = checked.axes_and_points(axes, points)
-        self._kinds = checked.kinds_of(kinds, len(self._axes))
-        self._home = checked.motion("home", home)
-        prismatic = np.array([kind == "prismatic" for kind in self._kinds], dtype=np.int32)
-        self._arm = Arm(prismatic, checked.joint_frames(self._axes), self._points, self._home)
-        self._errors = np.zeros((self.n_joints, 6))
-        if joint_errors is not None:
-            self._errors += checked.joint_errors(joint_errors, self.n_joints, ())
-        self._links = self._arm.links(self._errors)
-        if not np.isfinite(self._links.numbers).all():
-            raise ArgumentError("points, home or joint_errors are too large to be computed with")
-
     @classmethod
     def from_dh(
         cls,
@@ -87,7 +66,8 @@ class SerialArm:
         alpha: ArrayLike,
         d: ArrayLike,
         theta: ArrayLike = 0.0,
-        convention: str = "standard",
+        *,
+        convention: Convention = "standard",
         kinds: str | Sequence[str] | None = None,
         tool: ArrayLike | None = None,
         name: str = "serial arm",
@@ -119,12 +99,10 @@ class SerialArm:
         >>> arm.forward([0, 0])[:3, 3].tolist()
         [500.0, 0.0, 0.0]
         """
-        from pkmcal.arms.denavit_hartenberg import screws_of
-
         axes, points, home = screws_of(a, alpha, d, theta, convention)
         if tool is not None:
-            home = home @ checked.motion("tool", tool)
-        return cls(axes, points, home, kinds, name)
+            home = home @ motion("tool", tool)
+        return cls(axes, points, home, kinds=kinds, name=name)
 
     @classmethod
     def from_urdf(
@@ -149,202 +127,15 @@ class SerialArm:
             No such links, no moving joint between them, or one that an arm has not (floating,
             planar, mimic).
         """
-        from pkmcal.arms import urdf
+        from pkmcal.arms import urdf  # the parser takes a while to import
 
-        return urdf.read(path, tip, base)
+        return cls(**urdf.read(path, tip, base))
 
-    # what it is ---------------------------------------------------------------------------------
-
-    @property
-    def name(self) -> str:
-        """The arm's name."""
-        return self._name
-
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """Kind of each joint, "revolute" or "prismatic"."""
-        return self._kinds
-
-    @property
-    def n_joints(self) -> int:
-        """Number of joints, n."""
-        return len(self.kinds)
-
-    @property
-    def axes(self) -> FloatArray:
-        """Unit directions of the joints' axes at zero, (n, 3)."""
-        axes: FloatArray = self._axes.copy()
-        return axes
-
-    @property
-    def points(self) -> FloatArray:
-        """The points the joints' errors act at, (n, 3), mm."""
-        points: FloatArray = self._points.copy()
-        return points
-
-    @property
-    def home(self) -> FloatArray:
-        """The tool at zero, (4, 4), mm."""
-        home: FloatArray = self._home.copy()
-        return home
-
-    @property
-    def joint_errors(self) -> FloatArray:
-        """Δx Δy Δz [mm], Δφ Δθ Δψ [rad] of each joint, (n, 6)."""
-        errors: FloatArray = self._errors.copy()
-        return errors
-
-    @property
-    def actuator_units(self) -> tuple[str, ...]:
-        """Unit of each joint coordinate, "rad" or "mm"."""
-        return tuple("rad" if kind == "revolute" else "mm" for kind in self.kinds)
-
-    @property
-    def length(self) -> float:
-        """Characteristic length, mm: at this radius a rotation counts as its arc.
-
-        The root mean square distance of the joints' points from the tool at zero.
-        """
-        reach = self._points - self._home[:3, 3]
-        return float(np.hypot.reduce(reach, axis=None) / np.sqrt(self.n_joints)) or 1.0
-
-    @property
-    def screws(self) -> FloatArray:
-        """Nominal unit screws (ω, v) at zero, (n, 6): (ω, r × ω), or (0, v) (eq. 1)."""
-        none = np.zeros((self.n_joints, 6))
-        screws: FloatArray = self.jacobian(np.zeros(self.n_joints), none).T.copy()
-        return screws
-
-    def __reduce__(self) -> tuple[type[SerialArm], tuple[object, ...]]:
-        given = (self._axes, self._points, self._home, self.kinds, self.name, self._errors)
-        return SerialArm, given
+    def __reduce__(self) -> tuple[object, ...]:
+        return partial(SerialArm, **self.arguments), ()
 
     def __repr__(self) -> str:
         return f"<SerialArm {self.name}: {' '.join(self.kinds)}>"
-
-    # kinematics ---------------------------------------------------------------------------------
-
-    def forward(
-        self,
-        theta: ArrayLike,
-        joint_errors: ArrayLike | None = None,
-        threads: int | None = None,
-    ) -> FloatArray:
-        """Where the tool is (eq. 5; with errors eq. 19).
-
-        Parameters
-        ----------
-        theta : array_like (..., n)
-            Joint coordinates, rad and mm.
-        joint_errors : array_like (n, 6) or (..., n, 6), optional
-            Δx Δy Δz [mm], Δφ Δθ Δψ [rad] of each joint, for all rows or of each row; in place of
-            the arm's own.
-        threads : int, optional
-            As many as pay by default.
-
-        Returns
-        -------
-        ndarray (..., 4, 4)
-            From the tool to the base, mm. A row with a coordinate that is not finite, or beyond
-            1e5 rad, is NaN.
-
-        Raises
-        ------
-        ValueError, TypeError
-            A wrong shape, no numbers, or errors that are not finite.
-        """
-        rows, shape, links = self._given(theta, joint_errors)
-        return self._arm.forward(rows, links, threads).reshape(*shape, 4, 4)
-
-    def jacobian(
-        self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: str = "space"
-    ) -> FloatArray:
-        """The tool's twist by each joint coordinate.
-
-        Parameters
-        ----------
-        theta : array_like (..., n)
-            Joint coordinates, rad and mm.
-        joint_errors : array_like (n, 6) or (..., n, 6), optional
-            As in `forward`.
-        frame : {"space", "body", "tip"}
-            Twists (ω, v) seen in the base, v that of the point at the base's origin; seen in the
-            tool; or ω in base axes and v the velocity of the tool's origin.
-
-        Returns
-        -------
-        ndarray (..., 6, n)
-            ω first, rad and mm per rad or mm.
-
-        Raises
-        ------
-        ValueError, TypeError
-            A wrong shape, no numbers, or an unknown frame.
-        """
-        number = checked.frame_number(frame)
-        rows, shape, links = self._given(theta, joint_errors)
-        return self._arm.jacobian(rows, links, number).reshape(*shape, 6, self.n_joints)
-
-    def error_jacobian(
-        self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: str = "space"
-    ) -> FloatArray:
-        """The tool's twist by each joint error, the coordinates held.
-
-        Parameters
-        ----------
-        theta : array_like (..., n)
-            Joint coordinates, rad and mm.
-        joint_errors : array_like (n, 6) or (..., n, 6), optional
-            The errors at which the derivative is taken, as in `forward`.
-        frame : {"space", "body", "tip"}
-            As in `jacobian`.
-
-        Returns
-        -------
-        ndarray (..., 6, 6 n)
-            Columns Δx Δy Δz Δφ Δθ Δψ of joint 1, then of joint 2, ...
-
-        Raises
-        ------
-        ValueError, TypeError
-            A wrong shape, no numbers, or an unknown frame.
-        """
-        number = checked.frame_number(frame)
-        rows, shape, links = self._given(theta, joint_errors)
-        return self._arm.error_jacobian(rows, links, number).reshape(*shape, 6, 6 * self.n_joints)
-
-    def inverse(
-        self,
-        target: ArrayLike,
-        guess: ArrayLike | None = None,
-        joint_errors: ArrayLike | None = None,
-        parts: str = "pose",
-    ) -> ArmInverse:
-        """Joint coordinates that bring the tool to a target, by damped least squares.
-
-        Parameters
-        ----------
-        target : array_like (..., 4, 4)
-            Where the tool shall be, mm.
-        guess : array_like (n,) or (..., n), optional
-            Where to start, which decides between several solutions; 0 by default.
-        joint_errors : array_like (n, 6) or (..., n, 6), optional
-            As in `forward`: coordinates that undo these errors.
-        parts : {"pose", "position"}
-            What shall be met: position and orientation, or the position alone.
-
-        Returns
-        -------
-        ArmInverse
-            Coordinates, status and what is left of each row. A row that was not reached is NaN
-            and does not raise.
-
-        Raises
-        ------
-        ValueError, TypeError
-            A wrong shape, no numbers, or no rigid motions.
-        """
-        return damped_least_squares(self, target, guess, joint_errors, parts)
 
     # errors -------------------------------------------------------------------------------------
 
@@ -361,7 +152,14 @@ class SerialArm:
         ValueError, TypeError
             A wrong shape, no numbers, or errors that are not finite.
         """
-        return SerialArm(self._axes, self._points, self._home, self.kinds, self.name, joint_errors)
+        return SerialArm(
+            self._axes,
+            self._points,
+            self._home,
+            kinds=self.kinds,
+            name=self.name,
+            joint_errors=joint_errors,
+        )
 
     def corrected(self) -> SerialArm:
         """The same arm without joint errors: they are built into its axes, points and home.
@@ -374,23 +172,32 @@ class SerialArm:
             before = before @ moved
             axes[i] = before[:3, :3] @ self._axes[i]
             points[i] = before[:3, :3] @ self._points[i] + before[:3, 3]
-        return SerialArm(axes, points, before @ self._home, self.kinds, self.name)
+        return SerialArm(axes, points, before @ self._home, kinds=self.kinds, name=self.name)
 
     def error_motions(self) -> FloatArray:
         """The motions E by its joint errors, in the base (eq. 10 and 18), (n, 4, 4)."""
         return screw.at_points(self._errors, self._points)
 
-    def save(self, path: str | PathLike[str], comment: str = "") -> None:
-        """Write the arm's file, `comment` at its head; `load` reads it back to the last bit."""
-        from pkmcal.arms import arm_file
+    # files --------------------------------------------------------------------------------------
 
-        arm_file.write(self, path, comment)
+    def save(self, path: str | PathLike[str], comment: str = "") -> None:
+        """Write the arm's file; `load` reads it back to the last bit.
+
+        Parameters
+        ----------
+        path : str or path
+            Where to write; an existing file is replaced, whole or not at all.
+        comment : str, optional
+            Lines for its head, each with its ``#``.
+        """
+        arm_file.write(self.arguments, path, comment)
 
     def save_urdf(
         self,
         path: str | PathLike[str],
         source: str | PathLike[str],
         tip: str | None = None,
+        *,
         base: str | None = None,
     ) -> None:
         """Write a URDF file again with the joint errors in the origins of its joints.
@@ -413,13 +220,13 @@ class SerialArm:
         """
         from pkmcal.arms import urdf
 
-        urdf.write(self, path, source, tip, base)
+        if not self._is_alike(SerialArm.from_urdf(source, tip, base)):
+            raise FileError(f"source: {source} holds another arm than this one")
+        urdf.write(path, source, self.error_motions(), tip, base)
 
-    def _given(
-        self, theta: ArrayLike, joint_errors: ArrayLike | None
-    ) -> tuple[FloatArray, tuple[int, ...], Links]:
-        rows, shape = as_rows("theta", theta, self.n_joints)
-        if joint_errors is None:
-            return rows, shape, self._links
-        errors = checked.joint_errors(joint_errors, self.n_joints, shape)
-        return rows, shape, self._arm.links(errors)
+    def _is_alike(self, other: SerialArm) -> bool:
+        """Whether it is the same arm without the joint errors, up to rounding."""
+        if self.kinds != other.kinds:
+            return False
+        pairs = ((self.screws, other.screws), (self.points, other.points), (self.home, other.home))
+        return all(np.allclose(one, two, rtol=0, atol=_SAME) for one, two in pairs)

@@ -1,4 +1,4 @@
-"""Files of serial arms: TOML in, `SerialArm` out, and back to the last bit."""
+"""Files of serial arms: from TOML to the arguments of a `SerialArm`, and back to the last bit."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ from typing import Any
 import numpy as np
 
 from pkmcal import arguments, screw
-from pkmcal.arms.arm import ERRORS, SerialArm
-from pkmcal.arms.inputs import KINDS
+from pkmcal.arms.inputs import ERRORS, KINDS, ArmArguments, kinds_of
 from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.library import POSE
-from pkmcal.exceptions import FileError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table, shown
@@ -29,8 +27,8 @@ def is_arm(data: Mapping[str, Any]) -> bool:
     return "joint" in data and "limb" not in data
 
 
-def parse(source: Source) -> SerialArm:
-    """Make an arm of what its file says.
+def parse(source: Source) -> ArmArguments:
+    """Read an arm's file.
 
     Raises
     ------
@@ -46,21 +44,18 @@ def parse(source: Source) -> SerialArm:
     joints = top.tables("joint", "an arm")
     for joint in joints:
         joint.only(("kind", "axis", "point", "error"))
-    given: dict[str, Any] = {
-        "axes": [joint.vector("axis") for joint in joints],
-        "points": [_point(joint) for joint in joints],
+    kinds = [joint.choice("kind", KINDS, "kind of joint") for joint in joints]
+    return {
+        "axes": np.array([joint.vector("axis") for joint in joints]),
+        "points": np.array([_point(joint) for joint in joints]),
         "home": _home(tool),
-        "kinds": [joint.choice("kind", KINDS, "kind of joint") for joint in joints],
+        "kinds": kinds_of(kinds, len(joints)),
         "name": top.text("name"),
-        "joint_errors": [_error(joint) for joint in joints],
+        "joint_errors": np.array([_error(joint) for joint in joints]),
     }
-    try:
-        return SerialArm(**given)
-    except ValueError as error:  # numbers that are each right, and too large together
-        raise FileError(f"{source.place}: {error}") from None
 
 
-def write(arm: SerialArm, path: str | os.PathLike[str], comment: str = "") -> None:
+def write(arm: ArmArguments, path: str | os.PathLike[str], comment: str = "") -> None:
     """Write an arm's file in mm and rad, `comment` at its head; it is complete or untouched.
 
     Raises
@@ -68,12 +63,12 @@ def write(arm: SerialArm, path: str | os.PathLike[str], comment: str = "") -> No
     OSError
         The folder does not exist or cannot be written.
     """
-    head = {"name": arm.name, "units": {"length": "mm", "angle": "rad"}}
-    blocks = [HEADER, lines(head), "[tool]\n" + lines({"home": arm.home[:3].tolist()})]
-    for i, kind in enumerate(arm.kinds):
-        joint: dict[str, Any] = {"kind": kind, "axis": arm.axes[i].tolist()}
-        joint["point"] = arm.points[i].tolist()
-        error = dict(zip(ERRORS, arm.joint_errors[i].tolist(), strict=True))
+    head = {"name": arm["name"], "units": {"length": "mm", "angle": "rad"}}
+    blocks = [HEADER, lines(head), "[tool]\n" + lines({"home": arm["home"][:3].tolist()})]
+    for i, kind in enumerate(arm["kinds"]):
+        joint: dict[str, Any] = {"kind": kind, "axis": arm["axes"][i].tolist()}
+        joint["point"] = arm["points"][i].tolist()
+        error = dict(zip(ERRORS, arm["joint_errors"][i].tolist(), strict=True))
         if any(error.values()):
             joint["error"] = error
         blocks.append("[[joint]]\n" + lines(joint))

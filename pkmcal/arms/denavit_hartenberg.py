@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal, get_args
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -10,17 +12,17 @@ from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray, as_numbers
 from pkmcal.exceptions import ArgumentError
 
-CONVENTIONS = ("standard", "modified")
+Convention = Literal["standard", "modified"]
 
 
 def screws_of(
-    a: ArrayLike, alpha: ArrayLike, d: ArrayLike, theta: ArrayLike, convention: str
+    a: ArrayLike, alpha: ArrayLike, d: ArrayLike, theta: ArrayLike, convention: Convention
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Axes (n, 3), points (n, 3) and home (4, 4) at zero; the arguments are `from_dh`'s.
 
     A DH transform is two screws: one along x (a, α), one along the joint's axis z (d, θ).
     """
-    word("convention", convention, CONVENTIONS)
+    word("convention", convention, get_args(Convention))
     given = {"a": a, "alpha": alpha, "d": d, "theta": theta}
     columns = {}
     for name, value in given.items():

@@ -1,8 +1,9 @@
-"""What a `SerialArm` is given: checked, as arrays the core takes."""
+"""The arguments of a `SerialArm`: what files give, checked, as arrays the core takes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +15,21 @@ from pkmcal.core.screws import FRAMES
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_table import unit_vector
 
-KINDS = ("revolute", "prismatic")
+Frame = Literal["space", "body", "tip"]
+JointKind = Literal["revolute", "prismatic"]
+KINDS: tuple[JointKind, ...] = ("revolute", "prismatic")
+ERRORS = ("dx", "dy", "dz", "dphi", "dtheta", "dpsi")  # of a joint: three in mm, three in rad
+
+
+class ArmArguments(TypedDict):
+    """The arguments of `SerialArm`: what readers of files return and writers take."""
+
+    axes: FloatArray
+    points: FloatArray
+    home: FloatArray
+    kinds: tuple[JointKind, ...]
+    name: str
+    joint_errors: FloatArray
 
 
 def axes_and_points(axes: ArrayLike, points: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -27,7 +42,7 @@ def axes_and_points(axes: ArrayLike, points: ArrayLike) -> tuple[FloatArray, Flo
     return directions, places
 
 
-def joint_errors(given: ArrayLike, joints: int, shape: tuple[int, ...]) -> FloatArray:
+def checked_errors(given: ArrayLike, joints: int, shape: tuple[int, ...]) -> FloatArray:
     """Errors (n, 6) as they are, or those of each row as (N, n, 6)."""
     rows, leading = as_rows("joint_errors", given, 6)
     if not leading or leading[-1] != joints or leading[:-1] not in ((), shape):
@@ -58,13 +73,13 @@ def _unit(axes: FloatArray) -> FloatArray:
     return np.array([unit_vector(*axis) for axis in axes.tolist()])
 
 
-def kinds_of(given: str | Sequence[str] | None, joints: int) -> tuple[str, ...]:
-    """A kind for each joint."""
+def kinds_of(given: str | Sequence[str] | None, joints: int) -> tuple[JointKind, ...]:
+    """Check the kinds of joints: one for all, or one for each."""
     one = "revolute" if given is None else given
     said = words("kinds", one) * (joints if isinstance(one, str) else 1)
     if len(said) != joints:
         raise ArgumentError(f"kinds: one word for each of {joints} joints, found {len(said)}")
-    return tuple(word("kinds", each, KINDS) for each in said)
+    return tuple(KINDS[KINDS.index(word("kinds", each, KINDS))] for each in said)
 
 
 def motion(name: str, given: ArrayLike) -> FloatArray:
@@ -81,7 +96,7 @@ def motion(name: str, given: ArrayLike) -> FloatArray:
 
 
 def frame_number(frame: str) -> int:
-    """Of a frame that twists are seen in."""
+    """Index in the core of the frame that twists are seen in."""
     return FRAMES.index(word("frame", frame, FRAMES))
 
 

@@ -3,26 +3,51 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import screw
 from pkmcal.arguments import word
-from pkmcal.arms import inputs as checked
-from pkmcal.arrays import FloatArray, Int32Array, as_rows
+from pkmcal.arms.inputs import Frame, checked_errors
+from pkmcal.arrays import FloatArray, Int32Array, Unit, as_rows
 from pkmcal.core.library import STATUS
 from pkmcal.exceptions import ArgumentError
 
-if TYPE_CHECKING:
-    from pkmcal.arms.arm import SerialArm
-
-PARTS = {"pose": slice(0, 6), "position": slice(3, 6)}
+Part = Literal["pose", "position"]
+PARTS: dict[str, slice] = {"pose": slice(0, 6), "position": slice(3, 6)}
 _STEPS = 100
 _REACHED = 1e-9  # mm; what counts as there
 _LARGEST = 1e12  # damping at which a row is given up
 _OK, _NOT_CONVERGED, _INVALID = 0, 1, 4
+
+
+class Solvable(Protocol):
+    """What the search asks an arm for; `Chain` describes each."""
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints, n."""
+
+    @property
+    def length(self) -> float:
+        """Characteristic length, mm."""
+
+    @property
+    def actuator_units(self) -> tuple[Unit, ...]:
+        """Unit of each joint coordinate."""
+
+    def forward(self, theta: ArrayLike, joint_errors: ArrayLike | None = None) -> FloatArray:
+        """Where the tool is, (..., 4, 4)."""
+
+    def jacobian(
+        self,
+        theta: ArrayLike,
+        joint_errors: ArrayLike | None = None,
+        frame: Frame = "space",
+    ) -> FloatArray:
+        """The tool's twist by each joint coordinate, (..., 6, n)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +85,11 @@ class ArmInverse:
 
 
 def damped_least_squares(
-    arm: SerialArm,
+    arm: Solvable,
     target: ArrayLike,
     guess: ArrayLike | None,
     joint_errors: ArrayLike | None,
-    parts: str,
+    parts: Part,
 ) -> ArmInverse:
     """See `SerialArm.inverse`.
 
@@ -85,7 +110,7 @@ def damped_least_squares(
         theta += start
     errors = None
     if joint_errors is not None:
-        errors = checked.joint_errors(joint_errors, n, shape)
+        errors = checked_errors(joint_errors, n, shape)
     search = _Search(arm, goal, errors, PARTS[parts])
     begun = theta.copy()
     status, iterations, residual = search.run(theta)
@@ -103,7 +128,7 @@ def damped_least_squares(
 
 class _Search:
     def __init__(
-        self, arm: SerialArm, goal: FloatArray, errors: FloatArray | None, parts: slice
+        self, arm: Solvable, goal: FloatArray, errors: FloatArray | None, parts: slice
     ) -> None:
         self.arm, self.goal, self.errors, self.parts = arm, goal, errors, parts
         self.length = arm.length

@@ -13,14 +13,17 @@ import numpy as np
 
 from pkmcal import arguments, screw
 from pkmcal.arguments import did_you_mean
-from pkmcal.arms.arm import SerialArm
+from pkmcal.arms.inputs import ArmArguments, JointKind
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import FileError
 from pkmcal.files.atomic import write_whole
 
 _METRE = 1000.0  # mm
-_KINDS = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
-_SAME = 1e-9  # mm, and mm per rad: by so much the arm of a source may differ
+_KINDS: dict[str, JointKind] = {
+    "revolute": "revolute",
+    "continuous": "revolute",
+    "prismatic": "prismatic",
+}
 
 
 @dataclass(frozen=True)
@@ -28,42 +31,42 @@ class Joint:
     """A moving joint of a chain: its name, its kind, and at zero its parent link and itself."""
 
     name: str
-    kind: str
+    kind: JointKind
     parent: FloatArray  # (4, 4) of the parent link in the base, mm
     origin: FloatArray  # (4, 4) of the joint in the base, mm
     axis: FloatArray  # (3,) in the joint's frame
 
 
-def read(path: str | os.PathLike[str], tip: str | None, base: str | None) -> SerialArm:
-    """See `SerialArm.from_urdf`."""
+def read(path: str | os.PathLike[str], tip: str | None, base: str | None) -> ArmArguments:
+    """Read the chain of moving joints from base to tip; see `SerialArm.from_urdf`."""
     name, joints, home = _chain(path, tip, base)
-    return SerialArm(
-        axes=[joint.origin[:3, :3] @ joint.axis for joint in joints],
-        points=[joint.origin[:3, 3] for joint in joints],
-        home=home,
-        kinds=[joint.kind for joint in joints],
-        name=name,
-    )
+    return {
+        "axes": np.array([joint.origin[:3, :3] @ joint.axis for joint in joints]),
+        "points": np.array([joint.origin[:3, 3] for joint in joints]),
+        "home": home,
+        "kinds": tuple(joint.kind for joint in joints),
+        "name": name,
+        "joint_errors": np.zeros((len(joints), 6)),
+    }
 
 
 def write(
-    arm: SerialArm,
     path: str | os.PathLike[str],
     source: str | os.PathLike[str],
+    error_motions: FloatArray,
     tip: str | None,
     base: str | None,
 ) -> None:
-    """See `SerialArm.save_urdf`.
+    """Write a source again with the motions E (n, 4, 4) by joint errors in its origins.
 
     Joint i sits at H in the base and its parent link at P: its error makes that E H, so its
-    origin in the parent becomes P⁻¹ E H.
+    origin in the parent becomes P⁻¹ E H. See `SerialArm.save_urdf`.
     """
     _, joints, _ = _chain(source, tip, base)
-    _check_same(arm, read(source, tip, base), source)
     parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
     tree = ElementTree.parse(source, parser)
     elements = {each.get("name"): each for each in tree.getroot().findall("joint")}
-    for joint, error in zip(joints, arm.error_motions(), strict=True):
+    for joint, error in zip(joints, error_motions, strict=True):
         pose = screw.to_pose(np.linalg.inv(joint.parent) @ error @ joint.origin)
         element = elements[joint.name]
         origin = element.find("origin")
@@ -77,17 +80,6 @@ def write(
 
 def _text(numbers: FloatArray) -> str:
     return " ".join(repr(float(number)) for number in numbers)
-
-
-def _check_same(arm: SerialArm, other: SerialArm, source: str | os.PathLike[str]) -> None:
-    same = (
-        arm.kinds == other.kinds
-        and np.allclose(arm.screws, other.screws, rtol=0, atol=_SAME)
-        and np.allclose(arm.points, other.points, rtol=0, atol=_SAME)
-        and np.allclose(arm.home, other.home, rtol=0, atol=_SAME)
-    )
-    if not same:
-        raise FileError(f"source: {source} holds another arm than this one")
 
 
 def _chain(

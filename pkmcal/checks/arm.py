@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from pkmcal.arms.arm import ERRORS, SerialArm
+from pkmcal.arms.arm import SerialArm
+from pkmcal.arms.inputs import ERRORS
 from pkmcal.checks.finding import Finding
 from pkmcal.checks.function import whole_size
 

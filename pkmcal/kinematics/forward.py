@@ -4,17 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array
 from pkmcal.core.library import STATUS
 from pkmcal.modes.certificate import Certificate
-from pkmcal.modes.find import proofs
+from pkmcal.modes.find import AssemblyProblem, certify_rows
 
-if TYPE_CHECKING:
-    from pkmcal.kinematics.kinematics import Kinematics
+
+class Solved(Protocol):
+    """What a result asks of the machine it comes from; `Kinematics` describes each."""
+
+    def closure_by_twist(self, own: FloatArray, q: FloatArray) -> FloatArray:
+        """Closure rows by a scaled twist, (N, rows, m)."""
+
+    def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
+        """The closures at coordinates (N, n)."""
 
 
 @dataclass(eq=False)  # a frozen one takes a microsecond more to make
@@ -38,7 +45,7 @@ class Forward:
     iterations: Int32Array
     residual: FloatArray
     # where it comes from, for what is computed when asked for; rows in the machine's own frame
-    _kinematics: Kinematics = field(repr=False)
+    _machine: Solved = field(repr=False)
     _own: FloatArray = field(repr=False)
     _q: FloatArray = field(repr=False)
     _guess: FloatArray = field(repr=False)
@@ -85,13 +92,13 @@ class Forward:
         the only one within `unique`. Not ok with more closures than free coordinates, near a
         singularity, and where the row was not solved. It costs some 12 µs a row.
         """
-        problem = self._kinematics.assembly_problem(self._q)
-        return proofs(problem, self._own.reshape(-1, 6)).reshape(self.status.shape)
+        problem = self._machine.assembly_problem(self._q)
+        return certify_rows(problem, self._own.reshape(-1, 6)).reshape(self.status.shape)
 
     def _closure_by_twist(self, own: FloatArray) -> FloatArray:
         """Closure rows by a scaled twist (..., rows, m), at a pose for each row or one for all."""
         rows = np.ascontiguousarray(np.broadcast_to(own.reshape(-1, 6), (len(self._q), 6)))
-        steps = self._kinematics.closure_by_twist(rows, self._q)
+        steps = self._machine.closure_by_twist(rows, self._q)
         return steps.reshape(*self.status.shape, *steps.shape[1:])
 
     def failures(self) -> str:

@@ -19,7 +19,7 @@ from pkmcal.geometry.model import Limb, Model
 from pkmcal.kinematics.complete import complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
-from pkmcal.modes import find as modes
+from pkmcal.modes.find import AssemblyProblem
 
 Match = bool | str | Sequence[str] | None
 
@@ -265,10 +265,10 @@ class Kinematics:
         places = matched_coordinates(match, self.model.match, self.coordinates)
         return complete(self.machine, self.model.map, self.slots, rows, places)
 
-    def assembly_problem(self, q: FloatArray) -> modes.AssemblyProblem:
+    def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (n,) or (N, n), for certificates and searches for modes."""
         limbs = self.model.limbs
-        return modes.AssemblyProblem(
+        return AssemblyProblem(
             self.machine,
             self.model.map,
             [KINDS[limb.kind].all_rows(limb.couple > 0) for limb in limbs],

@@ -19,8 +19,8 @@ from pkmcal.geometry.model import Model
 from pkmcal.kinematics import overconstrained
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
-from pkmcal.modes import find as modes
 from pkmcal.modes.assemblies import Assemblies
+from pkmcal.modes.find import assemblies, continue_path, find_modes, pose_distance
 
 
 class Robot(Kinematics):
@@ -170,29 +170,30 @@ class Robot(Kinematics):
         if starts is not None:
             whole("starts", starts, 0, note=" or None")
         problem = self.assembly_problem(rows[0])
-        found = modes.find(problem, starts)
-        apart = modes.distance(found.poses, self.own_home[None], self.length)
-        own = np.ascontiguousarray(found.poses[np.argsort(apart)])
+        found = find_modes(problem, starts)
+        apart = pose_distance(found.poses, self.own_home[None], self.length)
+        order = np.argsort(apart)
+        own = np.ascontiguousarray(found.poses[order])
         poses = self.frames.outward(own)
 
-        def led(pose: FloatArray, actuators: ArrayLike | None, steps: int) -> FloatArray:
+        def continued(pose: FloatArray, actuators: ArrayLike | None, steps: int) -> FloatArray:
             own = self.frames.inward(pose[None])
             if actuators is None:
                 begin = self.machine.inverse(self.slots, own)
             else:
                 begin = as_rows("actuators", actuators, self.n_actuators)[0]
-            end = modes.led(problem, own, begin, steps)
+            end = continue_path(problem, own, begin, steps)
             outward: FloatArray = self.frames.outward(end)[0]
             return outward
 
-        return modes.assemblies(
+        return assemblies(
             problem,
             found,
-            poses,
-            np.argsort(apart),
-            _apart=lambda pose: modes.distance(own, self.frames.inward(pose), self.length),
-            _feasible=lambda: self.feasible(poses).ok,
-            _led=led,
+            order,
+            poses=poses,
+            distance=lambda pose: pose_distance(own, self.frames.inward(pose), self.length),
+            feasible=lambda: self.feasible(poses).ok,
+            continued=continued,
         )
 
     # errors of its geometry -----------------------------------------------------------------------

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal.arguments import did_you_mean, instance, words
-from pkmcal.arms.arm import ERRORS, SerialArm
+from pkmcal.arms.arm import SerialArm
+from pkmcal.arms.inputs import ERRORS
 from pkmcal.arrays import FloatArray, Int32Array, as_rows
 from pkmcal.core import screws
 from pkmcal.exceptions import ArgumentError

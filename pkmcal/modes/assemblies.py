@@ -56,9 +56,9 @@ class Assemblies:
     paths: int
     far: int
     lost: int
-    _apart: Callable[[FloatArray], FloatArray] = field(repr=False)
+    _distance: Callable[[FloatArray], FloatArray] = field(repr=False)
     _feasible: Callable[[], BoolArray] = field(repr=False)
-    _led: Callable[[FloatArray, ArrayLike | None, int], FloatArray] = field(repr=False)
+    _continued: Callable[[FloatArray, ArrayLike | None, int], FloatArray] = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -81,7 +81,7 @@ class Assemblies:
             raise ArgumentError(f"pose must have shape (6,), found {(*shape, 6)}")
         if not len(self):
             raise ArgumentError("there are no modes to choose from")
-        return int(np.argmin(self._apart(rows)))
+        return int(np.argmin(self._distance(rows)))
 
     def reached_from(
         self, pose: ArrayLike, actuators: ArrayLike | None = None, steps: int = 200
@@ -110,10 +110,10 @@ class Assemblies:
         rows, shape = as_rows("pose", pose, 6)
         if shape != ():
             raise ArgumentError(f"pose must have shape (6,), found {(*shape, 6)}")
-        end = self._led(rows[0], actuators, whole("steps", steps, 1))
+        end = self._continued(rows[0], actuators, whole("steps", steps, 1))
         if not np.isfinite(end).all() or not len(self):
             return None
-        apart = self._apart(end[None])
+        apart = self._distance(end[None])
         best = int(np.argmin(apart))
         return best if apart[best] <= 1e-6 + 10.0 * np.nan_to_num(self.error[best]) else None
 

@@ -1,13 +1,14 @@
-"""Find every assembly mode: paths from a start system, random starts, proofs, mirror images."""
+"""Find every assembly mode: by paths and random starts, with certificates and mirror images."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core import screws
 from pkmcal.core.machine import Machine
 from pkmcal.modes.assemblies import Assemblies, Signs
@@ -38,7 +39,7 @@ class AssemblyProblem(NamedTuple):
     length : float
         Characteristic length, mm.
     slots, q : ndarray
-        Geometry (limbs, SLOTS), and coordinates (n,), or (N, n) for `proofs`.
+        Geometry (limbs, SLOTS), and coordinates (n,), or (N, n) for `certify_rows`.
     """
 
     machine: Machine
@@ -62,7 +63,7 @@ class AssemblyProblem(NamedTuple):
 
 
 class Found(NamedTuple):
-    """Modes of a machine in its own frame, before they are put in order."""
+    """Modes in the machine's own frame, not yet in order."""
 
     poses: FloatArray
     proof: Certificate
@@ -97,8 +98,8 @@ def poses_of(map: str, frames: FloatArray) -> FloatArray:
     return poses
 
 
-def find(problem: AssemblyProblem, starts: int | None) -> Found:
-    """All modes by paths; by random starts where paths leave a doubt or `starts` says so."""
+def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
+    """Find all modes by paths; by random starts where paths leave a doubt or `starts` says so."""
     square = problem.machine.rows == problem.machine.m
     spheres = problem.spheres()
     start = start_system(problem.map, problem.rows, spheres) if square else None
@@ -113,7 +114,7 @@ def find(problem: AssemblyProblem, starts: int | None) -> Found:
         reason = "no start system for such limbs"
     else:
         ends = endpoints(problem.machine, start, problem.map, spheres)
-        real, all_proven = _real_ones(problem, ends)
+        real, all_proven = _real_solutions(problem, ends)
         if ends.lost > 0:
             reason = f"{ends.lost} of {ends.paths} paths lost"
         elif ends.lost:
@@ -122,8 +123,8 @@ def find(problem: AssemblyProblem, starts: int | None) -> Found:
     if starts is None:
         starts = STARTS if reason else 0
     if starts:
-        real = np.concatenate([real, _from_starts(problem, spheres, starts)])
-    poses, proof = _checked(problem, real)
+        real = np.concatenate([real, _from_random_starts(problem, spheres, starts)])
+    poses, proof = _certified(problem, real)
     if not reason and not proof.ok.all():
         reason = f"{np.sum(~proof.ok)} modes not certified"
     if not reason and len(poses) != expected:
@@ -138,8 +139,8 @@ def find(problem: AssemblyProblem, starts: int | None) -> Found:
     return Found(poses, proof, complete, reason, ends)
 
 
-def _real_ones(problem: AssemblyProblem, ends: Endpoints) -> tuple[FloatArray, bool]:
-    """The frames among the ends of paths that are real, or not proven to be otherwise.
+def _real_solutions(problem: AssemblyProblem, ends: Endpoints) -> tuple[FloatArray, bool]:
+    """Frames at the ends of paths that are real, or not proven to be otherwise.
 
     And whether all ends, complex ones too, are certified to be as many different solutions.
     """
@@ -163,7 +164,7 @@ def _scaled(frames: Any, length: float) -> Any:
     return u
 
 
-def _from_starts(problem: AssemblyProblem, spheres: FloatArray, starts: int) -> FloatArray:
+def _from_random_starts(problem: AssemblyProblem, spheres: FloatArray, starts: int) -> FloatArray:
     """Frames found by Newton's method from random orientations, on the sphere of some limb."""
     rng = np.random.default_rng(0)
     quaternion = rng.normal(size=(starts, 4))
@@ -184,7 +185,7 @@ def _from_starts(problem: AssemblyProblem, spheres: FloatArray, starts: int) -> 
     return frames_of(poses[status == 0])
 
 
-def _checked(problem: AssemblyProblem, frames: FloatArray) -> tuple[FloatArray, Certificate]:
+def _certified(problem: AssemblyProblem, frames: FloatArray) -> tuple[FloatArray, Certificate]:
     """Poses of real frames, each once, and their certificates."""
     poses = poses_of(problem.map, frames[np.isfinite(frames).all(axis=1)])
     u = _scaled(frames_of(poses), problem.length)
@@ -207,8 +208,8 @@ def _checked(problem: AssemblyProblem, frames: FloatArray) -> tuple[FloatArray, 
     return poses[kept], Certificate(proof.ok[kept], proof.error[kept], proof.unique[kept])
 
 
-def proofs(problem: AssemblyProblem, poses: FloatArray) -> Certificate:
-    """Certificates of poses (N, 6), each at its own coordinates: `problem.q` is (N, n)."""
+def certify_rows(problem: AssemblyProblem, poses: FloatArray) -> Certificate:
+    """Certify poses (N, 6), each at its own coordinates: `problem.q` is (N, n)."""
     ok, error, unique = np.zeros(len(poses), dtype=bool), *np.full((2, len(poses)), np.nan)
     solved = np.isfinite(poses).all(axis=1)
     if problem.machine.rows == problem.machine.m:
@@ -219,8 +220,8 @@ def proofs(problem: AssemblyProblem, poses: FloatArray) -> Certificate:
     return Certificate(ok, error, unique)
 
 
-def distance(poses: FloatArray, pose: FloatArray, length: float) -> FloatArray:
-    """How far poses (N, 6) are from one (1, 6), mm: p, and R as its largest entry times length."""
+def pose_distance(poses: FloatArray, pose: FloatArray, length: float) -> FloatArray:
+    """Distance of poses (N, 6) from one (1, 6), mm: of p, and largest entry of R times length."""
     difference = _scaled(frames_of(poses) - frames_of(pose), length)
     return np.asarray(np.abs(difference).max(axis=1, initial=0.0) * length)
 
@@ -234,8 +235,8 @@ def signs(problem: AssemblyProblem, poses: FloatArray) -> Signs:
     return np.asarray(np.sign(np.linalg.det(steps)), dtype=np.int8)
 
 
-def mirrored(problem: AssemblyProblem, poses: FloatArray) -> Int32Array:
-    """Of each pose which other is its mirror image in the plane of the anchors; -1 for none."""
+def mirror_images(problem: AssemblyProblem, poses: FloatArray) -> Int32Array:
+    """Index of each pose's mirror image in the plane of the anchors; -1 where none is."""
     none = np.full(len(poses), -1, dtype=np.int32)
     spheres, frames = problem.spheres(), frames_of(poses)
     b, c = spheres[:, 0:3], spheres[:, 3:6]
@@ -258,10 +259,12 @@ def mirrored(problem: AssemblyProblem, poses: FloatArray) -> Int32Array:
     return np.where(near.min(axis=1) < 1e-7, which, none).astype(np.int32)
 
 
-def led(problem: AssemblyProblem, pose: FloatArray, begin: FloatArray, steps: int) -> FloatArray:
-    """The pose (1, 6) after the actuators went from `begin` (1, n) at `pose` to `q`, straight.
+def continue_path(
+    problem: AssemblyProblem, pose: FloatArray, begin: FloatArray, steps: int
+) -> FloatArray:
+    """Follow a pose (1, 6) while the actuators go straight from `begin` (1, n) to `problem.q`.
 
-    NaN where a type-2 singularity is on the way.
+    The pose there; NaN where a type-2 singularity is on the way.
     """
     machine, slots = problem.machine, problem.slots
     at, side = pose, 0.0
@@ -292,16 +295,29 @@ def _plane(points: FloatArray) -> tuple[FloatArray, float] | None:
 def assemblies(
     problem: AssemblyProblem,
     found: Found,
-    outward: FloatArray,
-    order: NDArray[np.intp],
-    **calls: object,
+    order: IntArray,
+    *,
+    poses: FloatArray,
+    distance: Callable[[FloatArray], FloatArray],
+    feasible: Callable[[], BoolArray],
+    continued: Callable[[FloatArray, ArrayLike | None, int], FloatArray],
 ) -> Assemblies:
-    """The result: modes in `order`, their poses in the user's frames `outward`."""
+    """Collect modes in `order` with their `poses` in the user's frames; calls as `Assemblies`'."""
     proof, ends = found.proof, found.ends
     own = found.poses[order]
-    counts = (ends.paths, ends.far, ends.lost) if ends else (0, 0, 0)
-    certified: BoolArray = proof.ok[order]
     return Assemblies(
-        outward, certified, proof.error[order], proof.unique[order], found.complete, found.reason,
-        signs(problem, own), mirrored(problem, own), *counts, **calls,  # type: ignore[arg-type]
-    )  # fmt: skip
+        poses=poses,
+        certified=np.asarray(proof.ok[order]),
+        error=proof.error[order],
+        unique=proof.unique[order],
+        complete=found.complete,
+        reason=found.reason,
+        sign=signs(problem, own),
+        mirror=mirror_images(problem, own),
+        paths=ends.paths if ends else 0,
+        far=ends.far if ends else 0,
+        lost=ends.lost if ends else 0,
+        _distance=distance,
+        _feasible=feasible,
+        _continued=continued,
+    )

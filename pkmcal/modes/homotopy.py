@@ -21,9 +21,8 @@ from itertools import pairwise
 import numpy as np
 
 from pkmcal.arrays import ComplexArray, FloatArray
-from pkmcal.core import paths as core_paths
 from pkmcal.core.machine import Machine
-from pkmcal.core.paths import ARRIVED, FAR
+from pkmcal.core.paths import ARRIVED, FAR, follow
 
 ATTEMPTS = ((5e-3, 0), (1e-3, 1), (1e-3, 2), (3e-4, 3))  # accuracy, and which way round
 MIDDLING = 1e3  # entries of R and scaled p: larger ones are known less well, and never real
@@ -125,17 +124,17 @@ def start_system(map: str, rows: list[tuple[str, ...]], spheres: FloatArray) -> 
 
 def endpoints(machine: Machine, start: StartSystem, map: str, spheres: FloatArray) -> Endpoints:
     """Follow every path to the limbs `spheres` (limbs, 13); where some are lost, again."""
-    target, scale, middle_b, middle_c = _brought_to_scale(map, spheres)
+    target, scale, middle_b, middle_c = _normalized(map, spheres)
     n, every, before = len(start.states), np.empty((0, 12), dtype=np.complex128), None
     for accuracy, way in ATTEMPTS:
-        frames, far = _followed(machine, start, target, accuracy, way)
+        frames, far = _track(machine, start, target, accuracy, way)
         lost = n - far - len(frames)
         every = distinct(np.concatenate([every, frames]))
         if len(every) == n:  # there are no more, whichever way they were found
             far = lost = 0
             break
         if lost == 0:
-            if before is not None and _alike(frames, before):
+            if before is not None and _same_solutions(frames, before):
                 every = frames
                 break
             before, lost = frames, -1
@@ -144,13 +143,13 @@ def endpoints(machine: Machine, start: StartSystem, map: str, spheres: FloatArra
     return Endpoints(every, n, far, lost)
 
 
-def _alike(one: ComplexArray, other: ComplexArray) -> bool:
+def _same_solutions(one: ComplexArray, other: ComplexArray) -> bool:
     """Whether two sets of frames hold the same solutions of a middling size or less."""
     one, other = (each[np.abs(each).max(axis=1) < MIDDLING] for each in (one, other))
     return len(one) == len(other) == len(distinct(np.concatenate([one, other])))
 
 
-def _followed(
+def _track(
     machine: Machine, start: StartSystem, target: FloatArray, accuracy: float, way: int
 ) -> tuple[ComplexArray, int]:
     """The different finite ends of all paths, and how many went to infinity."""
@@ -161,7 +160,7 @@ def _followed(
         corners.insert(1, start.limbs * turn * rng.uniform(0.5, 1.5, shape))
     states, arrived = start.states, np.ones(len(start.states), dtype=bool)
     for a, b in pairwise(corners):
-        paths = core_paths.follow(machine, a, b, states, accuracy)
+        paths = follow(machine, a, b, states, accuracy)
         states, before = paths.state, arrived
         arrived = before & (paths.status == ARRIVED)
     return distinct(paths.frame[arrived]), int(np.sum(before & (paths.status == FAR)))
@@ -178,10 +177,8 @@ def distinct(frames: ComplexArray) -> ComplexArray:
     return kept
 
 
-def _brought_to_scale(
-    map: str, spheres: FloatArray
-) -> tuple[FloatArray, float, FloatArray, FloatArray]:
-    """Limbs of about the size of random ones, around the origin; and what brought them there."""
+def _normalized(map: str, spheres: FloatArray) -> tuple[FloatArray, float, FloatArray, FloatArray]:
+    """Limbs moved to the origin and scaled to the size of random ones; scale and both centres."""
     scaled = spheres.copy()
     b, c = spheres[:, 0:3], spheres[:, 3:6]
     middle_b, middle_c = b.mean(axis=0), c.mean(axis=0)

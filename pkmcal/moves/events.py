@@ -3,22 +3,47 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.kinematics.limits import Feasibility
+from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import dexterity
-
-if TYPE_CHECKING:
-    from pkmcal.moves.move import Move
 
 _STEPS = 2000  # along a move
 _HALVINGS = 50  # of a step, to the time a limit is met
 _THIRDS = 40  # taken off two steps, to where a margin is least
 _NEAR = 4.0  # times what a margin falls by in a step: no dip between steps goes deeper
 _STILL = 1e-9  # mm, rad or share: what a margin at rest changes by
+
+
+class Sample(Protocol):
+    """A machine at times of a move."""
+
+    @property
+    def pose(self) -> FloatArray:
+        """Poses (N, 6)."""
+
+
+class Sampled(Protocol):
+    """What is asked of a move; `Move` describes each."""
+
+    @property
+    def robot(self) -> Robot:
+        """The machine."""
+
+    @property
+    def start(self) -> FloatArray:
+        """Its first pose (6,)."""
+
+    @property
+    def duration(self) -> float:
+        """How long it takes, s."""
+
+    def sample(self, t: FloatArray) -> Sample:
+        """The machine at times (N,)."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +68,7 @@ class Event:
     limb: int | None
 
 
-def events(move: Move) -> list[Event]:
+def events(move: Sampled) -> list[Event]:
     """Limits that are broken and singularities that are met, with their times, in order.
 
     Strokes, joint cones and reach of every limb; a singularity is met where the determinant of
@@ -72,7 +97,7 @@ def events(move: Move) -> list[Event]:
     return sorted(found, key=lambda event: event.time)
 
 
-def _names(move: Move) -> list[tuple[str, int | None]]:
+def _names(move: Sampled) -> list[tuple[str, int | None]]:
     limbs = range(1, len(move.robot.model.limbs) + 1)
     names: list[tuple[str, int | None]] = [
         (what, limb) for what in Feasibility.LIMITS for limb in limbs
@@ -80,7 +105,7 @@ def _names(move: Move) -> list[tuple[str, int | None]]:
     return [*names, ("singularity", None)]
 
 
-def _margins(move: Move, times: FloatArray) -> FloatArray:
+def _margins(move: Sampled, times: FloatArray) -> FloatArray:
     """How far inside each limit at times, (N, limits); below 0 where it is broken.
 
     Reach is left where a limb's actuator can no longer move it: where its transmission is 0.
@@ -96,7 +121,7 @@ def _margins(move: Move, times: FloatArray) -> FloatArray:
     return np.hstack([*found, np.where(np.isnan(side), np.inf, side)[:, None]])
 
 
-def _dips(move: Move, times: FloatArray) -> FloatArray:
+def _dips(move: Sampled, times: FloatArray) -> FloatArray:
     """Where margins that may vanish between times (N,) are least."""
     margins = _margins(move, times)
     before, here, after = margins[:-2], margins[1:-1], margins[2:]
@@ -113,7 +138,7 @@ def _dips(move: Move, times: FloatArray) -> FloatArray:
     return (low + high) / 2
 
 
-def _turn(move: Move, low: float, high: float, column: int, before: bool) -> float:
+def _turn(move: Sampled, low: float, high: float, column: int, before: bool) -> float:
     """When a limit changes between two times."""
     for _ in range(_HALVINGS):
         middle = (low + high) / 2

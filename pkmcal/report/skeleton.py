@@ -131,7 +131,11 @@ def _chain(arm: SerialArm, q: FloatArray) -> FloatArray:
         home = np.eye(4)
         home[:3, 3] = arm.points[i - 1]
         part = SerialArm(
-            arm.axes[:i], arm.points[:i], home, arm.kinds[:i], joint_errors=arm.joint_errors[:i]
+            arm.axes[:i],
+            arm.points[:i],
+            home,
+            kinds=arm.kinds[:i],
+            joint_errors=arm.joint_errors[:i],
         )
         at.append(part.forward(q[:i])[:3, 3])
     at.append(arm.forward(q)[:3, 3])

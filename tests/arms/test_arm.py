@@ -33,7 +33,7 @@ def mixed(joints: int = 6, seed: int = 0, kinds: bool = True) -> pk.SerialArm:
     home = np.concatenate([rng.normal(size=3) * 800, rng.uniform(-3, 3, 3)])
     words = ["prismatic" if kinds and i % 3 == 2 else "revolute" for i in range(joints)]
     return pk.SerialArm(
-        rng.normal(size=(joints, 3)), rng.normal(size=(joints, 3)) * 500, home, words
+        rng.normal(size=(joints, 3)), rng.normal(size=(joints, 3)) * 500, home, kinds=words
     )
 
 
@@ -109,7 +109,7 @@ def test_multibody_engines_agree(engine: str, name: str) -> None:
 
 
 def test_a_prismatic_joint_slides_along_its_axis() -> None:
-    arm = pk.SerialArm([[0, 3, 4]], [[1, 2, 3]], [5, 6, 7, 0, 0, 0], "prismatic")
+    arm = pk.SerialArm([[0, 3, 4]], [[1, 2, 3]], [5, 6, 7, 0, 0, 0], kinds="prismatic")
     assert arm.forward([10])[:3, 3].tolist() == [5, 12, 15]
     assert arm.screws.tolist() == [[0, 0, 0, 0, 0.6, 0.8]]
 
@@ -374,7 +374,9 @@ def test_dh_numbers_give_the_chain_of_their_transforms() -> None:
     theta = rng.uniform(-2, 2, 5)
     tool = screw.from_pose([1, 2, 3, 0.1, 0.2, 0.3])
     for convention in ("standard", "modified"):
-        arm = pk.SerialArm.from_dh(a, alpha, d, offset, convention, kinds, tool)
+        arm = pk.SerialArm.from_dh(
+            a, alpha, d, offset, convention=convention, kinds=kinds, tool=tool
+        )
         total = np.eye(4)
         for i in range(5):
             slides = kinds[i] == "prismatic"
@@ -417,13 +419,17 @@ def _arm() -> pk.SerialArm:
             "points must be fin",
         ),
         (
-            lambda: pk.SerialArm(AXES, POINTS, HOME, "revolut"),
+            lambda: pk.SerialArm(AXES, POINTS, HOME, kinds="revolut"),
             ValueError,
             "did you mean 'revolute'",
         ),
-        (lambda: pk.SerialArm(AXES, POINTS, HOME, ["revolute"]), ValueError, "each of 2 joints"),
         (
-            lambda: pk.SerialArm(AXES, POINTS, HOME, 1),
+            lambda: pk.SerialArm(AXES, POINTS, HOME, kinds=["revolute"]),
+            ValueError,
+            "each of 2 joints",
+        ),
+        (
+            lambda: pk.SerialArm(AXES, POINTS, HOME, kinds=1),
             TypeError,
             "kinds must be a name or several",
         ),

@@ -30,7 +30,7 @@ SCARA = pk.SerialArm(
     [[0, 0, 1]] * 4,
     [[0, 0, 0], [400, 0, 0], [700, 0, 0], [700, 0, 0]],
     [700, 0, -50, 0, 0, 0],
-    ["revolute", "revolute", "prismatic", "revolute"],
+    kinds=["revolute", "revolute", "prismatic", "revolute"],
 )
 TARGET = [30.0, 40.0, 50.0]
 THREE = np.array([[30.0, 40.0, 50.0], [-60.0, 20.0, 30.0], [10.0, -80.0, 45.0]])

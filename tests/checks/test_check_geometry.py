@@ -290,12 +290,12 @@ def test_neighbours_on_one_axis_are_found_and_lose_a_rank(kind: str, sense: floa
     axes, points = [[0, 0, 1], along, sense * along], [[0, 0, 0], [0, 0, 520], [0, 0, 520]]
     points[2] = points[1] + 200.0 * along
     kinds = ["revolute", kind, kind]
-    arm = pk.SerialArm(axes, points, [0, 600, 520, 0, 0, 0], kinds)
+    arm = pk.SerialArm(axes, points, [0, 600, 520, 0, 0, 0], kinds=kinds)
     assert np.linalg.matrix_rank(arm.jacobian([0.1, 0.2, 0.3])) == 2
     found = pk.check_geometry(arm).findings
     assert [(each.kind, each.limbs) for each in found] == [("double", (2, 3))]
     points[2] = points[2] + np.array([0.0, 0.1, -0.1])  # beside it: for a slide it is the same
-    beside = pk.check_geometry(pk.SerialArm(axes, points, [0, 600, 520, 0, 0, 0], kinds))
+    beside = pk.check_geometry(pk.SerialArm(axes, points, [0, 600, 520, 0, 0, 0], kinds=kinds))
     assert beside.ok == (kind == "revolute")
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.modes import certificate
-from pkmcal.modes import find as modes
+from pkmcal.modes.find import frames_of
 
 from .. import dietmaier
 
@@ -23,7 +23,7 @@ def solved(name: str) -> tuple[certificate.Closures, np.ndarray]:
     robot = pk.load(name)
     q = robot.inverse(robot.home)
     q = q + np.random.default_rng(0).normal(size=q.shape) * (0.02 * np.abs(q) + 0.01)
-    u = modes.frames_of(robot.forward(q).pose[None])
+    u = frames_of(robot.forward(q).pose[None])
     u[:, 9:] /= robot.length
     closures = robot.assembly_problem(q).closures()
     return closures, certificate.newton(closures, u, 2)

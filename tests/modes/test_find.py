@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.core import paths as core_paths
 from pkmcal.core.paths import FAR, LOST, Paths
 from pkmcal.modes import homotopy
 
@@ -60,7 +59,7 @@ def test_balls_in_which_modes_are_unique_hold_one_mode_each():
     robot = dietmaier.hexapod()
     modes = robot.forward_all(dietmaier.LENGTHS)
     for k in range(len(modes)):
-        apart = modes._apart(modes.poses[[k]])
+        apart = modes._distance(modes.poses[[k]])
         apart[k] = np.inf
         assert apart.min() > modes.unique[k] - modes.error.max()
 
@@ -102,8 +101,8 @@ def test_2tpr2tps_of_general_geometry_has_32_paths_and_of_published_structure_24
 
 def lose(monkeypatch: pytest.MonkeyPatch, change: Any) -> None:
     """Have every run of the paths come back changed."""
-    honest = core_paths.follow
-    monkeypatch.setattr(core_paths, "follow", lambda *arguments: change(honest(*arguments)))
+    honest = homotopy.follow
+    monkeypatch.setattr(homotopy, "follow", lambda *arguments: change(honest(*arguments)))
 
 
 class SameEnd:
@@ -342,7 +341,7 @@ def test_homotopy_and_exhaustive_starts_agree_on_a_thousand_random_hexapods():
         q = robot.inverse(pose)
         modes = robot.forward_all(q, starts=0)
         assert modes.complete and modes.paths == 40 and len(modes) % 2 == 0
-        assert modes._apart(pose[None]).min() < 1e-6
+        assert modes._distance(pose[None]).min() < 1e-6
         both = robot.forward_all(q, starts=5000)
         assert len(both) == len(modes) and both.complete
         counts.append(len(modes))

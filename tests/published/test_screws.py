@@ -296,7 +296,7 @@ def _angles_in_reverse(angles: np.ndarray) -> np.ndarray:
 def test_six_errors_a_joint_are_more_than_can_be_told(kinds: list[str], rank: int) -> None:
     """What commutes with a joint may be the next one's error: four are left of a revolute joint,
     two of a prismatic one; the last joint of the chain keeps all six."""
-    arm = pk.SerialArm(ARM.axes, ARM.points, ARM.home, kinds)
+    arm = pk.SerialArm(ARM.axes, ARM.points, ARM.home, kinds=kinds)
     rng = np.random.default_rng(0)
     angles = rng.uniform(-2, 2, (200, 3)) * [100 if kind == "prismatic" else 1 for kind in kinds]
     J = arm.error_jacobian(angles, frame="tip")
