@@ -15,7 +15,7 @@ from pkmcal.calibration.parameters import POINTS, FitData, Parameters
 from pkmcal.core import instruments
 from pkmcal.core.library import STATUS
 from pkmcal.display import first_rows
-from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import Predicted, difference, distance_per_point, predict
 
@@ -28,7 +28,7 @@ class Evaluation:
     ----------
     theta : ndarray (n,)
         The parameters, mm and rad.
-    robot : Robot
+    robot : Calibratable
         With their geometry.
     pose : ndarray (K, 6)
         Where the machine is at each distinct row of actuators; NaN where it cannot be.
@@ -41,7 +41,7 @@ class Evaluation:
     """
 
     theta: FloatArray
-    robot: Robot
+    robot: Calibratable
     pose: FloatArray
     status: Int32Array
     predicted: tuple[Predicted, ...]

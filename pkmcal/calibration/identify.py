@@ -33,7 +33,7 @@ from pkmcal.calibration.plausibility import (
 )
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import as_given, as_machine
+from pkmcal.measurements.calibratable import Calibratable, as_given, as_machine
 from pkmcal.measurements.lack_of_fit import joined
 from pkmcal.measurements.measurements import Measurements
 
@@ -121,15 +121,15 @@ def identify(
     >>> round(found.robot.geometry["offset1"], 6)
     0.3
     """
-    robot = as_machine(robot)
-    datasets = _datasets(robot, measurements, frame, target, attachment)
+    machine = as_machine(robot)
+    datasets = _datasets(machine, measurements, frame, target, attachment)
     held: list[tuple[FitData, int]] = []
     if isinstance(holdout, Measurements):
-        held = [_as_fitted(robot, holdout, datasets)]
+        held = [_as_fitted(machine, holdout, datasets)]
     elif holdout is not None:
         pairs = [draw(data, holdout) for data in datasets]
         datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
-    chosen = parameters(robot, datasets, free, prior, bounds)
+    chosen = parameters(machine, datasets, free, prior, bounds)
     word("loss", loss, LIMITS)
     equations = Equations(datasets, chosen)
     start = equations.start()
@@ -192,7 +192,7 @@ def _remedy(result: Identification, estimator: Estimator, estimate: Estimate) ->
 
 
 def _datasets(
-    robot: Robot,
+    robot: Calibratable,
     measurements: Measurements | Sequence[Measurements],
     frame: str | Sequence[str],
     target: str | Sequence[str],
@@ -218,7 +218,7 @@ def _datasets(
 
 
 def _as_fitted(
-    robot: Robot, holdout: Measurements, datasets: Sequence[FitData]
+    robot: Calibratable, holdout: Measurements, datasets: Sequence[FitData]
 ) -> tuple[FitData, int]:
     """Hold other measurements out, with what is unknown of the fitted set of their kind."""
     _check(robot, holdout, "holdout")
@@ -227,7 +227,7 @@ def _as_fitted(
     return replace(datasets[i], measured=holdout, rows=np.arange(len(holdout))), i
 
 
-def _check(robot: Robot, measured: Measurements, argument: str) -> None:
+def _check(robot: Calibratable, measured: Measurements, argument: str) -> None:
     n = instance(argument, measured, Measurements).actuators.shape[1]
     if n != robot.n_actuators:
         raise ArgumentError(

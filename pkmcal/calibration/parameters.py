@@ -12,7 +12,7 @@ from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, IntArray, as_arcs
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
-from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 
 Prior = float | Mapping[str, float] | None
@@ -91,7 +91,7 @@ class Parameters:
         followed by them. Near it they are small, and their angles regular.
     points : mapping
         Column of the x of each unknown point, by "target", "attachment" or "anchor" and its name.
-    robot : Robot
+    robot : Calibratable
         The machine they belong to.
     """
 
@@ -106,7 +106,7 @@ class Parameters:
     frame: int | None
     origin: FloatArray
     points: Mapping[tuple[str, str], int]
-    robot: Robot
+    robot: Calibratable
 
     def __len__(self) -> int:
         return len(self.names)
@@ -174,7 +174,7 @@ class Parameters:
 
 
 def parameters(
-    robot: Robot,
+    robot: Calibratable,
     datasets: Sequence[FitData],
     free: str | Sequence[str] | None,
     prior: Prior,
@@ -240,7 +240,7 @@ def parameters(
     )
 
 
-def _travel(robot: Robot, measured: Measurements) -> float:
+def _travel(robot: Calibratable, measured: Measurements) -> float:
     """Largest actuator coordinate, mm; an angle counts as its arc."""
     arcs = measured.actuators * as_arcs(robot.actuator_units, robot.length)
     return max(1.0, float(np.abs(arcs).max()))

@@ -20,7 +20,7 @@ from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import ArmMachine, as_machine
+from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
@@ -207,16 +207,16 @@ def _poses(count: int) -> str:
     return f"{count} pose{'s' * (count != 1)}"
 
 
-def _commanded(name: str, robot: Robot, places: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def _commanded(name: str, robot: Calibratable, places: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Poses and actuators of poses, or of an arm's joint coordinates; NaN where there are none."""
-    if isinstance(robot, ArmMachine):
-        there, q, _ = robot.commanded(as_rows(name, places, robot.n_actuators)[0])
-    else:
+    if isinstance(robot, Robot):
         there, q, _ = ideal(robot, as_rows(name, places, 6)[0])
+    else:
+        there, q, _ = robot.commanded(as_rows(name, places, robot.n_actuators)[0])
     return there, q
 
 
-def _aims(robot: Robot, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def _aims(robot: Calibratable, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
     there, q = _commanded("targets", robot, targets)
     lost = np.flatnonzero(~np.isfinite(there).all(axis=1))
     if len(lost):
@@ -225,12 +225,12 @@ def _aims(robot: Robot, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def _within_limits(
-    robot: Robot, candidates: ArrayLike
+    robot: Calibratable, candidates: ArrayLike
 ) -> tuple[FloatArray, FloatArray, IntArray, int]:
     """Poses and actuators of the candidates that can be measured, which ones, and of how many."""
     there, q = _commanded("candidates", robot, candidates)
     good = np.asarray(np.isfinite(there).all(axis=1))
-    if not isinstance(robot, ArmMachine):  # whose file has no limits
+    if isinstance(robot, Robot):  # the file of an arm has no limits
         good[good] = robot.feasible(there[good]).ok
     # `identify` starts from home, too, and must find them
     good[good] = np.abs(robot.forward(q[good]).pose - there[good]).max(axis=1) < _FOUND
@@ -261,7 +261,7 @@ def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:
 
 
 def _equations(
-    robot: Robot,
+    robot: Calibratable,
     q: FloatArray,
     kind: str,
     target: ArrayLike | None,

@@ -107,16 +107,19 @@ def beyond_strokes(equations: Equations, start: Evaluation, end: Evaluation) -> 
     Both with the nominal machine, whose offsets may be unknown, and with the identified one,
     which may have been misled.
     """
-    out = np.ones((len(equations.actuators), len(start.robot.model.limbs)), dtype=bool)
-    for evaluation in (end, start):
-        if out.any():
-            drive = evaluation.robot.feasible(evaluation.pose).drive
-            out &= _out_of_stroke(evaluation.robot, drive)
+    robot, calibrated = start.robot, end.robot
+    if not isinstance(robot, Robot) or not isinstance(calibrated, Robot):
+        return []  # the file of an arm states no strokes
+    out = _out_of_stroke(calibrated, calibrated.feasible(end.pose).drive)
+    if not out.any():
+        return []
+    drive = robot.feasible(start.pose).drive
+    out &= _out_of_stroke(robot, drive)
     if not out.any():
         return []
     limbs = []
     for i in np.flatnonzero(out.any(axis=0)):
-        low, high = start.robot.model.limbs[i].stroke or (0.0, 0.0)
+        low, high = robot.model.limbs[i].stroke or (0.0, 0.0)
         beyond = drive[out[:, i], i]
         limbs.append(
             f"limb {i + 1} at {beyond.min():.4g} to {beyond.max():.4g}, its stroke is {low:g} to"

@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.plan_poses import Plan, plan_poses
 from pkmcal.cli.calibrate import free_names, read_deviations
@@ -19,7 +20,7 @@ from pkmcal.files.provenance import comment
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
-from pkmcal.measurements.calibratable import ArmMachine, as_given, as_machine
+from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.command_csv import read_commands, write_commands
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
@@ -83,11 +84,12 @@ def plan(
 
     Example: pkmcal plan hexapod --kind pose --count 20 --out plan
     """
-    machine = as_machine(load(robot))
-    chosen = free_names(machine, free)
+    machine: Robot | SerialArm = load(robot)
+    seen = as_machine(machine)
+    chosen = free_names(seen, free)
     with progress("choosing poses"):
         made = plan_poses(
-            as_given(machine),
+            machine,
             _drawn(machine, seed) if poses is None else _places(machine, poses),
             count=30 if count is None and accuracy is None else count,
             accuracy=accuracy,
@@ -96,7 +98,7 @@ def plan(
             kind=kind,
             noise=noise,
             free=chosen or None,
-            prior=read_deviations("--prior", prior or [], machine, chosen),
+            prior=read_deviations("--prior", prior or [], seen, chosen),
             unknown=unknown or (),
         )
     read = comment(contents(robot, *(path for path in (poses, targets) if path is not None)))
@@ -108,8 +110,8 @@ def plan(
     return 0 if np.isfinite(made.predicted) else 1
 
 
-def _drawn(machine: Robot, seed: int) -> FloatArray:
-    if isinstance(machine, ArmMachine):
+def _drawn(machine: Robot | SerialArm, seed: int) -> FloatArray:
+    if isinstance(machine, SerialArm):
         raise ArgumentError(
             f"--poses: {machine.name} is a serial arm, whose limits are not known: a file of joint"
             " coordinates to choose from is needed, with columns such as 'q1 [deg]'"
@@ -117,9 +119,9 @@ def _drawn(machine: Robot, seed: int) -> FloatArray:
     return sample_poses(machine, _DRAWN, seed, _SHARE)
 
 
-def _places(machine: Robot, path: Path) -> FloatArray:
+def _places(machine: Robot | SerialArm, path: Path) -> FloatArray:
     """Poses of a file, or an arm's joint coordinates."""
-    if isinstance(machine, ArmMachine):
+    if isinstance(machine, SerialArm):
         return read_commands(path, machine.actuator_units)
     return read_poses(path, machine)
 

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from pkmcal import display
+from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, propagate, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
 from pkmcal.files.provenance import printable
 from pkmcal.kinematics.workspace import reach, sample_poses, workspace
-from pkmcal.measurements.calibratable import ArmMachine, as_machine
+from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.iso9283 import performance
 from pkmcal.measurements.lack_of_fit import groups
 
@@ -248,12 +249,12 @@ def as_seen(found: Identification, places: FloatArray) -> FloatArray:
 
 def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice | None] | str:
     """The accuracy that the covariance predicts over the workspace, or why there is none."""
-    machine = as_machine(found.robot)
-    if isinstance(machine, ArmMachine):
+    machine = found.robot
+    if isinstance(machine, SerialArm):
         q = found.fit.equations.actuators
         shape = (_DRAWN, q.shape[1])
         random = np.random.default_rng(0).uniform(q.min(axis=0), q.max(axis=0), shape)
-        positions = machine.forward(random).pose[:, :3]
+        positions = as_machine(machine).forward(random).pose[:, :3]
         where = f"{_DRAWN} joint positions drawn within the range that was measured"
         return WorkspaceAccuracy(random, positions, expected(found, random), where), None
     try:
