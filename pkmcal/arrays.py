@@ -16,6 +16,7 @@ ComplexArray = NDArray[np.complex128]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 Int32Array = NDArray[np.int32]  # what the core writes
+Int64Array = NDArray[np.int64]
 
 Unit = Literal["mm", "rad", "1"]
 

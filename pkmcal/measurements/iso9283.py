@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.arrays import FloatArray, IntArray, as_rows
 from pkmcal.exceptions import ArgumentError
 
 REPEATS = 30  # what the standard asks for at each pose
@@ -37,7 +37,7 @@ class Performance:
         them, of 300 poses at most. It does not depend on where the instrument stands.
     """
 
-    repeats: NDArray[np.intp]
+    repeats: IntArray
     accuracy: FloatArray
     repeatability: FloatArray
     distance_accuracy: FloatArray

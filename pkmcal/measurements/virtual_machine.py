@@ -14,8 +14,9 @@ from pkmcal.arrays import FloatArray
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import ArmMachine, Solvable
+from pkmcal.measurements.components import COMPONENTS
 from pkmcal.measurements.fields import numbers
-from pkmcal.measurements.measurements import COMPONENTS, Measurements
+from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import predict
 from pkmcal.measurements.tracker import Tracker
 

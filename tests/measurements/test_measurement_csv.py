@@ -17,8 +17,9 @@ from hypothesis.extra.numpy import arrays
 from pkmcal.files import atomic as whole_file
 from pkmcal.files import csv_table
 from pkmcal.measurements import measurement_csv
+from pkmcal.measurements.components import COMPONENTS
 from pkmcal.measurements.measurement_csv import read_measurements
-from pkmcal.measurements.measurements import COMPONENTS, Measurements
+from pkmcal.measurements.measurements import Measurements
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 POSITIVE = st.floats(1e-300, 1e300)

@@ -14,7 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pkmcal.measurements import measurements as module
-from pkmcal.measurements.measurements import COMPONENTS, Measurements
+from pkmcal.measurements.components import COMPONENTS
+from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
 KINDS = tuple(COMPONENTS)
