@@ -11,28 +11,29 @@ of Economics and Statistics 90 (2008) 414-427). A prior's centre is drawn from t
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal import display
+from pkmcal import arguments, display
 from pkmcal.arguments import checked_seed, instance, whole
-from pkmcal.arguments import executor as checked_executor
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.least_squares import Search
+from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.result import Result
 
 _TOGETHER = 20  # replicates that one task computes
 _LEFT = 1e-6  # share of the noise below which a residual says nothing of it
 
 
-@dataclass(frozen=True, eq=False)
-class Bootstrap:
+@dataclass(frozen=True, eq=False, repr=False)
+class Bootstrap(Result):
     """Parameters of many calibrations; in the order of `free`, mm and rad.
 
     Attributes
@@ -64,7 +65,12 @@ class Bootstrap:
         """How many replicates did not converge."""
         return int(np.isnan(self.values).any(axis=1).sum())
 
-    def __str__(self) -> str:
+    def failures(self) -> str:
+        """Say how many replicates failed; empty where none did."""
+        count = f"{self.failed} of {len(self.values)}"
+        return f"{count} replicates did not converge" if self.failed else ""
+
+    def _parts(self) -> Iterator[str | Table]:
         rows = []
         for i, (name, unit) in enumerate(zip(self.free, self.units, strict=True)):
             numbers = (self.stderr[i], self.linear[i], self.bias[i], *self.interval95[i])
@@ -79,14 +85,15 @@ class Bootstrap:
             ])  # fmt: skip
         failed = f", {self.failed} did not converge" if self.failed else ""
         heads = ["parameter", "stderr", "linear", "bias", "2.5 %", "97.5 %"]
-        title = f"{len(self.values)} bootstrap replicates{failed}"
-        return f"{title}\n{display.Table(heads, rows, left=1)!s}"
+        yield f"{len(self.values)} bootstrap replicates{failed}"
+        yield Table(heads, rows, left=1)
 
 
 def bootstrap(
     found: Identification,
     replicates: int = 1000,
     seed: int = 0,
+    *,
     executor: Executor | None = None,
 ) -> Bootstrap:
     """Repeat a calibration to see how far its parameters scatter.
@@ -133,7 +140,7 @@ def bootstrap(
         raise ArgumentError("found: no degrees of freedom are left, so no residuals to draw from")
     seeds = np.random.SeedSequence(checked_seed(seed)).spawn(replicates)
     parts = [seeds[k : k + _TOGETHER] for k in range(0, replicates, _TOGETHER)]
-    workers = checked_executor(executor)
+    workers = arguments.executor(executor)
     replicate = Replicate(found.fit)
     done: Iterable[FloatArray] = (workers.map if workers else map)(replicate, parts)
     values = np.concatenate(list(done))

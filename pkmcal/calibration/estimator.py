@@ -16,7 +16,7 @@ from pkmcal.calibration.identifiability import (
     triangle,
 )
 from pkmcal.calibration.least_squares import Search
-from pkmcal.calibration.loss import Loss
+from pkmcal.calibration.loss import Loss, LossName
 from pkmcal.calibration.outliers import median_ratio
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.lack_of_fit import SIGNIFICANT, Split, groups, split
@@ -95,7 +95,7 @@ class Estimator:
         A name in `loss.LIMITS`.
     """
 
-    def __init__(self, equations: Equations, start: Evaluation, loss: str) -> None:
+    def __init__(self, equations: Equations, start: Evaluation, loss: LossName) -> None:
         self.equations, self.start, self.loss = equations, start, loss
         self.search = Search(equations, start)
         self.scale, self.prior = self.search.scale, self.search.prior
@@ -132,7 +132,7 @@ class Estimator:
 
     # between the least squares ------------------------------------------------------------------
 
-    def _loss(self, name: str, width: FloatArray) -> Loss:
+    def _loss(self, name: LossName, width: FloatArray) -> Loss:
         of_rows = width[self.equations.set_of]
         return Loss(name, self.equations.components, of_rows)
 

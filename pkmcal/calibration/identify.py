@@ -23,8 +23,8 @@ from pkmcal.calibration.fit_statistics import (
 )
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.loss import LIMITS
-from pkmcal.calibration.parameters import Bounds, FitData, Prior, parameters
+from pkmcal.calibration.loss import LIMITS, LossName
+from pkmcal.calibration.parameters import KNOWN, Bounds, FitData, Known, Prior, parameters
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
     implausible_changes,
@@ -45,13 +45,14 @@ def identify(
     robot: Robot | SerialArm,
     measurements: Measurements | Sequence[Measurements],
     free: str | Sequence[str] | None = None,
+    *,
     prior: Prior = None,
-    loss: str = "linear",
-    frame: str | Sequence[str] = "known",
-    target: str | Sequence[str] = "known",
+    loss: LossName = "linear",
+    frame: Known | Sequence[Known] = "known",
+    target: Known | Sequence[Known] = "known",
     holdout: float | Measurements | None = None,
     bounds: Bounds = None,
-    attachment: str | Sequence[str] = "known",
+    attachment: Known | Sequence[Known] = "known",
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -194,9 +195,9 @@ def _remedy(result: Identification, estimator: Estimator, estimate: Estimate) ->
 def _datasets(
     robot: Calibratable,
     measurements: Measurements | Sequence[Measurements],
-    frame: str | Sequence[str],
-    target: str | Sequence[str],
-    attachment: str | Sequence[str],
+    frame: Known | Sequence[Known],
+    target: Known | Sequence[Known],
+    attachment: Known | Sequence[Known],
 ) -> list[FitData]:
     sets = list(measurements) if isinstance(measurements, Iterable) else [measurements]
     for measured in sets:
@@ -245,7 +246,7 @@ def _unknown(argument: str, given: str | Sequence[str], count: int) -> list[bool
     said = [given] * count if alone else list(given)
     if len(said) != count:
         raise ArgumentError(f"{argument}: one word for each of {count} sets, found {len(said)}")
-    return [word(argument, each, ("known", "unknown")) == "unknown" for each in said]
+    return [word(argument, each, KNOWN) == "unknown" for each in said]
 
 
 def _result(estimator: Estimator, estimate: Estimate, held: HeldOut) -> Identification:

@@ -6,12 +6,16 @@ about every combination of parameters: that of a choice of them is between 0 and
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.calibration.identifiability import ROUNDING, decompose
 
-CRITERIA = ("prediction", "D", "A")
+Criterion = Literal["prediction", "D", "A"]
+
+CRITERIA: tuple[Criterion, ...] = ("prediction", "D", "A")
 
 _TRIED = 12  # members that matter least, one of which must want to be exchanged
 _BETTER = 1e-9  # share by which an exchange must gain
@@ -42,7 +46,12 @@ class Design:
     """
 
     def __init__(
-        self, blocks: FloatArray, prior: FloatArray, aims: FloatArray, criterion: str, worst: float
+        self,
+        blocks: FloatArray,
+        prior: FloatArray,
+        aims: FloatArray,
+        criterion: Criterion,
+        worst: float,
     ) -> None:
         n = blocks.shape[2]
         singular, basis = decompose(np.vstack([blocks.reshape(-1, n), prior]))

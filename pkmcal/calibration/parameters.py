@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from typing import Literal
 
 import numpy as np
 
@@ -13,16 +14,19 @@ from pkmcal.arrays import FloatArray, IntArray, as_arcs
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.measurements.components import Kind
 from pkmcal.measurements.measurements import Measurements
 
 Prior = float | Mapping[str, float] | None
+Known = Literal["known", "unknown"]
+KNOWN: tuple[Known, ...] = ("known", "unknown")
 Bounds = Mapping[str, tuple[float, float]] | None
 
 _POINT = (("x", "mm"), ("y", "mm"), ("z", "mm"))
 _FRAME = (*_POINT, ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
 
 # The points that measurements of a kind depend on: what `predict` calls them, and users.
-POINTS: dict[str, dict[str, str]] = {
+POINTS: dict[Kind, dict[str, str]] = {
     "pose": {},
     "position": {"target": "target"},
     "height": {"target": "target"},

@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import display
 from pkmcal.arguments import number, whole, word, words
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.identifiability import as_sum, sparse_basis
-from pkmcal.calibration.optimal_design import CRITERIA, Design
+from pkmcal.calibration.optimal_design import CRITERIA, Criterion, Design
 from pkmcal.calibration.parameters import FitData, Parameters, Prior, parameters
 from pkmcal.core.library import POSE
+from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable, as_machine
+from pkmcal.measurements.components import Kind
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.measurements.virtual_machine import VirtualMachine
+from pkmcal.result import Result
+
+Unknown = Literal["frame", "target"]
+UNKNOWN: tuple[Unknown, ...] = ("frame", "target")
 
 _DRAWS = 25  # of poses at random, to compare a plan with
 _ERROR = 0.5  # mm; what numbers may be off by that have no prior
@@ -31,8 +37,8 @@ _FOUND = 1e-6  # mm, rad: how near to a pose forward kinematics must end
 _UNIDENTIFIABLE = 1e-3  # mm a target moves per mm along an unidentifiable combination
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Result):
     """Poses to measure.
 
     Attributes
@@ -72,7 +78,7 @@ class Plan:
     def __len__(self) -> int:
         return len(self.indices)
 
-    def __str__(self) -> str:
+    def _parts(self) -> Iterator[str | Table]:
         left_out = f"; {self.left_out} candidates left out" if self.left_out else ""
         if isinstance(self.robot, SerialArm):  # several postures have one pose
             names: Sequence[str] = [f"q{i + 1}" for i in range(self.robot.n_joints)]
@@ -83,34 +89,36 @@ class Plan:
         heads = ["candidate"]
         heads += [f"{n} [{'deg' if t else 'mm'}]" for n, t in zip(names, turning, strict=True)]
         rows = [
-            [str(index), *(display.fixed(float(value), 3) for value in row)]
+            [str(index), *(fixed(float(value), 3) for value in row)]
             for index, row in zip(
                 self.indices, np.where(turning, np.degrees(given), given), strict=True
             )
         ]
-        return "\n".join([
-            f"{self.robot.name}: measure {_poses(len(self))} for {len(self.parameters)} parameters"
-            f"{left_out}",
-            f"predicted error {self.predicted:.3g} mm rms; {_poses(len(self))} at random"
-            f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g}",
-            *([] if np.isfinite(self.predicted) else ["too few to identify all of them"]),
-            str(display.Table(heads, rows)),
-        ])  # fmt: skip
+        count = _poses(len(self))
+        yield f"{self.robot.name}: measure {count} for {len(self.parameters)} parameters{left_out}"
+        yield (
+            f"predicted error {self.predicted:.3g} mm rms; {count} at random"
+            f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g}"
+        )
+        if not np.isfinite(self.predicted):
+            yield "too few to identify all of them"
+        yield Table(heads, rows)
 
 
 def plan_poses(
     robot: Robot | SerialArm,
     candidates: ArrayLike,
     count: int | None = None,
+    *,
     accuracy: float | None = None,
     targets: ArrayLike | None = None,
-    criterion: str = "prediction",
-    kind: str = "position",
+    criterion: Criterion = "prediction",
+    kind: Kind = "position",
     target: ArrayLike | None = None,
     noise: float | Tracker = 0.02,
     free: str | Sequence[str] | None = None,
     prior: Prior = None,
-    unknown: str | Sequence[str] = (),
+    unknown: Unknown | Sequence[Unknown] = (),
 ) -> Plan:
     """Choose poses to measure among candidates, by exchange.
 
@@ -263,7 +271,7 @@ def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:
 def _equations(
     robot: Calibratable,
     q: FloatArray,
-    kind: str,
+    kind: Kind,
     target: ArrayLike | None,
     noise: float | Tracker,
     free: str | Sequence[str] | None,
@@ -273,7 +281,7 @@ def _equations(
     """What would be measured, the rows of a pose one after another."""
     sought = words("unknown", unknown)
     for each in sought:
-        word("unknown", each, ("frame", "target"))
+        word("unknown", each, UNKNOWN)
     several = None if target is None else as_rows("target", target, 3)[0]
     count = 1 if several is None else len(several)
     measured = VirtualMachine(robot, noise).measure(
@@ -295,7 +303,7 @@ def _design(
     safe: BoolArray,
     aims: FloatArray,
     aims_at: FloatArray,
-    criterion: str,
+    criterion: Criterion,
 ) -> Design:
     chosen = equations.parameters
     start = equations.start()

@@ -13,6 +13,7 @@ from typing import Annotated
 
 import typer
 
+from pkmcal.arguments import word
 from pkmcal.cli.output import folder
 from pkmcal.cli.progress import progress
 from pkmcal.cli.robot_argument import ROBOT_OR_ARM, contents
@@ -105,6 +106,8 @@ def calibrate(
     --report out
     """
     from pkmcal.calibration.identify import identify
+    from pkmcal.calibration.loss import LIMITS
+    from pkmcal.calibration.parameters import KNOWN
 
     given = load(robot)
     machine = as_machine(given)
@@ -124,10 +127,10 @@ def calibrate(
             measured,
             free=chosen or None,
             prior=read_deviations("--prior", prior or [], machine, chosen),
-            loss=loss,
-            frame=frame,
-            target=target,
-            attachment=attachment,
+            loss=word("--loss", loss, LIMITS),
+            frame=word("--frame", frame, KNOWN),
+            target=word("--target", target, KNOWN),
+            attachment=word("--attachment", attachment, KNOWN),
             holdout=None if holdout is None else _read_holdout(holdout, machine),
         )
     if out is not None:
@@ -231,7 +234,7 @@ def read_tracker(text: str) -> Tracker:
         )
     far, azimuth, elevation, x, y, z = [*numbers, 0.0, 0.0, 0.0][:6]
     try:
-        return Tracker(far, math.radians(azimuth), math.radians(elevation), (x, y, z))
+        return Tracker(far, math.radians(azimuth), math.radians(elevation), position=(x, y, z))
     except ValueError as error:
         raise ArgumentError(f"--tracker {text}: {error}") from None
 

@@ -8,9 +8,11 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from pkmcal.arguments import word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.plan_poses import Plan, plan_poses
+from pkmcal.calibration.optimal_design import CRITERIA
+from pkmcal.calibration.plan_poses import UNKNOWN, Plan, plan_poses
 from pkmcal.cli.calibrate import free_names, read_deviations
 from pkmcal.cli.output import folder
 from pkmcal.cli.progress import progress
@@ -22,6 +24,7 @@ from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.command_csv import read_commands, write_commands
+from pkmcal.measurements.components import COMPONENTS
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
 
@@ -94,12 +97,12 @@ def plan(
             count=30 if count is None and accuracy is None else count,
             accuracy=accuracy,
             targets=None if targets is None else _places(machine, targets),
-            criterion=criterion,
-            kind=kind,
+            criterion=word("--criterion", criterion, CRITERIA),
+            kind=word("--kind", kind, COMPONENTS),
             noise=noise,
             free=chosen or None,
             prior=read_deviations("--prior", prior or [], seen, chosen),
-            unknown=unknown or (),
+            unknown=[word("--unknown", each, UNKNOWN) for each in unknown or ()],
         )
     read = comment(contents(robot, *(path for path in (poses, targets) if path is not None)))
     written = [] if out is None else _write(made, folder(out), read)
@@ -129,5 +132,5 @@ def _places(machine: Robot | SerialArm, path: Path) -> FloatArray:
 def _write(made: Plan, out: Path, head: str) -> list[Path]:
     poses, commands = out / "poses.csv", out / "commands.csv"
     write_poses(poses, made.poses, comment=head)
-    write_commands(commands, made.robot.actuator_units, made.actuators, head)
+    write_commands(commands, made.robot.actuator_units, made.actuators, comment=head)
     return [poses, commands]

@@ -44,7 +44,11 @@ def read_commands(path: str | PathLike[str], units: Sequence[str]) -> FloatArray
 
 
 def write_commands(
-    path: str | PathLike[str], units: Sequence[str], commands: FloatArray, comment: str = ""
+    path: str | PathLike[str],
+    units: Sequence[str],
+    commands: FloatArray,
+    *,
+    comment: str = "",
 ) -> None:
     """Write rows (N, n) that `read_commands` reads back to the last bit, or nothing.
 

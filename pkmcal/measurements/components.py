@@ -11,7 +11,7 @@ Kind = Literal["pose", "position", "height", "distance"]
 _LENGTHS: tuple[tuple[str, Unit], ...] = (("x", "mm"), ("y", "mm"), ("z", "mm"))
 _ANGLES: tuple[tuple[str, Unit], ...] = (("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
 
-COMPONENTS: dict[str, tuple[tuple[str, Unit], ...]] = {
+COMPONENTS: dict[Kind, tuple[tuple[str, Unit], ...]] = {
     "pose": _LENGTHS + _ANGLES,
     "position": _LENGTHS,
     "height": (("z", "mm"),),

@@ -40,7 +40,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentTypeError, FileError
 from pkmcal.files.column_names import BESIDE, RESERVED, known_as
 from pkmcal.files.csv_table import Table
-from pkmcal.measurements.components import COMPONENTS
+from pkmcal.measurements.components import COMPONENTS, Kind
 from pkmcal.measurements.measurements import Measurements
 
 _AXES = ("x", "y", "z")
@@ -157,7 +157,7 @@ def _compare(table: Table, units: tuple[str, ...], robot: Any) -> None:
             )
 
 
-def _kind(table: Table, several: tuple[str, ...]) -> str:
+def _kind(table: Table, several: tuple[str, ...]) -> Kind:
     """What was measured, by the columns that are there."""
     names = table.columns.keys()
     groups = {
@@ -181,7 +181,7 @@ def _kind(table: Table, several: tuple[str, ...]) -> str:
     return "position" if names.isdisjoint(_ANGLES) else "pose"
 
 
-def _read_sigma(table: Table, kind: str) -> FloatArray | None:
+def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
     """Deviations (rows, 1) or (rows, k), or covariances (rows, k, k)."""
     given = [name for name in table.columns if name.partition(".")[0] in ("sigma", "cov")]
     if not given:
@@ -240,7 +240,7 @@ def _read_several(
     return actuators[rows], values[rows, index], chosen
 
 
-def _read_targets(table: Table, kind: str) -> dict[str, Any]:
+def _read_targets(table: Table, kind: Kind) -> dict[str, Any]:
     """The target of each row, by name, by place or both."""
     points = {name: _read_point(table, name) for name in ("target", "attachment")}
     fields: dict[str, Any] = {name: place for name, place in points.items() if place is not None}

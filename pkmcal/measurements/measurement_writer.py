@@ -9,7 +9,7 @@ from typing import Protocol
 
 from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.files.csv_writer import write_csv
-from pkmcal.measurements.components import COMPONENTS
+from pkmcal.measurements.components import COMPONENTS, Kind
 
 
 class Writable(Protocol):
@@ -28,7 +28,7 @@ class Writable(Protocol):
         """What was measured, (N, k) or (N,)."""
 
     @property
-    def kind(self) -> str:
+    def kind(self) -> Kind:
         """Which key of `COMPONENTS` they are."""
 
     @property

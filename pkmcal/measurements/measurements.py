@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike
 from pkmcal import display
 from pkmcal.arguments import checked_seed, shown, word
 from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.components import COMPONENTS
+from pkmcal.measurements.components import COMPONENTS, Kind
 from pkmcal.measurements.fields import (
     attachment_array,
     integers,
@@ -27,12 +28,13 @@ from pkmcal.measurements.fields import (
 )
 from pkmcal.measurements.measurement_writer import write_measurements
 from pkmcal.measurements.tracker import Tracker
+from pkmcal.result import Result
 
 _LISTED_ROWS = 12  # a longer list of measurements is printed with its middle left out
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
-class Measurements:
+class Measurements(Result):
     """Actuator readings with what an instrument measured there. Arrays are copied and read-only.
 
     Parameters
@@ -86,7 +88,7 @@ class Measurements:
 
     actuators: FloatArray
     values: FloatArray
-    kind: str = "position"
+    kind: Kind = "position"
     sigma: FloatArray | None = None
     target: FloatArray | None = None
     group: Int64Array | None = None
@@ -100,7 +102,8 @@ class Measurements:
         self,
         actuators: ArrayLike,
         values: ArrayLike,
-        kind: str = "position",
+        kind: Kind = "position",
+        *,
         sigma: ArrayLike | Tracker | None = None,
         target: ArrayLike | None = None,
         group: ArrayLike | None = None,
@@ -269,10 +272,11 @@ class Measurements:
         """
         write_measurements(self, path, comment)
 
-    def __repr__(self) -> str:
-        return f"<Measurements: {self._title()}>"
+    def _parts(self) -> Iterator[str | Table]:
+        yield self._title()
+        yield self._table()
 
-    def __str__(self) -> str:
+    def _table(self) -> Table:
         units = self.actuator_units or ("",) * self.actuators.shape[1]
         heads, columns = ["row"], [[str(row) for row in range(len(self))]]
         for i, unit in enumerate(units):
@@ -292,7 +296,7 @@ class Measurements:
         rows = list(zip(*columns, strict=True))
         if len(rows) > _LISTED_ROWS:
             rows[_LISTED_ROWS - 4 : -3] = [("⋮",) * len(heads)]
-        return self._title() + "\n" + str(display.Table(heads, rows))
+        return Table(heads, rows)
 
     def _deviations(self) -> FloatArray | None:
         """Standard deviations (N, k), also where covariance matrices were given."""

@@ -9,6 +9,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray, wrapped
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose, compose_rates
+from pkmcal.measurements.components import Kind
 
 _ORIGIN = np.zeros(3)
 _NOWHERE = np.zeros(6)
@@ -40,7 +41,7 @@ class Predicted:
 
 
 def predict(
-    kind: str,
+    kind: Kind,
     pose: FloatArray,
     target: FloatArray = _ORIGIN,
     anchor: FloatArray = _ORIGIN,
@@ -105,7 +106,7 @@ def _poses(pose: FloatArray, frame: FloatArray | None, origin: FloatArray) -> Pr
     return Predicted(seen, instruments.seen_pose_rates(whole, seen), by_frame=by_frame)
 
 
-def difference(kind: str, values: FloatArray, predicted: FloatArray) -> FloatArray:
+def difference(kind: Kind, values: FloatArray, predicted: FloatArray) -> FloatArray:
     """Measured less predicted, (N, k); angles the short way round."""
     residual: FloatArray = values.reshape(predicted.shape) - predicted
     if kind == "pose":

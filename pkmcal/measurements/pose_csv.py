@@ -55,6 +55,7 @@ def write_poses(
     path: str | PathLike[str],
     poses: FloatArray,
     columns: dict[str, FloatArray] | None = None,
+    *,
     comment: str = "",
 ) -> None:
     """Write poses (N, 6), angles in degrees, and other columns beside them.

@@ -14,7 +14,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import ArmMachine, Solvable
-from pkmcal.measurements.components import COMPONENTS
+from pkmcal.measurements.components import COMPONENTS, Kind
 from pkmcal.measurements.fields import numbers
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import predict
@@ -53,6 +53,7 @@ class VirtualMachine:
         true_robot: Solvable | SerialArm,
         noise: float | Tracker = 0.02,
         seed: int = 0,
+        *,
         angle_noise: float | None = None,
     ) -> None:
         if not hasattr(true_robot, "forward"):
@@ -72,8 +73,9 @@ class VirtualMachine:
     def measure(
         self,
         q: ArrayLike,
-        kind: str = "position",
+        kind: Kind = "position",
         target: ArrayLike | None = None,
+        *,
         attachment: ArrayLike | None = None,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.

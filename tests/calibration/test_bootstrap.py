@@ -98,11 +98,13 @@ def test_stated_noise_that_is_wrong_does_not_mislead(hexapod: Robot) -> None:
 def test_mixed_measurements_robust_loss_and_covariances(hexapod: Robot) -> None:
     rng = np.random.default_rng(4)
     q = hexapod.inverse(hexapod_poses(hexapod, 30, rng))
-    tracker = pk.Tracker(0.01, 1e-5, 2e-5, (2000, 0, 0))
+    tracker = pk.Tracker(0.01, 1e-5, 2e-5, position=(2000, 0, 0))
     anchor = [400.0, 300, -100]
     sets = [
         pk.VirtualMachine(hexapod, tracker, seed=4).measure(q),
-        pk.VirtualMachine(hexapod, 0.05, seed=5).measure(q, "distance", anchor, [50, 0, 20]),
+        pk.VirtualMachine(hexapod, 0.05, seed=5).measure(
+            q, "distance", anchor, attachment=[50, 0, 20]
+        ),
         pk.VirtualMachine(hexapod, 0.02, seed=6).measure(q, "pose"),
     ]
     found = pk.identify(hexapod, sets, free="offset*", loss="huber")

@@ -39,12 +39,12 @@ def logged(name: str, frame: list[float], kind: str) -> tuple[Robot, Robot, Meas
         angle = NOISE / 500
         sigma = np.array([NOISE] * 3 + [angle] * 3)
         values = compose(at, pose) + sigma * rng.normal(size=(60, 6))
-        return robot, true, Measurements(q, values, kind, sigma)
+        return robot, true, Measurements(q, values, kind, sigma=sigma)
     points = instruments.seen_points(at, instruments.points(pose, TARGET)[0])[0]
     points += NOISE * rng.normal(size=points.shape)
     if kind == "height":
-        return robot, true, Measurements(q, points[:, 2], kind, NOISE, target=TARGET)
-    return robot, true, Measurements(q, points, kind, NOISE)
+        return robot, true, Measurements(q, points[:, 2], kind, sigma=NOISE, target=TARGET)
+    return robot, true, Measurements(q, points, kind, sigma=NOISE)
 
 
 def assert_found(found: pk.Identification, true: Robot, frame: list[float]) -> None:

@@ -212,7 +212,7 @@ def test_split_refuses_an_empty_side(holdout: float) -> None:
 
 def test_print_shows_units_and_the_digits_of_sigma() -> None:
     m = Measurements(
-        [[0.5, 300.0]], [[1, 2, 3, 0.1, 0, 0]], "pose", [0.02] * 3 + [2e-4] * 3,
+        [[0.5, 300.0]], [[1, 2, 3, 0.1, 0, 0]], "pose", sigma=[0.02] * 3 + [2e-4] * 3,
         actuator_units=["rad", "mm"],
     )  # fmt: skip
     title, heads, row = str(m).splitlines()
@@ -271,7 +271,7 @@ def test_without_noise_a_virtual_machine_reads_what_is_there(
 
 
 def test_distances_run_from_the_target_to_the_attachment() -> None:
-    m = VirtualMachine(Gantry(), noise=0).measure(Q, "distance", [0, 0, 10], [2, 0, 0])
+    m = VirtualMachine(Gantry(), noise=0).measure(Q, "distance", [0, 0, 10], attachment=[2, 0, 0])
     np.testing.assert_allclose(m.values, [np.sqrt(9 + 36 + 100), 2], atol=1e-14)
     np.testing.assert_array_equal(m.attachment, [2, 0, 0])
 
