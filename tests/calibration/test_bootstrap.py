@@ -19,11 +19,6 @@ from ..simulated import hexapod_poses, tilted_poses, with_errors
 
 
 @pytest.fixture(scope="module")
-def hexapod() -> Robot:
-    return pk.load("hexapod")
-
-
-@pytest.fixture(scope="module")
 def offsets(hexapod: Robot) -> Identification:
     rng = np.random.default_rng(0)
     q = hexapod.inverse(hexapod_poses(hexapod, 60, rng))

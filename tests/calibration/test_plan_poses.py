@@ -16,11 +16,6 @@ from ..simulated import missed, with_errors
 
 
 @pytest.fixture(scope="module")
-def hexapod() -> Robot:
-    return pk.load("hexapod")
-
-
-@pytest.fixture(scope="module")
 def candidates(hexapod: Robot) -> np.ndarray:
     return pk.sample_poses(hexapod, 200)
 

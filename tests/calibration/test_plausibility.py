@@ -24,11 +24,6 @@ Change = Callable[[Measurements], dict[str, Any]]
 
 
 @pytest.fixture(scope="module")
-def paper() -> Robot:
-    return pk.load("2tpr2tps")
-
-
-@pytest.fixture(scope="module")
 def points(paper: Robot) -> Measurements:
     rng = np.random.default_rng(1)
     machine = VirtualMachine(with_errors(paper, 0.5, rng))

@@ -7,17 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-import pkmcal as pk
 from pkmcal.calibration.identify import identify
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
 from ..simulated import hexapod_poses
-
-
-@pytest.fixture(scope="module")
-def hexapod() -> Robot:
-    return pk.load("hexapod")
 
 
 def test_the_unknown_fixed_point_of_distances_is_found(hexapod: Robot) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import doctest
 import pickle
 from types import SimpleNamespace
 from typing import Any
@@ -13,7 +12,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pkmcal.measurements import measurements as module
 from pkmcal.measurements.components import COMPONENTS
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
@@ -228,10 +226,6 @@ def test_print_fits_a_screen_and_says_what_it_leaves_out() -> None:
     assert len(lines) <= 24 and max(map(len, lines)) <= 120
     assert "⋮" in lines[10] and lines[-1].split()[0] == "499"
     assert repr(m) == f"<Measurements: {lines[0]}>"
-
-
-def test_the_examples_run() -> None:
-    assert doctest.testmod(module).failed == 0
 
 
 # --- the virtual machine -----------------------------------------------------------------------
