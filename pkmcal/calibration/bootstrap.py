@@ -7,6 +7,7 @@ rows of one pose may have anything in common (C. F. J. Wu, Jackknife, bootstrap 
 methods in regression analysis, Annals of Statistics 14 (1986) 1261-1295; A. C. Cameron, J. B.
 Gelbach and D. L. Miller, Bootstrap-based improvements for inference with clustered errors, Review
 of Economics and Statistics 90 (2008) 414-427). A prior's centre is drawn from the prior.
+SciPy's bootstrap draws observations anew, which changes the poses that were measured.
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ from pkmcal.measurements.lack_of_fit import SIGNIFICANT, Split, groups, split
 
 _ROUNDS = 20  # of estimating noise and unidentifiable combinations anew
 _LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
-_LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
+LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +198,7 @@ class Estimator:
         rows, components = self.equations.set_of, self.equations.components
         squares = self._squares(estimate.residual)
         factor = np.ones(len(self.unstated))
-        for i in np.flatnonzero(estimate.freedom >= _LEAST_FREEDOM):
+        for i in np.flatnonzero(estimate.freedom >= LEAST_FREEDOM):
             mine, k = squares[rows == i], components[rows == i]
             if self.loss == "linear":
                 variance = mine.sum() / estimate.freedom[i]

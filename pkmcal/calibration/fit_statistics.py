@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.identifiability import as_sum, observability, sparse_basis
 from pkmcal.calibration.outliers import outliers
 from pkmcal.measurements.lack_of_fit import joined
@@ -73,7 +73,7 @@ class SearchRecord:
 def reported_covariance(estimator: Estimator, estimate: Estimate) -> FloatArray:
     """Covariance (n, n) of the reported parameters, mm and rad; inf where noise is not known."""
     rates = _reported_by_scaled(estimator, estimate)
-    if (estimator.unstated & (estimate.freedom < 0.5)).any():
+    if (estimator.unstated & (estimate.freedom < LEAST_FREEDOM)).any():
         return np.full((len(rates), len(rates)), np.inf)
     covariance: FloatArray = rates @ estimate.covariance @ rates.T
     return covariance

@@ -31,7 +31,7 @@ from __future__ import annotations
 import itertools
 import re
 from os import PathLike
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -49,7 +49,15 @@ _ACTUATOR = re.compile(r"q[1-9][0-9]*")
 _OF_A_TARGET = re.compile(r"(?P<target>[^.]+)\.[xyz]")
 
 
-def read_measurements(path: str | PathLike[str], robot: Any = None) -> Measurements:
+class Actuated(Protocol):
+    """A machine whose actuators have units: `Robot`, `SerialArm`."""
+
+    @property
+    def actuator_units(self) -> tuple[str, ...]:
+        """Unit of each actuator, "mm" or "rad"."""
+
+
+def read_measurements(path: str | PathLike[str], robot: Actuated | None = None) -> Measurements:
     r"""Read measurements from a CSV file; its module lists the columns.
 
     A row with several targets (``A.x``, ``B.x`` …) yields one measurement per target, in the order
@@ -139,7 +147,7 @@ def _read_actuators(table: Table) -> tuple[FloatArray, tuple[str, ...]]:
     return np.stack([values for values, _ in read], axis=1), tuple(unit for _, unit in read)
 
 
-def _compare(table: Table, units: tuple[str, ...], robot: Any) -> None:
+def _compare(table: Table, units: tuple[str, ...], robot: Actuated | None) -> None:
     if robot is not None and not hasattr(robot, "actuator_units"):
         raise ArgumentTypeError(
             f"robot must be a Robot or SerialArm, found {arguments.shown(robot)}"

@@ -195,7 +195,7 @@ def test_a_plan_of_an_arm_shows_what_to_command() -> None:
         [[0, 0, 1], [1, 0, 0], [0, 0, 1]],
         [[0, 0, 0], [300, 0, 0], [400, 0, 0]],
         [450, 0, 0, 0, 0, 0],
-        ["revolute", "prismatic", "revolute"],
+        kinds=["revolute", "prismatic", "revolute"],
     )
     offered = np.random.default_rng(0).uniform(-1, 1, (30, 3)) * [2, 100, 2]
     lines = str(pk.plan_poses(arm, offered, 1, free="joint1.dx", kind="pose")).splitlines()

@@ -217,8 +217,8 @@ def test_copied_rows_are_named_but_repeats_are_not(paper: Robot, points: Measure
     assert said(paper, repeats, prior=0.5) == []
 
 
-def test_no_parameter_told_is_an_error(paper: Robot, points: Measurements) -> None:
-    with pytest.raises(ValueError, match=r"nothing about platform3.x, platform4.x"):
+def test_no_identifiable_parameter_is_an_error(paper: Robot, points: Measurements) -> None:
+    with pytest.raises(ValueError, match=r"they depend on none of platform3.x, platform4.x"):
         identify(paper, points, free=["platform3.x", "platform4.x"])
 
 
