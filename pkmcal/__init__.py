@@ -1,70 +1,112 @@
-"""Model, analyse, calibrate and compensate parallel kinematic machines."""
+"""Model, analyse, calibrate and compensate parallel kinematic machines.
+
+What is public is imported when it is first asked for: `import pkmcal` alone takes no time.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from pkmcal import screw, trajectory
-from pkmcal.arms.arm import SerialArm
-from pkmcal.calibration.bootstrap import Bootstrap, bootstrap
-from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.identify import identify
-from pkmcal.calibration.plan_poses import Plan, plan_poses
-from pkmcal.checks.check_geometry import GeometryCheck, check_geometry
-from pkmcal.compensation.compensate import Compensation, compensate
-from pkmcal.compensation.pso import SwarmResult, pso
-from pkmcal.error_model.allocation import Allocation, allocate_tolerance
-from pkmcal.error_model.sensitivity import Sensitivity, sensitivity
-from pkmcal.error_model.tolerance import Tolerance, tolerance
-from pkmcal.kinematics.forward import Forward
-from pkmcal.kinematics.limits import Feasibility
-from pkmcal.kinematics.robot import Robot
-from pkmcal.kinematics.workspace import Dexterity, Workspace, dexterity, sample_poses, workspace
-from pkmcal.loading import load, machines
-from pkmcal.measurements.measurement_csv import read_measurements
-from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.tracker import Tracker
-from pkmcal.measurements.virtual_machine import VirtualMachine
-from pkmcal.modes.assemblies import Assemblies
+if TYPE_CHECKING:  # the same names for type checkers and editors; a test compares both
+    from pkmcal import screw as screw
+    from pkmcal import trajectory as trajectory
+    from pkmcal.arms.arm import SerialArm as SerialArm
+    from pkmcal.arms.inverse import ArmInverse as ArmInverse
+    from pkmcal.calibration.bootstrap import Bootstrap as Bootstrap
+    from pkmcal.calibration.bootstrap import bootstrap as bootstrap
+    from pkmcal.calibration.identification import Identification as Identification
+    from pkmcal.calibration.identify import identify as identify
+    from pkmcal.calibration.plan_poses import Plan as Plan
+    from pkmcal.calibration.plan_poses import plan_poses as plan_poses
+    from pkmcal.checks.check_geometry import GeometryCheck as GeometryCheck
+    from pkmcal.checks.check_geometry import check_geometry as check_geometry
+    from pkmcal.checks.finding import Finding as Finding
+    from pkmcal.compensation.compensate import Compensation as Compensation
+    from pkmcal.compensation.compensate import compensate as compensate
+    from pkmcal.compensation.correction_grid import CorrectionGrid as CorrectionGrid
+    from pkmcal.compensation.correction_grid import correction_grid as correction_grid
+    from pkmcal.compensation.pso import SwarmResult as SwarmResult
+    from pkmcal.compensation.pso import pso as pso
+    from pkmcal.core.swarm import CONSTRICTION as CONSTRICTION
+    from pkmcal.core.swarm import SwarmSettings as SwarmSettings
+    from pkmcal.error_model.allocation import Allocation as Allocation
+    from pkmcal.error_model.allocation import allocate_tolerance as allocate_tolerance
+    from pkmcal.error_model.sensitivity import Sensitivity as Sensitivity
+    from pkmcal.error_model.sensitivity import sensitivity as sensitivity
+    from pkmcal.error_model.tolerance import Tolerance as Tolerance
+    from pkmcal.error_model.tolerance import tolerance as tolerance
+    from pkmcal.exceptions import ArgumentError as ArgumentError
+    from pkmcal.exceptions import ArgumentTypeError as ArgumentTypeError
+    from pkmcal.exceptions import CalibrationWarning as CalibrationWarning
+    from pkmcal.exceptions import Error as Error
+    from pkmcal.exceptions import FileError as FileError
+    from pkmcal.geometry.geometry import Geometry as Geometry
+    from pkmcal.kinematics.dexterity import Dexterity as Dexterity
+    from pkmcal.kinematics.dexterity import dexterity as dexterity
+    from pkmcal.kinematics.forward import Forward as Forward
+    from pkmcal.kinematics.limb_residual import LimbResidual as LimbResidual
+    from pkmcal.kinematics.limits import Feasibility as Feasibility
+    from pkmcal.kinematics.robot import Robot as Robot
+    from pkmcal.kinematics.workspace import Workspace as Workspace
+    from pkmcal.kinematics.workspace import sample_poses as sample_poses
+    from pkmcal.kinematics.workspace import workspace as workspace
+    from pkmcal.loading import load as load
+    from pkmcal.loading import machines as machines
+    from pkmcal.measurements.measurement_csv import read_measurements as read_measurements
+    from pkmcal.measurements.measurements import Measurements as Measurements
+    from pkmcal.measurements.tracker import Tracker as Tracker
+    from pkmcal.measurements.virtual_machine import VirtualMachine as VirtualMachine
+    from pkmcal.modes.assemblies import Assemblies as Assemblies
+    from pkmcal.modes.certificate import Certificate as Certificate
+    from pkmcal.moves.events import Event as Event
+    from pkmcal.moves.move import Move as Move
+    from pkmcal.moves.move import MoveSample as MoveSample
 
-__all__ = [
-    "Allocation",
-    "Assemblies",
-    "Bootstrap",
-    "Compensation",
-    "Dexterity",
-    "Feasibility",
-    "Forward",
-    "GeometryCheck",
-    "Identification",
-    "Measurements",
-    "Plan",
-    "Robot",
-    "Sensitivity",
-    "SerialArm",
-    "SwarmResult",
-    "Tolerance",
-    "Tracker",
-    "VirtualMachine",
-    "Workspace",
-    "allocate_tolerance",
-    "bootstrap",
-    "check_geometry",
-    "compensate",
-    "dexterity",
-    "identify",
-    "load",
-    "machines",
-    "plan_poses",
-    "pso",
-    "read_measurements",
-    "sample_poses",
-    "screw",
-    "sensitivity",
-    "tolerance",
-    "trajectory",
-    "workspace",
-]
+_HOMES = {
+    "arms.arm": ("SerialArm",),
+    "arms.inverse": ("ArmInverse",),
+    "calibration.bootstrap": ("Bootstrap", "bootstrap"),
+    "calibration.identification": ("Identification",),
+    "calibration.identify": ("identify",),
+    "calibration.plan_poses": ("Plan", "plan_poses"),
+    "checks.check_geometry": ("GeometryCheck", "check_geometry"),
+    "checks.finding": ("Finding",),
+    "compensation.compensate": ("Compensation", "compensate"),
+    "compensation.correction_grid": ("CorrectionGrid", "correction_grid"),
+    "compensation.pso": ("SwarmResult", "pso"),
+    "core.swarm": ("CONSTRICTION", "SwarmSettings"),
+    "error_model.allocation": ("Allocation", "allocate_tolerance"),
+    "error_model.sensitivity": ("Sensitivity", "sensitivity"),
+    "error_model.tolerance": ("Tolerance", "tolerance"),
+    "exceptions": (
+        "ArgumentError",
+        "ArgumentTypeError",
+        "CalibrationWarning",
+        "Error",
+        "FileError",
+    ),
+    "geometry.geometry": ("Geometry",),
+    "kinematics.dexterity": ("Dexterity", "dexterity"),
+    "kinematics.forward": ("Forward",),
+    "kinematics.limb_residual": ("LimbResidual",),
+    "kinematics.limits": ("Feasibility",),
+    "kinematics.robot": ("Robot",),
+    "kinematics.workspace": ("Workspace", "sample_poses", "workspace"),
+    "loading": ("load", "machines"),
+    "measurements.measurement_csv": ("read_measurements",),
+    "measurements.measurements": ("Measurements",),
+    "measurements.tracker": ("Tracker",),
+    "measurements.virtual_machine": ("VirtualMachine",),
+    "modes.assemblies": ("Assemblies",),
+    "modes.certificate": ("Certificate",),
+    "moves.events": ("Event",),
+    "moves.move": ("Move", "MoveSample"),
+}
+_HOME_OF = {name: f"pkmcal.{home}" for home, names in _HOMES.items() for name in names}
+_MODULES = ("screw", "trajectory")
+
+__all__ = sorted((*_HOME_OF, *_MODULES))
 
 
 def __getattr__(name: str) -> Any:
@@ -72,4 +114,14 @@ def __getattr__(name: str) -> Any:
         from importlib.metadata import version
 
         return version("pkmcal")
-    raise AttributeError(f"module 'pkmcal' has no attribute {name!r}")
+    if name in _MODULES:
+        return import_module(f"pkmcal.{name}")
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'pkmcal' has no attribute {name!r}")
+    found = getattr(import_module(_HOME_OF[name]), name)
+    globals()[name] = found  # asked for once
+    return found
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -64,10 +64,27 @@ def as_doubles(given: NDArray[Any]) -> FloatArray:
     return doubles if doubles.flags.aligned else doubles.copy()
 
 
-def wrapped(angles: FloatArray) -> FloatArray:
-    """Angles in rad the short way round, from -π up to π."""
-    short: FloatArray = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
-    return short
+def mm_per_unit(units: Sequence[str], length: float) -> FloatArray:
+    """Factors (n,) to mm of numbers in these units: a rotation counts as its arc at `length`.
+
+    Examples
+    --------
+    >>> mm_per_unit(("mm", "rad"), 250.0)
+    array([  1., 250.])
+    """
+    return np.array([length if unit == "rad" else 1.0 for unit in units])
+
+
+def whole_turns(angles: FloatArray) -> FloatArray:
+    """The whole turns in angles, rad: what is to be taken off to go the short way round.
+
+    Examples
+    --------
+    >>> angles = np.array([0.5, 2 * np.pi - 0.5])
+    >>> (angles - whole_turns(angles)).round(12)
+    array([ 0.5, -0.5])
+    """
+    return np.asarray(2 * np.pi * np.rint(angles / (2 * np.pi)))
 
 
 def rms(values: FloatArray) -> float:
@@ -75,14 +92,7 @@ def rms(values: FloatArray) -> float:
     return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float("nan")
 
 
-def as_arcs(units: Sequence[str], length: float) -> FloatArray:
-    """Factors (n,) that turn angles into their arc at `length` mm; 1 for other units."""
-    return np.where(np.array(units) == "rad", length, 1.0)
-
-
 def propagate(jacobian: FloatArray, covariance: FloatArray) -> FloatArray:
     """Variances trace(J C Jᵀ) (N,) of points whose derivatives J are (N, k, n), for C (n, n)."""
-    variance: FloatArray = np.einsum(
-        "nij,jk,nik->n", jacobian, covariance, jacobian, optimize=True
-    )
+    variance: FloatArray = np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian, optimize=True)
     return variance

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
-from itertools import zip_longest
+from itertools import islice, zip_longest
 
+_MOST_ROWS = 20  # of a table with a row for each pose
 _MOST_DECIMALS = 15  # a double has no digits beyond; also what an exact number is given
 
 
@@ -79,15 +80,16 @@ def displayed(value: float, unit: str) -> tuple[float, str]:
     return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
 
 
-def first_rows(rows: Sequence[int], most: int = 10) -> str:
-    """Row numbers for a message, the first `most` of them.
+def first_rows(rows: Iterable[int], most: int = 5) -> str:
+    """Number of the first `most` rows, and whether there are more.
 
     Examples
     --------
-    >>> first_rows([3, 5, 8]), first_rows(range(100), 3)
-    ('3, 5, 8', '0, 1, 2, …')
+    >>> first_rows([3, 14, 15]), first_rows(range(100))
+    ('3, 14, 15', '0, 1, 2, 3, 4, …')
     """
-    return ", ".join(str(row) for row in rows[:most]) + (", …" if len(rows) > most else "")
+    shown = [str(row) for row in islice(rows, most + 1)]
+    return ", ".join(shown[:most]) + (", …" if len(shown) > most else "")
 
 
 @dataclass(frozen=True)
@@ -150,3 +152,27 @@ class Table:
             for side, cell in zip(sides, cells, strict=True)
         )
         return f"<tr>{''.join(made)}</tr>"
+
+
+POSE_HEADER = ("x [mm]", "y [mm]", "z [mm]", "α [deg]", "β [deg]", "γ [deg]")
+
+
+def pose_cells(pose: Iterable[float]) -> list[str]:
+    """Cells of a table under `POSE_HEADER`, of x y z in mm and α β γ in rad.
+
+    Examples
+    --------
+    >>> pose_cells([0, -10, 850.25, 0, 0, math.pi])
+    ['0.0000', '-10.0000', '850.2500', '0.0000', '0.0000', '180.0000']
+    """
+    units = ("mm", "mm", "mm", "rad", "rad", "rad")
+    return [fixed(displayed(float(v), u)[0], 4) for v, u in zip(pose, units, strict=True)]
+
+
+def long_table(
+    header: Sequence[str], rows: Iterable[Sequence[str]], count: int
+) -> Iterator[str | Table]:
+    """A table of the first of `count` rows, and how many more there are."""
+    yield Table(header, list(islice(rows, _MOST_ROWS)))
+    if count > _MOST_ROWS:
+        yield f"... {count - _MOST_ROWS} more rows"

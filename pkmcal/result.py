@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from html import escape
+from typing import ClassVar
 
-from pkmcal.display import Table
+import numpy as np
+from numpy.typing import NDArray
+
+from pkmcal.display import Table, first_rows
 
 
 class Result:
@@ -33,3 +37,50 @@ class Result:
             for part in self._parts()
             if part != ""
         )
+
+
+class RowResult(Result):
+    """A result of many rows with a status each, 0 where the row was solved.
+
+    Attributes
+    ----------
+    status : ndarray of int (...)
+        What became of each row.
+    STATUS : mapping of int to str
+        What each status means.
+    """
+
+    status: NDArray[np.int32]
+    STATUS: ClassVar[Mapping[int, str]]
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """Which rows were solved, (...)."""
+        return np.equal(self.status, 0)
+
+    @property
+    def success(self) -> NDArray[np.bool_]:
+        """The same as `ok`."""
+        return self.ok
+
+    @property
+    def failed(self) -> NDArray[np.bool_]:
+        """Which rows were not solved, (...)."""
+        return np.not_equal(self.status, 0)
+
+    def failures(self) -> str:
+        """What failed and where, in one line; empty where nothing did."""
+        status = np.ravel(self.status)
+        found = ((words, np.flatnonzero(status == code)) for code, words in self.STATUS.items())
+        return "; ".join(
+            f"{rows.size} of {status.size} rows {words} (rows {first_rows(rows)})"
+            for words, rows in found
+            if rows.size and status[rows[0]]
+        )
+
+    def _counts(self) -> str:
+        """How many rows have which status."""
+        codes, counts = np.unique(self.status, return_counts=True)
+        parts = (f"{n} {self.STATUS[int(code)]}" for code, n in zip(codes, counts, strict=True))
+        total = "1 row" if np.size(self.status) == 1 else f"{np.size(self.status)} rows"
+        return f"{total}: {', '.join(parts)}" if codes.size else total

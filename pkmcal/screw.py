@@ -7,7 +7,9 @@ those of the paper on joint structure errors, DOI 10.3969/j.issn.1673-9833.2020.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +18,9 @@ from pkmcal.arguments import number
 from pkmcal.arrays import FloatArray, as_doubles, as_numbers, as_rows
 from pkmcal.core import screws
 from pkmcal.exceptions import ArgumentError
+from pkmcal.result import Result
+
+ErrorKind = Literal["helical", "rotation", "translation", "none"]
 
 _RIGID = 1e-6  # by so much a matrix may miss being a motion
 _NO_SLIDE = 1e-13  # mm along the axis per mm of v: a rotation, up to rounding
@@ -216,8 +221,8 @@ def to_pose(motion: ArrayLike) -> FloatArray:
     return screws.pose(rows).reshape(*shape, 6)
 
 
-@dataclass(frozen=True, eq=False)
-class JointError:
+@dataclass(frozen=True, eq=False, repr=False)
+class JointError(Result):
     """The error of a joint as one screw motion (eq. 6 to 9 and 17).
 
     Attributes
@@ -227,7 +232,7 @@ class JointError:
         motion from the joint's nominal place to its actual one.
     magnitude : float
         Angle in rad, or way in mm for a translation.
-    kind : str
+    kind : {"helical", "rotation", "translation", "none"}
         What the error does to the joint's axis, by the motion that brings it there:
         "helical" (the axes are skew; eq. 6), "rotation" (they intersect; eq. 7), "translation"
         (they are parallel, or the joint is shifted along its axis; eq. 8 and 9), or "none".
@@ -235,7 +240,7 @@ class JointError:
 
     twist: FloatArray
     magnitude: float
-    kind: str
+    kind: ErrorKind
 
     @property
     def pitch(self) -> float:
@@ -264,16 +269,18 @@ class JointError:
             raise ArgumentError("frame must be finite")
         return replace(self, twist=screws.adjoint(rows).reshape(6, 6) @ self.twist)
 
-    def __str__(self) -> str:
-        if self.kind == "none":
-            return "no error"
+    def _parts(self) -> Iterator[str]:
         w, v = (
             "({:.6g}, {:.6g}, {:.6g})".format(*part) for part in (self.twist[:3], self.twist[3:])
         )
-        if self.kind == "translation":
-            return f"translation by {self.magnitude:.6g} mm along {v}"
-        text = f"{self.kind} of {math.degrees(self.magnitude):.6g}° about {w}, v {v}"
-        return text + (f", pitch {self.pitch:.6g} mm/rad" if self.kind == "helical" else "")
+        if self.kind == "none":
+            yield "no error"
+        elif self.kind == "translation":
+            yield f"translation by {self.magnitude:.6g} mm along {v}"
+        else:
+            pitch = f", pitch {self.pitch:.6g} mm/rad" if self.kind == "helical" else ""
+            turn = f"{self.kind} of {math.degrees(self.magnitude):.6g}°"
+            yield f"{turn} about {w}, v {v}{pitch}"
 
 
 def joint_error(
@@ -314,6 +321,7 @@ def joint_error(
         number(name, value)
     twist = log(from_pose(list(given.values())))
     angle, way = math.hypot(*twist[:3]), math.hypot(*twist[3:])
+    kind: ErrorKind
     if angle == 0.0:
         kind, magnitude = ("translation", way) if way else ("none", 0.0)
     else:

@@ -57,8 +57,8 @@ def test_angles_are_shown_in_degrees_and_lengths_as_they_are() -> None:
 
 
 def test_columns_of_a_table_line_up() -> None:
-    lines = str(display.Table(["name", "mm"], [["radius", "1.0"], ["rod", "340.00"]], left=1))
-    assert lines.splitlines() == ["name        mm", "radius     1.0", "rod     340.00"]
+    lines = display.Table(["name", "mm"], [["radius", "1.0"], ["rod", "340.00"]], left=1)
+    assert str(lines).splitlines() == ["name        mm", "radius     1.0", "rod     340.00"]
 
 
 def test_long_tables_fold_into_columns_side_by_side() -> None:

@@ -241,7 +241,7 @@ class Chain:
         Returns
         -------
         ArmInverse
-            Coordinates, status and what is left of each row. A row that was not reached is NaN
+            Coordinates, status and residual of each row. A row that was not reached is NaN
             and does not raise.
 
         Raises

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -11,9 +12,11 @@ from numpy.typing import ArrayLike
 from pkmcal import screw
 from pkmcal.arguments import word
 from pkmcal.arms.inputs import Frame, checked_errors
-from pkmcal.arrays import FloatArray, Int32Array, Unit, as_rows
+from pkmcal.arrays import FloatArray, Int32Array, Unit, as_rows, mm_per_unit, whole_turns
 from pkmcal.core.library import STATUS
+from pkmcal.display import Table, displayed, fixed, long_table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.result import RowResult
 
 Part = Literal["pose", "position"]
 PARTS: dict[str, slice] = {"pose": slice(0, 6), "position": slice(3, 6)}
@@ -50,8 +53,8 @@ class Solvable(Protocol):
         """The tool's twist by each joint coordinate, (..., 6, n)."""
 
 
-@dataclass(frozen=True, eq=False)
-class ArmInverse:
+@dataclass(frozen=True, eq=False, repr=False)
+class ArmInverse(RowResult):
     """Inverse kinematics of a batch; every array has the batch's leading shape.
 
     Attributes
@@ -60,28 +63,43 @@ class ArmInverse:
         Joint coordinates, rad and mm; NaN where `status` is not 0. Revolute ones are within half
         a turn of the guess.
     status : ndarray of int (...)
-        0 ok, 1 not converged (out of reach, or another guess is needed), 4 invalid input.
+        0 ok, 1 not converged (out of reach, or another guess is needed), 4 invalid input; `ok`
+        and `failed` are masks of it, `failures` says it in words.
     iterations : ndarray of int (...)
         Steps tried.
     residual : ndarray (...)
         How far the tool stayed from the target, mm; a rotation counts as its arc at the arm's
         characteristic length. Kept where the row was not reached.
+    units : tuple of str
+        Unit of each joint coordinate, "rad" or "mm".
     """
+
+    STATUS = STATUS
 
     theta: FloatArray
     status: Int32Array
     iterations: Int32Array
     residual: FloatArray
+    units: tuple[Unit, ...]
 
-    @property
-    def ok(self) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
-        """Which rows were reached, (...)."""
-        return np.equal(self.status, _OK)
-
-    def __str__(self) -> str:
-        codes, counts = np.unique(self.status, return_counts=True)
-        parts = [f"{n} {STATUS[int(code)]}" for code, n in zip(codes, counts, strict=True)]
-        return ": ".join([f"{self.status.size} rows", *([", ".join(parts)] if parts else [])])
+    def _parts(self) -> Iterator[str | Table]:
+        yield self._counts()
+        header = [f"θ{i} [{displayed(0.0, unit)[1]}]" for i, unit in enumerate(self.units, 1)]
+        rows = zip(
+            self.theta.reshape(-1, len(self.units)),
+            self.residual.reshape(-1),
+            self.status.reshape(-1).tolist(),
+            strict=True,
+        )
+        cells = (
+            [
+                *(fixed(displayed(v, u)[0], 4) for v, u in zip(theta, self.units, strict=True)),
+                f"{residual:.1e}",
+                self.STATUS[code],
+            ]
+            for theta, residual, code in rows
+        )
+        yield from long_table([*header, "residual [mm]", "status"], cells, self.status.size)
 
 
 def damped_least_squares(
@@ -91,9 +109,9 @@ def damped_least_squares(
     joint_errors: ArrayLike | None,
     parts: Part,
 ) -> ArmInverse:
-    """See `SerialArm.inverse`.
+    """Solve `SerialArm.inverse` row by row.
 
-    Steps δ = Jᵀ (J Jᵀ + λ)⁻¹ e with the twist e that is left, each row with a damping λ of its
+    Steps δ = Jᵀ (J Jᵀ + λ)⁻¹ e with the twist e to the target, each row with a damping λ of its
     own: a tenth after a step that helped, fivefold after one that did not.
     """
     word("parts", parts, PARTS)
@@ -115,14 +133,14 @@ def damped_least_squares(
     begun = theta.copy()
     status, iterations, residual = search.run(theta)
     turning = [unit == "rad" for unit in arm.actuator_units]
-    whole_turns = np.rint((theta - begun)[:, turning] / (2 * np.pi))
-    theta[:, turning] -= 2 * np.pi * whole_turns
+    theta[:, turning] -= whole_turns((theta - begun)[:, turning])
     theta[status != _OK] = np.nan
     return ArmInverse(
         theta.reshape(*shape, n),
         status.reshape(shape),
         iterations.reshape(shape),
         residual.reshape(shape),
+        arm.actuator_units,
     )
 
 
@@ -132,8 +150,7 @@ class _Search:
     ) -> None:
         self.arm, self.goal, self.errors, self.parts = arm, goal, errors, parts
         self.length = arm.length
-        by_unit = [self.length if unit == "rad" else 1.0 for unit in arm.actuator_units]
-        self.travel = np.array(by_unit)  # mm of each coordinate, so that λ fits all
+        self.travel = mm_per_unit(arm.actuator_units, self.length)  # so that λ fits all
 
     def errors_of(self, rows: np.ndarray) -> FloatArray | None:
         """Joint errors shared by all rows, or those of these."""
@@ -142,14 +159,13 @@ class _Search:
         own: FloatArray = self.errors[rows]
         return own
 
-    def left(self, theta: FloatArray, rows: np.ndarray) -> FloatArray:
-        """What is left to the target, in base axes: rotation as arc, position, mm (N, k)."""
+    def remaining(self, theta: FloatArray, rows: np.ndarray) -> FloatArray:
+        """Twist to the target, in base axes: rotation as its arc, position, mm (N, k)."""
         tool = self.arm.forward(theta, self.errors_of(rows))
         turn = np.zeros_like(tool)
         turn[:, :3, :3] = self.goal[rows, :3, :3] @ tool[:, :3, :3].transpose(0, 2, 1)
         turn[:, 3, 3] = 1.0
-        lost = ~np.isfinite(tool).all(axis=(1, 2))
-        turn[lost] = np.nan
+        turn[~np.isfinite(tool).all(axis=(1, 2))] = np.nan
         off = screw.log(turn)
         off[:, :3] *= self.length
         off[:, 3:] = self.goal[rows, :3, 3] - tool[:, :3, 3]
@@ -161,7 +177,7 @@ class _Search:
         """Improve `theta` in place."""
         count = len(theta)
         everyone = np.arange(count)
-        off = self.left(theta, everyone)
+        off = self.remaining(theta, everyone)
         residual = np.hypot.reduce(off, axis=1)  # no squares: they overflow
         status = np.full(count, _NOT_CONVERGED, dtype=np.int32)
         status[np.isnan(residual)] = _INVALID
@@ -181,7 +197,7 @@ class _Search:
             square = J @ J.transpose(0, 2, 1) + damping[rows, None, None] * np.eye(k)
             step = J.transpose(0, 2, 1) @ np.linalg.solve(square, off[rows, :, None])
             trial = theta[rows] + step[:, :, 0] / self.travel
-            trial_off = self.left(trial, rows)
+            trial_off = self.remaining(trial, rows)
             trial_residual = np.hypot.reduce(trial_off, axis=1)
             better = trial_residual < residual[rows]
             taken = rows[better]

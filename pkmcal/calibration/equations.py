@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Int32Array, as_arcs, rms
+from pkmcal.arrays import FloatArray, Int32Array, mm_per_unit, rms
 from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_poses
 from pkmcal.calibration.parameters import POINTS, FitData, Parameters
 from pkmcal.core import instruments
@@ -264,7 +264,7 @@ class Equations:
         for code in sorted(set(status.tolist()) - {0}):
             rows = self.rows[status == code].tolist()
             parts.append(
-                f"{len(rows)} of {len(status)} rows {STATUS[code]} (rows {first_rows(rows)})"
+                f"{len(rows)} of {len(status)} rows {STATUS[code]} (rows {first_rows(rows, 10)})"
             )
         return "; ".join(parts)
 
@@ -273,7 +273,7 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     """Factors (N, k) or matrices (N, k, k) that make the noise one; 1 mm where it is not known."""
     sigma = measured.sigma
     if sigma is None:
-        return np.tile(as_arcs(measured.units, length), (len(measured), 1))
+        return np.tile(mm_per_unit(measured.units, length), (len(measured), 1))
     if sigma.ndim == 2:
         return 1.0 / sigma
     return np.linalg.inv(np.linalg.cholesky(sigma))

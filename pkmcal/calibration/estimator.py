@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, as_arcs
+from pkmcal.arrays import FloatArray, mm_per_unit
 from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.identifiability import (
     Decomposed,
@@ -248,7 +248,7 @@ class Estimator:
         for part, measured in zip(
             self.equations.jacobian(evaluation), self.equations.sets, strict=True
         ):
-            arcs = as_arcs(measured.units, self.start.robot.length)
+            arcs = mm_per_unit(measured.units, self.start.robot.length)
             parts.append((part * arcs[:, None]).reshape(-1, part.shape[2]))
         jacobian: FloatArray = np.concatenate(parts) * self.scale
         return jacobian

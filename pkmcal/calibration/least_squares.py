@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, as_arcs
+from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
 from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.loss import Loss
 from pkmcal.exceptions import ArgumentError
@@ -174,4 +174,4 @@ def _rounded(measured: Measurements, length: float) -> FloatArray:
     values = measured.values.reshape(len(measured), -1)
     lengths = np.array([unit == "mm" for unit in measured.units])
     size = np.abs(values[:, lengths]).max() + length
-    return np.broadcast_to(_ROUNDING * size / as_arcs(measured.units, length), values.shape)
+    return np.broadcast_to(_ROUNDING * size / mm_per_unit(measured.units, length), values.shape)

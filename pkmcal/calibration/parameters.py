@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.arguments import did_you_mean
-from pkmcal.arrays import FloatArray, IntArray, as_arcs
+from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import Calibratable
@@ -246,7 +246,7 @@ def parameters(
 
 def _travel(robot: Calibratable, measured: Measurements) -> float:
     """Largest actuator coordinate, mm; an angle counts as its arc."""
-    arcs = measured.actuators * as_arcs(robot.actuator_units, robot.length)
+    arcs = measured.actuators * mm_per_unit(robot.actuator_units, robot.length)
     return max(1.0, float(np.abs(arcs).max()))
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, as_arcs, rms
+from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit, rms
 from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.parameters import FitData, Parameters
@@ -66,7 +66,7 @@ def _alone(data: FitData, parameters: Parameters) -> FloatArray:
 
 def _misfit(residual: FloatArray, units: Sequence[str], size: float) -> float:
     """Root mean square residual, mm; angles as their arc. inf if a row is not reached."""
-    off = np.linalg.norm(residual * as_arcs(units, size), axis=1)
+    off = np.linalg.norm(residual * mm_per_unit(units, size), axis=1)
     return rms(off) if np.isfinite(off).all() else float("inf")
 
 
@@ -130,8 +130,8 @@ def beyond_strokes(equations: Equations, start: Evaluation, end: Evaluation) -> 
     rows = equations.rows[broken[poses_of]].tolist()
     more = f" and {len(limbs) - 2} more limbs" if len(limbs) > 2 else ""
     return [
-        f"actuators out of stroke in {len(rows)} of {len(poses_of)} rows (rows {first_rows(rows)}):"
-        f" {'; '.join(limbs[:2])}{more}; check units, signs and columns of the actuators, or the"
+        f"actuators out of stroke in {len(rows)} of {len(poses_of)} rows"
+        f" (rows {first_rows(rows, 10)}): {'; '.join(limbs[:2])}{more}; check units, signs and columns of the actuators, or the"
         " strokes in the robot file"
     ]
 

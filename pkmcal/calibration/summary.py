@@ -67,7 +67,7 @@ def limits(
         more = f" and {len(correlations) - 3} more" if len(correlations) > 3 else ""
         yield filled("correlated: ", shown + more)
     if outliers:
-        yield filled("outliers: ", f"rows {first_rows(outliers)}")
+        yield filled("outliers: ", f"rows {first_rows(outliers, 10)}")
     if at_bounds:
         yield filled("at a bound: ", ", ".join(at_bounds))
 

@@ -11,9 +11,9 @@ from pkmcal.checks.finding import Finding, named
 from pkmcal.checks.joint_layout import joints, size
 from pkmcal.core.library import POSE, SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.perturbed import completed
 from pkmcal.kinematics.robot import Robot
-from pkmcal.kinematics.workspace import dexterity
 
 _FULL_TURN = 2 * np.pi
 _STEEP = 0.5  # rad: no axis is tilted so far from its reference by error

@@ -119,7 +119,7 @@ def _drawn(machine: Robot | SerialArm, seed: int) -> FloatArray:
             f"--poses: {machine.name} is a serial arm, whose limits are not known: a file of joint"
             " coordinates to choose from is needed, with columns such as 'q1 [deg]'"
         )
-    return sample_poses(machine, _DRAWN, seed, _SHARE)
+    return sample_poses(machine, _DRAWN, seed, share=_SHARE)
 
 
 def _places(machine: Robot | SerialArm, path: Path) -> FloatArray:

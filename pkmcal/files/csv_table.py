@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from pkmcal import arguments
 from pkmcal.arguments import did_you_mean
 from pkmcal.exceptions import FileError
+from pkmcal.files.xlsx_rows import xlsx_rows
 
 # What one unit is in mm, in rad: (multiply by, divide by), so that 1 um is 1/1000 mm exactly.
 UNITS: dict[str, dict[str, tuple[float, float]]] = {
@@ -88,8 +89,6 @@ class Table:
         self.path = arguments.path("path", path)
         self._separator = ""
         if self.path.suffix.lower() in (".xlsx", ".xlsm", ".xls"):
-            from pkmcal.files.xlsx_rows import xlsx_rows
-
             every = xlsx_rows(self.path)
         else:
             lines = _content(self.path)

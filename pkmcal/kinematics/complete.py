@@ -1,4 +1,4 @@
-"""Poses that a machine can take: completed from some coordinates, and how far a pose is from one.
+"""Complete poses from some of their coordinates, and the rates of the actuators there.
 
 Where limbs constrain the pose (3-RPS, spatial 2TPR&2TPS) or share an actuator, six numbers are too
 many: the closures, with the matched coordinates held, determine the rest.
@@ -103,7 +103,7 @@ def complete(
     own[~done], q[~done] = np.nan, np.nan
     own = machine.forward(slots, q, own, threads=None)[0]
     if machine.rows > len(free):
-        own, q = _led_to(machine, slots, own, q, matched, wanted)
+        own, q = _correct_actuators(machine, slots, own, q, matched, wanted)
     return own, q
 
 
@@ -149,7 +149,7 @@ def completed_rates(
     return velocity, np.einsum("nij,nj->ni", inverse, rates[1] - carried)
 
 
-def _led_to(
+def _correct_actuators(
     machine: Machine,
     slots: FloatArray,
     own: FloatArray,
@@ -157,7 +157,7 @@ def _led_to(
     matched: Sequence[int],
     wanted: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Actuator coordinates whose pose, the one that misses the rows least, has what is wanted.
+    """Correct the actuators until the least-squares pose has the wanted coordinates.
 
     With more rows than free coordinates and inexact geometry no pose meets them all, and the one
     above that met the matched coordinates is not quite where the machine goes.

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -10,8 +11,10 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array
 from pkmcal.core.library import STATUS
+from pkmcal.display import POSE_HEADER, Table, long_table, pose_cells
 from pkmcal.modes.certificate import Certificate
 from pkmcal.modes.find import AssemblyProblem, certify_rows
+from pkmcal.result import RowResult
 
 
 class Solved(Protocol):
@@ -24,8 +27,8 @@ class Solved(Protocol):
         """The closures at coordinates (N, n)."""
 
 
-@dataclass(eq=False)  # a frozen one takes a microsecond more to make
-class Forward:
+@dataclass(eq=False, repr=False)  # a frozen one takes a microsecond more to make
+class Forward(RowResult):
     """Forward kinematics of a batch; every array has the batch's leading shape.
 
     Attributes
@@ -33,27 +36,25 @@ class Forward:
     pose : ndarray (..., 6)
         x y z in mm, α β γ in rad; NaN where `status` is not 0.
     status : ndarray of int (...)
-        0 ok, 1 not converged, 2 singular, 3 infeasible, 4 invalid input.
+        0 ok, 1 not converged, 2 singular, 3 infeasible, 4 invalid input; `ok` and `failed` are
+        masks of it, `failures` says it in words.
     iterations : ndarray of int (...)
         Newton steps taken.
     residual : ndarray (...)
         Largest closure error, mm; NaN where `status` is not 0.
     """
 
+    STATUS = STATUS
+
     pose: FloatArray
     status: Int32Array
     iterations: Int32Array
     residual: FloatArray
     # where it comes from, for what is computed when asked for; rows in the machine's own frame
-    _machine: Solved = field(repr=False)
-    _own: FloatArray = field(repr=False)
-    _q: FloatArray = field(repr=False)
-    _guess: FloatArray = field(repr=False)
-
-    @property
-    def ok(self) -> BoolArray:
-        """Which rows were solved, (...)."""
-        return np.equal(self.status, 0)
+    _machine: Solved
+    _own: FloatArray
+    _q: FloatArray
+    _guess: FloatArray
 
     @cached_property
     def conditioning(self) -> FloatArray:
@@ -74,7 +75,7 @@ class Forward:
         """Whether the determinant has the sign it has at the guess (...), computed when asked for.
 
         False means that the pose is another assembly mode than the guess's, with a singularity
-        between. True where it cannot be told: more closures than free coordinates.
+        between. True where it is unknown: with more closures than free coordinates.
         """
         steps = self._closure_by_twist(self._own)
         if steps.shape[-2] != steps.shape[-1]:
@@ -101,25 +102,8 @@ class Forward:
         steps = self._machine.closure_by_twist(rows, self._q)
         return steps.reshape(*self.status.shape, *steps.shape[1:])
 
-    def failures(self) -> str:
-        """What failed and where, in one line; empty where nothing did."""
-        status = np.atleast_1d(self.status).ravel()
-        parts = []
-        for code, words in STATUS.items():
-            rows = np.flatnonzero(status == code)
-            if code and rows.size:
-                shown = ", ".join(map(str, rows[:5])) + (", …" if rows.size > 5 else "")
-                parts.append(f"{rows.size} of {status.size} rows {words} (rows {shown})")
-        return "; ".join(parts)
-
-    def __str__(self) -> str:
-        pose = self.pose.reshape(-1, 6)
-        lines = ["       x mm        y mm        z mm     α deg     β deg     γ deg  status"]
-        shown = min(len(pose), 20)
-        for p, code in zip(pose[:shown], np.atleast_1d(self.status).ravel(), strict=False):
-            mm = "".join(f"{v:12.4f}" for v in p[:3])
-            deg = "".join(f"{v:10.4f}" for v in np.degrees(p[3:]))
-            lines.append(f"{mm}{deg}  {STATUS[int(code)]}")
-        if len(pose) > shown:
-            lines.append(f"... {len(pose) - shown} more rows")
-        return "\n".join(lines)
+    def _parts(self) -> Iterator[str | Table]:
+        yield self._counts()
+        rows = zip(self.pose.reshape(-1, 6), self.status.reshape(-1).tolist(), strict=True)
+        cells = ([*pose_cells(pose), self.STATUS[code]] for pose, code in rows)
+        yield from long_table([*POSE_HEADER, "status"], cells, np.size(self.status))

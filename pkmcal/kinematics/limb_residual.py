@@ -12,7 +12,7 @@ from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.core.library import pointer
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import Geometries
-from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.robot import Robot, require_parallel
 
 
 class LimbResidual:
@@ -50,7 +50,7 @@ class LimbResidual:
     >>> import pkmcal as pk
     >>> robot = pk.load("hexapod")
     >>> poses = robot.home + 10.0 * np.eye(6)[:3]
-    >>> cost = LimbResidual(robot, poses, robot.inverse(poses), ["offset*"])
+    >>> cost = LimbResidual(robot, poses, robot.inverse(poses), free=["offset*"])
     >>> cost(cost.nominal + [[0.0] * 6, [0.1] * 6]).round(6)
     array([0. , 0.1])
     """
@@ -60,8 +60,10 @@ class LimbResidual:
         robot: Robot,
         poses: ArrayLike,
         actuators: ArrayLike,
+        *,
         free: Sequence[str] | None = None,
     ) -> None:
+        require_parallel(robot)
         rows, shape = as_rows("poses", poses, 6)
         q, q_shape = as_rows("actuators", actuators, robot.n_actuators)
         if len(shape) != 1 or shape != q_shape or not len(rows):

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.display import Table, first_rows
 from pkmcal.geometry.model import Cone, Limb
+from pkmcal.result import Result
 
 ROUNDING = 1e-12  # relative: a pose at a limit keeps it
 
 
-@dataclass(frozen=True, eq=False)
-class Feasibility:
+@dataclass(frozen=True, eq=False, repr=False)
+class Feasibility(Result):
     """Limits kept, for each pose and limb; every array is (..., limbs).
 
     Attributes
@@ -57,13 +60,12 @@ class Feasibility:
                 rows = np.flatnonzero(~kept[:, limb])
                 if rows.size:
                     what = limit.replace("_", " ")
-                    shown = ", ".join(map(str, rows[:5])) + (", …" if rows.size > 5 else "")
-                    lines.append(f"limb {limb + 1}: {what} broken in rows {shown}")
+                    lines.append(f"limb {limb + 1}: {what} broken in rows {first_rows(rows)}")
         return lines
 
-    def __str__(self) -> str:
-        ok = np.atleast_1d(self.ok)
-        return "\n".join([f"{int(ok.sum())} of {ok.size} poses keep all limits", *self.broken()])
+    def _parts(self) -> Iterator[str | Table]:
+        yield f"{int(self.ok.sum())} of {self.ok.size} poses keep all limits"
+        yield from self.broken()
 
 
 def feasibility(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal._core import lib
-from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.arrays import FloatArray, as_rows, whole_turns
 from pkmcal.core.library import int_pointer, pointer
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.geometry import Geometry
@@ -163,7 +163,7 @@ def forward_of(
 def off(poses: FloatArray, from_poses: FloatArray) -> FloatArray:
     """Pose errors (..., 6), eq. 16: angles the short way round."""
     error = poses - from_poses
-    _short_way(error[..., 3:])
+    error[..., 3:] -= whole_turns(error[..., 3:])
     return error
 
 
@@ -171,10 +171,6 @@ def quantities_off(poses: FloatArray, from_pose: FloatArray) -> FloatArray:
     """Errors of poses (N, 6) from one pose and the distance of their positions, (7, N)."""
     found = np.empty((7, len(poses)))
     np.subtract(poses.T, from_pose[:, None], out=found[:6])
-    _short_way(found[3:6])
+    found[3:6] -= whole_turns(found[3:6])
     np.sqrt(found[0] ** 2 + found[1] ** 2 + found[2] ** 2, out=found[6])
     return found
-
-
-def _short_way(angles: FloatArray) -> None:
-    angles -= 2 * np.pi * np.rint(angles / (2 * np.pi))

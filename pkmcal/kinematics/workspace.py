@@ -1,129 +1,32 @@
-"""Where a machine can go and how well it moves there: grids of poses, limits, singularities."""
+"""Where a machine can go: grids of poses, how far each coordinate goes, random poses."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import display
 from pkmcal.arguments import checked_seed, did_you_mean, number, whole
 from pkmcal.arrays import BoolArray, FloatArray, as_rows
 from pkmcal.core.library import POSE
+from pkmcal.display import Table, displayed
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
-from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.dexterity import BLOCK, Dexterity, dexterity
 from pkmcal.kinematics.limits import Feasibility
 from pkmcal.kinematics.perturbed import completed
 from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.result import Result
 
-_BLOCK = 20_000  # poses at a time
 _STEPS = 200  # along each coordinate, in search of the end of the workspace
 _SMALLEST = 0.1  # of the conditioning at home: poses nearer to a singularity are not drawn
 _PATIENCE = 100  # times as many draws as poses are wanted
 _POWER = {1: "", 2: "²", 3: "³"}
 
 
-@dataclass(frozen=True, eq=False)
-class Dexterity:
-    """How well closures hold poses, for poses of any leading shape; NaN out of reach.
-
-    The singular values are those of the closures by a twist of the platform, rotations as their
-    arc at ``robot.length``: how far the joints part in mm when the platform yields by 1 mm.
-
-    Attributes
-    ----------
-    conditioning : ndarray (...)
-        σ_min/σ_max: 1 is isotropic, 0 a type-2 singularity. As `Forward.conditioning`.
-    sigma_min : ndarray (...)
-        The smallest: how well the weakest direction is held; 0 at a type-2 singularity.
-    manipulability : ndarray (...)
-        Their product.
-    determinant : ndarray (...)
-        The product with a sign, which changes across a type-2 singularity; NaN where there are
-        more closures than free coordinates.
-    transmission : ndarray (...)
-        The least of the limbs' |cos| of the angle between the limb and the motion of its actuator;
-        0 at a type-1 singularity, 1 for a limb whose own length is driven.
-    """
-
-    conditioning: FloatArray
-    sigma_min: FloatArray
-    manipulability: FloatArray
-    determinant: FloatArray
-    transmission: FloatArray
-
-
-def dexterity(robot: Robot, poses: ArrayLike) -> Dexterity:
-    """Conditioning, manipulability and distance from singularities at poses.
-
-    Parameters
-    ----------
-    robot : Robot
-        The machine.
-    poses : array_like (..., 6)
-        x y z in mm, α β γ in rad; on the machine's closures (`Robot.complete`).
-
-    Returns
-    -------
-    Dexterity
-        Arrays of the poses' leading shape.
-
-    Raises
-    ------
-    ValueError, TypeError
-        A wrong shape, or no numbers.
-
-    Examples
-    --------
-    >>> import pkmcal as pk
-    >>> robot = pk.load("2tpr2tps")
-    >>> found = dexterity(robot, robot.home)
-    >>> round(float(found.conditioning), 3), round(float(found.transmission), 3)
-    (0.104, 1.0)
-    """
-    require_parallel(robot)
-    rows, shape = as_rows("poses", poses, 6)
-    found = [_dexterity(robot, rows[i : i + _BLOCK]) for i in range(0, len(rows), _BLOCK)]
-    joined = np.concatenate(found, axis=1) if found else np.empty((5, 0))
-    return Dexterity(*(column.reshape(shape) for column in joined))
-
-
-def _dexterity(robot: Robot, poses: FloatArray) -> FloatArray:
-    """The five measures, one per row (5, N)."""
-    own, _ = robot.own_rows(poses)
-    slots = robot.slots
-    closure = robot.machine.closure(slots, own, robot.machine.inverse(slots, own))
-    out = np.full((5, len(own)), np.nan)
-    numbers = np.concatenate([closure.by_step, closure.by_q], axis=-1)
-    good = np.isfinite(numbers).all(axis=(1, 2))
-    steps = closure.by_step[good]
-    sigma = np.linalg.svd(steps, compute_uv=False)
-    out[0, good] = sigma[:, -1] / sigma[:, 0]
-    out[1, good] = sigma[:, -1]
-    out[2, good] = sigma.prod(axis=1)
-    if steps.shape[1] == steps.shape[2]:
-        out[3, good] = np.linalg.det(steps)
-    out[4, good] = _transmission(robot, closure.by_q[good])
-    return out
-
-
-def _transmission(robot: Robot, by_q: FloatArray) -> FloatArray:
-    least = np.full(len(by_q), np.inf)
-    row = 0
-    for i, limb in enumerate(robot.model.limbs):
-        kind = KINDS[limb.kind]
-        arm = abs(float(robot.geometry[f"gain{i + 1}"]))
-        if kind.driver == "crank":
-            arm *= abs(float(robot.geometry[f"crank{i + 1}"]))
-        least = np.minimum(least, np.abs(by_q[:, row, limb.actuator]) / arm)
-        row += 1 + len(kind.all_rows(limb.couple > 0))
-    return least
-
-
-@dataclass(frozen=True, eq=False)
-class Workspace:
+@dataclass(frozen=True, eq=False, repr=False)
+class Workspace(Result):
     """A grid of poses; coordinate k of it runs along axis k of every array.
 
     Attributes
@@ -164,24 +67,22 @@ class Workspace:
         """Cells inside times their size: mm³ where the axes are x, y and z."""
         return float(self.inside.sum()) * self.cell
 
-    def __str__(self) -> str:
+    def _parts(self) -> Iterator[str | Table]:
         cells = " x ".join(str(len(axis)) for axis in self.values)
+        share = 100 * float(self.inside.mean())
+        inside = self.dexterity.conditioning[self.inside]
+        best = f"; conditioning {inside.min():.3f} to {inside.max():.3f}" if inside.size else ""
+        yield f"{self.robot.name}: grid of {cells} poses, {share:.1f} % inside{best}"
         rows = []
         for name, axis in zip(self.axes, self.values, strict=True):
             half = (axis[1] - axis[0]) / 2
             ends = (axis[0] - half, axis[-1] + half)
-            (low, unit), (high, _) = (display.displayed(v, _unit(name)) for v in map(float, ends))
+            (low, unit), (high, _) = (displayed(v, _unit(name)) for v in map(float, ends))
             rows.append([f"{name} [{unit}]", f"{low:.6g}", f"{high:.6g}"])
+        yield Table(["axis", "from", "to"], rows, left=1)
         units = [_unit(name) for name in self.axes]
         powers = (f"{unit}{_POWER[units.count(unit)]}" for unit in dict.fromkeys(units))
-        share = 100 * float(self.inside.mean())
-        inside = self.dexterity.conditioning[self.inside]
-        best = f"; conditioning {inside.min():.3f} to {inside.max():.3f}" if inside.size else ""
-        return "\n".join([
-            f"{self.robot.name}: grid of {cells} poses, {share:.1f} % inside{best}",
-            str(display.Table(["axis", "from", "to"], rows, left=1)),
-            f"volume {self.volume:.4g} {' '.join(powers)}",
-        ])  # fmt: skip
+        yield f"volume {self.volume:.4g} {' '.join(powers)}"
 
 
 def workspace(
@@ -227,7 +128,7 @@ def workspace(
     rows = np.repeat(start[:1], int(np.prod(shape)), axis=0)
     for name, column in zip(axes, np.meshgrid(*values, indexing="ij"), strict=True):
         rows[:, POSE.index(name)] = column.ravel()
-    blocks = [completed(robot, rows[i : i + _BLOCK]) for i in range(0, len(rows), _BLOCK)]
+    blocks = [completed(robot, rows[i : i + BLOCK]) for i in range(0, len(rows), BLOCK)]
     rows = np.concatenate(blocks)
     poses = rows.reshape(*shape, 6)
     return Workspace(
@@ -235,7 +136,7 @@ def workspace(
     )
 
 
-def sample_poses(robot: Robot, count: int = 30, seed: int = 0, share: float = 0.5) -> FloatArray:
+def sample_poses(robot: Robot, count: int = 30, seed: int = 0, *, share: float = 0.5) -> FloatArray:
     """Random poses in the workspace: within all limits, and not near a singularity.
 
     Parameters

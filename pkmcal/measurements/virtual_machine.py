@@ -120,7 +120,7 @@ class VirtualMachine:
         if len(failed):
             raise ArgumentError(
                 f"q: {len(failed)} of {len(actuators)} rows have no pose on the true machine"
-                f" (rows {first_rows(failed)})"
+                f" (rows {first_rows(failed, 10)})"
             )
         places = (blank.targets, blank.attachments)
         point, fixed = places[::-1] if kind == "distance" else places

@@ -1,9 +1,9 @@
-"""Every assembly mode of a machine at given actuator coordinates, and what is proven about it."""
+"""`Assemblies`: every assembly mode at given actuator coordinates, and what is proven of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -11,13 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from pkmcal.arguments import whole
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows
+from pkmcal.display import POSE_HEADER, Table, pose_cells
 from pkmcal.exceptions import ArgumentError
+from pkmcal.result import Result
 
 Signs = NDArray[np.int8]
 
 
-@dataclass(frozen=True, eq=False)
-class Assemblies:
+@dataclass(frozen=True, eq=False, repr=False)
+class Assemblies(Result):
     """The poses a machine can have at one set of actuator coordinates, nearest to home first.
 
     Attributes
@@ -56,9 +58,9 @@ class Assemblies:
     paths: int
     far: int
     lost: int
-    _distance: Callable[[FloatArray], FloatArray] = field(repr=False)
-    _feasible: Callable[[], BoolArray] = field(repr=False)
-    _continued: Callable[[FloatArray, ArrayLike | None, int], FloatArray] = field(repr=False)
+    _distance: Callable[[FloatArray], FloatArray]
+    _feasible: Callable[[], BoolArray]
+    _continued: Callable[[FloatArray, ArrayLike | None, int], FloatArray]
 
     def __len__(self) -> int:
         return len(self.poses)
@@ -117,18 +119,19 @@ class Assemblies:
         best = int(np.argmin(apart))
         return best if apart[best] <= 1e-6 + 10.0 * np.nan_to_num(self.error[best]) else None
 
-    def __str__(self) -> str:
-        lines = [
-            f"{len(self)} assembly modes, {int(self.certified.sum())} certified; "
-            + ("complete: " if self.complete else "not known to be complete: ")
-            + self.reason,
-            "       x mm        y mm        z mm     α deg     β deg     γ deg"
-            "  det  mirror  error mm",
-        ]
-        for k, p in enumerate(self.poses):
-            mm = "".join(f"{v:12.4f}" for v in p[:3])
-            deg = "".join(f"{v:10.4f}" for v in np.degrees(p[3:]))
-            error = f"{self.error[k]:9.0e}" if self.certified[k] else "     none"
-            mirror = str(self.mirror[k]) if self.mirror[k] >= 0 else "-"
-            lines.append(f"{mm}{deg}  {'0+-'[int(self.sign[k])]:>3}  {mirror:>6} {error}")
-        return "\n".join(lines)
+    def _parts(self) -> Iterator[str | Table]:
+        known = "complete" if self.complete else "not known to be complete"
+        certified = int(self.certified.sum())
+        yield f"{len(self)} assembly modes, {certified} certified; {known}: {self.reason}"
+        yield Table(
+            [*POSE_HEADER, "det", "mirror", "error [mm]"],
+            [
+                [
+                    *pose_cells(pose),
+                    "0+-"[int(self.sign[k])],
+                    str(self.mirror[k]) if self.mirror[k] >= 0 else "-",
+                    f"{self.error[k]:.0e}" if self.certified[k] else "none",
+                ]
+                for k, pose in enumerate(self.poses)
+            ],
+        )

@@ -14,12 +14,14 @@ second time, in the form the proof needs; the core's own are not taken on trust.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.result import Result
 
 Array = Any  # of real or complex numbers
 ROUNDING = 64 * np.finfo(float).eps
@@ -28,8 +30,8 @@ DOWN = 1.0 - 1e-13
 R, P = slice(0, 9), slice(9, 12)
 
 
-@dataclass(frozen=True, eq=False)
-class Certificate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate(Result):
     """What is proven about N approximate solutions.
 
     Attributes
@@ -46,6 +48,10 @@ class Certificate:
     ok: BoolArray
     error: FloatArray
     unique: FloatArray
+
+    def _parts(self) -> Iterator[str]:
+        worst = f"; error at most {np.nanmax(self.error):.1e} mm" if self.ok.any() else ""
+        yield f"{int(self.ok.sum())} of {self.ok.size} rows certified{worst}"
 
     def reshape(self, shape: tuple[int, ...]) -> Certificate:
         """The same for a batch of this shape."""

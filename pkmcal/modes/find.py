@@ -99,7 +99,7 @@ def poses_of(map: str, frames: FloatArray) -> FloatArray:
 
 
 def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
-    """Find all modes by paths; by random starts where paths leave a doubt or `starts` says so."""
+    """Find all modes by paths; by random starts where paths prove nothing, or with `starts`."""
     square = problem.machine.rows == problem.machine.m
     spheres = problem.spheres()
     start = start_system(problem.map, problem.rows, spheres) if square else None

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.limits import Feasibility
 from pkmcal.kinematics.robot import Robot
-from pkmcal.kinematics.workspace import dexterity
+from pkmcal.result import Result
 
 _STEPS = 2000  # along a move
 _HALVINGS = 50  # of a step, to the time a limit is met
@@ -46,8 +48,8 @@ class Sampled(Protocol):
         """The machine at times (N,)."""
 
 
-@dataclass(frozen=True)
-class Event:
+@dataclass(frozen=True, repr=False)
+class Event(Result):
     """A limit that a move meets.
 
     Attributes
@@ -56,8 +58,8 @@ class Event:
         s; when it is first broken.
     until : float
         s; when it is kept again, or the end of the move.
-    what : str
-        The limit: "reach", "stroke", "base_cone", "platform_cone" or "singularity".
+    what : {"reach", "stroke", "base_cone", "platform_cone", "singularity"}
+        The limit.
     limb : int or None
         Which limb, counted from 1; None for the machine as a whole.
     """
@@ -67,13 +69,19 @@ class Event:
     what: str
     limb: int | None
 
+    def _parts(self) -> Iterator[str]:
+        limb = "" if self.limb is None else f"limb {self.limb}: "
+        broken = "met" if self.what == "singularity" else "broken"
+        what = self.what.replace("_", " ")
+        yield f"{self.time:.4f} to {self.until:.4f} s  {limb}{what} {broken}"
+
 
 def events(move: Sampled) -> list[Event]:
     """Limits that are broken and singularities that are met, with their times, in order.
 
     Strokes, joint cones and reach of every limb; a singularity is met where the determinant of
     the closures changes its sign, and from there the machine is on its other side. (With more
-    closures than free coordinates there is no determinant: `conditioning` tells.)
+    closures than free coordinates there is no determinant: see `Move.conditioning`.)
 
     Each limit's margin is looked at 2001 times and followed to its least between them, so that
     a limit is found however briefly it is broken. What can be missed lasts less than 1/1000 of

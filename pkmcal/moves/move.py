@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import display
 from pkmcal.arguments import number, word
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.core.library import POSE
+from pkmcal.display import POSE_HEADER, Table, displayed, long_table, pose_cells
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.complete import complete, completed_rates
+from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.perturbed import ON_THE_MANIFOLD
 from pkmcal.kinematics.robot import Robot, require_parallel
-from pkmcal.kinematics.workspace import dexterity, moved_coordinates
+from pkmcal.kinematics.workspace import moved_coordinates
 from pkmcal.moves import derivatives
 from pkmcal.moves.events import Event, events
 from pkmcal.moves.time_laws import (
@@ -29,6 +30,7 @@ from pkmcal.moves.time_laws import (
     limit,
     seconds,
 )
+from pkmcal.result import Result
 from pkmcal.screw import from_pose, to_pose
 
 _LAWS = {"cubic": CUBIC, "quintic": QUINTIC}
@@ -37,8 +39,8 @@ _STEPS = 2000  # along a move, in search of peaks
 Space = Literal["pose", "coordinates", "joint"]
 
 
-@dataclass(frozen=True, eq=False)
-class MoveSample:
+@dataclass(frozen=True, eq=False, repr=False)
+class MoveSample(Result):
     """A machine at N times of a move; every array has the shape of the times first.
 
     Attributes
@@ -63,9 +65,16 @@ class MoveSample:
     velocities: FloatArray
     accelerations: FloatArray
 
+    def _parts(self) -> Iterator[str | Table]:
+        times = self.time.reshape(-1)
+        yield f"{times.size} times of a move of {self.actuators.shape[-1]} actuators"
+        rows = zip(times, self.pose.reshape(-1, 6), strict=True)
+        cells = ([f"{time:.4f}", *pose_cells(pose)] for time, pose in rows)
+        yield from long_table(["t [s]", *POSE_HEADER], cells, times.size)
 
-@dataclass(frozen=True, eq=False)
-class Move:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Move(Result):
     """A move of a machine from rest to rest, made by `move`.
 
     Attributes
@@ -118,28 +127,19 @@ class Move:
         """How well the pose is held at times (...): 1 best, 0 at a singularity."""
         return dexterity(self.robot, self.sample(t).pose).conditioning
 
-    def __str__(self) -> str:
+    def _parts(self) -> Iterator[str | Table]:
+        yield f"{self.robot.name}: straight in {self._straight}, {self.duration:.4g} s"
         at = self.sample(np.linspace(0.0, self.duration, _STEPS + 1))
         rows = []
         for i, unit in enumerate(self.robot.actuator_units):
-            factor, unit = display.displayed(1.0, unit)
+            factor, unit = displayed(1.0, unit)
             numbers = (at.actuators[0, i], at.actuators[-1, i], np.abs(at.velocities[:, i]).max(),
                        np.abs(at.accelerations[:, i]).max())  # fmt: skip
             rows.append([f"q{i + 1} [{unit}]", *(f"{number * factor:.4g}" for number in numbers)])
-        title = (
-            f"{self.robot.name}: straight in {self._straight}, {self.duration:.4g} s,"
-            f" conditioning {np.min(self.conditioning(at.time)):.3g} at least"
-        )
         head = ["actuator", "from", "to", "top speed [/s]", "top acceleration [/s²]"]
-        lines = [title, str(display.Table(head, rows, left=1))]
-        for event in self.events():
-            limb = "" if event.limb is None else f"limb {event.limb}: "
-            broken = "met" if event.what == "singularity" else "broken"
-            lines.append(
-                f"{event.time:.4f} to {event.until:.4f} s  {limb}{event.what.replace('_', ' ')}"
-                f" {broken}"
-            )
-        return "\n".join(lines)
+        yield Table(head, rows, left=1)
+        yield f"conditioning {np.min(self.conditioning(at.time)):.3g} at least"
+        yield from map(str, self.events())
 
     # --------------------------------------------------------------------------------------------
 
@@ -187,6 +187,7 @@ def move(
     robot: Robot,
     start: ArrayLike,
     end: ArrayLike,
+    *,
     duration: float | None = None,
     law: Literal["cubic", "quintic", "jerk-limited"] = "quintic",
     space: Space = "pose",
@@ -204,9 +205,9 @@ def move(
         x y z in mm, α β γ in rad.
     duration : float, optional
         s; by default the shortest within the limits.
-    law : str
-        "quintic", "cubic", or in joint space "jerk-limited".
-    space : str
+    law : {"quintic", "cubic", "jerk-limited"}
+        The last in joint space alone.
+    space : {"pose", "coordinates", "joint"}
         "pose": the platform's origin goes straight and the platform turns about one axis (SLERP);
         "coordinates": those that the robot file declares to match, or else its free coordinates,
         go straight, and the machine determines the others, as by `Robot.complete`;

@@ -5,7 +5,6 @@ Two multibody engines that know nothing of screws stand beside it.
 
 from __future__ import annotations
 
-import doctest
 import math
 import re
 import subprocess
@@ -240,7 +239,7 @@ def test_inverse_of_the_position_alone_needs_no_orientation() -> None:
     found = arm.inverse(target, guess=[0.1, -0.2, -0.3], parts="position")
     assert found.ok.all()
     assert np.abs(arm.forward(found.theta) - target)[:, :3, 3].max() < 2e-9
-    assert str(found) == "50 rows: 50 ok"
+    assert str(found).startswith("50 rows: 50 ok\n")
 
 
 def test_what_is_out_of_reach_is_said_and_nan() -> None:
@@ -498,12 +497,6 @@ def test_what_is_given_and_returned_is_not_shared() -> None:
 
 
 # --- what is written about it -----------------------------------------------------------------
-
-
-def test_the_page_on_serial_arms_is_true() -> None:
-    page = Path(__file__).parents[2] / "docs" / "serial-arms.md"
-    failed, examples = doctest.testfile(str(page), module_relative=False)
-    assert (failed, examples > 8) == (0, True)
 
 
 def test_the_example_prints_the_numbers_of_its_page_and_draws_the_curves(tmp_path: Path) -> None:

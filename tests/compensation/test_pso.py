@@ -366,7 +366,7 @@ def test_tied_numbers_follow_their_parameters() -> None:
     cost = LimbResidual(robot, poses, q)
     changed = cost.nominal + 0.1 * np.arange(1, 1 + len(cost.free)) / len(cost.free)
     other = robot.replace(dict(zip(cost.free, changed, strict=True)))
-    (alone,) = (LimbResidual(other, poses, q, cost.free)(changed[None]),)
+    (alone,) = (LimbResidual(other, poses, q, free=cost.free)(changed[None]),)
     np.testing.assert_allclose(cost(changed), alone[0], rtol=1e-12)
     assert cost(changed) > 0.01
 
@@ -377,7 +377,7 @@ def test_a_swarm_over_the_geometry_finds_the_errors_of_a_hexapod() -> None:
     errors = dict(zip([f"offset{i}" for i in range(1, 7)], rng.normal(0, 0.5, 6), strict=True))
     true = robot.replace(errors)
     q = robot.inverse(hexapod_poses(robot, 20, rng))
-    cost = LimbResidual(robot, true.forward(q).pose, q, ["offset*"])
+    cost = LimbResidual(robot, true.forward(q).pose, q, free=["offset*"])
     found = pso(cost, cost.nominal - 2, cost.nominal + 2, **STABLE)
     np.testing.assert_allclose(found.position, list(errors.values()), atol=1e-4)
 
@@ -389,7 +389,7 @@ def test_limb_residual_names_what_does_not_fit() -> None:
     with pytest.raises(ValueError, match="poses must have shape"):
         LimbResidual(robot, poses, q[:2])
     with pytest.raises(ValueError, match="bsae"):
-        LimbResidual(robot, poses, q, ["bsae1.x"])
+        LimbResidual(robot, poses, q, free=["bsae1.x"])
     with pytest.raises(ValueError, match="values must have shape"):
         LimbResidual(robot, poses, q)(np.zeros((2, 3)))
 

@@ -196,8 +196,12 @@ def test_the_core_refuses_an_isa_a_machine_and_columns_it_does_not_have() -> Non
 # importing ----------------------------------------------------------------------------------------
 
 
-def test_importing_pkmcal_loads_nothing_heavy() -> None:
-    code = "import pkmcal, sys; print(*sorted({name.split('.')[0] for name in sys.modules}))"
+def test_a_robot_needs_numpy_and_the_core_alone() -> None:
+    code = (
+        "import pkmcal, sys; robot = pkmcal.load('hexapod');"
+        "robot.forward(robot.inverse(robot.home));"
+        "print(*sorted({name.split('.')[0] for name in sys.modules}))"
+    )
     loaded = set(run(code).stdout.split())
     assert "numpy" in loaded
     assert not loaded & {"sympy", "scipy", "matplotlib", "typer", "rich", "dask", "mpmath"}

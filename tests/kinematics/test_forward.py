@@ -145,7 +145,22 @@ def test_forward_is_a_table_that_ends() -> None:
     robot = pk.load("hexapod")
     q = robot.inverse(poses("hexapod", 30))
     q[1] = np.nan
-    lines = str(robot.forward(q)).splitlines()
-    assert len(lines) == 22 and lines[-1] == "... 10 more rows"
-    assert lines[1].endswith("ok") and lines[2].endswith("invalid input")
-    assert str(robot.forward(q[0])).splitlines() == lines[:2]
+    found = robot.forward(q)
+    title, header, *rows, more = str(found).splitlines()
+    assert title == "30 rows: 29 ok, 1 invalid input" and repr(found) == f"<Forward: {title}>"
+    assert header.split()[::2] == ["x", "y", "z", "α", "β", "γ", "status"]
+    assert len(rows) == 20 and more == "... 10 more rows"
+    assert [row.split()[-1] for row in rows[:2]] == ["ok", "input"]
+    assert float(rows[0].split()[2]) == pytest.approx(found.pose[0, 2], abs=1e-4)
+    assert found._repr_html_().count("<tr>") == 21
+
+
+def test_rows_that_failed_are_named() -> None:
+    robot = pk.load("hexapod")
+    q = np.tile(robot.inverse(robot.home), (3, 4, 1))
+    q[1, :3] = np.nan
+    found = robot.forward(q)
+    assert np.argwhere(found.failed).tolist() == [[1, 0], [1, 1], [1, 2]]
+    assert (found.ok == ~found.failed).all() and (found.success == found.ok).all()
+    assert found.failures() == "3 of 12 rows invalid input (rows 4, 5, 6)"
+    assert robot.forward(q[0]).failures() == ""

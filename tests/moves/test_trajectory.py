@@ -127,7 +127,7 @@ def test_machines_whose_limbs_constrain_the_pose_go_straight_in_their_own_coordi
     expected = pk.trajectory.quintic(start[matched], end[matched], 2.0).sample(at.time)[0]
     np.testing.assert_allclose(at.pose[:, matched], expected, atol=1e-10)
     np.testing.assert_allclose(at.pose[[0, -1]], [start, end], atol=1e-8)
-    assert f"straight in {' '.join(robot.model.match or robot.coordinates)}," in str(move)
+    assert f"straight in {' '.join(robot.model.match or robot.coordinates)}," in repr(move)
 
 
 def test_coordinates_that_no_pose_has_on_the_way_are_refused() -> None:

@@ -7,7 +7,6 @@ wrong a test states the misprint and how much it is off.
 
 from __future__ import annotations
 
-import doctest
 import re
 import runpy
 from pathlib import Path
@@ -296,13 +295,6 @@ def test_example_walks_through_the_eight_steps(
     rods = re.search(r"as polar angles: rods of \[(.*?)\] mm; stated are 223", said)
     assert rods and {f"{float(rod):.3f}" for rod in rods[1].split()} == {"223.000"}
     assert {path.name for path in tmp_path.iterdir()} == {"listing.png", "move.png", "space.png"}
-
-
-def test_the_examples_of_the_document_are_run() -> None:
-    found = doctest.testfile(
-        str(FOLDER.parents[1] / "docs" / "rbt-6t03p.md"), module_relative=False
-    )
-    assert found.attempted > 8 and found.failed == 0
 
 
 def test_numbers_of_the_examples_readme(printed: pk.Robot, robot: pk.Robot) -> None:
