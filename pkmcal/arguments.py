@@ -16,6 +16,7 @@ import numpy as np
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 
 T = TypeVar("T")
+W = TypeVar("W", bound=str)  # of a Literal
 
 
 def number(name: str, value: object, least: float = -math.inf, above: float = -math.inf) -> float:
@@ -54,7 +55,7 @@ def whole(name: str, value: object, least: int, most: float = math.inf, note: st
     return int(cast(int, value))
 
 
-def word(name: str, value: object, known: Collection[str]) -> str:
+def word(name: str, value: object, known: Collection[W]) -> W:
     """One of the known words.
 
     Raises
@@ -65,7 +66,7 @@ def word(name: str, value: object, known: Collection[str]) -> str:
     if not isinstance(value, str) or value not in known:
         near = did_you_mean(value, known, listed=0)
         raise ArgumentError(f"{name} must be one of {', '.join(known)}; found {shown(value)}{near}")
-    return value
+    return cast(W, value)
 
 
 def words(name: str, value: object) -> tuple[str, ...]:

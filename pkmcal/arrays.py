@@ -16,6 +16,7 @@ ComplexArray = NDArray[np.complex128]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 Int32Array = NDArray[np.int32]  # what the core writes
+Int64Array = NDArray[np.int64]
 
 Unit = Literal["mm", "rad", "1"]
 
@@ -84,3 +85,14 @@ def whole_turns(angles: FloatArray) -> FloatArray:
     array([ 0.5, -0.5])
     """
     return np.asarray(2 * np.pi * np.rint(angles / (2 * np.pi)))
+
+
+def rms(values: FloatArray) -> float:
+    """Root mean square; NaN without values."""
+    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float("nan")
+
+
+def propagate(jacobian: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Variances trace(J C Jᵀ) (N,) of points whose derivatives J are (N, k, n), for C (n, n)."""
+    variance: FloatArray = np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian, optimize=True)
+    return variance

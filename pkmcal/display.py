@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
-from itertools import islice
+from itertools import islice, zip_longest
 
 _MOST_ROWS = 20  # of a table with a row for each pose
 _MOST_DECIMALS = 15  # a double has no digits beyond; also what an exact number is given
@@ -104,6 +104,8 @@ class Table:
         Cells.
     left : int
         So many of the first columns are text and flush left; numbers are flush right.
+    columns : int
+        On a terminal the rows are set in so many columns side by side.
 
     Examples
     --------
@@ -115,15 +117,26 @@ class Table:
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
     left: int = 0
+    columns: int = 1
 
     def __str__(self) -> str:
+        count = -(-len(self.rows) // self.columns)
+        if self.columns > 1 and count:
+            parts = [self.rows[k : k + count] for k in range(0, len(self.rows), count)]
+            blocks = [str(Table(self.header, part, self.left)).splitlines() for part in parts]
+            widths = [max(map(len, block)) for block in blocks]
+            lined = (
+                "   ".join(line.ljust(width) for line, width in zip(lines, widths, strict=True))
+                for lines in zip_longest(*blocks, fillvalue="")
+            )
+            return "\n".join(map(str.rstrip, lined))
         lines = [list(self.header), *map(list, self.rows)]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         flush = [str.ljust] * self.left + [str.rjust] * (len(widths) - self.left)
         return "\n".join(
             "  ".join(
                 pad(cell, width) for pad, cell, width in zip(flush, line, widths, strict=True)
-            )
+            ).rstrip()
             for line in lines
         )
 

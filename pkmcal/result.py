@@ -17,7 +17,7 @@ class Result:
     """A result that says itself: ``repr`` in one line, ``str`` and ``_repr_html_`` as tables.
 
     A subclass gives its parts once, text and tables in the order they are read; the first is its
-    title, on one line.
+    title, on one line. An empty text is a blank line on a terminal.
     """
 
     @abstractmethod
@@ -35,6 +35,7 @@ class Result:
         return "\n".join(
             part.html() if isinstance(part, Table) else f"<p>{escape(part)}</p>"
             for part in self._parts()
+            if part != ""
         )
 
 

@@ -237,7 +237,7 @@ CALLS: dict[str, Call] = {
         },
     ),
     "covariance": (
-        pk.Tracker(0.01, 1e-5, 1e-5, (3000, 0, 0)).covariance,
+        pk.Tracker(0.01, 1e-5, 1e-5, position=(3000, 0, 0)).covariance,
         {"points": POSES[:, :3]},
         {"points": "numbers"},
     ),

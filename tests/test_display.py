@@ -59,3 +59,14 @@ def test_angles_are_shown_in_degrees_and_lengths_as_they_are() -> None:
 def test_columns_of_a_table_line_up() -> None:
     lines = display.Table(["name", "mm"], [["radius", "1.0"], ["rod", "340.00"]], left=1)
     assert str(lines).splitlines() == ["name        mm", "radius     1.0", "rod     340.00"]
+
+
+def test_long_tables_fold_into_columns_side_by_side() -> None:
+    rows = [[name, str(k)] for k, name in enumerate("abcde")]
+    folded = str(display.Table(["name", "n"], rows, left=1, columns=2)).splitlines()
+    assert folded == [
+        "name  n   name  n",
+        "a     0   d     3",
+        "b     1   e     4",
+        "c     2",
+    ]

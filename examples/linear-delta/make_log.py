@@ -44,7 +44,7 @@ def log() -> pk.Measurements:
     printer = pk.VirtualMachine(robot.replace(TRUE), noise=NOISE, seed=41)
     read = printer.measure(travels, kind="height")
     return pk.Measurements(
-        travels.round(6), read.values.round(3), "height", read.sigma, actuator_units="mm"
+        travels.round(6), read.values.round(3), "height", sigma=read.sigma, actuator_units="mm"
     )
 
 

@@ -1,6 +1,7 @@
 """Where an instrument stands: the frame in which what a machine predicts lies nearest to readings.
 
-In closed form or nearly so, with the machine as drawn: where the search for its errors starts.
+In closed form or nearly so, with the nominal machine: where the search for its errors starts.
+SciPy aligns one set of known points; here targets may be unknown, and 24 starts run at once.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ _FLAT = 0.05  # share of the largest spread of points below which they lie in a 
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
-    """Points of one or several sets as an instrument has them, and what the machine says of them.
+class PointPairs:
+    """Measured points of one or several sets, and the same points as the machine predicts them.
 
     Attributes
     ----------
@@ -38,7 +39,7 @@ class Seen:
     target: IntArray
 
 
-def of_points(seen: Seen) -> tuple[FloatArray, FloatArray]:
+def of_points(seen: PointPairs) -> tuple[FloatArray, FloatArray]:
     """Frame (6,) and shifts (k, 3) of the unknown targets that bring points nearest to readings.
 
     For a given turning of the frame both its place and the shifts follow linearly; for given
@@ -54,7 +55,9 @@ def of_points(seen: Seen) -> tuple[FloatArray, FloatArray]:
         mine = seen.target == k
         shifted[mine, :, k] = seen.turn[mine]
     lever = _centred(shifted).reshape(3 * len(values), 3 * count)  # of all points, by the shifts
-    inverse = np.linalg.pinv(lever, rcond=1e-6)  # what points do not tell stays where it is said
+    inverse = np.linalg.pinv(
+        lever, rcond=1e-6
+    )  # what points do not determine stays where it is stated
     # shifts = gain · vec(turn) - still, and turn = Kabsch of `straight` + `by_shift` · shifts
     seen_by = np.einsum("ni,jk->njik", values, np.eye(3)).reshape(-1, 9)  # of Rᵀ v, by vec(R)
     gain, still = inverse @ seen_by, inverse @ point.reshape(-1)
@@ -85,12 +88,12 @@ def of_poses(values: FloatArray, pose: FloatArray) -> FloatArray:
 def of_heights(values: FloatArray, point: FloatArray) -> FloatArray:
     """Frame (6,) in which points (N, 3) have nearly the heights (N,) that were measured.
 
-    Heights say which way is up, but for what lies in a plane: there it is up as drawn.
+    Heights say which way is up, but for what lies in a plane: there it is up as in the robot file.
     """
     spread, axes = np.linalg.svd(_centred(point), full_matrices=False)[1:]
-    told = axes[spread > _FLAT * spread[0]]
-    up = np.linalg.lstsq(_centred(point) @ told.T, _centred(values), rcond=None)[0] @ told
-    rest = np.array([0.0, 0.0, 1.0]) - told.T @ told[:, 2]
+    seen = axes[spread > _FLAT * spread[0]]
+    up = np.linalg.lstsq(_centred(point) @ seen.T, _centred(values), rcond=None)[0] @ seen
+    rest = np.array([0.0, 0.0, 1.0]) - seen.T @ seen[:, 2]
     if np.linalg.norm(rest) > _FLAT:
         rest *= np.sqrt(max(0.0, 1.0 - up @ up)) / np.linalg.norm(rest)
         up = up + rest

@@ -1,4 +1,4 @@
-"""Calibrations repeated on measurements that could as well have been: what the residuals say.
+"""Bootstrap of a calibration: the scatter of its parameters over resampled residuals.
 
 The wild bootstrap by pose: where the model says a pose is, the residuals of that pose are added
 again, corrected for what the fit has taken from them, with a sign drawn at random. Nothing is
@@ -7,32 +7,34 @@ rows of one pose may have anything in common (C. F. J. Wu, Jackknife, bootstrap 
 methods in regression analysis, Annals of Statistics 14 (1986) 1261-1295; A. C. Cameron, J. B.
 Gelbach and D. L. Miller, Bootstrap-based improvements for inference with clustered errors, Review
 of Economics and Statistics 90 (2008) 414-427). A prior's centre is drawn from the prior.
+SciPy's bootstrap draws observations anew, which changes the poses that were measured.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal import display
+from pkmcal import arguments, display
 from pkmcal.arguments import checked_seed, instance, whole
-from pkmcal.arguments import executor as checked_executor
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.equations import Equations, Point
-from pkmcal.calibration.estimator import Estimate
+from pkmcal.calibration.equations import Equations, Evaluation
+from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.least_squares import Search
+from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.result import Result
 
 _TOGETHER = 20  # replicates that one task computes
 _LEFT = 1e-6  # share of the noise below which a residual says nothing of it
 
 
-@dataclass(frozen=True, eq=False)
-class Bootstrap:
+@dataclass(frozen=True, eq=False, repr=False)
+class Bootstrap(Result):
     """Parameters of many calibrations; in the order of `free`, mm and rad.
 
     Attributes
@@ -42,7 +44,7 @@ class Bootstrap:
     values : ndarray (replicates, n)
         NaN where a replicate did not converge.
     stderr : ndarray (n,)
-        Standard deviation of the replicates; inf where nothing tells the parameter.
+        Standard deviation of the replicates; inf where the parameter is not determined.
     interval95 : ndarray (n, 2)
         Between these lie 95 % of the replicates.
     bias : ndarray (n,)
@@ -64,7 +66,12 @@ class Bootstrap:
         """How many replicates did not converge."""
         return int(np.isnan(self.values).any(axis=1).sum())
 
-    def __str__(self) -> str:
+    def failures(self) -> str:
+        """Say how many replicates failed; empty where none did."""
+        count = f"{self.failed} of {len(self.values)}"
+        return f"{count} replicates did not converge" if self.failed else ""
+
+    def _parts(self) -> Iterator[str | Table]:
         rows = []
         for i, (name, unit) in enumerate(zip(self.free, self.units, strict=True)):
             numbers = (self.stderr[i], self.linear[i], self.bias[i], *self.interval95[i])
@@ -79,14 +86,15 @@ class Bootstrap:
             ])  # fmt: skip
         failed = f", {self.failed} did not converge" if self.failed else ""
         heads = ["parameter", "stderr", "linear", "bias", "2.5 %", "97.5 %"]
-        title = f"{len(self.values)} bootstrap replicates{failed}"
-        return f"{title}\n{display.Table(heads, rows, left=1)!s}"
+        yield f"{len(self.values)} bootstrap replicates{failed}"
+        yield Table(heads, rows, left=1)
 
 
 def bootstrap(
     found: Identification,
     replicates: int = 1000,
     seed: int = 0,
+    *,
     executor: Executor | None = None,
 ) -> Bootstrap:
     """Repeat a calibration to see how far its parameters scatter.
@@ -129,25 +137,25 @@ def bootstrap(
     """
     instance("found", found, Identification)
     whole("replicates", replicates, 2)
-    if not (found._estimate.freedom > 0).all() or not np.isfinite(found._told).all():
-        raise ArgumentError("found: no equation is left over whose residual could be drawn again")
+    if not (found.fit.estimate.freedom > 0).all() or not np.isfinite(found.fit.covariance).all():
+        raise ArgumentError("found: no degrees of freedom are left, so no residuals to draw from")
     seeds = np.random.SeedSequence(checked_seed(seed)).spawn(replicates)
     parts = [seeds[k : k + _TOGETHER] for k in range(0, replicates, _TOGETHER)]
-    workers = checked_executor(executor)
-    replicate = Replicate(found._equations, found._estimate)
+    workers = arguments.executor(executor)
+    replicate = Replicate(found.fit)
     done: Iterable[FloatArray] = (workers.map if workers else map)(replicate, parts)
     values = np.concatenate(list(done))
     good = values[np.isfinite(values).all(axis=1)]
     if len(good) < 2:
         raise ArgumentError("found: its replicates do not converge, the fit is not to be trusted")
-    told = np.isfinite(found.stderr)
+    finite = np.isfinite(found.stderr)
     interval = np.quantile(good, (0.025, 0.975), axis=0).T
-    interval[~told] = -np.inf, np.inf
+    interval[~finite] = -np.inf, np.inf
     return Bootstrap(
         free=found.free,
         units=found.units,
         values=values,
-        stderr=np.where(told, good.std(axis=0, ddof=1), np.inf),
+        stderr=np.where(finite, good.std(axis=0, ddof=1), np.inf),
         interval95=interval,
         bias=good.mean(axis=0) - found.values,
         linear=found.stderr,
@@ -159,12 +167,12 @@ class Replicate:
 
     Parameters
     ----------
-    equations, estimate : Equations, Estimate
+    fit : Fit
         Of the calibration.
     """
 
-    def __init__(self, equations: Equations, estimate: Estimate) -> None:
-        self._equations, self._estimate = equations, estimate
+    def __init__(self, fit: Fit) -> None:
+        self._equations, self._estimate = equations, estimate = fit.equations, fit.estimate
         # rows of one pose take one sign
         edges = np.cumsum([0, *map(len, equations.sets)])
         self._pose = np.concatenate(equations.pose_of)
@@ -173,7 +181,7 @@ class Replicate:
                 mine = slice(edges[k], edges[k + 1])
                 self._pose[mine] = measured.pose_index + self._pose.max() + 1
         _, self._pose = np.unique(self._pose, return_inverse=True)
-        self._residuals = equations.coloured(self._corrected(), estimate.setting.noise)
+        self._residuals = equations.unwhiten(self._corrected(), estimate.state.noise)
 
     def _corrected(self) -> FloatArray:
         """Whitened residuals (M,) with the deviation that the noise has."""
@@ -195,7 +203,7 @@ class Replicate:
         return np.array([self._one(np.random.default_rng(seed)) for seed in seeds])
 
     def _one(self, random: np.random.Generator) -> FloatArray:
-        equations, at = self._equations, self._estimate.point
+        equations, at = self._equations, self._estimate.evaluation
         prior = equations.parameters.prior
         stated = np.isfinite(prior)
         centre = at.theta.copy()
@@ -206,12 +214,12 @@ class Replicate:
         values = [seen.values + r for seen, r in zip(at.predicted, drawn, strict=True)]
         return self._solved(equations.with_values(values, centre), replace(at, residuals=drawn))
 
-    def _solved(self, equations: Equations, at: Point) -> FloatArray:
-        setting = self._estimate.setting
+    def _solved(self, equations: Equations, at: Evaluation) -> FloatArray:
+        state = self._estimate.state
         search = Search(equations, at)
-        kept = setting.searched.untold
-        pins = setting.searched.singular[0] * kept.T
-        u = search.best(np.zeros(len(at.theta)), setting.noise, setting.loss, pins)
+        kept = state.fitted.unidentifiable
+        pins = state.fitted.singular[0] * kept.T
+        u = search.best(np.zeros(len(at.theta)), state.noise, state.loss, pins)
         theta = at.theta + search.scale * (u - kept @ (kept.T @ u))
         found = equations.parameters.reported(theta)
         return found if search.converged else np.full_like(found, np.nan)

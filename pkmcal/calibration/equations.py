@@ -8,27 +8,27 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pkmcal.arrays import FloatArray
-from pkmcal.calibration.alignment import Seen, of_heights, of_points, of_poses
-from pkmcal.calibration.parameters import POINTS, Parameters, Share
+from pkmcal.arrays import FloatArray, Int32Array, mm_per_unit, rms
+from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_poses
+from pkmcal.calibration.parameters import POINTS, FitData, Parameters
 from pkmcal.core import instruments
 from pkmcal.core.library import STATUS
-from pkmcal.kinematics.robot import Robot
+from pkmcal.display import first_rows
+from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import Predicted, difference, distance_per_point, predict
 
 
 @dataclass(frozen=True, eq=False)
-class Point:
-    """The equations at one parameter vector.
+class Evaluation:
+    """The equations evaluated at one parameter vector.
 
     Attributes
     ----------
     theta : ndarray (n,)
         The parameters, mm and rad.
-    robot : Robot
+    robot : Calibratable
         With their geometry.
     pose : ndarray (K, 6)
         Where the machine is at each distinct row of actuators; NaN where it cannot be.
@@ -41,42 +41,42 @@ class Point:
     """
 
     theta: FloatArray
-    robot: Robot
+    robot: Calibratable
     pose: FloatArray
-    status: NDArray[np.int32]
+    status: Int32Array
     predicted: tuple[Predicted, ...]
     residuals: tuple[FloatArray, ...]
 
     @property
-    def reached(self) -> bool:
-        """Whether the machine reaches every row."""
+    def ok(self) -> bool:
+        """Whether the forward kinematics solved every row."""
         return not self.status.any()
 
 
 class Equations:
-    """What some measurements say about the parameters.
+    """The stacked residual equations of all measurements, and their Jacobian.
 
     Parameters
     ----------
-    shares : sequence of Share
-        Rows with the same actuators are solved once.
+    datasets : sequence of FitData
+        The rows to fit; rows with the same actuators are solved once.
     parameters : Parameters
-        What is estimated.
+        The parameter vector.
     """
 
-    def __init__(self, shares: Sequence[Share], parameters: Parameters) -> None:
-        self.shares = tuple(shares)
-        self.sets = tuple(share.measured for share in shares)
-        self.rows = np.concatenate([share.rows for share in shares])
+    def __init__(self, datasets: Sequence[FitData], parameters: Parameters) -> None:
+        self.datasets = tuple(datasets)
+        self.sets = tuple(data.measured for data in datasets)
+        self.rows = np.concatenate([data.rows for data in datasets])
         self.parameters = parameters
-        self._framed = [share.framed for share in shares]
+        self._framed = [data.framed for data in datasets]
         self._columns = [  # of the points that are sought, by what `predict` calls them
             {
-                name: parameters.columns_of(role, share.measured)
-                for name, role in POINTS[share.measured.kind].items()
-                if role in share.sought
+                name: parameters.columns_of(role, data.measured)
+                for name, role in POINTS[data.measured.kind].items()
+                if role in data.sought
             }
-            for share in shares
+            for data in datasets
         ]
         self._known = [
             {
@@ -100,8 +100,8 @@ class Equations:
         self.first = np.cumsum(self.components) - self.components  # equation of each row
         self.set_of = np.repeat(np.arange(len(self.sets)), np.diff(edges))
 
-    def at(self, theta: FloatArray) -> Point:
-        """The equations at `theta` (n,)."""
+    def at(self, theta: FloatArray) -> Evaluation:
+        """Evaluate at `theta` (n,)."""
         robot = self.parameters.robot._with_values(self.parameters.values_at(theta))
         solved = robot.forward(self.actuators, self._guess)
         frame = self.parameters.frame_at(theta)
@@ -117,7 +117,9 @@ class Equations:
             )
             predicted.append(seen)
             residuals.append(difference(measured.kind, measured.values, seen.values))
-        return Point(theta, robot, solved.pose, solved.status, tuple(predicted), tuple(residuals))
+        return Evaluation(
+            theta, robot, solved.pose, solved.status, tuple(predicted), tuple(residuals)
+        )
 
     def with_values(self, values: Sequence[FloatArray], prior_centre: FloatArray) -> Equations:
         """The same with other measured values (N, k) of each set, and another centre (n,)."""
@@ -129,25 +131,25 @@ class Equations:
         other.parameters = replace(self.parameters, start=prior_centre)
         return other
 
-    def start(self) -> Point:
-        """The equations at the present parameters, an unknown frame laid on what was measured.
+    def start(self) -> Evaluation:
+        """Evaluate at the present parameters, an unknown frame aligned with the readings.
 
-        Rows that are not reached from a measured pose are tried from home.
+        Rows that fail from a measured pose are tried from home.
         """
         theta = self.parameters.start.copy()
-        point = self.at(theta)
-        if not point.reached:
-            self._guess[point.status != 0] = self.parameters.robot.home
-            point = self.at(theta)
-        if self.parameters.frame is None or not point.reached:
-            return point
-        frame, theta = self._laid(point)
-        self.parameters, theta = self.parameters.laid(theta, frame)
+        evaluation = self.at(theta)
+        if not evaluation.ok:
+            self._guess[evaluation.status != 0] = self.parameters.robot.home
+            evaluation = self.at(theta)
+        if self.parameters.frame is None or not evaluation.ok:
+            return evaluation
+        frame, theta = self._aligned(evaluation)
+        self.parameters, theta = self.parameters.aligned(theta, frame)
         return self.at(theta)
 
-    def _laid(self, point: Point) -> tuple[FloatArray, FloatArray]:
-        """The frame (6,) in which readings lie nearest, and parameters with targets moved along."""
-        theta = point.theta.copy()
+    def _aligned(self, evaluation: Evaluation) -> tuple[FloatArray, FloatArray]:
+        """The frame (6,) nearest to the readings, and parameters with unknown targets shifted."""
+        theta = evaluation.theta.copy()
         framed = {
             kind: [i for i, m in enumerate(self.sets) if self._framed[i] and m.kind == kind]
             for kind in ("position", "pose", "height")
@@ -156,9 +158,9 @@ class Equations:
             kind = "pose" if framed["pose"] else "height"
             values = np.concatenate([self.sets[i].values for i in framed[kind]])
             if kind == "pose":
-                poses = np.concatenate([point.pose[self.pose_of[i]] for i in framed[kind]])
+                poses = np.concatenate([evaluation.pose[self.pose_of[i]] for i in framed[kind]])
                 return of_poses(values, poses), theta
-            points = np.concatenate([self._points(point, i)[0] for i in framed[kind]])
+            points = np.concatenate([self._points(evaluation, i)[0] for i in framed[kind]])
             return of_heights(values, points), theta
         columns = np.concatenate([
             self._columns[i]["target"][:, 0]
@@ -168,8 +170,8 @@ class Equations:
         ])  # fmt: skip
         sought, target = np.unique(columns, return_inverse=True)
         target = target.reshape(-1) - int(sought[0] < 0)
-        parts = [self._points(point, i) for i in framed["position"]]
-        seen = Seen(
+        parts = [self._points(evaluation, i) for i in framed["position"]]
+        seen = PointPairs(
             values=np.concatenate([self.sets[i].values for i in framed["position"]]),
             point=np.concatenate([places for places, _ in parts]),
             turn=np.concatenate([turn for _, turn in parts]),
@@ -182,23 +184,23 @@ class Equations:
             theta[mine] = np.clip(moved, self.parameters.lower[mine], self.parameters.upper[mine])
         return frame, theta
 
-    def _points(self, point: Point, i: int) -> tuple[FloatArray, FloatArray]:
+    def _points(self, evaluation: Evaluation, i: int) -> tuple[FloatArray, FloatArray]:
         """Where the targets of set `i` are in the base frame (N, 3), and how they are turned."""
         sought = self._columns[i].get("target")
-        target = self._known[i]["target"] if sought is None else point.theta[sought]
-        places, _, turn = instruments.points(point.pose[self.pose_of[i]], target)
+        target = self._known[i]["target"] if sought is None else evaluation.theta[sought]
+        places, _, turn = instruments.points(evaluation.pose[self.pose_of[i]], target)
         return places, turn
 
-    def go_on_from(self, point: Point) -> None:
-        """Let later calls of `at` start from its poses."""
-        self._guess = np.where(point.status[:, None] == 0, point.pose, self._guess)
+    def warm_start(self, evaluation: Evaluation) -> None:
+        """Start the forward kinematics of later calls of `at` from its poses."""
+        self._guess = np.where(evaluation.status[:, None] == 0, evaluation.pose, self._guess)
 
-    def jacobian(self, point: Point) -> list[FloatArray]:
+    def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n)."""
         p = self.parameters
-        by_geometry = point.robot.error_twists(point.pose, self.actuators)[:, :, p.places]
+        by_geometry = evaluation.robot.error_twists(evaluation.pose, self.actuators)[:, :, p.places]
         parts = []
-        for i, seen in enumerate(point.predicted):
+        for i, seen in enumerate(evaluation.predicted):
             rows, k = seen.values.shape
             part = np.zeros((rows, k, len(p)))
             part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
@@ -225,8 +227,8 @@ class Equations:
             stacked.append((scaled / factor).reshape(-1, *part.shape[2:]))
         return np.concatenate(stacked)
 
-    def coloured(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:
-        """The reverse of `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad."""
+    def unwhiten(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:
+        """Invert `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad."""
         parts, rest = [], whitened
         for measured, white, factor in zip(self.sets, self._whiten, noise, strict=True):
             mine, rest = np.split(rest, [len(measured) * white.shape[1]])
@@ -242,28 +244,28 @@ class Equations:
         white = self._whiten[i]
         return white if white.ndim == 3 else white[:, :, None] * np.eye(white.shape[1])
 
-    def distances(self, point: Point) -> FloatArray:
+    def distances(self, evaluation: Evaluation) -> FloatArray:
         """How far off each measured point is, mm, in the order of the sets."""
-        return np.concatenate([distance_per_point(r) for r in point.residuals])
+        return np.concatenate([distance_per_point(r) for r in evaluation.residuals])
 
-    def rms(self, point: Point) -> float:
+    def rms(self, evaluation: Evaluation) -> float:
         """Root mean square of `distances` over the rows that were reached; NaN without any."""
-        off = self.distances(point)
-        off = off[np.isfinite(off)]
-        return float(np.sqrt(np.mean(off**2))) if off.size else float("nan")
+        off = self.distances(evaluation)
+        return rms(off[np.isfinite(off)])
 
-    def status(self, point: Point) -> NDArray[np.int32]:
+    def status(self, evaluation: Evaluation) -> Int32Array:
         """Of the forward kinematics, for each row."""
-        return np.concatenate([point.status[place] for place in self.pose_of])
+        return np.concatenate([evaluation.status[place] for place in self.pose_of])
 
-    def unreached(self, point: Point) -> str:
-        """Which rows the machine does not reach and why, in words; empty where it reaches all."""
-        status = self.status(point)
+    def failures(self, evaluation: Evaluation) -> str:
+        """Say which rows failed and why; empty where the forward kinematics solved all."""
+        status = self.status(evaluation)
         parts = []
         for code in sorted(set(status.tolist()) - {0}):
             rows = self.rows[status == code].tolist()
-            shown = ", ".join(map(str, rows[:10])) + (", …" if len(rows) > 10 else "")
-            parts.append(f"{len(rows)} of {len(status)} rows {STATUS[code]} (rows {shown})")
+            parts.append(
+                f"{len(rows)} of {len(status)} rows {STATUS[code]} (rows {first_rows(rows, 10)})"
+            )
         return "; ".join(parts)
 
 
@@ -271,8 +273,7 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     """Factors (N, k) or matrices (N, k, k) that make the noise one; 1 mm where it is not known."""
     sigma = measured.sigma
     if sigma is None:
-        per_unit = np.array([length if unit == "rad" else 1.0 for unit in measured.units])
-        return np.tile(per_unit, (len(measured), 1))
+        return np.tile(mm_per_unit(measured.units, length), (len(measured), 1))
     if sigma.ndim == 2:
         return 1.0 / sigma
     return np.linalg.inv(np.linalg.cholesky(sigma))

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
-from pkmcal.calibration.equations import Equations, Point
+from pkmcal.arrays import FloatArray, mm_per_unit
+from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.identifiability import (
     Decomposed,
     Directions,
@@ -16,19 +16,19 @@ from pkmcal.calibration.identifiability import (
     triangle,
 )
 from pkmcal.calibration.least_squares import Search
-from pkmcal.calibration.loss import Loss
+from pkmcal.calibration.loss import Loss, LossName
 from pkmcal.calibration.outliers import median_ratio
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.lack_of_fit import SIGNIFICANT, Split, groups, split
 
 _ROUNDS = 20  # of estimating noise and unidentifiable combinations anew
 _LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
-_LEAST_FREEDOM = 0.5  # equations that must be left over for residuals to tell the noise
+LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
 
 
 @dataclass(frozen=True, eq=False)
-class Setting:
-    """What the least squares take as given, and what is revised between them.
+class IterationState:
+    """What one least-squares solve takes as given, and what is revised before the next.
 
     Attributes
     ----------
@@ -36,19 +36,19 @@ class Setting:
         Factor on the stated deviations of each set; where none is stated, the deviation in mm.
     loss : Loss
         How rows count.
-    told : Directions
-        What the measurements tell.
+    measured : Directions
+        Identifiable from the measurements alone.
     determined : Directions
-        What measurements and prior tell.
-    searched : Directions
-        What they tell to the machine's size or better; the rest is kept where it started.
+        Identifiable from measurements and prior.
+    fitted : Directions
+        Determined to the machine's size or better; the rest is kept at its start.
     """
 
     noise: FloatArray
     loss: Loss
-    told: Directions
+    measured: Directions
     determined: Directions
-    searched: Directions
+    fitted: Directions
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +57,10 @@ class Estimate:
 
     Attributes
     ----------
-    point : Point
+    evaluation : Evaluation
         The equations there.
-    setting : Setting
-        Noise, loss and what can be told.
+    state : IterationState
+        Noise, loss and identifiable directions.
     residual : ndarray (M,)
         Measured less predicted, whitened.
     jacobian : ndarray (M, n)
@@ -73,8 +73,8 @@ class Estimate:
         Equations of each set less the parameters they went into.
     """
 
-    point: Point
-    setting: Setting
+    evaluation: Evaluation
+    state: IterationState
     residual: FloatArray
     jacobian: FloatArray
     weights: FloatArray
@@ -83,19 +83,19 @@ class Estimate:
 
 
 class Estimator:
-    """Weighted least squares, and what follows from them.
+    """Weighted least squares, iterated with the noise and rank that they imply.
 
     Parameters
     ----------
     equations : Equations
         What is fitted.
-    start : Point
-        Where the search starts and what the smallest change counts from.
+    start : Evaluation
+        Where the search starts, and what unidentifiable combinations keep.
     loss : str
-        A name of `pkmcal.loss.LIMITS`.
+        A name in `loss.LIMITS`.
     """
 
-    def __init__(self, equations: Equations, start: Point, loss: str) -> None:
+    def __init__(self, equations: Equations, start: Evaluation, loss: LossName) -> None:
         self.equations, self.start, self.loss = equations, start, loss
         self.search = Search(equations, start)
         self.scale, self.prior = self.search.scale, self.search.prior
@@ -107,37 +107,37 @@ class Estimator:
         self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
 
     def solve(self) -> Estimate:
-        """The estimate; noise that is not stated is estimated along, set by set."""
+        """Estimate the parameters and, where no sigma is stated, the noise of each set."""
         ones = np.ones(len(self.unstated))
-        setting = self._setting(ones, self._first_loss(), None)
-        if not setting.searched.rank:
+        state = self._state(ones, self._first_loss(), None)
+        if not state.fitted.rank:
             names = ", ".join(self.equations.parameters.names)
-            raise ArgumentError(f"they tell nothing about {names}")
+            raise ArgumentError(f"they depend on none of {names}")
         u = np.zeros(len(self.scale))
         for _ in range(_ROUNDS):
-            # what is not told is held by rows that nothing contradicts
-            kept = setting.searched.untold
-            pins = setting.searched.singular[0] * kept.T
-            u = self.search.best(u, setting.noise, setting.loss, pins)
+            # rows that nothing contradicts pin what is not determined
+            kept = state.fitted.unidentifiable
+            pins = state.fitted.singular[0] * kept.T
+            u = self.search.best(u, state.noise, state.loss, pins)
             u = u - kept @ (kept.T @ u)
-            estimate = self._estimate(u, setting)
+            estimate = self._estimate(u, state)
             revised = self._revised(estimate)
-            steady = self._steady(setting, revised)
-            setting = revised
-            if steady:
+            settled = self._settled(state, revised)
+            state = revised
+            if settled:
                 break
         if self.loss == "linear" and not self.unstated.any():
-            return replace(estimate, setting=setting)  # nothing that it was made with has changed
-        return self._estimate(u, setting)
+            return replace(estimate, state=state)  # nothing that it was made with has changed
+        return self._estimate(u, state)
 
     # between the least squares ------------------------------------------------------------------
 
-    def _loss(self, name: str, width: FloatArray) -> Loss:
+    def _loss(self, name: LossName, width: FloatArray) -> Loss:
         of_rows = width[self.equations.set_of]
         return Loss(name, self.equations.components, of_rows)
 
     def _first_loss(self) -> Loss:
-        """Wide enough for the machine as drawn, and not so wide that gross errors lead astray."""
+        """Limits wide enough for the nominal machine, and no wider than gross errors allow."""
         ones = np.ones(len(self.unstated))
         if self.loss == "linear":
             return self._loss("linear", ones)
@@ -154,45 +154,51 @@ class Estimator:
         squares: FloatArray = np.add.reduceat(residual**2, np.cumsum(components) - components)
         return squares
 
-    def _setting(self, noise: FloatArray, loss: Loss, point: Point | None) -> Setting:
-        """What can be told with this noise, before (`point` None) or after a fit."""
+    def _state(
+        self, noise: FloatArray, loss: Loss, evaluation: Evaluation | None
+    ) -> IterationState:
+        """Split the directions for this noise, before (`evaluation` None) or after a fit."""
         size = self.start.robot.length
-        noise_known = point is not None or not self.unstated.any()
-        faint = size if noise_known else np.inf
+        noise_known = evaluation is not None or not self.unstated.any()
+        worst = size if noise_known else np.inf
         if self._first is None or (noise != self._first[0]).any():
             at_start = self._at_start / (noise @ np.array(self._equations_of))[:, None]
             self._first = noise, self._decomposed(at_start)
         _, first = self._first
         now = (
-            (None, None) if point is None else self._decomposed(self.search.jacobian(point, noise))
+            (None, None)
+            if evaluation is None
+            else self._decomposed(self.search.jacobian(evaluation, noise))
         )
-        told = directions(first[0], now[0], size)
+        measured = directions(first[0], now[0], size)
         determined = directions(first[1], now[1], size)
-        return Setting(noise, loss, told, determined, directions(first[1], now[1], size, faint))
+        return IterationState(
+            noise, loss, measured, determined, directions(first[1], now[1], size, worst)
+        )
 
     def _decomposed(self, jacobian: FloatArray) -> tuple[Decomposed, Decomposed]:
-        """Without and with the prior."""
+        """Decompose without and with the prior."""
         data = decompose(jacobian)
         return data, decompose(np.vstack([jacobian, self.prior])) if len(self.prior) else data
 
-    def _revised(self, estimate: Estimate) -> Setting:
-        """Noise where it is not stated, limits of the loss, and what can be told with them."""
+    def _revised(self, estimate: Estimate) -> IterationState:
+        """Estimate unstated noise and limits of the loss, and split the directions anew."""
         factor = self._spread(estimate)
         noise = np.where(
             self.unstated,
-            np.maximum(estimate.setting.noise * factor, _LEAST_NOISE),
-            estimate.setting.noise,
+            np.maximum(estimate.state.noise * factor, _LEAST_NOISE),
+            estimate.state.noise,
         )
-        # while the model is still far off, rows are odd only if they are further off than most
+        # while the model is still far off, outliers are rows further off than most
         width = np.where(self.unstated, 1.0, np.maximum(factor, 1.0))
-        return self._setting(noise, self._loss(self.loss, width), estimate.point)
+        return self._state(noise, self._loss(self.loss, width), estimate.evaluation)
 
     def _spread(self, estimate: Estimate) -> FloatArray:
-        """Deviation of the whitened residuals of each set, (sets,); 1 where nothing tells it."""
+        """Deviation of the whitened residuals of each set, (sets,); 1 without freedom."""
         rows, components = self.equations.set_of, self.equations.components
         squares = self._squares(estimate.residual)
         factor = np.ones(len(self.unstated))
-        for i in np.flatnonzero(estimate.freedom >= _LEAST_FREEDOM):
+        for i in np.flatnonzero(estimate.freedom >= LEAST_FREEDOM):
             mine, k = squares[rows == i], components[rows == i]
             if self.loss == "linear":
                 variance = mine.sum() / estimate.freedom[i]
@@ -204,7 +210,7 @@ class Estimator:
         return factor
 
     def _inflation(self, estimate: Estimate, i: int) -> float:
-        """Where the model misses more than repeats scatter, they tell that once, not each time."""
+        """Factor on the variance under lack of fit, which the repeats of a pose share."""
         repeated = self._repeats(estimate, i)
         if not repeated.chance < SIGNIFICANT:
             return 1.0
@@ -216,7 +222,7 @@ class Estimator:
         return [self._repeats(estimate, i, plain) for i in range(len(self._groups))]
 
     def _repeats(self, estimate: Estimate, i: int, plain: bool = False) -> Split:
-        group, residual = self._groups[i], estimate.point.residuals[i]
+        group, residual = self._groups[i], estimate.evaluation.residuals[i]
         k = residual.shape[1]
         leverage = len(residual) * k - float(estimate.freedom[i])
         if plain:
@@ -225,10 +231,10 @@ class Estimator:
             return split(residual[:, :lengths], white, group, leverage * lengths / k)
         weights = estimate.weights[self.equations.set_of == i]
         white = self.equations.white(i) * np.sqrt(weights)[:, None, None]
-        return split(residual, white / estimate.setting.noise[i], group, leverage)
+        return split(residual, white / estimate.state.noise[i], group, leverage)
 
-    def _steady(self, old: Setting, new: Setting) -> bool:
-        if old.searched.rank != new.searched.rank:
+    def _settled(self, old: IterationState, new: IterationState) -> bool:
+        if old.fitted.rank != new.fitted.rank:
             return False
         if self.loss == "linear" and not len(self.prior) and len(self.unstated) == 1:
             return True  # the noise does not move the solution
@@ -236,30 +242,32 @@ class Estimator:
             old.loss.width, new.loss.width, rtol=1e-3
         )
 
-    def plain(self, point: Point) -> FloatArray:
+    def scaled_jacobian(self, evaluation: Evaluation) -> FloatArray:
         """Scaled Jacobian (M, n), not whitened: mm per mm, angles as their arc."""
         parts = []
-        for part, measured in zip(self.equations.jacobian(point), self.equations.sets, strict=True):
-            arc = np.where(np.array(measured.units) == "rad", self.start.robot.length, 1.0)
-            parts.append((part * arc[:, None]).reshape(-1, part.shape[2]))
+        for part, measured in zip(
+            self.equations.jacobian(evaluation), self.equations.sets, strict=True
+        ):
+            arcs = mm_per_unit(measured.units, self.start.robot.length)
+            parts.append((part * arcs[:, None]).reshape(-1, part.shape[2]))
         jacobian: FloatArray = np.concatenate(parts) * self.scale
         return jacobian
 
-    def _estimate(self, u: FloatArray, setting: Setting) -> Estimate:
-        point = self.search.at(u)
-        jacobian = self.search.jacobian(point, setting.noise)
-        residual = self.equations.whitened(point.residuals, setting.noise)
-        weights = setting.loss.weights(residual)
+    def _estimate(self, u: FloatArray, state: IterationState) -> Estimate:
+        evaluation = self.search.at(u)
+        jacobian = self.search.jacobian(evaluation, state.noise)
+        residual = self.equations.whitened(evaluation.residuals, state.noise)
+        weights = state.loss.weights(residual)
         every = np.repeat(weights, self.equations.components)
         parts = [np.sqrt(every[mine, None]) * jacobian[mine] for mine in self._equations_of]
         factors = [triangle(part) for part in parts]
-        told = setting.determined.told
+        basis = state.determined.identifiable
         _, singular, rows = np.linalg.svd(
-            triangle(np.vstack([*factors, self.prior])) @ told, full_matrices=False
+            triangle(np.vstack([*factors, self.prior])) @ basis, full_matrices=False
         )
-        half = told @ (rows.T / singular)
-        fitted = half[:, : setting.searched.rank]
+        half = basis @ (rows.T / singular)
+        fitted = half[:, : state.fitted.rank]
         leverage = [float(((factor @ fitted) ** 2).sum()) for factor in factors]
         count = [float(every[mine].sum()) for mine in self._equations_of]
         freedom = np.array(count) - np.array(leverage)
-        return Estimate(point, setting, residual, jacobian, weights, half @ half.T, freedom)
+        return Estimate(evaluation, state, residual, jacobian, weights, half @ half.T, freedom)

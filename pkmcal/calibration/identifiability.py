@@ -1,4 +1,4 @@
-"""Which combinations of the parameters measurements can tell, and how well.
+"""Which combinations of the parameters are identifiable, and how well.
 
 Everything here is in scaled parameters: 1 means about 1 mm at the machine.
 """
@@ -15,37 +15,37 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 
 _KINDS = 4  # kinds of parameters whose combinations are looked for
-_ELSEWHERE = 1e-5  # share of a combination outside some parameters that does not count
-_SPELLED = 6  # parameters whose shares are spelled out
+_OUTSIDE = 1e-5  # share of a combination outside some parameters that does not count
+_SPELLED = 6  # parameters whose coefficients are printed
 _IN_ONE_THREAD = 8192  # numbers
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
-CLEAR = 0.01  # share of the machine's size to which a combination must be told to count after all
+CLEAR = 0.01  # share of the machine's size to which a combination must be determined to count
 
 
 @dataclass(frozen=True, eq=False)
 class Directions:
-    """Combinations of the parameters, split by what the measurements tell.
+    """Orthonormal combinations of the parameters, split into identifiable and not.
 
     Attributes
     ----------
-    told, untold : ndarray (n, r), (n, n - r)
+    identifiable, unidentifiable : ndarray (n, r), (n, n - r)
         Orthonormal columns.
     singular : ndarray (n,)
         Singular values of the scaled, whitened Jacobian, largest first.
     """
 
-    told: FloatArray
-    untold: FloatArray
+    identifiable: FloatArray
+    unidentifiable: FloatArray
     singular: FloatArray
 
     @property
     def rank(self) -> int:
-        """How many combinations are told."""
-        return int(self.told.shape[1])
+        """Number of identifiable combinations."""
+        return int(self.identifiable.shape[1])
 
     @property
     def gap(self) -> float:
-        """Singular value of the last combination told over that of the first untold."""
+        """Singular value of the last identifiable combination over that of the next."""
         if self.rank in (0, len(self.singular)):
             return float("inf")
         last, next_one = self.singular[self.rank - 1], self.singular[self.rank]
@@ -81,13 +81,14 @@ def triangle(matrix: FloatArray) -> FloatArray:
 
 
 def directions(
-    before: Decomposed, after: Decomposed | None, size: float, faint: float = np.inf
+    before: Decomposed, after: Decomposed | None, size: float, worst: float = np.inf
 ) -> Directions:
     """Split the combinations by the Jacobians before and after the fit.
 
-    A combination is told if its singular value is not zero. The Jacobian before the fit, with the
-    machine as drawn, decides: there the gap is clean. Its errors blur the gap, so the one after
-    the fit overrules it only where it shows more combinations to `CLEAR` of the machine's size.
+    A combination is identifiable if its singular value is not zero. The Jacobian before the fit,
+    of the nominal machine, decides: there the gap is clean. Errors of the machine blur the gap, so
+    the Jacobian after the fit overrules only where it determines more combinations to `CLEAR` of
+    the machine's size.
 
     Parameters
     ----------
@@ -95,27 +96,27 @@ def directions(
         `decompose` of the scaled, whitened Jacobians.
     size : float
         Of the machine, mm.
-    faint : float
+    worst : float
         Standard deviation in mm, one over the singular value, beyond which a combination does not
         count either, before or after.
     """
-    rank, deciding = _able(before[0], faint), before
+    rank, deciding = _count(before[0], worst), before
     if after is not None:
-        clear, able = _able(after[0], CLEAR * size), _able(after[0], faint)
-        if clear > rank or able < rank:
-            rank, deciding = (clear if clear > rank else able), after
+        clear, usable = _count(after[0], CLEAR * size), _count(after[0], worst)
+        if clear > rank or usable < rank:
+            rank, deciding = (clear if clear > rank else usable), after
     singular, basis = deciding
     return Directions(basis[:, :rank], basis[:, rank:], singular)
 
 
-def _able(singular: FloatArray, deviation: float) -> int:
-    """How many singular values are not zero and tell more than to this deviation."""
+def _count(singular: FloatArray, deviation: float) -> int:
+    """Number of singular values that are not zero and stand for at most this deviation."""
     floor = max(ROUNDING * float(singular[0]), 1.0 / deviation)
     return int(np.count_nonzero(singular > floor))
 
 
 def observability(jacobian: FloatArray, poses: int, rank: int) -> dict[str, float]:
-    """Observability indices O1 … O5 of a scaled Jacobian, over the combinations that are told.
+    """Observability indices O1 … O5 of a scaled Jacobian, over the identifiable combinations.
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ def observability(jacobian: FloatArray, poses: int, rank: int) -> dict[str, floa
     poses : int
         Number of measured poses.
     rank : int
-        How many combinations are told.
+        Number of identifiable combinations.
 
     Notes
     -----
@@ -145,12 +146,12 @@ def observability(jacobian: FloatArray, poses: int, rank: int) -> dict[str, floa
     }
 
 
-def plain_basis(untold: FloatArray, names: Sequence[str]) -> FloatArray:
-    """The same combinations, each of as few kinds of parameters as will do.
+def sparse_basis(unidentifiable: FloatArray, names: Sequence[str]) -> FloatArray:
+    """Rewrite combinations so that each involves as few kinds of parameters as possible.
 
     Parameters
     ----------
-    untold : ndarray (n, d)
+    unidentifiable : ndarray (n, d)
         Orthonormal columns.
     names : sequence of str, n
         Of the parameters; ``base1.x`` and ``base2.x`` are of one kind.
@@ -160,7 +161,7 @@ def plain_basis(untold: FloatArray, names: Sequence[str]) -> FloatArray:
     ndarray (n, d)
         The largest entry of each column is 1.
     """
-    d = untold.shape[1]
+    d = unidentifiable.shape[1]
     families = [_family(name) for name in names]
     kinds = list(dict.fromkeys(families))
     member = np.array([[family == kind for kind in kinds] for family in families])
@@ -170,19 +171,19 @@ def plain_basis(untold: FloatArray, names: Sequence[str]) -> FloatArray:
     for support in [*itertools.chain.from_iterable(few), range(len(kinds))]:
         if found.shape[1] == d:
             break
-        outside = untold[~member[:, list(support)].any(axis=1)]
+        outside = unidentifiable[~member[:, list(support)].any(axis=1)]
         _, singular, rows = np.linalg.svd(np.vstack([outside, np.zeros((d, d))]))
-        inside = rows[np.count_nonzero(singular > _ELSEWHERE) :].T
+        inside = rows[np.count_nonzero(singular > _OUTSIDE) :].T
         _, size, turn = np.linalg.svd(inside - found @ (found.T @ inside), full_matrices=False)
-        new = inside @ turn[: np.count_nonzero(size > _ELSEWHERE)].T
+        new = inside @ turn[: np.count_nonzero(size > _OUTSIDE)].T
         if new.shape[1]:
-            parts.append(_reduced(untold @ new))
+            parts.append(_reduced(unidentifiable @ new))
             found = np.linalg.qr(np.hstack([found, new])).Q
-    return np.hstack([np.zeros((len(untold), 0)), *parts])
+    return np.hstack([np.zeros((len(unidentifiable), 0)), *parts])
 
 
 def _reduced(basis: FloatArray) -> FloatArray:
-    """The same combinations by elimination: each has a parameter that the others are without."""
+    """Eliminate: each combination has a parameter that the others are without."""
     basis = basis.copy()
     d = basis.shape[1]
     pivots: list[int] = []
@@ -201,15 +202,17 @@ def _reduced(basis: FloatArray) -> FloatArray:
 
 
 def _family(name: str) -> str:
-    """What a parameter is apart from its limb; the frame is one, and so are targets."""
+    """The kind of a parameter: its name without the limb; the frame is one kind, as are targets."""
     first = name.split(".")[0]
     if first == "frame" or first.startswith(("target", "anchor")):
         return re.sub("(frame|target|anchor).*", r"\1", first)
     return re.sub(r"\d+", "", name)
 
 
-def in_words(combination: FloatArray, names: Sequence[str]) -> str:
-    """One combination that cannot be told, such as "base1.z … base4.z together".
+def as_sum(combination: FloatArray, names: Sequence[str]) -> str:
+    """Print a combination of parameters, such as "base1.x + base2.x − platform1.x".
+
+    Measurements do not change where the parameters change together in these proportions.
 
     Parameters
     ----------
@@ -223,30 +226,35 @@ def in_words(combination: FloatArray, names: Sequence[str]) -> str:
         if abs(value) > 0.01:
             groups.setdefault(float(f"{value:.2g}"), []).append(name)
     members = [name for group in groups.values() for name in group]
-    if len(members) == 1:
-        return f"{members[0]} by itself"
-    if len(groups) == 1:
-        return f"{listed(members)} together"
-    if set(groups) == {1.0, -1.0}:
-        return f"{listed(groups[1.0])} together, {listed(groups[-1.0])} against them"
-    if len(members) <= _SPELLED:
-        return "together " + ", ".join(f"{v:+g} {listed(g)}" for v, g in groups.items())
-    kinds = list(dict.fromkeys(_family(name) for name in names))
-    ordered = sorted(members, key=lambda name: (kinds.index(_family(name)), names.index(name)))
-    return f"{listed(ordered)} together, in one proportion"
+    if len(members) > _SPELLED and set(map(abs, groups)) != {1.0}:
+        kinds = list(dict.fromkeys(_family(name) for name in names))
+        ordered = sorted(members, key=lambda name: (kinds.index(_family(name)), names.index(name)))
+        return f"a combination of {listed(ordered)}"
+    terms = [
+        (" − " if value < 0 else " + ", "" if abs(value) == 1.0 else f"{abs(value):g} ", name)
+        for value, group in sorted(groups.items(), key=lambda pair: pair[0] < 0)
+        for name in _runs(group, " − … − " if value < 0 else " + … + ", abs(value) == 1.0)
+    ]
+    text = "".join(sign + factor + name for sign, factor, name in terms)
+    return text.removeprefix(" + ")
 
 
 def listed(names: Sequence[str]) -> str:
     """Names in a row; three and more that only count on, as "base1.x … base4.x"."""
+    return ", ".join(_runs(names, " … "))
+
+
+def _runs(names: Sequence[str], between: str, fold: bool = True) -> list[str]:
+    """Names, three and more that only count on folded into one text."""
     texts: list[str] = []
     run: list[str] = []
     for name in [*names, ""]:
         if run and _follows(run[-1], name):
             run.append(name)
             continue
-        texts += [f"{run[0]} … {run[-1]}"] if len(run) > 2 else run
+        texts += [f"{run[0]}{between}{run[-1]}"] if fold and len(run) > 2 else run
         run = [name]
-    return ", ".join(texts)
+    return texts
 
 
 def _follows(name: str, next_name: str) -> bool:

@@ -6,8 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
-from pkmcal.calibration.equations import Equations, Point
+from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
+from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.loss import Loss
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.measurements import Measurements
@@ -23,7 +23,7 @@ class Search:
     ----------
     equations : Equations
         What is fitted.
-    start : Point
+    start : Evaluation
         θ0, where all rows are reached.
 
     Attributes
@@ -38,25 +38,23 @@ class Search:
         Misfit of the rows that were reached at the start and after every step taken, rms in mm.
     """
 
-    def __init__(self, equations: Equations, start: Point) -> None:
+    def __init__(self, equations: Equations, start: Evaluation) -> None:
         parameters = equations.parameters
         self.equations, self.start, self.scale = equations, start, parameters.scale
-        sigma = parameters.prior / self.scale
-        stated = np.flatnonzero(np.isfinite(sigma))
-        self.prior = np.eye(len(sigma))[stated] / sigma[stated, None]
+        self.prior = parameters.prior_rows
         self._centre = self.prior @ ((parameters.start - start.theta) / self.scale)
         lower, upper = ((end - start.theta) / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
         self._method: Literal["trf", "lm"] = "trf" if bounded else "lm"
         self._rounding = [_rounded(m, start.robot.length) for m in equations.sets]
-        self._last: tuple[FloatArray, Point] = (np.zeros(len(sigma)), start)
+        self._last: tuple[FloatArray, Evaluation] = (np.zeros(len(self.scale)), start)
         self._refused = np.zeros(len(equations.rows), dtype=bool)
         self.evaluations = 0
         self.converged = False
         self.history: list[float] = []
 
-    def at(self, u: FloatArray) -> Point:
+    def at(self, u: FloatArray) -> Evaluation:
         """The equations at scaled parameters (n,)."""
         if not np.array_equal(u, self._last[0]):
             self._last = (u.copy(), self.equations.at(self.start.theta + self.scale * u))
@@ -64,7 +62,7 @@ class Search:
         return self._last[1]
 
     def jacobian(
-        self, point: Point, noise: FloatArray, aside: BoolArray | None = None
+        self, evaluation: Evaluation, noise: FloatArray, aside: BoolArray | None = None
     ) -> FloatArray:
         """Derivative (M, n) of the predicted values, scaled and whitened; 0 for rows set aside.
 
@@ -74,7 +72,7 @@ class Search:
             It does not exist, at a singularity of the machine.
         """
         equations = self.equations
-        jacobian = equations.whitened(equations.jacobian(point), noise) * self.scale
+        jacobian = equations.whitened(equations.jacobian(evaluation), noise) * self.scale
         if aside is not None:
             jacobian[np.repeat(aside, equations.components)] = 0.0
         if not np.isfinite(jacobian).all():
@@ -110,12 +108,12 @@ class Search:
             return straight
         converged, here = self.converged, self.at(straight)
         around, _ = self._minimum(u, noise, loss, pins, barred)
-        if self.at(around).reached:
+        if self.at(around).ok:
             around, other = self._minimum(around, noise, loss, pins, everything)
             if other < cost:
                 return around
         self.converged, self._last = converged, (straight, here)
-        equations.go_on_from(here)
+        equations.warm_start(here)
         return straight
 
     def _minimum(
@@ -129,8 +127,8 @@ class Search:
         offset = np.concatenate([self._centre, np.zeros(len(pins))])
         without = np.repeat(aside, equations.components)
 
-        def data(point: Point) -> FloatArray:
-            whitened = equations.whitened(point.residuals, noise)
+        def data(evaluation: Evaluation) -> FloatArray:
+            whitened = equations.whitened(evaluation.residuals, noise)
             whitened[without] = 0.0
             return whitened
 
@@ -140,20 +138,20 @@ class Search:
         worse = 10.0 * (1.0 + np.abs(first).max())
 
         def residual(u: FloatArray) -> FloatArray:
-            point = self.at(u)
+            evaluation = self.at(u)
             held = extra @ u - offset
-            missed = (equations.status(point) != 0) & ~aside
+            missed = (equations.status(evaluation) != 0) & ~aside
             if missed.any():  # worse than any step that is taken
                 self._refused |= missed
                 return np.full(len(first) + len(held) + 1, worse + floor)
-            return np.concatenate([-loss.residual(data(point)), held, [floor]])
+            return np.concatenate([-loss.residual(data(evaluation)), held, [floor]])
 
         def jacobian(u: FloatArray) -> FloatArray:
-            point = self.at(u)
-            equations.go_on_from(point)  # the step to it was taken
-            self.history.append(equations.rms(point))
-            by_u = self.jacobian(point, noise, aside)
-            return np.vstack([loss.jacobian(data(point), by_u), extra, np.zeros(len(u))])
+            evaluation = self.at(u)
+            equations.warm_start(evaluation)  # the step to it was taken
+            self.history.append(equations.rms(evaluation))
+            by_u = self.jacobian(evaluation, noise, aside)
+            return np.vstack([loss.jacobian(data(evaluation), by_u), extra, np.zeros(len(u))])
 
         found = least_squares(
             residual,
@@ -176,4 +174,4 @@ def _rounded(measured: Measurements, length: float) -> FloatArray:
     values = measured.values.reshape(len(measured), -1)
     lengths = np.array([unit == "mm" for unit in measured.units])
     size = np.abs(values[:, lengths]).max() + length
-    return np.broadcast_to(_ROUNDING * np.where(lengths, size, size / length), values.shape)
+    return np.broadcast_to(_ROUNDING * size / mm_per_unit(measured.units, length), values.shape)

@@ -18,12 +18,15 @@ estimation techniques, Image and Vision Computing 15 (1997) 59-76).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 
-LIMITS = {"linear": np.inf, "huber": 1.345, "cauchy": 2.385}
+LossName = Literal["linear", "huber", "cauchy"]
+
+LIMITS: dict[LossName, float] = {"linear": np.inf, "huber": 1.345, "cauchy": 2.385}
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +43,7 @@ class Loss:
         Factor on the limit c of each row.
     """
 
-    name: str
+    name: LossName
     components: IntArray
     width: FloatArray
 

@@ -1,17 +1,21 @@
 """Optimal design by exchange: which rows of a large Jacobian to keep.
 
-Everything is in coordinates in which all candidates together tell every combination of parameters
-to one: what a choice of them tells is then a number between 0 and 1, free of units.
+Everything is in coordinates in which all candidates have unit information
+about every combination of parameters: that of a choice of them is between 0 and 1, without units.
 """
 
 from __future__ import annotations
+
+from typing import Literal
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.calibration.identifiability import ROUNDING, decompose
 
-CRITERIA = ("prediction", "D", "A")
+Criterion = Literal["prediction", "D", "A"]
+
+CRITERIA: tuple[Criterion, ...] = ("prediction", "D", "A")
 
 _TRIED = 12  # members that matter least, one of which must want to be exchanged
 _BETTER = 1e-9  # share by which an exchange must gain
@@ -27,46 +31,50 @@ class Design:
         Derivative of what is measured at each candidate by the parameters, both scaled by their
         standard deviations.
     prior : ndarray (p, n)
-        Rows that tell something whatever is chosen.
+        Rows that are there whatever is chosen.
     aims : ndarray (T, 3, n)
         Derivative of the points that are to be known, mm.
     criterion : str
         One of `CRITERIA`.
-    faint : float
-        What is told to no better than this deviation, scaled, counts as not told while poses are
-        chosen.
+    worst : float
+        Scaled deviation from which a combination counts as unidentifiable while poses are chosen.
 
     Attributes
     ----------
-    untold : ndarray (n, d)
-        Orthonormal combinations of parameters that not even all candidates tell.
+    unidentifiable : ndarray (n, d)
+        Orthonormal combinations of parameters that not even all candidates identify.
     """
 
     def __init__(
-        self, blocks: FloatArray, prior: FloatArray, aims: FloatArray, criterion: str, faint: float
+        self,
+        blocks: FloatArray,
+        prior: FloatArray,
+        aims: FloatArray,
+        criterion: Criterion,
+        worst: float,
     ) -> None:
         n = blocks.shape[2]
         singular, basis = decompose(np.vstack([blocks.reshape(-1, n), prior]))
         rank = int(np.count_nonzero(singular > ROUNDING * singular[0]))
-        told = basis[:, :rank] / singular[:rank]
-        self.untold = basis[:, rank:]
+        unit = basis[:, :rank] / singular[:rank]
+        self.unidentifiable = basis[:, rank:]
         self._determinant = criterion == "D"
-        self._blocks = blocks @ told
-        self._prior = (prior @ told).T @ (prior @ told)
-        metric = told.T @ told  # of the scaled parameters
-        self._ridge = metric / faint**2
-        aimed = (aims @ told).reshape(-1, rank)
+        self._blocks = blocks @ unit
+        self._prior = (prior @ unit).T @ (prior @ unit)
+        metric = unit.T @ unit  # of the scaled parameters
+        self._ridge = metric / worst**2
+        aimed = (aims @ unit).reshape(-1, rank)
         self._errors = aimed.T @ aimed / len(aims)
         self._cost = metric if criterion == "A" else self._errors
 
     def predicted(self, chosen: IntArray) -> float:
         """Root mean square error (mm) at the aims if these candidates are measured."""
-        told, directions = np.linalg.eigh(self._information(chosen))
+        information, directions = np.linalg.eigh(self._information(chosen))
         errors = np.einsum("ij,ik,kj->j", directions, self._errors, directions)
-        known = told > _NOTHING
+        known = information > _NOTHING
         if (errors[~known] > _NOTHING * errors.sum()).any():
             return float("inf")
-        return float(np.sqrt((errors[known] / told[known]).sum()))
+        return float(np.sqrt((errors[known] / information[known]).sum()))
 
     def at_random(self, count: int, draws: int) -> float:
         """Median of `predicted` over choices of `count` candidates at random."""

@@ -53,7 +53,7 @@ def outliers(
         use = np.repeat(kept, components)
         factor = triangle(np.vstack([root[use] * jacobian[use], prior]))
         normal = factor.T @ factor
-        # the ridge is for directions that only rows set aside told
+        # the ridge is for directions that only rows set aside determined
         covariance = np.linalg.inv(normal + 1e-14 * np.trace(normal) * np.eye(len(normal)))
         shift = covariance @ (weighted[use].T @ residual[use] - pull)
         left = residual - jacobian @ shift

@@ -1,28 +1,32 @@
-"""What a calibration estimates: numbers of the geometry, the instrument's frame, points."""
+"""The parameter vector of a calibration: geometry, instrument frame, targets and attachments."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+from typing import Literal
 
 import numpy as np
 
 from pkmcal.arguments import did_you_mean
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
-from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.measurements.components import Kind
 from pkmcal.measurements.measurements import Measurements
 
 Prior = float | Mapping[str, float] | None
+Known = Literal["known", "unknown"]
+KNOWN: tuple[Known, ...] = ("known", "unknown")
 Bounds = Mapping[str, tuple[float, float]] | None
 
 _POINT = (("x", "mm"), ("y", "mm"), ("z", "mm"))
 _FRAME = (*_POINT, ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
 
 # The points that measurements of a kind depend on: what `predict` calls them, and users.
-POINTS: dict[str, dict[str, str]] = {
+POINTS: dict[Kind, dict[str, str]] = {
     "pose": {},
     "position": {"target": "target"},
     "height": {"target": "target"},
@@ -31,8 +35,8 @@ POINTS: dict[str, dict[str, str]] = {
 
 
 @dataclass(frozen=True, eq=False)
-class Share:
-    """The rows of one set of measurements that are fitted or held out.
+class FitData:
+    """Rows of one set of measurements, to be fitted or held out.
 
     Attributes
     ----------
@@ -41,7 +45,7 @@ class Share:
     rows : ndarray of int (N,)
         Their numbers in what the user gave, counted through all sets.
     unknown_frame, unknown_target, unknown_attachment : bool
-        What the user says is not known of them.
+        Which of them `identify` was asked to find along.
     """
 
     measured: Measurements
@@ -52,12 +56,12 @@ class Share:
 
     @property
     def framed(self) -> bool:
-        """Whether the unknown frame is among what it depends on."""
+        """Whether these readings depend on the unknown frame."""
         return self.unknown_frame and self.measured.kind != "distance"
 
     @property
     def sought(self) -> tuple[str, ...]:
-        """Which of its points are not known: "target", or "attachment" and "anchor"."""
+        """Which of its points are estimated: "target", or "attachment" and "anchor"."""
         unknown = {
             "target": self.unknown_target,
             "anchor": self.unknown_target,
@@ -68,7 +72,7 @@ class Share:
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """The vector that is estimated: numbers of the geometry first, then frame and points.
+    """The parameter vector: numbers of the geometry first, then frame and points.
 
     Attributes
     ----------
@@ -91,7 +95,7 @@ class Parameters:
         followed by them. Near it they are small, and their angles regular.
     points : mapping
         Column of the x of each unknown point, by "target", "attachment" or "anchor" and its name.
-    robot : Robot
+    robot : Calibratable
         The machine they belong to.
     """
 
@@ -106,7 +110,7 @@ class Parameters:
     frame: int | None
     origin: FloatArray
     points: Mapping[tuple[str, str], int]
-    robot: Robot
+    robot: Calibratable
 
     def __len__(self) -> int:
         return len(self.names)
@@ -115,6 +119,14 @@ class Parameters:
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Lower and upper bounds."""
         return self.lower, self.upper
+
+    @property
+    def prior_rows(self) -> FloatArray:
+        """A row (p, n) for each parameter with a prior: one over its scaled deviation."""
+        sigma = self.prior / self.scale
+        stated = np.flatnonzero(np.isfinite(sigma))
+        rows: FloatArray = np.eye(len(sigma))[stated] / sigma[stated, None]
+        return rows
 
     def values_at(self, theta: FloatArray) -> FloatArray:
         """The geometry's values (p,) for `theta` (n,)."""
@@ -126,8 +138,8 @@ class Parameters:
         """Pose (6,) of the base counted from `origin`; None where the frame is known."""
         return None if self.frame is None else theta[self.frame : self.frame + 6]
 
-    def laid(self, theta: FloatArray, frame: FloatArray) -> tuple[Parameters, FloatArray]:
-        """Parameters with the base at `frame` (6,), counted from there unless limits are stated."""
+    def aligned(self, theta: FloatArray, frame: FloatArray) -> tuple[Parameters, FloatArray]:
+        """Put the base at `frame` (6,) and count from there, unless a prior or bound is stated."""
         assert self.frame is not None
         mine, theta = slice(self.frame, self.frame + 6), theta.copy()
         stated = np.isfinite([self.prior[mine], self.lower[mine], self.upper[mine]]).any()
@@ -166,8 +178,8 @@ class Parameters:
 
 
 def parameters(
-    robot: Robot,
-    shares: Sequence[Share],
+    robot: Calibratable,
+    datasets: Sequence[FitData],
     free: str | Sequence[str] | None,
     prior: Prior,
     bounds: Bounds,
@@ -191,14 +203,14 @@ def parameters(
     names, units = list(chosen), [str(geometry.units[i]) for i in places]
     start = list(geometry.values[places])
     frame = None
-    if any(share.framed for share in shares):
+    if any(data.framed for data in datasets):
         frame = len(names)
         names += [f"frame.{axis}" for axis, _ in _FRAME]
         units += [unit for _, unit in _FRAME]
         start += [0.0] * 6
     points: dict[tuple[str, str], int] = {}
     known: dict[tuple[str, str], FloatArray] = {}
-    for role, measured in ((role, share.measured) for share in shares for role in share.sought):
+    for role, measured in ((role, data.measured) for data in datasets for role in data.sought):
         for name, place in _points_of(role, measured)[0].items():
             if (role, name) in points:
                 if (known[role, name] != place).any():
@@ -211,7 +223,7 @@ def parameters(
             names += [f"{role}{name}.{axis}" for axis, _ in _POINT]
             units += [unit for _, unit in _POINT]
             start += list(place)
-    travel = max(_travel(robot, share.measured) for share in shares)
+    travel = max(_travel(robot, data.measured) for data in datasets)
     of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
     scale = np.array([of_unit[unit] for unit in units])
     values = np.array(start, dtype=np.float64)
@@ -232,10 +244,10 @@ def parameters(
     )
 
 
-def _travel(robot: Robot, measured: Measurements) -> float:
+def _travel(robot: Calibratable, measured: Measurements) -> float:
     """Largest actuator coordinate, mm; an angle counts as its arc."""
-    per_unit = [robot.length if unit == "rad" else 1.0 for unit in robot.actuator_units]
-    return max(1.0, float(np.abs(measured.actuators * per_unit).max()))
+    arcs = measured.actuators * mm_per_unit(robot.actuator_units, robot.length)
+    return max(1.0, float(np.abs(arcs).max()))
 
 
 def _points_of(role: str, measured: Measurements) -> tuple[dict[str, FloatArray], IntArray]:

@@ -2,37 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from pkmcal import display
 from pkmcal.arguments import number, whole, word, words
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import FloatArray, IntArray, as_rows
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.identifiability import in_words, plain_basis
-from pkmcal.calibration.optimal_design import CRITERIA, Design
-from pkmcal.calibration.parameters import Parameters, Prior, Share, parameters
+from pkmcal.calibration.identifiability import as_sum, sparse_basis
+from pkmcal.calibration.optimal_design import CRITERIA, Criterion, Design
+from pkmcal.calibration.parameters import FitData, Parameters, Prior, parameters
 from pkmcal.core.library import POSE
+from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import ArmMachine, as_machine
+from pkmcal.measurements.calibratable import Calibratable, as_machine
+from pkmcal.measurements.components import Kind
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.measurements.virtual_machine import VirtualMachine
+from pkmcal.result import Result
+
+Unknown = Literal["frame", "target"]
+UNKNOWN: tuple[Unknown, ...] = ("frame", "target")
 
 _DRAWS = 25  # of poses at random, to compare a plan with
 _ERROR = 0.5  # mm; what numbers may be off by that have no prior
 _TIMES, _MACHINES = 2.0, 16  # so many machines with so many times these errors must get there
 _FOUND = 1e-6  # mm, rad: how near to a pose forward kinematics must end
-_UNTOLD = 1e-3  # mm a pose moves per mm along a combination that cannot be told
+_UNIDENTIFIABLE = 1e-3  # mm a target moves per mm along an unidentifiable combination
 
 
-@dataclass(frozen=True, eq=False)
-class Plan:
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Result):
     """Poses to measure.
 
     Attributes
@@ -72,7 +78,7 @@ class Plan:
     def __len__(self) -> int:
         return len(self.indices)
 
-    def __str__(self) -> str:
+    def _parts(self) -> Iterator[str | Table]:
         left_out = f"; {self.left_out} candidates left out" if self.left_out else ""
         if isinstance(self.robot, SerialArm):  # several postures have one pose
             names: Sequence[str] = [f"q{i + 1}" for i in range(self.robot.n_joints)]
@@ -83,34 +89,36 @@ class Plan:
         heads = ["candidate"]
         heads += [f"{n} [{'deg' if t else 'mm'}]" for n, t in zip(names, turning, strict=True)]
         rows = [
-            [str(index), *(display.fixed(float(value), 3) for value in row)]
+            [str(index), *(fixed(float(value), 3) for value in row)]
             for index, row in zip(
                 self.indices, np.where(turning, np.degrees(given), given), strict=True
             )
         ]
-        return "\n".join([
-            f"{self.robot.name}: measure {_poses(len(self))} for {len(self.parameters)} parameters"
-            f"{left_out}",
-            f"predicted error {self.predicted:.3g} mm rms; {_poses(len(self))} at random"
-            f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g}",
-            *([] if np.isfinite(self.predicted) else ["too few: not all of them would be told"]),
-            str(display.Table(heads, rows)),
-        ])  # fmt: skip
+        count = _poses(len(self))
+        yield f"{self.robot.name}: measure {count} for {len(self.parameters)} parameters{left_out}"
+        yield (
+            f"predicted error {self.predicted:.3g} mm rms; {count} at random"
+            f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g}"
+        )
+        if not np.isfinite(self.predicted):
+            yield "too few to identify all of them"
+        yield Table(heads, rows)
 
 
 def plan_poses(
     robot: Robot | SerialArm,
     candidates: ArrayLike,
     count: int | None = None,
+    *,
     accuracy: float | None = None,
     targets: ArrayLike | None = None,
-    criterion: str = "prediction",
-    kind: str = "position",
+    criterion: Criterion = "prediction",
+    kind: Kind = "position",
     target: ArrayLike | None = None,
     noise: float | Tracker = 0.02,
     free: str | Sequence[str] | None = None,
     prior: Prior = None,
-    unknown: str | Sequence[str] = (),
+    unknown: Unknown | Sequence[Unknown] = (),
 ) -> Plan:
     """Choose poses to measure among candidates, by exchange.
 
@@ -120,7 +128,7 @@ def plan_poses(
     Parameters
     ----------
     robot : Robot or SerialArm
-        The machine as drawn, or as last calibrated.
+        The nominal machine, or as last calibrated.
     candidates : array_like (N, 6), for a serial arm (N, n)
         Poses that could be measured, mm and rad; of an arm its joint coordinates. Those that break
         the machine's limits are left out, and those that machines with twice the errors of the
@@ -158,7 +166,7 @@ def plan_poses(
     ------
     ValueError, TypeError
         An argument that does not fit; no candidate within limits; a wanted accuracy that not even
-        all candidates reach; parameters that move the targets and that no candidate tells.
+        all candidates reach; unidentifiable parameters that move the targets.
 
     Notes
     -----
@@ -207,16 +215,16 @@ def _poses(count: int) -> str:
     return f"{count} pose{'s' * (count != 1)}"
 
 
-def _commanded(name: str, robot: Robot, places: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def _commanded(name: str, robot: Calibratable, places: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Poses and actuators of poses, or of an arm's joint coordinates; NaN where there are none."""
-    if isinstance(robot, ArmMachine):
-        there, q, _ = robot.visited(as_rows(name, places, robot.n_actuators)[0])
-    else:
+    if isinstance(robot, Robot):
         there, q, _ = ideal(robot, as_rows(name, places, 6)[0])
+    else:
+        there, q, _ = robot.commanded(as_rows(name, places, robot.n_actuators)[0])
     return there, q
 
 
-def _aims(robot: Robot, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
+def _aims(robot: Calibratable, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
     there, q = _commanded("targets", robot, targets)
     lost = np.flatnonzero(~np.isfinite(there).all(axis=1))
     if len(lost):
@@ -225,12 +233,12 @@ def _aims(robot: Robot, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def _within_limits(
-    robot: Robot, candidates: ArrayLike
+    robot: Calibratable, candidates: ArrayLike
 ) -> tuple[FloatArray, FloatArray, IntArray, int]:
     """Poses and actuators of the candidates that can be measured, which ones, and of how many."""
     there, q = _commanded("candidates", robot, candidates)
     good = np.asarray(np.isfinite(there).all(axis=1))
-    if not isinstance(robot, ArmMachine):  # whose file has no limits
+    if isinstance(robot, Robot):  # the file of an arm has no limits
         good[good] = robot.feasible(there[good]).ok
     # `identify` starts from home, too, and must find them
     good[good] = np.abs(robot.forward(q[good]).pose - there[good]).max(axis=1) < _FOUND
@@ -242,7 +250,7 @@ def _within_limits(
     return there[inside], q[inside], inside, len(there)
 
 
-def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> NDArray[np.bool_]:
+def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:
     """Which candidates machines with errors reach, too: none beside a singularity."""
     k = len(chosen.places)
     sigma = np.minimum(chosen.prior, _ERROR * chosen.scale)[:k]
@@ -261,9 +269,9 @@ def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> NDArray[np.bo
 
 
 def _equations(
-    robot: Robot,
+    robot: Calibratable,
     q: FloatArray,
-    kind: str,
+    kind: Kind,
     target: ArrayLike | None,
     noise: float | Tracker,
     free: str | Sequence[str] | None,
@@ -273,7 +281,7 @@ def _equations(
     """What would be measured, the rows of a pose one after another."""
     sought = words("unknown", unknown)
     for each in sought:
-        word("unknown", each, ("frame", "target"))
+        word("unknown", each, UNKNOWN)
     several = None if target is None else as_rows("target", target, 3)[0]
     count = 1 if several is None else len(several)
     measured = VirtualMachine(robot, noise).measure(
@@ -286,22 +294,20 @@ def _equations(
     if several is not None:
         index = np.tile(np.arange(count), len(q))
         measured = replace(measured, target=several, target_index=index)
-    share = Share(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
-    return Equations([share], parameters(robot, [share], free, prior, None))
+    data = FitData(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
+    return Equations([data], parameters(robot, [data], free, prior, None))
 
 
 def _design(
     equations: Equations,
-    safe: NDArray[np.bool_],
+    safe: BoolArray,
     aims: FloatArray,
     aims_at: FloatArray,
-    criterion: str,
+    criterion: Criterion,
 ) -> Design:
     chosen = equations.parameters
-    point = equations.start()
-    rows = equations.whitened(equations.jacobian(point), np.ones(1)) * chosen.scale
-    stated = np.isfinite(chosen.prior)
-    prior = np.diag(chosen.scale / chosen.prior)[stated]
+    start = equations.start()
+    rows = equations.whitened(equations.jacobian(start), np.ones(1)) * chosen.scale
     k = len(chosen.places)
     twists = chosen.robot.error_twists(aims, aims_at)
     by_geometry = twists[:, 3:, chosen.places] * chosen.scale[:k]
@@ -311,13 +317,13 @@ def _design(
             "candidates or targets: one is singular, where nothing holds the platform"
         )
     blocks = rows.reshape(len(safe), -1, len(chosen))[safe]
-    design = Design(blocks, prior, aimed, criterion, chosen.robot.length)
-    moving = np.abs(aimed @ design.untold).max(initial=0.0)
-    if moving > _UNTOLD:
-        words = [in_words(c, chosen.names) for c in plain_basis(design.untold, chosen.names).T]
+    design = Design(blocks, chosen.prior_rows, aimed, criterion, chosen.robot.length)
+    moving = np.abs(aimed @ design.unidentifiable).max(initial=0.0)
+    if moving > _UNIDENTIFIABLE:
+        basis = sparse_basis(design.unidentifiable, chosen.names)
         raise ArgumentError(
-            f"candidates: not even all of them tell {words[0]}, which moves the targets; offer"
-            " others, free fewer parameters or state a prior"
+            f"candidates: not even all of them identify {as_sum(basis[:, 0], chosen.names)}, which"
+            " moves the targets; offer others, free fewer parameters or state a prior"
         )
     return design
 

@@ -7,20 +7,20 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pkmcal.arrays import FloatArray
-from pkmcal.calibration.equations import Equations, Point
+from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit, rms
+from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.identifiability import listed
-from pkmcal.calibration.parameters import Parameters, Share
+from pkmcal.calibration.parameters import FitData, Parameters
+from pkmcal.display import first_rows
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
 _GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
 FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
 _BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
-_LEFT_OVER = 0.5  # equations that show how good a fit is
-_TELLING = 0.2  # a reading that leaves so little of the misfit is what was meant
+_LEAST_FREEDOM = 0.5  # degrees of freedom from which residuals show how good a fit is
+MISFIT_RATIO = 0.2  # of the misfit that another reading may leave to be named as what was meant
 _FACTORS = {
     "mm": (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)),
     "rad": (
@@ -31,25 +31,27 @@ _FACTORS = {
 }
 
 
-def misread(shares: Sequence[Share], parameters: Parameters, point: Point) -> list[str]:
-    """What measurements that the machine misses grossly were probably meant to be.
+def likely_unit_errors(
+    datasets: Sequence[FitData], parameters: Parameters, evaluation: Evaluation
+) -> list[str]:
+    """Suspect units or exchanged columns in measurements that are grossly off.
 
     Each set is read in other units and with columns exchanged; a reading that fits far better is
     named.
     """
     size = parameters.robot.length
     found = []
-    for i, share in enumerate(shares):
-        present = _misfit(point.residuals[i], size)
+    for i, data in enumerate(datasets):
+        present = _misfit(evaluation.residuals[i], data.measured.units, size)
         if present <= _GROSS * size:
             continue
         trials = {
-            words: _misfit(_alone(replace(share, measured=other), parameters), size)
-            for words, other in _readings(share.measured, parameters.robot.actuator_units)
+            words: _misfit(_alone(replace(data, measured=other), parameters), other.units, size)
+            for words, other in _readings(data.measured, parameters.robot.actuator_units)
         }
         words = min(trials, key=lambda text: trials[text])
-        if trials[words] < _TELLING * present:
-            which = f"measurements {i + 1}: " if len(shares) > 1 else ""
+        if trials[words] < MISFIT_RATIO * present:
+            which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
             off = (
                 f"off by {present:.3g} mm" if np.isfinite(present) else "out of the machine's reach"
             )
@@ -57,22 +59,21 @@ def misread(shares: Sequence[Share], parameters: Parameters, point: Point) -> li
     return found
 
 
-def _alone(share: Share, parameters: Parameters) -> FloatArray:
-    (residual,) = Equations([share], parameters).start().residuals
+def _alone(data: FitData, parameters: Parameters) -> FloatArray:
+    (residual,) = Equations([data], parameters).start().residuals
     return residual
 
 
-def _misfit(residual: FloatArray, size: float) -> float:
+def _misfit(residual: FloatArray, units: Sequence[str], size: float) -> float:
     """Root mean square residual, mm; angles as their arc. inf if a row is not reached."""
-    arcs = residual * np.array([1.0, 1.0, 1.0, size, size, size])[: residual.shape[1]]
-    squares = (arcs**2).sum(axis=1)
-    return float(np.sqrt(squares.mean())) if np.isfinite(squares).all() else float("inf")
+    off = np.linalg.norm(residual * mm_per_unit(units, size), axis=1)
+    return rms(off) if np.isfinite(off).all() else float("inf")
 
 
 def _readings(
     measured: Measurements, actuator_units: Sequence[str]
 ) -> Iterator[tuple[str, Measurements]]:
-    """Other things that measurements could have been meant to be."""
+    """Read measurements in other units, with other signs and with columns exchanged."""
     for unit in dict.fromkeys(actuator_units):
         mine = np.array([unit == other for other in actuator_units])
         for name, factor in _FACTORS[unit]:
@@ -100,22 +101,25 @@ def _readings(
         yield f"{names[one]} and {names[other]} are exchanged", replace(measured, values=values)
 
 
-def beyond_strokes(equations: Equations, start: Point, end: Point) -> list[str]:
+def beyond_strokes(equations: Equations, start: Evaluation, end: Evaluation) -> list[str]:
     """Rows whose actuators are out of the strokes that the robot file states.
 
-    They are if they are both with the machine as drawn, whose offsets may be unknown, and as
-    identified, which may have been misled.
+    Both with the nominal machine, whose offsets may be unknown, and with the identified one,
+    which may have been misled.
     """
-    out = np.ones((len(equations.actuators), len(start.robot.model.limbs)), dtype=bool)
-    for point in (end, start):
-        if out.any():
-            drive = point.robot.feasible(point.pose).drive
-            out &= _out_of_stroke(point.robot, drive)
+    robot, calibrated = start.robot, end.robot
+    if not isinstance(robot, Robot) or not isinstance(calibrated, Robot):
+        return []  # the file of an arm states no strokes
+    out = _out_of_stroke(calibrated, calibrated.feasible(end.pose).drive)
+    if not out.any():
+        return []
+    drive = robot.feasible(start.pose).drive
+    out &= _out_of_stroke(robot, drive)
     if not out.any():
         return []
     limbs = []
     for i in np.flatnonzero(out.any(axis=0)):
-        low, high = start.robot.model.limbs[i].stroke or (0.0, 0.0)
+        low, high = robot.model.limbs[i].stroke or (0.0, 0.0)
         beyond = drive[out[:, i], i]
         limbs.append(
             f"limb {i + 1} at {beyond.min():.4g} to {beyond.max():.4g}, its stroke is {low:g} to"
@@ -124,26 +128,25 @@ def beyond_strokes(equations: Equations, start: Point, end: Point) -> list[str]:
     poses_of = np.concatenate(equations.pose_of)
     broken = np.asarray(out.any(axis=1))
     rows = equations.rows[broken[poses_of]].tolist()
-    shown = ", ".join(map(str, rows[:10])) + (", …" if len(rows) > 10 else "")
     more = f" and {len(limbs) - 2} more limbs" if len(limbs) > 2 else ""
     return [
-        f"actuators out of stroke in {len(rows)} of {len(poses_of)} rows (rows {shown}):"
-        f" {'; '.join(limbs[:2])}{more}; check units, signs and columns of the actuators, or the"
+        f"actuators out of stroke in {len(rows)} of {len(poses_of)} rows"
+        f" (rows {first_rows(rows, 10)}): {'; '.join(limbs[:2])}{more}; check units, signs and columns of the actuators, or the"
         " strokes in the robot file"
     ]
 
 
-def _out_of_stroke(robot: Robot, drive: FloatArray) -> NDArray[np.bool_]:
+def _out_of_stroke(robot: Robot, drive: FloatArray) -> BoolArray:
     """Which drives (K, limbs) are beyond their strokes by more than errors explain."""
     strokes = [limb.stroke or (-np.inf, np.inf) for limb in robot.model.limbs]
     low, high = np.array(strokes).T
     room = np.where(np.isfinite(low), _BEYOND * (high - low), 0.0)
-    out: NDArray[np.bool_] = (drive < low - room) | (drive > high + room)
+    out: BoolArray = (drive < low - room) | (drive > high + room)
     return out
 
 
-def strayed(start: Point, end: Point, parameters: Parameters) -> list[str]:
-    """Numbers of the geometry that moved further than errors of manufacture move them."""
+def implausible_changes(start: Evaluation, end: Evaluation, parameters: Parameters) -> list[str]:
+    """Find numbers of the geometry that moved further than errors of manufacture explain."""
     k = len(parameters.places)
     moved = np.abs((end.theta - start.theta) / parameters.scale)[:k]
     far = np.flatnonzero(moved > FAR * parameters.robot.length)
@@ -156,8 +159,8 @@ def strayed(start: Point, end: Point, parameters: Parameters) -> list[str]:
     ]
 
 
-def meagre(equations: Equations, rank: int, dof: float, with_prior: bool) -> list[str]:
-    """Too few measurements, one pose only, rows that were entered twice."""
+def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: bool) -> list[str]:
+    """Find too few measurements, one pose only, rows that were entered twice."""
     found = []
     n, count = len(equations.parameters), int(equations.components.sum())
     if len(equations.actuators) == 1 and len(equations.rows) > 1:
@@ -167,10 +170,10 @@ def meagre(equations: Equations, rank: int, dof: float, with_prior: bool) -> lis
             f"{count} equations for {n} parameters: measure more poses, free fewer parameters or"
             " state a prior"
         )
-    elif dof < _LEFT_OVER:
+    elif dof < _LEAST_FREEDOM:
         found.append(
-            f"{count} equations for {rank} combinations of parameters: nothing is left"
-            " over to show how good the fit is; measure more poses"
+            f"{count} equations for {rank} identifiable combinations: no degrees of"
+            " freedom are left to show how good the fit is; measure more poses"
         )
     start = 0
     for measured in equations.sets:

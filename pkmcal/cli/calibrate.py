@@ -13,6 +13,7 @@ from typing import Annotated
 
 import typer
 
+from pkmcal.arguments import word
 from pkmcal.cli.output import folder
 from pkmcal.cli.progress import progress
 from pkmcal.cli.robot_argument import ROBOT_OR_ARM, contents
@@ -20,9 +21,8 @@ from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import UNITS
 from pkmcal.files.provenance import comment
-from pkmcal.kinematics.robot import Robot
 from pkmcal.loading import load
-from pkmcal.measurements.calibratable import as_machine
+from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurement_csv import read_measurements
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
@@ -106,8 +106,11 @@ def calibrate(
     --report out
     """
     from pkmcal.calibration.identify import identify
+    from pkmcal.calibration.loss import LIMITS
+    from pkmcal.calibration.parameters import KNOWN
 
-    machine = as_machine(load(robot))
+    given = load(robot)
+    machine = as_machine(given)
     for option, written in (("--out", out), ("--report", report)):
         if written is not None:
             _refuse_own_input(option, written, robot)
@@ -120,14 +123,14 @@ def calibrate(
     with progress("identifying"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
         found = identify(
-            machine,
+            given,
             measured,
             free=chosen or None,
             prior=read_deviations("--prior", prior or [], machine, chosen),
-            loss=loss,
-            frame=frame,
-            target=target,
-            attachment=attachment,
+            loss=word("--loss", loss, LIMITS),
+            frame=word("--frame", frame, KNOWN),
+            target=word("--target", target, KNOWN),
+            attachment=word("--attachment", attachment, KNOWN),
             holdout=None if holdout is None else _read_holdout(holdout, machine),
         )
     if out is not None:
@@ -150,7 +153,7 @@ def calibrate(
     return 0 if found.converged and not found.warnings else 1
 
 
-def free_names(robot: Robot, given: Sequence[str] | None) -> list[str]:
+def free_names(robot: Calibratable, given: Sequence[str] | None) -> list[str]:
     """Names that ``--free`` chooses, or the robot's default set.
 
     Raises
@@ -168,7 +171,7 @@ def free_names(robot: Robot, given: Sequence[str] | None) -> list[str]:
 
 
 def read_deviations(
-    option: str, given: Sequence[str], robot: Robot, names: Sequence[str]
+    option: str, given: Sequence[str], robot: Calibratable, names: Sequence[str]
 ) -> float | Mapping[str, float] | None:
     """Standard deviations from the command line; None where none is given.
 
@@ -179,7 +182,7 @@ def read_deviations(
         tolerances.
     given : sequence of str
         "σ" for all numbers in mm, or "NAME=σ"; σ may have a unit, and for angles must.
-    robot : Robot
+    robot : Calibratable
         The machine.
     names : sequence of str
         The numbers of its geometry that may have one.
@@ -203,7 +206,7 @@ def read_deviations(
     return sigmas or None
 
 
-def _deviation(text: str, robot: Robot, names: Sequence[str]) -> tuple[str, float]:
+def _deviation(text: str, robot: Calibratable, names: Sequence[str]) -> tuple[str, float]:
     """Name or wildcard, "" for all, and σ in mm, rad or 1."""
     match = _DEVIATION.fullmatch(text.strip())
     if match is None:
@@ -231,7 +234,7 @@ def read_tracker(text: str) -> Tracker:
         )
     far, azimuth, elevation, x, y, z = [*numbers, 0.0, 0.0, 0.0][:6]
     try:
-        return Tracker(far, math.radians(azimuth), math.radians(elevation), (x, y, z))
+        return Tracker(far, math.radians(azimuth), math.radians(elevation), position=(x, y, z))
     except ValueError as error:
         raise ArgumentError(f"--tracker {text}: {error}") from None
 
@@ -244,7 +247,7 @@ def _seen_by(tracker: Tracker, measured: Measurements) -> Measurements:
     return replace(measured, sigma=tracker.covariance(measured.values))
 
 
-def _unit_of(pattern: str, robot: Robot, names: Sequence[str]) -> str:
+def _unit_of(pattern: str, robot: Calibratable, names: Sequence[str]) -> str:
     """Unit of the numbers that a pattern covers; what is not known is a length."""
     units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
     known = {name: str(units[name]) for name in names}
@@ -272,7 +275,7 @@ def _in_unit(number: float, unit: str, quantity: str, name: str) -> float:
     return number * times / over
 
 
-def _read_holdout(text: str, robot: Robot) -> float | Measurements:
+def _read_holdout(text: str, robot: Calibratable) -> float | Measurements:
     """A fraction, a number of poses or a file."""
     try:
         number = float(text)

@@ -95,7 +95,7 @@ def compensate(
             for i, unit in enumerate(units)
         }
         read = contents(robot, desired, measured)
-        write_poses(folder(out) / "corrected.csv", poses, columns, comment(read))
+        write_poses(folder(out) / "corrected.csv", poses, columns, comment=comment(read))
     if json:
         typer.echo(as_json(found))
     else:

@@ -163,6 +163,7 @@ def demonstrate(seed: int = 1) -> Demonstration:
     checked = machine.measure(nominal.inverse(poses))
     found = identify(nominal, measured, prior=SIGMA, holdout=checked)
 
+    assert isinstance(found.robot, Robot)  # as was given
     ideal, corrected = nominal.inverse(poses), found.robot.inverse(poses)
     off = [true.forward(q).pose - poses for q in (ideal, corrected)]
     before, after = (np.linalg.norm(error[:, :3], axis=1) for error in off)

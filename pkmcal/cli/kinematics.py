@@ -64,7 +64,7 @@ def inverse(
     if out is not None:
         read = contents(robot, *([Path(poses)] if row is None else []))
         units = machine.actuator_units
-        write_commands(folder(out) / "commands.csv", units, q, comment(read))
+        write_commands(folder(out) / "commands.csv", units, q, comment=comment(read))
     if json:
         typer.echo(as_json({"actuators": q, "units": machine.actuator_units, "ok": allowed.ok}))
     else:

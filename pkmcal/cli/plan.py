@@ -8,8 +8,11 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from pkmcal.arguments import word
+from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.plan_poses import Plan, plan_poses
+from pkmcal.calibration.optimal_design import CRITERIA
+from pkmcal.calibration.plan_poses import UNKNOWN, Plan, plan_poses
 from pkmcal.cli.calibrate import free_names, read_deviations
 from pkmcal.cli.output import folder
 from pkmcal.cli.progress import progress
@@ -19,8 +22,9 @@ from pkmcal.files.provenance import comment
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
-from pkmcal.measurements.calibratable import ArmMachine, as_given, as_machine
+from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.command_csv import read_commands, write_commands
+from pkmcal.measurements.components import COMPONENTS
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
 
@@ -83,21 +87,22 @@ def plan(
 
     Example: pkmcal plan hexapod --kind pose --count 20 --out plan
     """
-    machine = as_machine(load(robot))
-    chosen = free_names(machine, free)
+    machine: Robot | SerialArm = load(robot)
+    seen = as_machine(machine)
+    chosen = free_names(seen, free)
     with progress("choosing poses"):
         made = plan_poses(
-            as_given(machine),
+            machine,
             _drawn(machine, seed) if poses is None else _places(machine, poses),
             count=30 if count is None and accuracy is None else count,
             accuracy=accuracy,
             targets=None if targets is None else _places(machine, targets),
-            criterion=criterion,
-            kind=kind,
+            criterion=word("--criterion", criterion, CRITERIA),
+            kind=word("--kind", kind, COMPONENTS),
             noise=noise,
             free=chosen or None,
-            prior=read_deviations("--prior", prior or [], machine, chosen),
-            unknown=unknown or (),
+            prior=read_deviations("--prior", prior or [], seen, chosen),
+            unknown=[word("--unknown", each, UNKNOWN) for each in unknown or ()],
         )
     read = comment(contents(robot, *(path for path in (poses, targets) if path is not None)))
     written = [] if out is None else _write(made, folder(out), read)
@@ -108,8 +113,8 @@ def plan(
     return 0 if np.isfinite(made.predicted) else 1
 
 
-def _drawn(machine: Robot, seed: int) -> FloatArray:
-    if isinstance(machine, ArmMachine):
+def _drawn(machine: Robot | SerialArm, seed: int) -> FloatArray:
+    if isinstance(machine, SerialArm):
         raise ArgumentError(
             f"--poses: {machine.name} is a serial arm, whose limits are not known: a file of joint"
             " coordinates to choose from is needed, with columns such as 'q1 [deg]'"
@@ -117,9 +122,9 @@ def _drawn(machine: Robot, seed: int) -> FloatArray:
     return sample_poses(machine, _DRAWN, seed, share=_SHARE)
 
 
-def _places(machine: Robot, path: Path) -> FloatArray:
+def _places(machine: Robot | SerialArm, path: Path) -> FloatArray:
     """Poses of a file, or an arm's joint coordinates."""
-    if isinstance(machine, ArmMachine):
+    if isinstance(machine, SerialArm):
         return read_commands(path, machine.actuator_units)
     return read_poses(path, machine)
 
@@ -127,5 +132,5 @@ def _places(machine: Robot, path: Path) -> FloatArray:
 def _write(made: Plan, out: Path, head: str) -> list[Path]:
     poses, commands = out / "poses.csv", out / "commands.csv"
     write_poses(poses, made.poses, comment=head)
-    write_commands(commands, made.robot.actuator_units, made.actuators, head)
+    write_commands(commands, made.robot.actuator_units, made.actuators, comment=head)
     return [poses, commands]

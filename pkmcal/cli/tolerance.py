@@ -98,7 +98,7 @@ def tolerance(
     if out is not None:
         read = contents(robot, *([] if poses is None else [poses]))
         table = folder(out) / "tolerance.csv"
-        write_poses(table, found.poses, _columns(found), comment(read))
+        write_poses(table, found.poses, _columns(found), comment=comment(read))
     typer.echo(told)
     return 1 if found.failed.any() else 0
 

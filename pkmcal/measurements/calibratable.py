@@ -1,24 +1,125 @@
-"""A serial arm as calibration sees a machine: numbers with names, and poses of its tool."""
+"""What calibration asks of a machine, and the adapter through which serial arms answer it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from typing import Any, cast
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pkmcal.arguments import did_you_mean, instance, words
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arms.inputs import ERRORS
-from pkmcal.arrays import FloatArray, Int32Array, as_rows
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows
 from pkmcal.core import screws
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
 
 _OK, _INVALID = 0, 4  # of a row, as in `Forward`
+
+
+class Solved(Protocol):
+    """Poses at actuator coordinates, row by row; `Forward` describes each."""
+
+    @property
+    def pose(self) -> FloatArray:
+        """Poses (N, 6), NaN where there is none."""
+
+    @property
+    def ok(self) -> BoolArray:
+        """Which rows have a pose, (N,)."""
+
+
+class SolvedRows(Solved, Protocol):
+    """The same with the reason where a row failed."""
+
+    @property
+    def status(self) -> Int32Array:
+        """0 where a row has a pose, else why not, (N,)."""
+
+
+class Solvable(Protocol):
+    """A machine whose poses can be computed: what a virtual one needs."""
+
+    def forward(self, q: FloatArray) -> Solved:
+        """Poses at actuator coordinates (N, n)."""
+
+
+class NamedNumbers(Protocol):
+    """The numbers of a geometry; `Geometry` describes each."""
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of the p numbers."""
+
+    @property
+    def units(self) -> Sequence[str]:
+        """Their units: "mm", "rad" or "1"."""
+
+    @property
+    def values(self) -> FloatArray:
+        """Their values (p,)."""
+
+    def match(self, patterns: str | Iterable[str], argument: str = "") -> list[str]:
+        """Names that names and wildcards choose."""
+
+
+class FreeByDefault(Protocol):
+    """What a robot file declares."""
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Numbers that a calibration frees unless it is given others."""
+
+
+class Calibratable(Protocol):
+    """A machine that can be calibrated: `Robot`, and a `SerialArm` through `ArmMachine`."""
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def length(self) -> float:
+        """Its characteristic length, mm: an angle counts as its arc there."""
+
+    @property
+    def n_actuators(self) -> int:
+        """Number of actuators, n."""
+
+    @property
+    def actuator_units(self) -> tuple[str, ...]:
+        """Unit of each, "mm" or "rad"."""
+
+    @property
+    def home(self) -> FloatArray:
+        """The pose (6,) from which the forward kinematics start."""
+
+    @property
+    def geometry(self) -> NamedNumbers:
+        """The p numbers that may be free."""
+
+    @property
+    def model(self) -> FreeByDefault:
+        """What its file declares."""
+
+    def replace(self, changes: FloatArray) -> Calibratable:
+        """A machine with other numbers (p,), checked as those of a file are."""
+
+    def _with_values(self, values: FloatArray) -> Calibratable:
+        """The same, quickly, for numbers near the present ones."""
+
+    def forward(self, q: FloatArray, guess: FloatArray | None = None) -> SolvedRows:
+        """Poses at actuator coordinates (N, n)."""
+
+    def error_twists(self, pose: FloatArray, actuators: FloatArray) -> FloatArray:
+        """Derivative (N, 6, p) of the platform's twist to each number."""
+
+    def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+        """Poses (N, 6), actuator coordinates (N, n) and batch shape of what a user commands."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,10 +158,9 @@ class ArmGeometry:
 
 @dataclass(frozen=True)
 class ArmModel:
-    """What an arm declares: all its joint errors are free, and no limb has a stroke."""
+    """What an arm declares: all its joint errors are free."""
 
     free: tuple[str, ...]
-    limbs: tuple[()] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,13 +171,13 @@ class ArmPoses:
     status: Int32Array
 
     @property
-    def ok(self) -> NDArray[np.bool_]:
+    def ok(self) -> BoolArray:
         """Which rows have a pose."""
         return np.equal(self.status, _OK)
 
 
 class ArmMachine:
-    """An arm behind the face of a parallel machine.
+    """A serial arm as `Calibratable`.
 
     Parameters
     ----------
@@ -96,11 +196,12 @@ class ArmMachine:
         self.model = ArmModel(names)
         self.home = screws.pose(arm.home.reshape(1, 16))[0]
 
-    def replace(self, values: ArrayLike) -> ArmMachine:
+    def replace(self, changes: FloatArray) -> ArmMachine:
         """With other joint errors (6 n,), mm and rad."""
-        return ArmMachine(self.arm.replace(np.reshape(values, (-1, 6))))
+        return ArmMachine(self.arm.replace(changes.reshape(-1, 6)))
 
-    _with_values = replace
+    def _with_values(self, values: FloatArray) -> ArmMachine:
+        return self.replace(values)
 
     def forward(self, q: ArrayLike, guess: ArrayLike | None = None) -> ArmPoses:
         """Poses at joint coordinates (N, n); an arm needs no guess."""
@@ -109,29 +210,28 @@ class ArmMachine:
         status = np.where(known, _OK, _INVALID).astype(np.int32)
         return ArmPoses(screws.pose(motions), status)
 
-    def error_twists(self, pose: ArrayLike, q: ArrayLike) -> FloatArray:
+    def error_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
         """Turning of the tool, then velocity of its origin, by each error: (N, 6, 6 n).
 
-        In base axes, at joint coordinates `q` (N, n); an arm needs no pose.
+        In base axes, at joint coordinates `actuators` (N, n); an arm needs no pose.
         """
-        return self.arm.error_jacobian(q, frame="tip")
+        return self.arm.error_jacobian(actuators, frame="tip")
 
-    def visited(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
+    def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Pose, coordinates and batch shape of joint coordinates (..., n)."""
         q, shape = as_rows("poses", places, self.n_actuators)
         return self.forward(q).pose, q, shape
 
 
-def as_machine(robot: Robot | SerialArm) -> Robot:
-    """The robot itself, or an arm behind the face of one."""
+def as_machine(robot: Robot | SerialArm | ArmMachine) -> Calibratable:
+    """The robot itself, or an arm through its adapter."""
     if isinstance(robot, SerialArm):
-        return cast(Robot, ArmMachine(robot))
-    if isinstance(cast(Any, robot), ArmMachine):
+        return ArmMachine(robot)
+    if isinstance(robot, ArmMachine):
         return robot
     return instance("robot", robot, Robot, " or SerialArm")
 
 
-def as_given(robot: Robot) -> Robot:
+def as_given(machine: Calibratable) -> Robot | SerialArm:
     """The reverse of `as_machine`: what the user gave, an arm as an arm."""
-    machine: Any = robot
-    return cast(Robot, machine.arm) if isinstance(machine, ArmMachine) else robot
+    return machine.arm if isinstance(machine, ArmMachine) else instance("robot", machine, Robot)

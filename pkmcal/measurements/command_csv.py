@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from os import PathLike
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.files.atomic import write_whole
 from pkmcal.files.column_names import known_as
 from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_writer import write_csv
 
 
 def read_commands(path: str | PathLike[str], units: Sequence[str]) -> FloatArray:
@@ -46,7 +44,11 @@ def read_commands(path: str | PathLike[str], units: Sequence[str]) -> FloatArray
 
 
 def write_commands(
-    path: str | PathLike[str], units: Sequence[str], commands: FloatArray, comment: str = ""
+    path: str | PathLike[str],
+    units: Sequence[str],
+    commands: FloatArray,
+    *,
+    comment: str = "",
 ) -> None:
     """Write rows (N, n) that `read_commands` reads back to the last bit, or nothing.
 
@@ -66,9 +68,5 @@ def write_commands(
     OSError
         The folder does not exist or cannot be written.
     """
-    text = io.StringIO()
-    text.write(comment)
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(f"q{i + 1} [{unit}]" for i, unit in enumerate(units))
-    writer.writerows(map(repr, row) for row in commands.tolist())
-    write_whole(path, text.getvalue())
+    headings = [f"q{i + 1} [{unit}]" for i, unit in enumerate(units)]
+    write_csv(path, headings, (map(repr, row) for row in commands.tolist()), comment=comment)

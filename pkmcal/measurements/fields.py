@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pkmcal.arguments import words
-from pkmcal.arrays import as_numbers
+from pkmcal.arrays import FloatArray, Int64Array, as_numbers
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.tracker import Tracker
 
 
-def numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:
+def numbers(name: str, given: ArrayLike) -> FloatArray:
     """A copy as finite doubles."""
     array = np.array(as_numbers(name, given, "n"), dtype=np.float64)
     if not np.isfinite(array).all():
@@ -23,7 +23,7 @@ def numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def integers(name: str, given: ArrayLike, rows: int) -> NDArray[np.int64]:
+def integers(name: str, given: ArrayLike, rows: int) -> Int64Array:
     """A copy as whole numbers, one per row."""
     array = numbers(name, given)
     if array.shape != (rows,):
@@ -35,8 +35,8 @@ def integers(name: str, given: ArrayLike, rows: int) -> NDArray[np.int64]:
 
 
 def sigma_array(
-    given: ArrayLike | Tracker, kind: str, shape: tuple[int, int], values: NDArray[np.float64]
-) -> NDArray[np.float64]:
+    given: ArrayLike | Tracker, kind: str, shape: tuple[int, int], values: FloatArray
+) -> FloatArray:
     """Standard deviations (N, k) or covariances (N, k, k)."""
     rows, k = shape
     if isinstance(given, Tracker):
@@ -65,8 +65,8 @@ def sigma_array(
 
 
 def target_array(
-    given: ArrayLike | None, kind: str, index: NDArray[np.int64] | None, rows: int
-) -> NDArray[np.float64] | None:
+    given: ArrayLike | None, kind: str, index: Int64Array | None, rows: int
+) -> FloatArray | None:
     """One target, one per row, or several that an index chooses from; None where none is given."""
     if kind == "pose" and (given is not None or index is not None):
         raise ArgumentError("target: a pose is the platform's own and takes no target")
@@ -100,7 +100,7 @@ def target_array(
 
 def attachment_array(
     given: ArrayLike | None, kind: str, targets: int | None, rows: int
-) -> NDArray[np.float64] | None:
+) -> FloatArray | None:
     """One attachment, one per row, or one for each of the several targets; None without."""
     if given is None:
         return None
@@ -119,8 +119,8 @@ def attachment_array(
 
 def names_of_targets(
     given: Sequence[str] | None,
-    index: NDArray[np.int64] | None,
-    target: NDArray[np.float64] | None,
+    index: Int64Array | None,
+    target: FloatArray | None,
 ) -> tuple[str, ...] | None:
     """Names of the several targets, "1", "2", … unless given; None where there is no index."""
     if index is None:

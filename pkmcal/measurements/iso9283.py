@@ -6,21 +6,24 @@ calibration, the identified one after it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.arrays import FloatArray, IntArray, as_rows
+from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.result import Result
 
 REPEATS = 30  # what the standard asks for at each pose
 _SIGMAS = 3.0  # of the spread, which the standard adds to the mean
 _PAIRED = 300  # poses between which distances are taken, at most
 
 
-@dataclass(frozen=True, eq=False)
-class Performance:
+@dataclass(frozen=True, eq=False, repr=False)
+class Performance(Result):
     """How well a machine goes where it is sent; mm, one entry for each of G poses.
 
     Attributes
@@ -37,10 +40,27 @@ class Performance:
         them, of 300 poses at most. It does not depend on where the instrument stands.
     """
 
-    repeats: NDArray[np.intp]
+    repeats: IntArray
     accuracy: FloatArray
     repeatability: FloatArray
     distance_accuracy: FloatArray
+
+    def _parts(self) -> Iterator[str | Table]:
+        few, many = int(self.repeats.min()), int(self.repeats.max())
+        count = f"{few}" if few == many else f"{few} to {many}"
+        yield f"{len(self.repeats)} poses, each measured {count} times"
+        scores = {
+            "accuracy AP": self.accuracy,
+            "repeatability RP": self.repeatability,
+            "distance accuracy AD": np.abs(self.distance_accuracy),
+        }
+        rows = [[name, *_mean_and_largest(values)] for name, values in scores.items()]
+        yield Table(["[mm]", "mean", "largest"], rows, left=1)
+
+
+def _mean_and_largest(values: FloatArray) -> list[str]:
+    finite = values[np.isfinite(values)]
+    return [f"{finite.mean():.3g}", f"{finite.max():.3g}"] if len(finite) else ["", ""]
 
 
 def performance(measured: ArrayLike, commanded: ArrayLike, pose: ArrayLike) -> Performance:

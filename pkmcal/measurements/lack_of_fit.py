@@ -1,4 +1,4 @@
-"""Repeated measurements of one pose: what their scatter says of the instrument and of the model.
+"""Pure error and lack of fit of repeated measurements, and the F test between them.
 
 Residuals of rows that repeat a pose are split into what they scatter about their common mean, the
 pure error, which the model has no part in, and the mean, which is what the model misses there. If
@@ -41,19 +41,20 @@ class Split:
     @property
     def scatter(self) -> float:
         """Deviation of repeats about their mean; NaN without repeats."""
-        told = self.pure_freedom > 0
-        return float(np.sqrt(self.pure / self.pure_freedom)) if told else float("nan")
+        if self.pure_freedom <= 0:
+            return float("nan")
+        return float(np.sqrt(self.pure / self.pure_freedom))
 
     @property
     def ratio(self) -> float:
-        """Mean square of what is missed over that of the scatter; NaN where one is not told."""
+        """Mean square of what is missed over that of the scatter; NaN without freedom."""
         if self.pure_freedom <= 0 or self.missed_freedom < 1 or self.pure <= 0:
             return float("nan")
         return self.missed / self.missed_freedom / (self.pure / self.pure_freedom)
 
     @property
     def chance(self) -> float:
-        """How likely a ratio as large would be if the model were right; NaN where none is told."""
+        """How likely a ratio as large would be if the model were right; NaN without a ratio."""
         from scipy.special import fdtrc
 
         return float(fdtrc(self.missed_freedom, self.pure_freedom, self.ratio))
@@ -111,11 +112,11 @@ def split(residual: FloatArray, white: FloatArray, group: IntArray, leverage: fl
 
 def joined(parts: Sequence[Split]) -> Split:
     """Several sets taken together, those without repeats left out."""
-    told = [part for part in parts if part.pure_freedom > 0]
+    repeated = [part for part in parts if part.pure_freedom > 0]
     return Split(
-        pure=sum(part.pure for part in told),
-        pure_freedom=sum(part.pure_freedom for part in told),
-        missed=sum(part.missed for part in told),
-        missed_freedom=sum(part.missed_freedom for part in told),
-        repeats=sum(part.repeats for part in told) / max(len(told), 1),
+        pure=sum(part.pure for part in repeated),
+        pure_freedom=sum(part.pure_freedom for part in repeated),
+        missed=sum(part.missed for part in repeated),
+        missed_freedom=sum(part.missed_freedom for part in repeated),
+        repeats=sum(part.repeats for part in repeated) / max(len(repeated), 1),
     )

@@ -1,4 +1,4 @@
-"""Measurements in CSV files: columns by name, in any order, with their units in brackets.
+"""Read measurements from CSV files: columns by name, in any order, with their units in brackets.
 
 ====================================  =============================================================
 columns                               meaning
@@ -17,33 +17,31 @@ columns                               meaning
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
 ====================================  =============================================================
 
-Names are also taken as instruments and controllers write them: capitals, ``Joint 1``, ``J1``,
-``Axis 1``, ``Leg 1`` for q1, ``Height`` for z, ``Roll``, ``Pitch``, ``Yaw`` for alpha, beta, gamma,
-``Std`` for sigma, ``Reflector`` or ``SMR`` for target, ``Pose`` for group. ``Index``, ``Time``,
-``Date`` and ``Comment`` are left out. ``Rx`` and the like are not taken: makers differ in what
-they mean. Lengths are in mm, cm, m, um or in; angles in rad, mrad or deg; covariances in products
-of mm and rad. What separates the columns and which lines are skipped: `pkmcal.csv_table`.
+`pkmcal.files.column_names` matches headings, also as instruments and controllers write them:
+capitals, ``Joint 1``, ``J1``, ``Axis 1``, ``Leg 1`` for q1, ``Height`` for z, ``Roll``, ``Pitch``,
+``Yaw`` for alpha, beta, gamma, ``Std`` for sigma, ``Reflector`` or ``SMR`` for target, ``Pose`` for
+group. ``Index``, ``Time``, ``Date`` and ``Comment`` are left out. ``Rx`` and the like are not
+taken: makers differ in what they mean. Lengths are in mm, cm, m, um or in; angles in rad, mrad or
+deg; covariances in products of mm and rad. `pkmcal.files.csv_table` says what separates the columns
+and which lines are skipped.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 import itertools
 import re
-from collections.abc import Iterator, Sequence
 from os import PathLike
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pkmcal import arguments
+from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentTypeError, FileError
-from pkmcal.files.atomic import write_whole
 from pkmcal.files.column_names import BESIDE, RESERVED, known_as
 from pkmcal.files.csv_table import Table
-from pkmcal.measurements.measurements import COMPONENTS, Measurements
+from pkmcal.measurements.components import COMPONENTS, Kind
+from pkmcal.measurements.measurements import Measurements
 
 _AXES = ("x", "y", "z")
 _ANGLES = ("alpha", "beta", "gamma")
@@ -51,8 +49,16 @@ _ACTUATOR = re.compile(r"q[1-9][0-9]*")
 _OF_A_TARGET = re.compile(r"(?P<target>[^.]+)\.[xyz]")
 
 
-def read_measurements(path: str | PathLike[str], robot: Any = None) -> Measurements:
-    r"""Read measurements from a CSV file; see `pkmcal.measurement_csv` for its columns.
+class Actuated(Protocol):
+    """A machine whose actuators have units: `Robot`, `SerialArm`."""
+
+    @property
+    def actuator_units(self) -> tuple[str, ...]:
+        """Unit of each actuator, "mm" or "rad"."""
+
+
+def read_measurements(path: str | PathLike[str], robot: Actuated | None = None) -> Measurements:
+    r"""Read measurements from a CSV file; its module lists the columns.
 
     A row with several targets (``A.x``, ``B.x`` …) yields one measurement per target, in the order
     of the columns, with the same actuators: `target_index` says which, `target_names` the names.
@@ -111,40 +117,6 @@ def read_measurements(path: str | PathLike[str], robot: Any = None) -> Measureme
         raise FileError(f"{table.path}: {error}") from None
 
 
-def write_measurements(
-    measurements: Measurements, path: str | PathLike[str], comment: str = ""
-) -> None:
-    """Write measurements in mm and rad, one row each, so that they are read back to the last bit.
-
-    Several targets are written as the columns ``target`` and ``target.x`` …; of the targets, those
-    that no row measured are left out.
-
-    Parameters
-    ----------
-    measurements : Measurements
-        What to write.
-    path : str or path
-        The file; replaced as a whole or not at all.
-    comment : str, optional
-        Lines for its head, each with its ``#``.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written; one that was there before is untouched.
-    """
-    headings, columns = zip(*_columns(measurements), strict=True)
-    text = io.StringIO()
-    text.write(arguments.comment(comment))
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(headings)
-    writer.writerows(zip(*columns, strict=True))
-    write_whole(path, text.getvalue())
-
-
-# --- reading -----------------------------------------------------------------------------------
-
-
 def _several_targets(table: Table) -> tuple[str, ...]:
     """Names of the targets that have columns of their own, in the order of the columns."""
     matches = (_OF_A_TARGET.fullmatch(name) for name in table.columns)
@@ -169,13 +141,13 @@ def _read(table: Table, name: str, *quantities: str, blank: bool = False) -> tup
     return table.numbers(name, *quantities, blank=blank)
 
 
-def _read_actuators(table: Table) -> tuple[NDArray[np.float64], tuple[str, ...]]:
+def _read_actuators(table: Table) -> tuple[FloatArray, tuple[str, ...]]:
     count = max((int(n[1:]) for n in table.columns if _ACTUATOR.fullmatch(n)), default=1)
     read = [_read(table, f"q{i + 1}", "mm", "rad") for i in range(count)]
     return np.stack([values for values, _ in read], axis=1), tuple(unit for _, unit in read)
 
 
-def _compare(table: Table, units: tuple[str, ...], robot: Any) -> None:
+def _compare(table: Table, units: tuple[str, ...], robot: Actuated | None) -> None:
     if robot is not None and not hasattr(robot, "actuator_units"):
         raise ArgumentTypeError(
             f"robot must be a Robot or SerialArm, found {arguments.shown(robot)}"
@@ -193,7 +165,7 @@ def _compare(table: Table, units: tuple[str, ...], robot: Any) -> None:
             )
 
 
-def _kind(table: Table, several: tuple[str, ...]) -> str:
+def _kind(table: Table, several: tuple[str, ...]) -> Kind:
     """What was measured, by the columns that are there."""
     names = table.columns.keys()
     groups = {
@@ -217,7 +189,7 @@ def _kind(table: Table, several: tuple[str, ...]) -> str:
     return "position" if names.isdisjoint(_ANGLES) else "pose"
 
 
-def _read_sigma(table: Table, kind: str) -> NDArray[np.float64] | None:
+def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
     """Deviations (rows, 1) or (rows, k), or covariances (rows, k, k)."""
     given = [name for name in table.columns if name.partition(".")[0] in ("sigma", "cov")]
     if not given:
@@ -253,8 +225,8 @@ def _read_sigma(table: Table, kind: str) -> NDArray[np.float64] | None:
 
 
 def _read_several(
-    table: Table, targets: tuple[str, ...], actuators: NDArray[np.float64], fields: dict[str, Any]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], dict[str, Any]]:
+    table: Table, targets: tuple[str, ...], actuators: FloatArray, fields: dict[str, Any]
+) -> tuple[FloatArray, FloatArray, dict[str, Any]]:
     """One measurement per row and target that was seen there, row by row."""
     for name in table.columns:
         if name.partition(".")[0] in ("target", "attachment"):
@@ -276,7 +248,7 @@ def _read_several(
     return actuators[rows], values[rows, index], chosen
 
 
-def _read_targets(table: Table, kind: str) -> dict[str, Any]:
+def _read_targets(table: Table, kind: Kind) -> dict[str, Any]:
     """The target of each row, by name, by place or both."""
     points = {name: _read_point(table, name) for name in ("target", "attachment")}
     fields: dict[str, Any] = {name: place for name, place in points.items() if place is not None}
@@ -308,7 +280,7 @@ def _read_targets(table: Table, kind: str) -> dict[str, Any]:
     return chosen | {"target_index": index, "target_names": order}
 
 
-def _read_point(table: Table, name: str) -> NDArray[np.float64] | None:
+def _read_point(table: Table, name: str) -> FloatArray | None:
     """A point of each row (rows, 3); None where it has no columns."""
     columns = [f"{name}.{axis}" for axis in _AXES]
     if not any(column in table.columns for column in columns):
@@ -316,44 +288,8 @@ def _read_point(table: Table, name: str) -> NDArray[np.float64] | None:
     return np.stack([_read(table, column, "mm")[0] for column in columns], axis=1)
 
 
-def _one(places: NDArray[np.float64]) -> NDArray[np.float64]:
+def _one(places: FloatArray) -> FloatArray:
     """One point (3,) where all rows have the same, to the last bit: 0.0 is not -0.0."""
     bits = places.view(np.int64)
-    one: NDArray[np.float64] = places[0] if (bits == bits[0]).all() else places
+    one: FloatArray = places[0] if (bits == bits[0]).all() else places
     return one
-
-
-# --- writing -----------------------------------------------------------------------------------
-
-
-def _columns(m: Measurements) -> Iterator[tuple[str, Sequence[str]]]:
-    """Headings and cells, in the order in which they are written."""
-    for i, unit in enumerate(m.actuator_units or ("mm",) * m.actuators.shape[1]):
-        yield f"q{i + 1} [{unit}]", _exact(m.actuators[:, i])
-    components = COMPONENTS[m.kind]
-    for i, (name, unit) in enumerate(components):
-        yield f"{name} [{unit}]", _exact(m.values.reshape(len(m), -1)[:, i])
-    if m.sigma is not None and m.sigma.ndim == 3:
-        for i, j in itertools.combinations_with_replacement(range(len(components)), 2):
-            (a, of_a), (b, of_b) = components[i], components[j]
-            yield f"cov.{a}.{b} [{of_a}*{of_b}]", _exact(m.sigma[:, i, j])
-    elif m.sigma is not None and m.kind != "pose" and (m.sigma == m.sigma[:, :1]).all():
-        yield "sigma [mm]", _exact(m.sigma[:, 0])
-    elif m.sigma is not None:
-        for i, (name, unit) in enumerate(components):
-            yield f"sigma.{name} [{unit}]", _exact(m.sigma[:, i])
-    if m.target_index is not None and m.target_names is not None:
-        yield "target", [m.target_names[i] for i in m.target_index]
-    places = {} if m.target is None else {"target": m.targets}
-    if m.attachment is not None:
-        places["attachment"] = m.attachments
-    for point, rows in places.items():
-        for axis, name in enumerate(_AXES):
-            yield f"{point}.{name} [mm]", _exact(rows[:, axis])
-    if m.group is not None:
-        yield "group", [str(number) for number in m.group]
-
-
-def _exact(values: NDArray[np.float64]) -> list[str]:
-    """The shortest decimals that are read back to the same bits."""
-    return [repr(float(value)) for value in values]

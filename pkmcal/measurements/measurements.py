@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pkmcal import display
 from pkmcal.arguments import checked_seed, shown, word
+from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.measurements.components import COMPONENTS, Kind
 from pkmcal.measurements.fields import (
     attachment_array,
     integers,
@@ -23,24 +26,15 @@ from pkmcal.measurements.fields import (
     target_array,
     units_of_actuators,
 )
+from pkmcal.measurements.measurement_writer import write_measurements
 from pkmcal.measurements.tracker import Tracker
-
-_LENGTHS = (("x", "mm"), ("y", "mm"), ("z", "mm"))
-_ANGLES = (("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
-
-# What one measured value of each kind consists of: its components and their units.
-COMPONENTS: dict[str, tuple[tuple[str, str], ...]] = {
-    "pose": _LENGTHS + _ANGLES,
-    "position": _LENGTHS,
-    "height": (("z", "mm"),),
-    "distance": (("distance", "mm"),),
-}
+from pkmcal.result import Result
 
 _LISTED_ROWS = 12  # a longer list of measurements is printed with its middle left out
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
-class Measurements:
+class Measurements(Result):
     """Actuator readings with what an instrument measured there. Arrays are copied and read-only.
 
     Parameters
@@ -49,7 +43,7 @@ class Measurements:
         Actuator coordinates as commanded or read, mm or rad as the limbs say.
     values : (N, 6), (N, 3) or (N,) array
         What was measured, in mm and rad, in the base frame (or the instrument's, where
-        `identify` is told that the frame is unknown); see `kind`.
+        `identify` is given ``frame="unknown"``); see `kind`.
     kind : {"position", "pose", "height", "distance"}
         "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the target,
         (N, 3). "height": z of the target, (N,). "distance": from the target, which here is a
@@ -92,23 +86,24 @@ class Measurements:
       0  450.0000  452.0000  400.0000  405.0000   6.000  -6.200  400.500
     """
 
-    actuators: NDArray[np.float64]
-    values: NDArray[np.float64]
-    kind: str = "position"
-    sigma: NDArray[np.float64] | None = None
-    target: NDArray[np.float64] | None = None
-    group: NDArray[np.int64] | None = None
-    target_index: NDArray[np.int64] | None = None
+    actuators: FloatArray
+    values: FloatArray
+    kind: Kind = "position"
+    sigma: FloatArray | None = None
+    target: FloatArray | None = None
+    group: Int64Array | None = None
+    target_index: Int64Array | None = None
     target_names: tuple[str, ...] | None = None
     actuator_units: tuple[str, ...] | None = None
-    attachment: NDArray[np.float64] | None = None
+    attachment: FloatArray | None = None
 
     # The types above are those of the attributes; anything array-like is taken.
     def __init__(
         self,
         actuators: ArrayLike,
         values: ArrayLike,
-        kind: str = "position",
+        kind: Kind = "position",
+        *,
         sigma: ArrayLike | Tracker | None = None,
         target: ArrayLike | None = None,
         group: ArrayLike | None = None,
@@ -166,7 +161,7 @@ class Measurements:
         return tuple(unit for _, unit in COMPONENTS[self.kind])
 
     @property
-    def targets(self) -> NDArray[np.float64]:
+    def targets(self) -> FloatArray:
         """The target of every row, (N, 3) in mm; zeros where none was given.
 
         Raises
@@ -182,18 +177,18 @@ class Measurements:
         return self._of_rows(self.target)
 
     @property
-    def attachments(self) -> NDArray[np.float64]:
+    def attachments(self) -> FloatArray:
         """The attachment of every row, (N, 3) in mm; zeros where none was given."""
         return self._of_rows(self.attachment)
 
-    def _of_rows(self, place: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    def _of_rows(self, place: FloatArray | None) -> FloatArray:
         place = np.zeros(3) if place is None else place
         if self.target_index is not None and place.ndim == 2:
             place = place[self.target_index]
         return np.array(np.broadcast_to(place, (len(self), 3)), order="C")
 
     @property
-    def pose_index(self) -> NDArray[np.int64]:
+    def pose_index(self) -> Int64Array:
         """Which pose each row belongs to, (N,), counted from 0: by `group`, else by actuators."""
         rows = self.actuators if self.group is None else self.group[:, None]
         return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
@@ -275,14 +270,13 @@ class Measurements:
         OSError
             The file cannot be written; one that was there before is untouched.
         """
-        from pkmcal.measurements.measurement_csv import write_measurements
-
         write_measurements(self, path, comment)
 
-    def __repr__(self) -> str:
-        return f"<Measurements: {self._title()}>"
+    def _parts(self) -> Iterator[str | Table]:
+        yield self._title()
+        yield self._table()
 
-    def __str__(self) -> str:
+    def _table(self) -> Table:
         units = self.actuator_units or ("",) * self.actuators.shape[1]
         heads, columns = ["row"], [[str(row) for row in range(len(self))]]
         for i, unit in enumerate(units):
@@ -302,13 +296,13 @@ class Measurements:
         rows = list(zip(*columns, strict=True))
         if len(rows) > _LISTED_ROWS:
             rows[_LISTED_ROWS - 4 : -3] = [("⋮",) * len(heads)]
-        return self._title() + "\n" + str(display.Table(heads, rows))
+        return Table(heads, rows)
 
-    def _deviations(self) -> NDArray[np.float64] | None:
+    def _deviations(self) -> FloatArray | None:
         """Standard deviations (N, k), also where covariance matrices were given."""
         if self.sigma is None or self.sigma.ndim == 2:
             return self.sigma
-        variances: NDArray[np.float64] = np.diagonal(self.sigma, axis1=1, axis2=2)
+        variances: FloatArray = np.diagonal(self.sigma, axis1=1, axis2=2)
         return np.sqrt(variances)
 
     def _title(self) -> str:
@@ -345,7 +339,7 @@ def _heading(name: str, unit: str) -> str:
     return f"{name} [{shown}]" if shown else name
 
 
-def _column(values: NDArray[np.float64], unit: str, sigma: NDArray[np.float64] | None) -> list[str]:
+def _column(values: FloatArray, unit: str, sigma: FloatArray | None) -> list[str]:
     """Numbers to the digits their sigma supports, else to 0.1 µm and 0.0001 degrees."""
     places = 4
     if sigma is not None:

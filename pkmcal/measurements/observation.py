@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, whole_turns
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose, compose_rates
+from pkmcal.measurements.components import Kind
 
 _ORIGIN = np.zeros(3)
 _NOWHERE = np.zeros(6)
@@ -40,7 +41,7 @@ class Predicted:
 
 
 def predict(
-    kind: str,
+    kind: Kind,
     pose: FloatArray,
     target: FloatArray = _ORIGIN,
     anchor: FloatArray = _ORIGIN,
@@ -105,11 +106,11 @@ def _poses(pose: FloatArray, frame: FloatArray | None, origin: FloatArray) -> Pr
     return Predicted(seen, instruments.seen_pose_rates(whole, seen), by_frame=by_frame)
 
 
-def difference(kind: str, values: FloatArray, predicted: FloatArray) -> FloatArray:
+def difference(kind: Kind, values: FloatArray, predicted: FloatArray) -> FloatArray:
     """Measured less predicted, (N, k); angles the short way round."""
     residual: FloatArray = values.reshape(predicted.shape) - predicted
     if kind == "pose":
-        residual[:, 3:] = np.remainder(residual[:, 3:] + np.pi, 2 * np.pi) - np.pi
+        residual[:, 3:] -= whole_turns(residual[:, 3:])
     return residual
 
 

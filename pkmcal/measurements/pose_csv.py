@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from os import PathLike
 
 import numpy as np
@@ -11,9 +9,9 @@ import numpy as np
 from pkmcal import display
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import POSE
-from pkmcal.files.atomic import write_whole
 from pkmcal.files.column_names import BESIDE, known_as
 from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_writer import write_csv
 from pkmcal.kinematics.robot import Robot
 
 _DECIMALS = {"mm": 6, "deg": 8}
@@ -57,6 +55,7 @@ def write_poses(
     path: str | PathLike[str],
     poses: FloatArray,
     columns: dict[str, FloatArray] | None = None,
+    *,
     comment: str = "",
 ) -> None:
     """Write poses (N, 6), angles in degrees, and other columns beside them.
@@ -72,17 +71,15 @@ def write_poses(
     comment : str, optional
         Lines for its head, each with its ``#``.
     """
-    text = io.StringIO()
-    text.write(comment)
-    writer = csv.writer(text, lineterminator="\n")
     units = ["mm" if k < 3 else "deg" for k in range(6)]
     others = columns or {}
-    heading = [f"{name} [{unit}]" for name, unit in zip(POSE, units, strict=True)]
-    writer.writerow([*heading, *others])
+    headings = [f"{name} [{unit}]" for name, unit in zip(POSE, units, strict=True)]
     shown = np.concatenate([poses[:, :3], np.degrees(poses[:, 3:])], axis=1)
-    for i, row in enumerate(shown):
-        cells = (
-            display.fixed(float(v), _DECIMALS[unit]) for v, unit in zip(row, units, strict=True)
-        )
-        writer.writerow([*cells, *(f"{column[i]:.8g}" for column in others.values())])
-    write_whole(path, text.getvalue())
+    cells = (
+        [
+            *(display.fixed(float(v), _DECIMALS[u]) for v, u in zip(row, units, strict=True)),
+            *(f"{column[i]:.8g}" for column in others.values()),
+        ]
+        for i, row in enumerate(shown)
+    )
+    write_csv(path, [*headings, *others], cells, comment=comment)

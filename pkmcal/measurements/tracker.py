@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -27,7 +27,7 @@ class Tracker:
         rad.
     position : (float, float, float)
         Where it stands, mm, in the frame its points are given in: the base frame, or, where
-        `identify` is told that the frame is unknown, its own, where it stands at 0. Its vertical
+        `identify` is given ``frame="unknown"``, its own, where it stands at 0. Its vertical
         axis is that frame's z.
 
     Examples
@@ -40,7 +40,7 @@ class Tracker:
     range: float
     azimuth: float
     elevation: float
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    position: tuple[float, float, float] = field(default=(0.0, 0.0, 0.0), kw_only=True)
 
     def __post_init__(self) -> None:
         for name in ("range", "azimuth", "elevation"):

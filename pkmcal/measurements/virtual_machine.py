@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pkmcal.arguments import checked_seed, number, shown, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
+from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
-from pkmcal.measurements.calibratable import ArmMachine
+from pkmcal.measurements.calibratable import ArmMachine, Solvable
+from pkmcal.measurements.components import COMPONENTS, Kind
 from pkmcal.measurements.fields import numbers
-from pkmcal.measurements.measurements import COMPONENTS, Measurements
+from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import predict
 from pkmcal.measurements.tracker import Tracker
 
 _ARM = 200.0  # mm; an instrument good to 0.02 mm over it is good to 1e-4 rad
-
-
-class Solvable(Protocol):
-    """What a virtual machine asks of a robot."""
-
-    def forward(self, q: NDArray[np.float64]) -> Any:
-        """A result with `pose` (N, 6) and `ok` (N,) for actuators (N, n)."""
-        ...
 
 
 class VirtualMachine:
@@ -59,6 +53,7 @@ class VirtualMachine:
         true_robot: Solvable | SerialArm,
         noise: float | Tracker = 0.02,
         seed: int = 0,
+        *,
         angle_noise: float | None = None,
     ) -> None:
         if not hasattr(true_robot, "forward"):
@@ -78,8 +73,9 @@ class VirtualMachine:
     def measure(
         self,
         q: ArrayLike,
-        kind: str = "position",
+        kind: Kind = "position",
         target: ArrayLike | None = None,
+        *,
         attachment: ArrayLike | None = None,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.
@@ -120,12 +116,11 @@ class VirtualMachine:
             attachment=attachment,
         )
         solved = self._machine.forward(actuators)
-        failed = np.flatnonzero(~np.asarray(solved.ok))
+        failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
         if len(failed):
-            rows = ", ".join(map(str, failed[:10])) + (", …" if len(failed) > 10 else "")
             raise ArgumentError(
                 f"q: {len(failed)} of {len(actuators)} rows have no pose on the true machine"
-                f" (rows {rows})"
+                f" (rows {first_rows(failed, 10)})"
             )
         places = (blank.targets, blank.attachments)
         point, fixed = places[::-1] if kind == "distance" else places

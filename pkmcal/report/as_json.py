@@ -49,6 +49,8 @@ def _plain(value: Any) -> Any:
         geometry = as_machine(value).geometry
         numbers = zip(geometry.names, geometry.values.tolist(), strict=True)
         return {"name": value.name, "geometry": dict(numbers)}
+    if hasattr(value, "to_dict"):
+        return _plain(value.to_dict())
     if dataclasses.is_dataclass(value):
         fields = (field.name for field in dataclasses.fields(value))
         return {name: _plain(getattr(value, name)) for name in fields if name[0] != "_"}

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from pkmcal import display
-from pkmcal.arrays import FloatArray
+from pkmcal.arms.arm import SerialArm
+from pkmcal.arrays import FloatArray, propagate, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
 from pkmcal.files.provenance import printable
 from pkmcal.kinematics.workspace import reach, sample_poses, workspace
-from pkmcal.measurements.calibratable import ArmMachine, as_machine
+from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.iso9283 import performance
 from pkmcal.measurements.lack_of_fit import groups
 
@@ -92,13 +93,13 @@ def _falls(found: Identification, name: str) -> str:
 
 def instrument_sought(found: Identification) -> bool:
     """Whether a frame or points of the instrument are among the parameters."""
-    return len(found.free) > len(found._equations.parameters.places)
+    return len(found.free) > len(found.fit.parameters.places)
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:
     """Residuals of each measured component: mean, rms and largest, before and after; mm and rad."""
     names: dict[str, tuple[str, list[FloatArray], list[FloatArray]]] = {}
-    parts = zip(found._equations.sets, found._start.residuals, found.residuals, strict=True)
+    parts = zip(found.fit.equations.sets, found.fit.start.residuals, found.residuals, strict=True)
     for measured, first, last in parts:
         pairs = zip(measured.components, measured.units, strict=True)
         for k, (name, unit) in enumerate(pairs):
@@ -110,7 +111,7 @@ def directions(found: Identification) -> list[dict[str, Any]]:
         row: dict[str, Any] = {"name": name, "unit": unit}
         for when, values in (("before", np.concatenate(firsts)), ("after", np.concatenate(lasts))):
             row[f"mean_{when}"] = float(values.mean())
-            row[f"rms_{when}"] = float(np.sqrt((values**2).mean()))
+            row[f"rms_{when}"] = rms(values)
             row[f"largest_{when}"] = float(np.abs(values).max())
         rows.append(row)
     return rows
@@ -118,11 +119,11 @@ def directions(found: Identification) -> list[dict[str, Any]]:
 
 def points(found: Identification) -> list[dict[str, Any]]:
     """Every fitted row: its number, where the machine is, how far off before and after, mm."""
-    equations = found._equations
-    off_before = equations.distances(found._start)
-    off = equations.distances(found._estimate.point)
+    equations = found.fit.equations
+    off_before = equations.distances(found.fit.start)
+    off = equations.distances(found.fit.end)
     place = np.concatenate(equations.pose_of)
-    at = found._estimate.point.pose[place]
+    at = found.fit.end.pose[place]
     return [
         {
             "row": int(row),
@@ -152,7 +153,7 @@ def parameters(found: Identification) -> list[dict[str, Any]]:
     untold = _share_untold(found)
     rows = []
     for i in range(len(found.free)):
-        prior = float(found._equations.parameters.prior[i])
+        prior = float(found.fit.parameters.prior[i])
         rows.append({
             "name": printable(found.free[i]),
             "unit": found.units[i],
@@ -168,7 +169,7 @@ def parameters(found: Identification) -> list[dict[str, Any]]:
 
 def _share_untold(found: Identification) -> FloatArray:
     """How much of each parameter lies along combinations that measurements do not tell, 0 to 1."""
-    share: FloatArray = np.linalg.norm(found._estimate.setting.told.untold, axis=1)
+    share: FloatArray = np.linalg.norm(found.fit.estimate.state.measured.unidentifiable, axis=1)
     return share
 
 
@@ -187,21 +188,18 @@ def _knowledge(found: Identification, i: int, prior: float, untold: float) -> st
 
 def correlation(found: Identification) -> FloatArray:
     """Correlations (n, n); NaN beside parameters that are not told."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scale = np.where(np.isfinite(found.stderr) & (found.stderr > 0), found.stderr, np.nan)
-        matrix: FloatArray = found.covariance / np.outer(scale, scale)
-    return matrix
+    return found.correlation_matrix
 
 
 def iso9283(found: Identification) -> list[dict[str, Any]]:
     """AP, RP and AD of every set of positions or poses, before and after the calibration."""
-    equations = found._equations
+    equations = found.fit.equations
     scores = []
     for i, measured in enumerate(equations.sets):
         if measured.kind not in ("position", "pose"):
             continue
         group, values = groups(measured), measured.values[:, :3]
-        first = performance(values, found._start.predicted[i].values[:, :3], group)
+        first = performance(values, found.fit.start.predicted[i].values[:, :3], group)
         last = performance(values, values - found.residuals[i][:, :3], group)
         scores.append({
             "set": i + 1,
@@ -213,8 +211,8 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
             "accuracy_mean": float(last.accuracy.mean()),
             "repeatability": last.repeatability.tolist(),
             "repeatability_largest": _largest(last.repeatability),
-            "distance_before": _rms(first.distance_accuracy),
-            "distance": _rms(last.distance_accuracy),
+            "distance_before": rms(first.distance_accuracy),
+            "distance": rms(last.distance_accuracy),
             "distance_largest_before": _largest(first.distance_accuracy),
             "distance_largest": _largest(last.distance_accuracy),
         })  # fmt: skip
@@ -232,18 +230,17 @@ def expected(found: Identification, places: FloatArray) -> FloatArray:
 
 def as_seen(found: Identification, places: FloatArray) -> FloatArray:
     """Standard deviation of the first row's target in the instrument's frame, as `expected`."""
-    known = found._equations
-    at, q, _ = as_machine(found.robot).visited(places)
-    like = known.shares[0]
+    known = found.fit.equations
+    at, q, _ = as_machine(found.robot).commanded(places)
+    like = known.datasets[0]
     rows = np.zeros(len(q), dtype=np.intp)
     measured = replace(like.measured.select(rows), actuators=q, group=np.arange(len(q)))
     equations = Equations([replace(like, measured=measured, rows=rows)], known.parameters)
-    point = equations.at(found._estimate.point.theta)
+    point = equations.at(found.fit.end.theta)
     jacobian = equations.jacobian(point)[0][:, :3]
     jacobian *= known.parameters.scale
-    covariance = found._estimate.covariance
-    variance = np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian, optimize=True)
-    untold = jacobian @ found._untold_here()
+    variance = propagate(jacobian, found.fit.estimate.covariance)
+    untold = jacobian @ found.fit.undetermined()
     sure = np.linalg.norm(untold, axis=(1, 2)) < _NOTHING
     off = np.abs(point.pose[equations.pose_of[0]] - at)[:, :3].max(axis=1)
     sure &= off < _ELSEWHERE  # another assembly mode is another place
@@ -252,12 +249,12 @@ def as_seen(found: Identification, places: FloatArray) -> FloatArray:
 
 def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice | None] | str:
     """The accuracy that the covariance predicts over the workspace, or why there is none."""
-    machine = as_machine(found.robot)
-    if isinstance(machine, ArmMachine):
-        q = found._equations.actuators
+    machine = found.robot
+    if isinstance(machine, SerialArm):
+        q = found.fit.equations.actuators
         shape = (_DRAWN, q.shape[1])
         random = np.random.default_rng(0).uniform(q.min(axis=0), q.max(axis=0), shape)
-        positions = machine.forward(random).pose[:, :3]
+        positions = as_machine(machine).forward(random).pose[:, :3]
         where = f"{_DRAWN} joint positions drawn within the range that was measured"
         return WorkspaceAccuracy(random, positions, expected(found, random), where), None
     try:
@@ -280,10 +277,6 @@ def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice 
 
 def _mm(value: float) -> str:
     return f"{value:.3g} mm"
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt((values**2).mean())) if values.size else float("nan")
 
 
 def _largest(values: FloatArray) -> float:

@@ -51,10 +51,10 @@ def machine(found: Identification) -> Figure | None:
 
     None where it has no pose.
     """
-    equations = found._equations
+    equations = found.fit.equations
     middle = len(equations.actuators) // 2
-    q, pose = equations.actuators[middle], found._estimate.point.pose[middle]
-    before, after = found._start.theta, found._estimate.point.theta
+    q, pose = equations.actuators[middle], found.fit.end.pose[middle]
+    before, after = found.fit.start.theta, found.fit.end.theta
     drawn = exaggerated(equations.parameters, before, after, q, pose)
     if drawn is None:
         return None

@@ -59,7 +59,9 @@ def residuals(found: Identification) -> Figure:
     """Residuals row by row, over the workspace with their direction, and as quantiles."""
     from matplotlib.figure import Figure
 
-    units = [unit for unit in ("mm", "rad") if any(unit in m.units for m in found._equations.sets)]
+    units = [
+        unit for unit in ("mm", "rad") if any(unit in m.units for m in found.fit.equations.sets)
+    ]
     figure = Figure(figsize=(11.0, 3.0 * len(units) + 4.2), layout="constrained")
     heights = [3.0] * len(units) + [4.2]
     grid = figure.add_gridspec(len(units) + 1, 2, height_ratios=heights)
@@ -73,7 +75,7 @@ def residuals(found: Identification) -> Figure:
 
 def _by_row(panel: Axes, found: Identification, unit: str) -> None:
     """One mark per row and component, rows that are outliers ringed."""
-    equations, seen = found._equations, set()
+    equations, seen = found.fit.equations, set()
     shown = displayed(0.0, unit)[1]
     for i, (measured, residual) in enumerate(zip(equations.sets, found.residuals, strict=True)):
         rows = found.rows[equations.set_of == i]
@@ -96,7 +98,7 @@ def _by_row(panel: Axes, found: Identification, unit: str) -> None:
 
 def _over_the_workspace(panel: Axes, found: Identification) -> None:
     """Arrows for residuals in x and y, colours for the other one, at the poses they belong to."""
-    equations, pose = found._equations, found._estimate.point.pose
+    equations, pose = found.fit.equations, found.fit.end.pose
     at, along, other = [], [], []
     for place, residual in zip(equations.pose_of, found.residuals, strict=True):
         at.append(pose[place, :2])
@@ -128,10 +130,10 @@ def _quantiles(panel: Axes, found: Identification) -> None:
     """Residuals in units of their own deviation: on the line if noise is normal and as stated."""
     from scipy.special import ndtri
 
-    estimate = found._estimate
+    estimate = found.fit.estimate
     weighted = (
         estimate.jacobian
-        * np.sqrt(np.repeat(estimate.weights, found._equations.components))[:, None]
+        * np.sqrt(np.repeat(estimate.weights, found.fit.equations.components))[:, None]
     )
     left = 1.0 - np.einsum("ij,jk,ik->i", weighted, estimate.covariance, weighted)
     told = left > 1e-6

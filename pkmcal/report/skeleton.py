@@ -13,7 +13,7 @@ from pkmcal.calibration.parameters import Parameters
 from pkmcal.core.instruments import seen_points
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import ArmMachine, as_given, as_machine
+from pkmcal.measurements.calibratable import as_given
 
 _SEEN = 0.06  # of the machine's size: how far the most displaced joint is drawn off
 _MOST = 0.2
@@ -54,26 +54,25 @@ def skeleton(robot: Robot | SerialArm, q: FloatArray, guess: FloatArray) -> Skel
     guess : ndarray (6,)
         Near its pose.
     """
-    machine = as_machine(robot)
-    if isinstance(machine, ArmMachine):
-        return Skeleton((_chain(machine.arm, q),), np.empty((0, 3)), np.empty((0, 3)))
-    solved = machine.forward(q, guess)
+    if isinstance(robot, SerialArm):
+        return Skeleton((_chain(robot, q),), np.empty((0, 3)), np.empty((0, 3)))
+    solved = robot.forward(q, guess)
     if not solved.ok:
         return None
-    own, _ = machine.own_rows(solved.pose)
-    slots = machine.slots
-    _, towards, _ = machine.machine.limbs(slots, own)
+    own, _ = robot.own_rows(solved.pose)
+    slots = robot.slots
+    _, towards, _ = robot.machine.limbs(slots, own)
     base, platform = np.ascontiguousarray(slots[:, :3]), np.ascontiguousarray(slots[:, 3:6])
     ends = seen_points(own[0], platform)[0]
     lines = []
-    for i, limb in enumerate(machine.model.limbs):
+    for i, limb in enumerate(robot.model.limbs):
         kind = KINDS[limb.kind]
         line = [base[i], ends[i]]
         if kind.driver != "length":  # the joint that the slider or crank carries
-            rod = machine.geometry[f"rod{i + 1}"]
+            rod = robot.geometry[f"rod{i + 1}"]
             line.insert(1, ends[i] - rod * towards[0, i])
         lines.append(np.array(line))
-    frame = machine.model.base_frame
+    frame = robot.model.base_frame
     outward = np.zeros(6) if frame is None else frame
     return Skeleton(
         tuple(_in_frame(outward, line) for line in lines),

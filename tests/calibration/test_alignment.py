@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from pkmcal.calibration import alignment
-from pkmcal.calibration.alignment import Seen
+from pkmcal.calibration.alignment import PointPairs
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose
 
@@ -37,10 +37,10 @@ def assert_same(found: np.ndarray, expected: np.ndarray, atol: float = 1e-6) -> 
 
 
 def seen(frame: np.ndarray, pose: np.ndarray, true: np.ndarray, said: np.ndarray,
-         target: np.ndarray) -> Seen:  # fmt: skip
+         target: np.ndarray) -> PointPairs:  # fmt: skip
     point, _, turn = instruments.points(pose, said)
     values = instruments.seen_points(frame, instruments.points(pose, true)[0])[0]
-    return Seen(values, point, turn, target)
+    return PointPairs(values, point, turn, target)
 
 
 @every
@@ -106,5 +106,5 @@ def test_too_few_points_give_some_frame(count: int) -> None:
     found = alignment.of_heights(np.arange(count) + 5.0, point)
     assert np.isfinite(found).all()
     turn, none = np.tile(np.eye(3), (count, 1, 1)), np.full(count, -1)
-    frame, _ = alignment.of_points(Seen(point + 1.0, point, turn, none))
+    frame, _ = alignment.of_points(PointPairs(point + 1.0, point, turn, none))
     np.testing.assert_allclose(instruments.seen_points(frame, point)[0], point + 1.0, atol=1e-9)

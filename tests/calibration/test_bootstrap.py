@@ -19,11 +19,6 @@ from ..simulated import hexapod_poses, tilted_poses, with_errors
 
 
 @pytest.fixture(scope="module")
-def hexapod() -> Robot:
-    return pk.load("hexapod")
-
-
-@pytest.fixture(scope="module")
 def offsets(hexapod: Robot) -> Identification:
     rng = np.random.default_rng(0)
     q = hexapod.inverse(hexapod_poses(hexapod, 60, rng))
@@ -98,11 +93,13 @@ def test_stated_noise_that_is_wrong_does_not_mislead(hexapod: Robot) -> None:
 def test_mixed_measurements_robust_loss_and_covariances(hexapod: Robot) -> None:
     rng = np.random.default_rng(4)
     q = hexapod.inverse(hexapod_poses(hexapod, 30, rng))
-    tracker = pk.Tracker(0.01, 1e-5, 2e-5, (2000, 0, 0))
+    tracker = pk.Tracker(0.01, 1e-5, 2e-5, position=(2000, 0, 0))
     anchor = [400.0, 300, -100]
     sets = [
         pk.VirtualMachine(hexapod, tracker, seed=4).measure(q),
-        pk.VirtualMachine(hexapod, 0.05, seed=5).measure(q, "distance", anchor, [50, 0, 20]),
+        pk.VirtualMachine(hexapod, 0.05, seed=5).measure(
+            q, "distance", anchor, attachment=[50, 0, 20]
+        ),
         pk.VirtualMachine(hexapod, 0.02, seed=6).measure(q, "pose"),
     ]
     found = pk.identify(hexapod, sets, free="offset*", loss="huber")
@@ -132,9 +129,9 @@ def test_fewer_than_two_replicates_are_refused(offsets: Identification, replicat
         pk.bootstrap(offsets, replicates)
 
 
-@pytest.mark.filterwarnings("ignore:.*nothing is left over:UserWarning")
+@pytest.mark.filterwarnings("ignore:.*no degrees of freedom:UserWarning")
 def test_without_an_equation_left_over_there_is_nothing_to_draw(hexapod: Robot) -> None:
     q = hexapod.inverse(hexapod_poses(hexapod, 2, np.random.default_rng(6)))
     found = pk.identify(hexapod, pk.VirtualMachine(hexapod).measure(q), free="offset*")
-    with pytest.raises(ValueError, match="found: no equation is left over"):
+    with pytest.raises(ValueError, match="found: no degrees of freedom"):
         pk.bootstrap(found, 10)

@@ -1,4 +1,4 @@
-"""What measurements can tell: ranks of the published machine, and combinations in words."""
+"""Identifiability: ranks of the published machine, and combinations as sums."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.calibration.identifiability import in_words, listed, observability, plain_basis
+from pkmcal.calibration.identifiability import as_sum, listed, observability, sparse_basis
 from pkmcal.calibration.identify import identify
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
@@ -42,8 +42,8 @@ def test_unidentifiable_combinations_move_no_measured_point() -> None:
     poses = tilted_poses(robot, 30, np.random.default_rng(5))
     q = robot.inverse(poses)
     found = identify(robot, VirtualMachine(robot).measure(q))
-    assert "platform3.x by itself" in found.unidentifiable
-    assert "platform4.x by itself" in found.unidentifiable
+    assert "platform3.x" in found.unidentifiable
+    assert "platform4.x" in found.unidentifiable
     moved = robot.replace({"platform3.x": 5e-4, "platform4.x": -7e-4})  # mm; to first order
     np.testing.assert_allclose(moved.forward(q).pose, robot.forward(q).pose, atol=1e-8)
 
@@ -55,7 +55,7 @@ def test_a_turned_delta_is_named_by_its_towers() -> None:
     poses[:, :2], poses[:, 2] = rng.uniform(-80, 80, (20, 2)), 10.0
     measured = VirtualMachine(robot).measure(robot.inverse(poses), kind="height")
     found = identify(robot, measured, free=[*robot.model.free, "angle3"])
-    assert found.unidentifiable == ("angle1 … angle3 together",)
+    assert found.unidentifiable == ("angle1 + … + angle3",)
     unknown = dict(zip(found.free, np.isinf(found.stderr), strict=True))
     assert [name for name, inf in unknown.items() if inf] == ["angle1", "angle2", "angle3"]
 
@@ -67,10 +67,10 @@ def test_a_base_moved_with_the_frame_is_named() -> None:
     measured = VirtualMachine(robot).measure(robot.inverse(poses), kind="pose")
     found = identify(robot, measured, free=["base*.x"], frame="unknown")
     assert found.rank == 11
-    assert found.unidentifiable == ("base1.x … base6.x together, frame.x against them",)
+    assert found.unidentifiable == ("base1.x + … + base6.x − frame.x",)
 
 
-def test_what_is_not_told_keeps_its_value() -> None:
+def test_what_is_unidentifiable_keeps_its_value() -> None:
     robot = pk.load("2tpr2tps")
     poses = tilted_poses(robot, 30, np.random.default_rng(8))
     true = robot.replace({"offset1": 0.4, "platform3.x": 0.5})
@@ -92,15 +92,16 @@ def test_observability_indices_of_known_singular_values() -> None:
 @pytest.mark.parametrize(
     ("values", "text"),
     [
-        ([1, 0, 0, 0], "base1.x by itself"),
-        ([1, 1, 1, 0], "base1.x … base3.x together"),
-        ([1, 1, -1, 0], "base1.x, base2.x together, base3.x against them"),
-        ([1, 0, -0.5, 0.25], "together +1 base1.x, -0.5 base3.x, +0.25 offset1"),
+        ([1, 0, 0, 0], "base1.x"),
+        ([1, 1, 1, 0], "base1.x + … + base3.x"),
+        ([1, 1, -1, 0], "base1.x + base2.x − base3.x"),
+        ([-1, -1, -1, 1], "offset1 − base1.x − … − base3.x"),
+        ([1, 0, -0.5, 0.25], "base1.x + 0.25 offset1 − 0.5 base3.x"),
     ],
 )
-def test_combinations_in_words(values: list[float], text: str) -> None:
+def test_combinations_as_sums(values: list[float], text: str) -> None:
     names = ["base1.x", "base2.x", "base3.x", "offset1"]
-    assert in_words(np.array(values), names) == text
+    assert as_sum(np.array(values), names) == text
 
 
 def test_names_that_count_on_are_shortened() -> None:
@@ -108,13 +109,13 @@ def test_names_that_count_on_are_shortened() -> None:
     assert listed(names) == "base1.z … base4.z, rod1, rod3"
 
 
-def test_plain_basis_spans_the_same_combinations() -> None:
+def test_sparse_basis_spans_the_same_combinations() -> None:
     rng = np.random.default_rng(10)
     names = [
         f"{point}{i}.{axis}" for point in ("base", "platform") for i in (1, 2) for axis in "xy"
     ]
-    untold, _ = np.linalg.qr(rng.normal(size=(8, 3)))
-    basis = plain_basis(untold, names)
+    open_ones, _ = np.linalg.qr(rng.normal(size=(8, 3)))
+    basis = sparse_basis(open_ones, names)
     assert basis.shape == (8, 3)
-    np.testing.assert_allclose(untold @ (untold.T @ basis), basis, atol=1e-9)
+    np.testing.assert_allclose(open_ones @ (open_ones.T @ basis), basis, atol=1e-9)
     assert np.linalg.matrix_rank(basis) == 3

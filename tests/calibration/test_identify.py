@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import doctest
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,16 +17,6 @@ from pkmcal.measurements.virtual_machine import VirtualMachine
 
 from .. import workspaces
 from ..simulated import hexapod_poses, missed, tilted_poses, with_errors
-
-
-@pytest.fixture(scope="module")
-def paper() -> Robot:
-    return pk.load("2tpr2tps")
-
-
-@pytest.fixture(scope="module")
-def hexapod() -> Robot:
-    return pk.load("hexapod")
 
 
 def values(robot: Robot, names: tuple[str, ...]) -> np.ndarray:
@@ -353,7 +341,7 @@ def test_result_reads_itself_out(paper: Robot) -> None:
     assert text == found.summary()
     assert len(text.splitlines()) <= 24
     assert max(map(len, text.splitlines())) <= 100
-    for word in ("rank 25 of 28", "held out", "expected", "chi²/dof", "platform3.x by itself"):
+    for word in ("rank 25 of 28", "held out", "expected", "chi²/dof", "  platform3.x"):
         assert word in text
     assert found.parameters["base1.x"]["value"] == found.robot.geometry["base1.x"]
     np.testing.assert_allclose(found.stderr**2, np.diagonal(found.covariance))
@@ -383,12 +371,6 @@ def test_a_machine_on_a_wall_is_calibrated_as_one_on_the_floor(paper: Robot) -> 
     np.testing.assert_allclose(there.values, here.values, atol=1e-6)
     np.testing.assert_allclose(there.stderr, here.stderr, rtol=1e-6)
     assert there.accuracy(hung.home) == pytest.approx(here.accuracy(paper.home), rel=1e-6)
-
-
-def test_the_examples_of_the_document_are_run() -> None:
-    document = Path(__file__).resolve().parents[2] / "docs" / "calibration.md"
-    found = doctest.testfile(str(document), module_relative=False)
-    assert found.attempted >= 7 and found.failed == 0
 
 
 @pytest.mark.parametrize("word", ["frame", "target", "attachment"])

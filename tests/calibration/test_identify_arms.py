@@ -14,7 +14,7 @@ import pytest
 import pkmcal as pk
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.identify import identify
-from pkmcal.calibration.parameters import Share, parameters
+from pkmcal.calibration.parameters import FitData, parameters
 from pkmcal.measurements.calibratable import ArmMachine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
@@ -64,7 +64,7 @@ OTHERS = {
         [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 1], [1, 0, 0]],
         [[0, 0, 0]] * 4 + [[0, 0, -150]],
         [0, 0, -250, 0, 0, 0],
-        ["prismatic"] * 3 + ["revolute"] * 2,
+        kinds=["prismatic"] * 3 + ["revolute"] * 2,
     ),
 }
 
@@ -222,7 +222,7 @@ def test_derivatives_of_what_is_read_are_those_of_differences(kind: str, framed:
         target=None if kind == "pose" else [300.0, -200.0, 150.0],
         attachment=[50.0, 60.0, 70.0] if kind == "distance" else None,
     )  # fmt: skip
-    share = Share(measured, np.arange(7), framed, False)
+    share = FitData(measured, np.arange(7), framed, False)
     equations = Equations([share], parameters(ArmMachine(erring(ARM)), [share], None, None, None))
     at = equations.parameters.start.copy()
     if framed:

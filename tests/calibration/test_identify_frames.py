@@ -39,12 +39,12 @@ def logged(name: str, frame: list[float], kind: str) -> tuple[Robot, Robot, Meas
         angle = NOISE / 500
         sigma = np.array([NOISE] * 3 + [angle] * 3)
         values = compose(at, pose) + sigma * rng.normal(size=(60, 6))
-        return robot, true, Measurements(q, values, kind, sigma)
+        return robot, true, Measurements(q, values, kind, sigma=sigma)
     points = instruments.seen_points(at, instruments.points(pose, TARGET)[0])[0]
     points += NOISE * rng.normal(size=points.shape)
     if kind == "height":
-        return robot, true, Measurements(q, points[:, 2], kind, NOISE, target=TARGET)
-    return robot, true, Measurements(q, points, kind, NOISE)
+        return robot, true, Measurements(q, points[:, 2], kind, sigma=NOISE, target=TARGET)
+    return robot, true, Measurements(q, points, kind, sigma=NOISE)
 
 
 def assert_found(found: pk.Identification, true: Robot, frame: list[float]) -> None:
@@ -56,8 +56,8 @@ def assert_found(found: pk.Identification, true: Robot, frame: list[float]) -> N
     reported = np.ascontiguousarray(found.values[first : first + 6])
     ends = [instruments.seen_points(f, corners)[0] for f in (reported, np.array(frame))]
     np.testing.assert_allclose(*ends, atol=0.3)
-    off = found.robot.forward(found._equations.actuators).pose
-    off -= true.forward(found._equations.actuators).pose
+    off = found.robot.forward(found.fit.equations.actuators).pose
+    off -= true.forward(found.fit.equations.actuators).pose
     assert np.abs(off[:, :3]).max() < 0.3
 
 

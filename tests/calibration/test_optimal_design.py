@@ -67,6 +67,8 @@ def test_what_nothing_tells_is_named_and_does_not_count() -> None:
     blocks[:, :, 3] = blocks[:, :, 2]  # only the sum of the last two is seen
     none = np.zeros((0, 4))
     design = Design(blocks, none, aims, "prediction", 1e9)
-    np.testing.assert_allclose(np.abs(design.untold[:, 0]), [0, 0, 0.5**0.5, 0.5**0.5], atol=1e-9)
+    np.testing.assert_allclose(
+        np.abs(design.unidentifiable[:, 0]), [0, 0, 0.5**0.5, 0.5**0.5], atol=1e-9
+    )
     assert design.predicted(np.array([3])) == float("inf")  # two equations for three parameters
     assert np.isfinite(design.predicted(np.array([3, 4])))

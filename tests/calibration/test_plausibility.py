@@ -24,11 +24,6 @@ Change = Callable[[Measurements], dict[str, Any]]
 
 
 @pytest.fixture(scope="module")
-def paper() -> Robot:
-    return pk.load("2tpr2tps")
-
-
-@pytest.fixture(scope="module")
 def points(paper: Robot) -> Measurements:
     rng = np.random.default_rng(1)
     machine = VirtualMachine(with_errors(paper, 0.5, rng))
@@ -178,7 +173,7 @@ def test_fewer_equations_than_parameters_are_named(paper: Robot, points: Measure
 def test_no_equation_left_over_is_named(paper: Robot, points: Measurements) -> None:
     two = points.select(slice(0, 2))
     texts = said(paper, two, free=["offset*", "base1.x", "base2.y"])
-    assert any("nothing is left over" in text for text in texts)
+    assert any("no degrees of freedom are left" in text for text in texts)
 
 
 def test_no_equation_left_over_is_named_with_a_prior_that_leaves_the_frame_out(
@@ -186,7 +181,7 @@ def test_no_equation_left_over_is_named_with_a_prior_that_leaves_the_frame_out(
 ) -> None:
     three = points.select(slice(0, 3))
     (text,) = said(paper, three, prior=0.5, frame="unknown", target="unknown")
-    assert "9 equations for 9 combinations of parameters: nothing is left over" in text
+    assert "9 equations for 9 identifiable combinations: no degrees of freedom are left" in text
 
 
 @pytest.mark.parametrize(
@@ -209,7 +204,7 @@ def test_without_sigma_and_nothing_left_over_nothing_is_certain(
     paper: Robot, points: Measurements
 ) -> None:
     two = dataclasses.replace(points.select(slice(0, 2)), sigma=None)
-    with pytest.warns(UserWarning, match="nothing is left"):
+    with pytest.warns(UserWarning, match="no degrees of freedom"):
         found = identify(paper, two, free=["offset*", "base1.x", "base2.y"])
     assert np.isinf(found.stderr).all()
 
@@ -222,8 +217,8 @@ def test_copied_rows_are_named_but_repeats_are_not(paper: Robot, points: Measure
     assert said(paper, repeats, prior=0.5) == []
 
 
-def test_no_parameter_told_is_an_error(paper: Robot, points: Measurements) -> None:
-    with pytest.raises(ValueError, match=r"nothing about platform3.x, platform4.x"):
+def test_no_identifiable_parameter_is_an_error(paper: Robot, points: Measurements) -> None:
+    with pytest.raises(ValueError, match=r"they depend on none of platform3.x, platform4.x"):
         identify(paper, points, free=["platform3.x", "platform4.x"])
 
 

@@ -101,7 +101,7 @@ def test_wrong_input_is_refused_in_one_line(arguments: list[str], words: str) ->
 
 def test_commands_come_back_to_the_last_bit(tmp_path: Path) -> None:
     q = np.random.default_rng(0).normal(0, 1e3, (20, 2)) * [1, 1e-9]
-    write_commands(tmp_path / "q.csv", ("mm", "rad"), q, "# from nowhere\n")
+    write_commands(tmp_path / "q.csv", ("mm", "rad"), q, comment="# from nowhere\n")
     np.testing.assert_array_equal(read_commands(tmp_path / "q.csv", ("mm", "rad")), q)
     with pytest.raises(ValueError, match=r"q.csv, line 2: column 'q2' has unit \[rad\]"):
         read_commands(tmp_path / "q.csv", ("mm", "mm"))

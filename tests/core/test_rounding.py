@@ -36,7 +36,7 @@ def fitted(
     q = robot.inverse(poses(robot, 40, seed))
     seen = true.forward(q).pose
     values = seen if kind == "pose" else seen[:, :3]
-    measured = pk.Measurements(q, values, kind, sigma, actuator_units=robot.actuator_units)
+    measured = pk.Measurements(q, values, kind, sigma=sigma, actuator_units=robot.actuator_units)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         warnings.filterwarnings("ignore", "actuators out of stroke|.* combinations of param")

@@ -7,17 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-import pkmcal as pk
 from pkmcal.calibration.identify import identify
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
 from ..simulated import hexapod_poses
-
-
-@pytest.fixture(scope="module")
-def hexapod() -> Robot:
-    return pk.load("hexapod")
 
 
 def test_the_unknown_fixed_point_of_distances_is_found(hexapod: Robot) -> None:
@@ -40,7 +34,9 @@ def test_wires_are_found_at_both_ends(hexapod: Robot) -> None:
     index = np.tile(np.arange(6), 60)
     anchors, ends = rng.uniform(-500, 500, (6, 3)), rng.uniform(-120, 120, (6, 3))
     anchors[:, 2] -= 400.0
-    exact = VirtualMachine(true, noise=0).measure(q, "distance", anchors[index], ends[index])
+    exact = VirtualMachine(true, noise=0).measure(
+        q, "distance", anchors[index], attachment=ends[index]
+    )
     rough = dataclasses.replace(
         exact,
         target=anchors + rng.normal(0, 3, (6, 3)),
@@ -62,7 +58,7 @@ def test_wires_may_be_held_out_with_both_ends_unknown(hexapod: Robot) -> None:
     rng = np.random.default_rng(20)
     q = hexapod.inverse(hexapod_poses(hexapod, 60, rng))
     anchor, end = np.array([400.0, 300.0, -100.0]), np.array([60.0, -40.0, 20.0])
-    measured = VirtualMachine(hexapod, noise=0.02).measure(q, "distance", anchor, end)
+    measured = VirtualMachine(hexapod, noise=0.02).measure(q, "distance", anchor, attachment=end)
     rough = dataclasses.replace(measured, target=anchor + 3.0, attachment=end - 2.0)
     words = {"target": "unknown", "attachment": "unknown"}
     found = identify(hexapod, rough, free="offset2", prior=0.5, holdout=0.25, **words)
@@ -76,7 +72,7 @@ def test_one_end_may_be_known_and_the_other_not(hexapod: Robot) -> None:
     rng = np.random.default_rng(19)
     q = hexapod.inverse(hexapod_poses(hexapod, 40, rng))
     anchor, end = np.array([400.0, 300.0, -100.0]), np.array([60.0, -40.0, 20.0])
-    exact = VirtualMachine(hexapod, noise=0).measure(q, "distance", anchor, end)
+    exact = VirtualMachine(hexapod, noise=0).measure(q, "distance", anchor, attachment=end)
     rough = dataclasses.replace(exact, attachment=end + np.array([3, -4, 5]))
     found = identify(hexapod, rough, free="offset2", attachment="unknown")
     assert found.free == ("offset2", "attachment1.x", "attachment1.y", "attachment1.z")

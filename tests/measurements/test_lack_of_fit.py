@@ -20,11 +20,6 @@ from ..simulated import hexapod_poses, tilted_poses, with_errors
 TIMES = 4
 
 
-@pytest.fixture(scope="module")
-def hexapod() -> Robot:
-    return pk.load("hexapod")
-
-
 def repeated(true: Robot, robot: Robot, count: int, seed: int, noise: float = 0.02) -> Measurements:
     rng = np.random.default_rng(seed)
     q = np.repeat(robot.inverse(hexapod_poses(robot, count, rng)), TIMES, axis=0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import doctest
 import math
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,10 +14,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from pkmcal.files import atomic as whole_file
-from pkmcal.files import csv_table
-from pkmcal.measurements import measurement_csv
+from pkmcal.measurements.components import COMPONENTS
 from pkmcal.measurements.measurement_csv import read_measurements
-from pkmcal.measurements.measurements import COMPONENTS, Measurements
+from pkmcal.measurements.measurements import Measurements
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 POSITIVE = st.floats(1e-300, 1e300)
@@ -321,8 +319,3 @@ def test_bytes_that_are_not_text_are_an_error(tmp_path: Path) -> None:
 def test_a_missing_file_is_an_error_of_the_system(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="absent"):
         read_measurements(tmp_path / "absent.csv")
-
-
-def test_the_examples_run() -> None:
-    for module in (csv_table, measurement_csv):
-        assert doctest.testmod(module).failed == 0

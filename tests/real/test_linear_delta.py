@@ -56,7 +56,7 @@ def test_nine_parameters_and_how_little_heights_tell_of_rods(
 def test_heights_cannot_tell_how_the_printer_is_turned(robot: Robot, heights: Measurements) -> None:
     found = identify(robot, heights, free=[*robot.model.free, "angle3"])
     assert found.rank == 6
-    assert found.unidentifiable == ("angle1 … angle3 together",)
+    assert found.unidentifiable == ("angle1 + … + angle3",)
 
 
 def test_points_that_were_not_fitted_are_as_near(robot: Robot, heights: Measurements) -> None:

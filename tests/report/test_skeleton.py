@@ -66,7 +66,7 @@ def test_change_is_drawn_as_many_times_as_said_and_can_be_seen() -> None:
     q = robot.inverse(poses)
     machine = pk.VirtualMachine(true)
     found = pk.identify(robot, machine.measure(q, "pose"), free=["base1.x", "offset4"])
-    drawn = exaggerated(found._equations.parameters, found.start, found.values, q[0], poses[0])
+    drawn = exaggerated(found.fit.parameters, found.start, found.values, q[0], poses[0])
     assert drawn is not None
     before, after, times = drawn
     shift = after.limbs[0][0] - before.limbs[0][0]

@@ -1,0 +1,54 @@
+"""A solved calibration: what was fitted, where it started, where it ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.calibration.equations import Equations, Evaluation
+from pkmcal.calibration.estimator import Estimate
+from pkmcal.calibration.identifiability import decompose
+from pkmcal.calibration.parameters import Parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """The least-squares problem behind an `Identification`, and its solution.
+
+    Attributes
+    ----------
+    equations : Equations
+        The residual equations of the fitted rows.
+    start : Evaluation
+        They at the nominal machine, an unknown frame aligned with the readings.
+    estimate : Estimate
+        They at the solution, with its statistics.
+    covariance : ndarray (n, n)
+        Of the reported parameters along determined combinations, mm and rad; inf where the noise
+        is not known.
+    """
+
+    equations: Equations
+    start: Evaluation
+    estimate: Estimate
+    covariance: FloatArray
+
+    @property
+    def parameters(self) -> Parameters:
+        """The parameter vector."""
+        return self.equations.parameters
+
+    @property
+    def end(self) -> Evaluation:
+        """The equations at the solution."""
+        return self.estimate.evaluation
+
+    def undetermined(self) -> FloatArray:
+        """Scaled combinations (n, d) that are not determined, at the identified geometry.
+
+        `Estimate.state` has them at the nominal machine; they turn with its errors.
+        """
+        _, basis = decompose(np.vstack([self.estimate.jacobian, self.parameters.prior_rows]))
+        return basis[:, self.estimate.state.determined.rank :]

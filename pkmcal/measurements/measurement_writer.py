@@ -1,0 +1,123 @@
+"""Write measurements to a CSV file that `read_measurements` reads back to the last bit."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from os import PathLike
+from typing import Protocol
+
+from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.files.csv_writer import write_csv
+from pkmcal.measurements.components import COMPONENTS, Kind
+
+
+class Writable(Protocol):
+    """The fields of `Measurements` that are written, each as it describes them."""
+
+    @property
+    def actuators(self) -> FloatArray:
+        """Actuator coordinates (N, n)."""
+
+    @property
+    def actuator_units(self) -> tuple[str, ...] | None:
+        """Their units."""
+
+    @property
+    def values(self) -> FloatArray:
+        """What was measured, (N, k) or (N,)."""
+
+    @property
+    def kind(self) -> Kind:
+        """Which key of `COMPONENTS` they are."""
+
+    @property
+    def sigma(self) -> FloatArray | None:
+        """Deviations (N, k) or covariances (N, k, k)."""
+
+    @property
+    def target(self) -> FloatArray | None:
+        """Targets as given."""
+
+    @property
+    def targets(self) -> FloatArray:
+        """The target of every row (N, 3)."""
+
+    @property
+    def target_index(self) -> Int64Array | None:
+        """Which of several targets each row measured."""
+
+    @property
+    def target_names(self) -> tuple[str, ...] | None:
+        """Their names."""
+
+    @property
+    def attachment(self) -> FloatArray | None:
+        """Attachments as given."""
+
+    @property
+    def attachments(self) -> FloatArray:
+        """The attachment of every row (N, 3)."""
+
+    @property
+    def group(self) -> Int64Array | None:
+        """Which rows repeat one pose."""
+
+
+def write_measurements(
+    measurements: Writable, path: str | PathLike[str], comment: str = ""
+) -> None:
+    """Write measurements in mm and rad, one row each, so that they are read back to the last bit.
+
+    Several targets are written as the columns ``target`` and ``target.x`` …; of the targets, those
+    that no row measured are left out.
+
+    Parameters
+    ----------
+    measurements : Measurements
+        What to write.
+    path : str or path
+        The file; replaced as a whole or not at all.
+    comment : str, optional
+        Lines for its head, each with its ``#``.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; one that was there before is untouched.
+    """
+    headings, columns = zip(*_columns(measurements), strict=True)
+    write_csv(path, headings, zip(*columns, strict=True), comment=comment)
+
+
+def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
+    """Headings and cells, in the order in which they are written."""
+    for i, unit in enumerate(m.actuator_units or ("mm",) * m.actuators.shape[1]):
+        yield f"q{i + 1} [{unit}]", _exact(m.actuators[:, i])
+    components = COMPONENTS[m.kind]
+    for i, (name, unit) in enumerate(components):
+        yield f"{name} [{unit}]", _exact(m.values.reshape(len(m.values), -1)[:, i])
+    if m.sigma is not None and m.sigma.ndim == 3:
+        for i, j in itertools.combinations_with_replacement(range(len(components)), 2):
+            (a, of_a), (b, of_b) = components[i], components[j]
+            yield f"cov.{a}.{b} [{of_a}*{of_b}]", _exact(m.sigma[:, i, j])
+    elif m.sigma is not None and m.kind != "pose" and (m.sigma == m.sigma[:, :1]).all():
+        yield "sigma [mm]", _exact(m.sigma[:, 0])
+    elif m.sigma is not None:
+        for i, (name, unit) in enumerate(components):
+            yield f"sigma.{name} [{unit}]", _exact(m.sigma[:, i])
+    if m.target_index is not None and m.target_names is not None:
+        yield "target", [m.target_names[i] for i in m.target_index]
+    places = {} if m.target is None else {"target": m.targets}
+    if m.attachment is not None:
+        places["attachment"] = m.attachments
+    for point, rows in places.items():
+        for axis, name in enumerate("xyz"):
+            yield f"{point}.{name} [mm]", _exact(rows[:, axis])
+    if m.group is not None:
+        yield "group", [str(number) for number in m.group]
+
+
+def _exact(values: FloatArray) -> list[str]:
+    """The shortest decimals that are read back to the same bits."""
+    return [repr(float(value)) for value in values]

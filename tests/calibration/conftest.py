@@ -1,0 +1,18 @@
+"""Machines that the tests of this room share."""
+
+from __future__ import annotations
+
+import pytest
+
+import pkmcal as pk
+
+
+@pytest.fixture(scope="session")
+def hexapod() -> pk.Robot:
+    return pk.load("hexapod")
+
+
+@pytest.fixture(scope="session")
+def paper() -> pk.Robot:
+    """The 2TPR&2TPS of the paper."""
+    return pk.load("2tpr2tps")

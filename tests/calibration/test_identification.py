@@ -1,0 +1,81 @@
+"""The result of a calibration: one source for its texts, and the names users know."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.exceptions import CalibrationWarning
+from pkmcal.report.as_json import as_json
+from pkmcal.result import Result
+
+from ..simulated import hexapod_poses
+
+
+@pytest.fixture(scope="module")
+def found(hexapod: pk.Robot) -> pk.Identification:
+    rng = np.random.default_rng(0)
+    measured = pk.VirtualMachine(hexapod.replace({"offset1": 0.3})).measure(
+        hexapod.inverse(hexapod_poses(hexapod, 20, rng))
+    )
+    return pk.identify(hexapod, measured, free="offset*", holdout=0.25)
+
+
+def results(found: pk.Identification) -> Iterator[Result]:
+    hexapod = pk.load("hexapod")
+    yield found
+    yield pk.bootstrap(found, 20)
+    yield found.fit.equations.sets[0]
+    yield pk.plan_poses(hexapod, pk.sample_poses(hexapod, 20), 12, kind="pose")
+
+
+def test_every_result_has_one_line_and_one_table_for_terminal_and_notebook(
+    found: pk.Identification,
+) -> None:
+    for result in results(found):
+        line, page = repr(result), result._repr_html_()
+        assert "\n" not in line and line.startswith(f"<{type(result).__name__}: ")
+        cells = re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", page)
+        assert cells and all(cell.strip() in str(result) for cell in cells)
+
+
+def test_names_of_lmfit_and_scipy_stand_for_the_same(found: pk.Identification) -> None:
+    assert found.success is found.converged
+    assert found.nfev == found.evaluations > 0
+    assert found.covar is found.covariance
+    assert found.redchi == found.chi2_per_dof
+    assert found.params == found.parameters
+
+
+def test_redchi_is_the_weighted_sum_of_squares_per_degree_of_freedom(
+    found: pk.Identification,
+) -> None:
+    (measured,) = found.fit.equations.sets
+    assert measured.sigma is not None
+    squares = float(((found.residuals[0] / measured.sigma) ** 2).sum())
+    assert found.dof == measured.values.size - len(found.free)
+    assert found.redchi == pytest.approx(squares / found.dof, rel=1e-12)
+
+
+def test_json_has_every_name_of_the_result(found: pk.Identification) -> None:
+    keys = re.findall(r'^  "(\w+)":', as_json(found, "parameters"), re.MULTILINE)
+    assert keys[:3] == ["robot", "free", "units"] and keys[-1] == "parameters"
+    assert {"stderr", "holdout_rms", "lack_of_fit", "observability", "history"} <= set(keys)
+    assert all(hasattr(found, key) for key in keys)
+
+
+def test_a_result_is_not_changed(found: pk.Identification) -> None:
+    for name in ("rank", "success", "robot", "fit"):
+        with pytest.raises(AttributeError):
+            setattr(found, name, None)
+
+
+def test_what_identify_doubts_is_a_calibration_warning(hexapod: pk.Robot) -> None:
+    q = np.repeat(hexapod.inverse(hexapod.home)[None], 3, axis=0)
+    measured = pk.VirtualMachine(hexapod).measure(q)
+    with pytest.warns(CalibrationWarning, match="all rows have the same actuators"):
+        pk.identify(hexapod, measured, free=["offset1", "offset2"])
