@@ -92,7 +92,7 @@ class Estimator:
     start : Point
         Where the search starts and what the smallest change counts from.
     loss : str
-        A name of `pkmcal.loss.LIMITS`.
+        A name of `pkmcal.calibration.loss.LIMITS`.
     """
 
     def __init__(self, equations: Equations, start: Point, loss: str) -> None:

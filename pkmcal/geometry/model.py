@@ -36,7 +36,7 @@ class Limb:
     Attributes
     ----------
     kind : str
-        A name of `pkmcal.limb_kinds.KINDS`.
+        A name of `pkmcal.geometry.limb_kinds.KINDS`.
     actuator : int
         Which actuator drives it, counted from 0; limbs may share one.
     branch : int
@@ -92,7 +92,7 @@ class Model:
         Names that a calibration frees unless told otherwise; empty when the file has none.
     stated : mapping of str to float
         What a data sheet claims, by name of a number, of a slot ("rod": every rod), or of
-        `pkmcal.robotfile.STATED_SIZES`.
+        `pkmcal.geometry.robot_file.STATED_SIZES`.
     base_frame : ndarray (6,) or None
         Pose of the machine's own frame in the frame poses are given in.
     tool_frame : ndarray (6,) or None

@@ -22,7 +22,7 @@ Names are also taken as instruments and controllers write them: capitals, ``Join
 ``Std`` for sigma, ``Reflector`` or ``SMR`` for target, ``Pose`` for group. ``Index``, ``Time``,
 ``Date`` and ``Comment`` are left out. ``Rx`` and the like are not taken: makers differ in what
 they mean. Lengths are in mm, cm, m, um or in; angles in rad, mrad or deg; covariances in products
-of mm and rad. What separates the columns and which lines are skipped: `pkmcal.csv_table`.
+of mm and rad. What separates the columns and which lines are skipped: `pkmcal.files.csv_table`.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ _OF_A_TARGET = re.compile(r"(?P<target>[^.]+)\.[xyz]")
 
 
 def read_measurements(path: str | PathLike[str], robot: Any = None) -> Measurements:
-    r"""Read measurements from a CSV file; see `pkmcal.measurement_csv` for its columns.
+    r"""Read measurements from a CSV file; columns: see `pkmcal.measurements.measurement_csv`.
 
     A row with several targets (``A.x``, ``B.x`` …) yields one measurement per target, in the order
     of the columns, with the same actuators: `target_index` says which, `target_names` the names.
