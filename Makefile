@@ -28,7 +28,7 @@ help:
 	@echo "make regenerate  derive the formulas again and write generated/"
 	@echo "make check       fail if 'make regenerate' would change anything"
 	@echo "make bench       run the benchmarks"
-	@echo "make docs        write the reference of all names to build/docs"
+	@echo "make docs        build the site of pages and reference in build/docs"
 	@echo "make lint        run ruff, mypy and the contract of floors"
 	@echo "make sanitize    run the tests on a core built with the address and UB sanitizers"
 	@echo "make clean       remove what was built, $(VENV) too"
@@ -59,10 +59,11 @@ lint: $(TESTS)
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 
-# the reference of all public names, from their docstrings
+# The site of all pages and the reference. A warning is an error; without -E Sphinx would
+# not repeat those of pages that have not changed.
 docs: $(TESTS)
-	$(BIN)/pdoc -d numpy -o build/docs pkmcal pkmcal.kinematics
-	@echo "build/docs/pkmcal.html"
+	$(BIN)/python -m sphinx -b html -E -W --keep-going -q -c docs . build/docs
+	@echo "build/docs/index.html"
 
 # A copy of the package in a folder of its own, found before the one in $(VENV). Without the preloaded
 # runtime and Python's plain malloc the sanitizer misses overflows of arrays; without the C++ runtime

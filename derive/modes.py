@@ -6,7 +6,7 @@ choice has isolated ones at most, and all of them are connected: leading the num
 carries one solution to another (monodromy). So one solution, which is easy (choose the state, then
 the lengths that fit), gives all, and loops go on until none has been new for long.
 
-Published counts (40, 32, 24, 16, 6) are where they should end; `tests/test_modes.py` checks
+Published counts (40, 32, 24, 16, 6) are where they should end; `tests/modes/test_counts.py` checks
 them by other means.
 """
 

@@ -204,7 +204,7 @@ def to_pose(motion: ArrayLike) -> FloatArray:
     Returns
     -------
     ndarray (..., 6)
-        x y z in mm, α β γ in rad, |β| ≤ π/2.
+        x y z in mm, α β γ in rad, -π/2 ≤ β ≤ π/2.
 
     Raises
     ------

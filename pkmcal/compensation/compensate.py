@@ -144,7 +144,7 @@ def compensate(
         The swarm looks for the correction of a pass between minus and plus this, mm or rad; by
         default twice the largest difference L* - L of any pose.
     swarm : SwarmSettings
-        Size and factors of the swarms; by default the paper's. `pkmcal.swarm.CONSTRICTION` are
+        Size and factors of the swarms; by default the paper's. `pkmcal.core.swarm.CONSTRICTION` are
         stable ones.
 
     Returns

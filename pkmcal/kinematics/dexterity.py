@@ -37,7 +37,7 @@ class Dexterity(Result):
         The product with a sign, which changes across a type-2 singularity; NaN where there are
         more closures than free coordinates.
     transmission : ndarray (...)
-        The least of the limbs' |cos| of the angle between the limb and the motion of its actuator;
+        The least, over the limbs, of abs(cos) of the angle between limb and motion of its actuator;
         0 at a type-1 singularity, 1 for a limb whose own length is driven.
     """
 

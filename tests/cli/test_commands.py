@@ -107,7 +107,7 @@ def test_every_verb_explains_itself_and_speaks_json(verb: str) -> None:
 def test_shell_completion_knows_the_verbs() -> None:
     asked = {"_PKMCAL_COMPLETE": "complete_bash", "COMP_WORDS": "pkmcal cal", "COMP_CWORD": "1"}
     done = subprocess.run(
-        [sys.executable, "-c", "from pkmcal.cli import main; main()"],
+        [sys.executable, "-c", "from pkmcal.cli.main import main; main()"],
         env=os.environ | asked,
         capture_output=True,
         text=True,
@@ -117,7 +117,7 @@ def test_shell_completion_knows_the_verbs() -> None:
 
 
 def test_process_refuses_in_one_line_and_with_exit_code_2(tmp_path: Path) -> None:
-    code = "from pkmcal.cli import main; main()"
+    code = "from pkmcal.cli.main import main; main()"
     done = subprocess.run(
         [sys.executable, "-c", code, "calibrate", "hexapd", "x.csv"],
         cwd=tmp_path,
@@ -131,9 +131,9 @@ def test_process_refuses_in_one_line_and_with_exit_code_2(tmp_path: Path) -> Non
 
 def test_process_prints_to_a_terminal_that_lacks_letters(tmp_path: Path) -> None:
     code = (
-        "import sys; from pkmcal import cli\n"
+        "import sys; from pkmcal.cli.main import main\n"
         "sys.stdout.reconfigure(encoding='cp437')\n"
-        "cli.main()"
+        "main()"
     )  # fmt: skip
     arguments = ["calibrate", ROBOT, PROBE, "--frame", "unknown"]  # a range: offset1 … offset3
     done = subprocess.run(
@@ -258,7 +258,7 @@ def test_result_that_did_not_converge_is_not_to_be_trusted(monkeypatch: pytest.M
     def gave_up(*arguments: Any, **settings: Any) -> Identification:
         return dataclasses.replace(identify(*arguments, **settings), converged=False)
 
-    monkeypatch.setattr(sys.modules["pkmcal.identify"], "identify", gave_up)
+    monkeypatch.setattr("pkmcal.calibration.identify.identify", gave_up)
     result = run("calibrate", ROBOT, PROBE)
     assert result.exit_code == 1
     assert "not converged" in result.stdout

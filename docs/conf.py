@@ -1,0 +1,59 @@
+"""How Sphinx builds the site: `make docs`, which runs it from the project's root."""
+
+from __future__ import annotations
+
+import re
+from importlib import metadata
+from typing import Any
+
+from pkmcal.result import Result
+
+project = "pkmcal"
+author = "The pkmcal developers"
+copyright = author  # Sphinx asks for it under this name
+release = metadata.version("pkmcal")
+
+# The root is the source folder, so that one relative link serves the site and the repository.
+root_doc = "docs/index"
+include_patterns = ["*.md", "docs/**.md", "examples/*/README.md"]
+templates_path = ["templates"]
+html_additional_pages = {"index": "to_first_page.html"}
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc"]
+myst_heading_anchors = 3
+
+default_role = "py:obj"  # `robot.inverse` in a docstring: a link where there is such a name
+autodoc_typehints = "none"  # numpydoc's Parameters say them in words
+autodoc_member_order = "bysource"
+autodoc_default_options = {"members": True, "inherited-members": True}
+numpydoc_show_class_members = False  # autodoc writes the members out
+
+html_theme = "pydata_sphinx_theme"
+html_title = "pkmcal"
+html_theme_options = {
+    "navigation_depth": 2,
+    "show_toc_level": 2,
+    "show_prev_next": False,
+    "footer_start": ["copyright"],
+    "footer_end": [],
+    "secondary_sidebar_items": ["page-toc"],
+}
+html_sidebars = {"README": [], "docs/index": [], "**": ["sidebar-nav-bs"]}
+html_static_path = ["static"]
+html_css_files = ["wide.css"]  # outputs of 100 columns fit
+html_copy_source = False
+html_show_sourcelink = False
+
+
+def signature_of_class(
+    app: Any, what: str, name: str, obj: Any, options: Any, signature: str, returned: str
+) -> tuple[str, None] | None:
+    """No signature where functions make the object: results, and what holds private fields."""
+    if what == "class" and (issubclass(obj, Result) or "_" in re.findall(r"[(, ](\w)", signature)):
+        return "", None
+    return None
+
+
+def setup(app: Any) -> None:
+    """Connect to Sphinx, before numpydoc looks at signatures."""
+    app.connect("autodoc-process-signature", signature_of_class, priority=400)
