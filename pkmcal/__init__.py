@@ -34,6 +34,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.error_model.allocation import allocate_tolerance as allocate_tolerance
     from pkmcal.error_model.sensitivity import Sensitivity as Sensitivity
     from pkmcal.error_model.sensitivity import sensitivity as sensitivity
+    from pkmcal.error_model.sensitivity import study_cases as study_cases
     from pkmcal.error_model.tolerance import Tolerance as Tolerance
     from pkmcal.error_model.tolerance import tolerance as tolerance
     from pkmcal.exceptions import ArgumentError as ArgumentError
@@ -77,7 +78,7 @@ _HOMES = {
     "compensation.pso": ("SwarmResult", "pso"),
     "core.swarm": ("CONSTRICTION", "SwarmSettings"),
     "error_model.allocation": ("Allocation", "allocate_tolerance"),
-    "error_model.sensitivity": ("Sensitivity", "sensitivity"),
+    "error_model.sensitivity": ("Sensitivity", "sensitivity", "study_cases"),
     "error_model.tolerance": ("Tolerance", "tolerance"),
     "exceptions": (
         "ArgumentError",

@@ -356,6 +356,11 @@ CALLS: dict[str, Call] = {
             "progress": "function",
         },
     ),
+    "study_cases": (
+        pk.study_cases,
+        {"robot": FLAT, "study": "offsets"},
+        {"robot": "parallel", "study": "word"},
+    ),
     "SwarmSettings": (
         pk.SwarmSettings,
         {"particles": 5},

@@ -194,6 +194,7 @@ def study_cases(robot: Robot, study: str) -> list[str]:
     >>> study_cases(pk.load("2tpr2tps"), "all-limbs")[:3]
     ['offset*', 'base*.x', 'base*.y']
     """
+    require_parallel(robot)
     word("study", study, STUDIES)
     geometry = robot.geometry
     own = set(own_names(robot))
