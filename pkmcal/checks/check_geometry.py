@@ -11,13 +11,13 @@ from pkmcal.checks.finding import Finding
 from pkmcal.checks.function import singular, unreachable, wrong_unit
 from pkmcal.checks.layout import (
     angles_as_coordinates,
+    contradicted,
     doubled,
     off_circle,
     opposite_order,
     swapped,
     unlike,
 )
-from pkmcal.checks.stated import contradicted
 from pkmcal.kinematics.robot import Robot
 
 CHECKS = (
