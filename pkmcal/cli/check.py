@@ -8,21 +8,19 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from pkmcal.checks.check_geometry import check_geometry
-from pkmcal.cli.robot_argument import ROBOT_OR_ARM
-from pkmcal.loading import load
+import pkmcal as pk
+from pkmcal.cli.options import Json, RobotOrArm
 from pkmcal.measurements.calibratable import as_machine
-from pkmcal.measurements.measurement_csv import read_measurements
 from pkmcal.report.as_json import as_json
 
 
 def check(
-    robot: Annotated[str, ROBOT_OR_ARM],
+    robot: RobotOrArm,
     measurements: Annotated[
         Path | None,
         typer.Argument(metavar="CSV", help="Measurements of it: columns, units, numbers."),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+    json: Json = False,
 ) -> int:
     """Look for what tables of a machine's geometry get wrong.
 
@@ -33,9 +31,9 @@ def check(
 
     Example: pkmcal check hexapod
     """
-    machine = load(robot)
-    measured = None if measurements is None else read_measurements(measurements, machine)
-    found = check_geometry(machine)
+    machine = pk.load(robot)
+    measured = None if measurements is None else pk.read_measurements(measurements, machine)
+    found = pk.check_geometry(machine)
     lost: list[int] = []
     if measured is not None:
         lost = np.flatnonzero(~as_machine(machine).forward(measured.actuators).ok).tolist()

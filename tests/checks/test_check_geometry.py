@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal.cli import main as cli
 
 from ..mutations import MUTATIONS, manufactured, similar, with_model, with_slots
 
@@ -302,11 +300,7 @@ def test_neighbours_on_one_axis_are_found_and_lose_a_rank(kind: str, sense: floa
 # --- the command -----------------------------------------------------------------------------
 
 
-def run(*arguments: str) -> Any:
-    return CliRunner().invoke(cli.app, list(arguments), prog_name="pkmcal")
-
-
-def test_exit_code_says_whether_something_was_found() -> None:
+def test_exit_code_says_whether_something_was_found(run: Any) -> None:
     good, bad = run("check", "hexapod"), run("check", "rbt-6t03p-printed")
     assert (good.exit_code, good.stdout) == (0, "hexapod: nothing found\n")
     assert bad.exit_code == 1
@@ -316,14 +310,14 @@ def test_exit_code_says_whether_something_was_found() -> None:
     assert (arm.exit_code, arm.stdout) == (0, "3R arm: nothing found\n")
 
 
-def test_json_has_the_findings() -> None:
+def test_json_has_the_findings(run: Any) -> None:
     result = json.loads(run("check", "rbt-6t03p-printed", "--json").stdout)
     assert result["ok"] is False
     assert [each["kind"] for each in result["findings"]][:2] == ["angle", "alike"]
     assert result["measurements"] is None
 
 
-def test_measurements_are_read_by_line_and_column(tmp_path: Path) -> None:
+def test_measurements_are_read_by_line_and_column(run: Any, tmp_path: Path) -> None:
     file = tmp_path / "m.csv"
     columns = ",".join(f"q{i} [mm]" for i in range(1, 7))
     file.write_text(f"{columns},z [mm]\n800,800,800,800,800,800,750\n")
@@ -338,7 +332,7 @@ def test_measurements_are_read_by_line_and_column(tmp_path: Path) -> None:
     assert "line 2" in wrong.stderr and "q3" in wrong.stderr
 
 
-def test_rows_without_a_pose_are_told_in_json_too(tmp_path: Path) -> None:
+def test_rows_without_a_pose_are_told_in_json_too(run: Any, tmp_path: Path) -> None:
     log = tmp_path / "m.csv"
     log.write_text("q1 [rad],q2 [rad],q3 [rad],z [mm]\n0,0,0,520\n0,1e6,0,520\n")
     told = run("check", "3r", str(log), "--json")

@@ -13,11 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib import image
-from typer.testing import CliRunner
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
-from pkmcal.cli import main as cli
 from pkmcal.report import contents as report_data
 from pkmcal.report import report
 from pkmcal.report.contents import verdict
@@ -295,12 +293,12 @@ def test_page_prints(folder: Path, tmp_path: Path) -> None:
 
 
 def test_calibrate_writes_the_report_and_says_where(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     delta = Path(__file__).resolve().parents[2] / "examples" / "linear-delta"
     monkeypatch.chdir(tmp_path)
     files = [str(delta / "robot.toml"), str(delta / "probe.csv")]
-    result = CliRunner().invoke(cli.app, ["calibrate", *files, "--report", "out"])
+    result = run("calibrate", *files, "--report", "out")
     assert result.exit_code == 0
     assert result.stdout.endswith("\nreport: out/report.html\n")
     assert {path.name for path in Path("out").iterdir()} == {
@@ -311,9 +309,9 @@ def test_calibrate_writes_the_report_and_says_where(
     assert list(said["inputs"].values()) == digests
 
 
-def test_report_does_not_replace_the_robot_it_reads(tmp_path: Path) -> None:
+def test_report_does_not_replace_the_robot_it_reads(run: Any, tmp_path: Path) -> None:
     delta = Path(__file__).resolve().parents[2] / "examples" / "linear-delta"
     arguments = [str(delta / "robot.toml"), str(delta / "probe.csv"), "--report", str(delta)]
-    result = CliRunner().invoke(cli.app, ["calibrate", *arguments])
+    result = run("calibrate", *arguments)
     assert result.exit_code == 2 and "would replace" in result.stderr
     assert not (delta / "report.html").exists()
