@@ -60,3 +60,20 @@ def as_doubles(given: NDArray[Any]) -> FloatArray:
     """The same numbers as the core reads them: float64, one behind the other, aligned."""
     doubles = np.ascontiguousarray(given, dtype=np.float64)
     return doubles if doubles.flags.aligned else doubles.copy()
+
+
+def wrapped(angles: FloatArray) -> FloatArray:
+    """Angles in rad the short way round, from -π up to π."""
+    short: FloatArray = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
+    return short
+
+
+def rms(values: FloatArray) -> float:
+    """Root mean square; NaN without values."""
+    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float("nan")
+
+
+def propagate(jacobian: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Variances trace(J C Jᵀ) (N,) of points whose derivatives J are (N, k, n), for C (n, n)."""
+    variance: FloatArray = np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian, optimize=True)
+    return variance

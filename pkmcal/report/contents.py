@@ -1,4 +1,4 @@
-"""What a calibration report says, as numbers and sentences; `pkmcal.report` gives it its looks."""
+"""What a calibration report says, as numbers and sentences; `report` renders it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal import display
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, propagate, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
@@ -23,14 +23,14 @@ _SPREAD = 3.0  # deviations by which held-out points may miss what is expected
 _GAIN = 0.9  # of the misfit that must not be left for a calibration to be worth it
 _CELLS, _DRAWN = 30, 500  # of the map of the workspace along an axis; of poses for its quantiles
 _SHARE = 0.9  # of the way from home to the ends of the workspace
-_TOLD, _ALONE = 0.5, 0.99  # of the prior's deviation: to what measurements narrow it down
-_ELSEWHERE = 1.0  # mm
-_NOTHING = 1e-3  # share of a parameter in what cannot be told that does not count
+_MOSTLY, _ONLY = 0.5, 0.99  # of the prior's deviation, above which the prior dominates
+_ELSEWHERE = 1.0  # mm: a pose so far from the one asked for is of another assembly mode
+_NEGLIGIBLE = 1e-3  # share of a parameter in unidentifiable combinations
 
 
 @dataclass(frozen=True, eq=False)
 class WorkspaceAccuracy:
-    """How far off the calibrated machine is expected to be, one standard deviation, mm.
+    """Expected error of the calibrated machine over its workspace, one standard deviation, mm.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class WorkspaceAccuracy:
     positions : ndarray (N, 3)
         Of the tool there, mm.
     accuracy : ndarray (N,)
-        inf where the measurements do not tell.
+        inf where the measurements do not determine it.
     where : str
         How the poses were chosen.
     """
@@ -50,8 +50,8 @@ class WorkspaceAccuracy:
     where: str
 
     @property
-    def told(self) -> FloatArray:
-        """Those that are finite."""
+    def predicted(self) -> FloatArray:
+        """Those of `accuracy` that are finite."""
         return self.accuracy[np.isfinite(self.accuracy)]
 
 
@@ -65,7 +65,7 @@ class Slice:
 
 
 def verdict(found: Identification) -> tuple[str, str]:
-    """How it went: "good", "doubtful" or "bad", and one sentence."""
+    """Judge the calibration: "good", "doubtful" or "bad", and one sentence."""
     if not found.converged:
         return "bad", "Not to be trusted: the least squares did not converge."
     if found.warnings:
@@ -85,18 +85,18 @@ def verdict(found: Identification) -> tuple[str, str]:
 
 
 def _falls(found: Identification, name: str) -> str:
-    """What a misfit does."""
+    """Say how a misfit changed."""
     before, after = getattr(found, f"{name}_before"), getattr(found, name)
     return f"{'falls' if after < before else 'goes'} from {_mm(before)} to {_mm(after)} rms"
 
 
-def instrument_sought(found: Identification) -> bool:
-    """Whether a frame or points of the instrument are among the parameters."""
+def instrument_identified(found: Identification) -> bool:
+    """Say whether a frame or points of the instrument are among the parameters."""
     return len(found.free) > len(found._equations.parameters.places)
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:
-    """Residuals of each measured component: mean, rms and largest, before and after; mm and rad."""
+    """List mean, rms and largest residual of each component, before and after; mm and rad."""
     names: dict[str, tuple[str, list[FloatArray], list[FloatArray]]] = {}
     parts = zip(found._equations.sets, found._start.residuals, found.residuals, strict=True)
     for measured, first, last in parts:
@@ -110,14 +110,14 @@ def directions(found: Identification) -> list[dict[str, Any]]:
         row: dict[str, Any] = {"name": name, "unit": unit}
         for when, values in (("before", np.concatenate(firsts)), ("after", np.concatenate(lasts))):
             row[f"mean_{when}"] = float(values.mean())
-            row[f"rms_{when}"] = float(np.sqrt((values**2).mean()))
+            row[f"rms_{when}"] = rms(values)
             row[f"largest_{when}"] = float(np.abs(values).max())
         rows.append(row)
     return rows
 
 
 def points(found: Identification) -> list[dict[str, Any]]:
-    """Every fitted row: its number, where the machine is, how far off before and after, mm."""
+    """List every fitted row: its number, the pose, the distance before and after, mm."""
     equations = found._equations
     off_before = equations.distances(found._start)
     off = equations.distances(found._estimate.point)
@@ -136,20 +136,20 @@ def points(found: Identification) -> list[dict[str, Any]]:
 
 
 def worst(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The rows that are furthest off after the calibration."""
+    """Select the rows with the largest distances after the calibration."""
     return sorted(rows, key=lambda row: -row["after"])[:_WORST]
 
 
 def moved(rows: list[dict[str, Any]]) -> list[tuple[int, str, str, int]]:
-    """The coordinates that are not always 0: place, name, unit, and decimals that are shown."""
+    """List the coordinates that are not always 0: place, name, unit, and decimals to show."""
     some = np.any([row["pose"] for row in rows], axis=0)
     units = [("mm", 1)] * 3 + [("rad", 2)] * 3
     return [(k, POSE[k], *units[k]) for k in range(len(POSE)) if some[k]]
 
 
 def parameters(found: Identification) -> list[dict[str, Any]]:
-    """Each parameter before and after, and in words how well it is known."""
-    untold = _share_untold(found)
+    """List each parameter before and after, and in words how well it is determined."""
+    share = _unidentifiable_share(found)
     rows = []
     for i in range(len(found.free)):
         prior = float(found._equations.parameters.prior[i])
@@ -159,34 +159,36 @@ def parameters(found: Identification) -> list[dict[str, Any]]:
             "before": float(found.start[i]),
             "after": float(found.values[i]),
             "stderr": float(found.stderr[i]),
-            "told": bool(np.isfinite(found.stderr[i])),
+            "identifiable": bool(np.isfinite(found.stderr[i])),
+            "told": bool(np.isfinite(found.stderr[i])),  # the former name, for readers of JSON
             "prior": prior,
-            "knowledge": _knowledge(found, i, prior, float(untold[i])),
+            "knowledge": _knowledge(found, i, prior, float(share[i])),
         })  # fmt: skip
     return rows
 
 
-def _share_untold(found: Identification) -> FloatArray:
-    """How much of each parameter lies along combinations that measurements do not tell, 0 to 1."""
+def _unidentifiable_share(found: Identification) -> FloatArray:
+    """Return how much of each parameter lies in unidentifiable combinations, 0 to 1."""
     share: FloatArray = np.linalg.norm(found._estimate.setting.told.untold, axis=1)
     return share
 
 
-def _knowledge(found: Identification, i: int, prior: float, untold: float) -> str:
+def _knowledge(found: Identification, i: int, prior: float, share: float) -> str:
     if found.free[i] in found.at_bounds:
-        return "stopped at its bound"
+        return "at its bound"
     sigma = float(found.stderr[i])
     if not np.isfinite(sigma):
-        return "not told"
-    if np.isfinite(prior) and sigma > _ALONE * prior:
-        return "the prior alone"
-    if np.isfinite(prior) and sigma > _TOLD * prior:
-        return "mostly the prior"
-    return "well told" if untold < _NOTHING or np.isfinite(prior) else "told in part"
+        return "not identifiable"
+    if np.isfinite(prior) and sigma > _ONLY * prior:
+        return "prior only"
+    if np.isfinite(prior) and sigma > _MOSTLY * prior:
+        return "mostly prior"
+    identified = share < _NEGLIGIBLE or np.isfinite(prior)
+    return "identified" if identified else "partly determined"
 
 
 def correlation(found: Identification) -> FloatArray:
-    """Correlations (n, n); NaN beside parameters that are not told."""
+    """Return the correlations (n, n); NaN for parameters that are not identifiable."""
     with np.errstate(invalid="ignore", divide="ignore"):
         scale = np.where(np.isfinite(found.stderr) & (found.stderr > 0), found.stderr, np.nan)
         matrix: FloatArray = found.covariance / np.outer(scale, scale)
@@ -194,7 +196,7 @@ def correlation(found: Identification) -> FloatArray:
 
 
 def iso9283(found: Identification) -> list[dict[str, Any]]:
-    """AP, RP and AD of every set of positions or poses, before and after the calibration."""
+    """Compute AP, RP and AD of every set of positions or poses, before and after."""
     equations = found._equations
     scores = []
     for i, measured in enumerate(equations.sets):
@@ -213,8 +215,8 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
             "accuracy_mean": float(last.accuracy.mean()),
             "repeatability": last.repeatability.tolist(),
             "repeatability_largest": _largest(last.repeatability),
-            "distance_before": _rms(first.distance_accuracy),
-            "distance": _rms(last.distance_accuracy),
+            "distance_before": rms(first.distance_accuracy),
+            "distance": rms(last.distance_accuracy),
             "distance_largest_before": _largest(first.distance_accuracy),
             "distance_largest": _largest(last.distance_accuracy),
         })  # fmt: skip
@@ -222,16 +224,17 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
 
 
 def expected(found: Identification, places: FloatArray) -> FloatArray:
-    """Standard deviation of the tool, mm (N,), at poses (N, 6), of an arm at joints (N, n).
+    """Predict the standard deviation of the tool, mm (N,), at poses (N, 6) or joints (N, n).
 
-    Where the instrument's frame or targets were sought, that of the first target as the
-    instrument sees it: in the base frame it holds what nobody can know of where the base is.
+    Where the instrument's frame or targets were identified too, that of the first target in the
+    instrument's frame: in the base frame it would contain the pose of the base, which no
+    measurement determines.
     """
-    return as_seen(found, places) if instrument_sought(found) else found.accuracy(places)
+    return as_seen(found, places) if instrument_identified(found) else found.accuracy(places)
 
 
 def as_seen(found: Identification, places: FloatArray) -> FloatArray:
-    """Standard deviation of the first row's target in the instrument's frame, as `expected`."""
+    """Predict that of the first row's target in the instrument's frame, as `expected` does."""
     known = found._equations
     at, q, _ = as_machine(found.robot).visited(places)
     like = known.shares[0]
@@ -242,16 +245,16 @@ def as_seen(found: Identification, places: FloatArray) -> FloatArray:
     jacobian = equations.jacobian(point)[0][:, :3]
     jacobian *= known.parameters.scale
     covariance = found._estimate.covariance
-    variance = np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian, optimize=True)
-    untold = jacobian @ found._untold_here()
-    sure = np.linalg.norm(untold, axis=(1, 2)) < _NOTHING
-    off = np.abs(point.pose[equations.pose_of[0]] - at)[:, :3].max(axis=1)
-    sure &= off < _ELSEWHERE  # another assembly mode is another place
+    variance = propagate(jacobian, covariance)
+    undetermined = jacobian @ found._untold_here()
+    sure = np.linalg.norm(undetermined, axis=(1, 2)) < _NEGLIGIBLE
+    distance = np.abs(point.pose[equations.pose_of[0]] - at)[:, :3].max(axis=1)
+    sure &= distance < _ELSEWHERE
     return np.where(sure, np.sqrt(variance), np.inf)
 
 
 def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice | None] | str:
-    """The accuracy that the covariance predicts over the workspace, or why there is none."""
+    """Predict the accuracy over the workspace from the covariance, or say why that fails."""
     machine = as_machine(found.robot)
     if isinstance(machine, ArmMachine):
         q = found._equations.actuators
@@ -282,17 +285,13 @@ def _mm(value: float) -> str:
     return f"{value:.3g} mm"
 
 
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt((values**2).mean())) if values.size else float("nan")
-
-
 def _largest(values: FloatArray) -> float:
-    told = np.abs(values[np.isfinite(values)])
-    return float(told.max()) if told.size else float("nan")
+    finite = np.abs(values[np.isfinite(values)])
+    return float(finite.max()) if finite.size else float("nan")
 
 
 def shown(value: float, unit: str, sigma: float) -> str:
-    """A number in the unit people read, to the digits that `sigma` supports."""
+    """Show a number in the unit people read, to the digits that `sigma` supports."""
     number, _ = display.displayed(value, unit)
     deviation, _ = display.displayed(sigma, unit)
     return display.fixed(number, display.decimals(deviation) if np.isfinite(deviation) else 4)
