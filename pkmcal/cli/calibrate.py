@@ -26,7 +26,7 @@ from pkmcal.report.as_json import as_json
 
 def calibrate(
     robot: RobotOrArm,
-    csv: Annotated[Path, typer.Argument(metavar="CSV", help="What was measured, with units.")],
+    csv: Annotated[Path, typer.Argument(metavar="CSV", help="Measurements with units.")],
     free: Free = None,
     prior: Prior = None,
     holdout: Annotated[
@@ -42,15 +42,21 @@ def calibrate(
     ] = "linear",
     frame: Annotated[
         str,
-        typer.Option(metavar="WORD", help="unknown: the instrument is not in the base frame."),
+        typer.Option(
+            metavar="WORD",
+            help="unknown: identify the frame of the instrument, too.",
+        ),
     ] = "known",
     target: Annotated[
         str,
-        typer.Option(metavar="WORD", help="unknown: find the measured points of the platform."),
+        typer.Option(metavar="WORD", help="unknown: identify the points on the platform, too."),
     ] = "known",
     attachment: Annotated[
         str,
-        typer.Option(metavar="WORD", help="unknown: find where on the platform distances end."),
+        typer.Option(
+            metavar="WORD",
+            help="unknown: identify where distances end, too.",
+        ),
     ] = "known",
     tracker: Annotated[
         str | None,

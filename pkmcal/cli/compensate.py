@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 import numpy as np
 import typer
@@ -13,6 +13,7 @@ import pkmcal as pk
 from pkmcal.arrays import FloatArray
 from pkmcal.cli.options import Json, ParallelRobot, Seed
 from pkmcal.cli.output import contents, folder
+from pkmcal.compensation.compensate import Method, Orientation
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
@@ -27,7 +28,7 @@ _BESIDE = re.compile(r"q\d+|sigma(\..+)?|group")  # in a file of measurements, a
 
 def compensate(
     robot: ParallelRobot,
-    desired: Annotated[Path, typer.Argument(metavar="DESIRED.csv", help="Poses asked for.")],
+    desired: Annotated[Path, typer.Argument(metavar="DESIRED.csv", help="Desired poses.")],
     measured: Annotated[
         Path,
         typer.Argument(
@@ -63,7 +64,7 @@ def compensate(
     ] = None,
     json: Json = False,
 ) -> int:
-    """Correct the commands of a machine by where it went (eq. 18 of the 2TPR&2TPS paper).
+    """Correct the commands of a machine by measured poses (eq. 18 of the 2TPR&2TPS paper).
 
     Exit code 1: a limb cannot reach some of the poses, or a measured error is implausibly large.
 
@@ -79,8 +80,8 @@ def compensate(
         machine,
         poses,
         reached,
-        method=method,
-        orientation=orientation or _orientation(machine, reached, measured),
+        method=cast(Method, method),
+        orientation=cast(Orientation, orientation) or _orientation(machine, reached, measured),
         match=None if match is None else [name.strip() for name in match.split(",")],
         common=common,
         seed=seed,
@@ -126,7 +127,7 @@ def read_reached(path: Path) -> FloatArray:
     )
 
 
-def _orientation(robot: Robot, reached: FloatArray, path: Path) -> str:
+def _orientation(robot: Robot, reached: FloatArray, path: Path) -> Orientation:
     """Choose where the orientation comes from if the command does not say."""
     if reached.shape[1] == 6:
         return "measured"

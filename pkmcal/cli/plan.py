@@ -46,7 +46,7 @@ def plan(
     ] = None,
     targets: Annotated[
         Path | None,
-        typer.Option(metavar="CSV", help="Where it is to be accurate; by default the candidates."),
+        typer.Option(metavar="CSV", help="Poses where accuracy counts; by default the candidates."),
     ] = None,
     criterion: Annotated[
         str, typer.Option(metavar="WORD", help="prediction, D or A: what is minimised.")
@@ -61,7 +61,7 @@ def plan(
     prior: Prior = None,
     unknown: Annotated[
         list[str] | None,
-        typer.Option(metavar="WORD", help="frame or target: what is not known of the instrument."),
+        typer.Option(metavar="WORD", help="frame or target: identified too, as for calibrate."),
     ] = None,
     seed: Seed = 0,
     out: Annotated[

@@ -15,7 +15,7 @@ from pkmcal.cli.options import Json, ParallelRobot, Poses, Seed
 from pkmcal.cli.output import contents, folder
 from pkmcal.cli.progress import progress
 from pkmcal.core.library import POSE
-from pkmcal.error_model.sensitivity import STUDIES, Sensitivity, study_cases
+from pkmcal.error_model.sensitivity import STUDIES, Sensitivity, Study, study_cases
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import comment
@@ -23,7 +23,7 @@ from pkmcal.loading import load_parallel
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
 
-_TITLES = {
+_TITLES: dict[Study, str] = {
     "limb1": "one number of limb 1 in error",
     "offsets": "one zero length in error",
     "all-limbs": "the same error on all limbs",
@@ -42,7 +42,7 @@ def sensitivity(
     ),
     json: Json = False,
 ) -> int:
-    """Show what an error of each number of the geometry does to the pose.
+    """Show the pose error that an error of each number of the geometry causes.
 
     Three studies: the numbers of limb 1 one by one, the zero lengths, and each kind of number on
     all limbs together; of each a figure pose by pose and one of the means. Every error is solved
@@ -53,7 +53,7 @@ def sensitivity(
     machine = load_parallel(robot)
     at = pk.sample_poses(machine, seed=seed) if poses is None else read_poses(poses, machine)
     found = {
-        name: pk.sensitivity(machine, at, step, cases)
+        name: pk.sensitivity(machine, at, step, cases=cases)
         for name in STUDIES
         if (cases := study_cases(machine, name))
     }
@@ -75,9 +75,10 @@ def _as_mapping(found: Sensitivity) -> dict[str, object]:
     return {name: getattr(found, name) for name in names}
 
 
-def _write(found: dict[str, Sensitivity], out: Path, head: str) -> list[Path]:
+def _write(found: dict[Study, Sensitivity], out: Path, head: str) -> list[Path]:
     """Write the table, the poses, and two figures of each study."""
-    from pkmcal.report.error_figures import errors_by_pose, mean_errors, save
+    from pkmcal.report.drawing import write_both
+    from pkmcal.report.error_figures import errors_by_pose, mean_errors
 
     first = next(iter(found.values()))
     table, poses = out / "sensitivity.csv", out / "poses.csv"
@@ -88,12 +89,12 @@ def _write(found: dict[str, Sensitivity], out: Path, head: str) -> list[Path]:
         for k, (name, result) in enumerate(found.items()):
             moved(k, len(found))
             title = f"{result.robot.name}: {_TITLES[name]}, {result.step:g} mm"
-            written += save(errors_by_pose(result, title), out / f"{name}-poses")
-            written += save(mean_errors(result, title), out / f"{name}-mean")
+            written += write_both(errors_by_pose(result, title), out / f"{name}-poses")
+            written += write_both(mean_errors(result, title), out / f"{name}-mean")
     return written
 
 
-def _table(found: dict[str, Sensitivity]) -> str:
+def _table(found: dict[Study, Sensitivity]) -> str:
     """Means of all studies as CSV."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

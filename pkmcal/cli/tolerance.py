@@ -83,7 +83,15 @@ def tolerance(
             deviations = read_deviations("--sigma", sigma or [], machine, own_names(machine))
             assert deviations is not None
             with progress("machines x poses") as moved:
-                found = pk.tolerance(machine, at, deviations, samples, seed, executor, moved)
+                found = pk.tolerance(
+                    machine,
+                    at,
+                    deviations,
+                    samples=samples,
+                    seed=seed,
+                    executor=executor,
+                    progress=moved,
+                )
             text = as_json(found, "position_share") if json else str(found)
             if map is not None and out is not None:
                 _draw_map(machine, map, deviations, seed, executor, folder(out))
@@ -119,7 +127,8 @@ def _columns(found: Tolerance) -> dict[str, FloatArray]:
 def _draw_map(
     robot: Robot, axes: str, sigma: Sigma, seed: int, executor: ThreadPoolExecutor, out: Path
 ) -> None:
-    from pkmcal.report import error_figures
+    from pkmcal.report.drawing import write_both
+    from pkmcal.report.error_figures import tolerance_map
 
     names = [name.strip() for name in axes.split(",")]
     if len(names) != 2:
@@ -130,5 +139,13 @@ def _draw_map(
         raise ArgumentError(f"--map {axes}: {unknown[0]!r} is not one of {', '.join(ends)}")
     grid = pk.workspace(robot, {name: (*ends[name], _CELLS) for name in names})
     with progress("map") as moved:
-        found = pk.tolerance(robot, grid.poses, sigma, _MACHINES, seed, executor, moved)
-    error_figures.save(error_figures.tolerance_map(found, grid), out / "map")
+        found = pk.tolerance(
+            robot,
+            grid.poses,
+            sigma,
+            samples=_MACHINES,
+            seed=seed,
+            executor=executor,
+            progress=moved,
+        )
+    write_both(tolerance_map(found, grid), out / "map")

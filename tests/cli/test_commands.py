@@ -237,7 +237,7 @@ def test_result_that_did_not_converge_is_not_to_be_trusted(
     def gave_up(*arguments: Any, **settings: Any) -> Identification:
         return dataclasses.replace(identify(*arguments, **settings), converged=False)
 
-    monkeypatch.setattr(sys.modules["pkmcal.identify"], "identify", gave_up)
+    monkeypatch.setattr(pk, "identify", gave_up)
     result = run("calibrate", ROBOT, PROBE)
     assert result.exit_code == 1
     assert "not converged" in result.stdout
@@ -322,7 +322,7 @@ def test_mistake_in_a_robot_file_is_named_with_the_file(
         ([ROBOT, PROBE, "--target", "unkown"], "target must be one of known, unknown"),
         ([ROBOT, PROBE, "--los", "huber"], "No such option"),
         ([ROBOT, PROBE, "--out", PROBE], "this is not a folder"),
-        ([ROBOT, PROBE, "--out", str(DELTA)], "would replace"),
+        ([ROBOT, PROBE, "--out", str(DELTA)], "would overwrite"),
         (["rbt-6t03p-printed", "six.csv"], "free: RBT-6T03P"),
     ],
 )

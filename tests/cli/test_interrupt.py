@@ -14,7 +14,7 @@ import pytest
 from pkmcal.files.atomic import write_whole
 
 # Says when the program is loaded, so that the signal meets its work.
-_PROGRAM = "from pkmcal.cli import main; print('ready', flush=True); main()"
+_PROGRAM = "from pkmcal.cli.main import main; print('ready', flush=True); main()"
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="sends a POSIX signal")
 

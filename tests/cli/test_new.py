@@ -36,7 +36,7 @@ def test_written_file_loads_as_the_machine(run: Any, name: str, tmp_path: Path) 
 @pytest.mark.parametrize("name", sorted({*pk.machines()} - {"3r"}))
 def test_every_key_that_a_limb_may_have_is_explained(name: str) -> None:
     head = template(name).partition("#\n# ")[2]
-    told = {
+    explained = {
         word
         for names in re.findall(r"^#   ([a-z_, ]+?)  ", template(name), re.MULTILINE)
         for word in names.split(", ")
@@ -44,7 +44,7 @@ def test_every_key_that_a_limb_may_have_is_explained(name: str) -> None:
     assert head
     kinds = [KINDS[limb.kind] for limb in pk.load(name).model.limbs]
     keys = {key for kind in kinds for key in kind.keys()}  # noqa: SIM118
-    assert {key for key in keys if not key.endswith("_tilt")} <= told
+    assert {key for key in keys if not key.endswith("_tilt")} <= explained
 
 
 def test_lines_are_short_enough_to_read() -> None:
@@ -54,10 +54,10 @@ def test_lines_are_short_enough_to_read() -> None:
         assert max(map(len, lines[:end])) <= 100, name
 
 
-def test_a_file_that_is_there_is_left_alone(run: Any, tmp_path: Path) -> None:
+def test_an_existing_file_is_left_alone(run: Any, tmp_path: Path) -> None:
     (tmp_path / "hexapod.toml").write_text("mine")
     result = run("new", "hexapod")
-    assert result.exit_code == 2 and "is there already" in result.stderr
+    assert result.exit_code == 2 and "exists already" in result.stderr
     assert (tmp_path / "hexapod.toml").read_text() == "mine"
 
 

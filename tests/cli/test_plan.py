@@ -75,9 +75,9 @@ def test_postures_of_an_arm_are_chosen_from_a_file_of_joint_coordinates(
     arguments = ["3r", "--poses", "c.csv", "--targets", "c.csv", "--count", "8", "--kind", "pose"]
     result = run("plan", *arguments, "--out", "plan")
     assert (result.exit_code, result.stderr) == (0, "")
-    expected = pk.plan_poses(arm, np.radians(degrees), 8, kind="pose")
+    candidates = read_commands("c.csv", ("rad",) * 3)
+    expected = pk.plan_poses(arm, candidates, 8, kind="pose")
     assert result.stdout.startswith(str(expected))
-    from pkmcal.measurements.command_csv import read_commands
 
     commands = read_commands(tmp_path / "plan" / "commands.csv", arm.actuator_units)
     np.testing.assert_allclose(commands, expected.actuators, rtol=1e-15)

@@ -14,9 +14,10 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.cli import tolerance as cli_tolerance
-from pkmcal.cli.calibrate import read_deviations
+from pkmcal.cli.geometry_options import read_deviations
 from pkmcal.error_model.sensitivity import STUDIES, own_names, study_cases
 from pkmcal.measurements.pose_csv import read_poses, write_poses
+from pkmcal.report import drawing
 from pkmcal.report import error_figures as figures
 
 
@@ -25,7 +26,7 @@ def without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Drawing takes seconds; one test draws all."""
     for name in ("errors_by_pose", "mean_errors"):
         monkeypatch.setattr(figures, name, lambda found, title: None)
-    monkeypatch.setattr(figures, "save", lambda figure, path: [path.with_suffix(".png")])
+    monkeypatch.setattr(drawing, "write_both", lambda figure, path: [path.with_suffix(".png")])
 
 
 @pytest.mark.usefixtures("without_figures")
@@ -79,7 +80,7 @@ def test_one_command_draws_the_six_figures_and_writes_the_table(run: Any, tmp_pa
     files = {path.name for path in (tmp_path / "errors").iterdir()}
     assert files == expected | {"sensitivity.csv", "poses.csv"}
     robot = pk.load("2tpr2tps")
-    found = pk.sensitivity(robot, pk.sample_poses(robot), 1.0, study_cases(robot, "offsets"))
+    found = pk.sensitivity(robot, pk.sample_poses(robot), 1.0, cases=study_cases(robot, "offsets"))
     assert str(found) in result.stdout
     table = _rows(tmp_path / "errors" / "sensitivity.csv")
     rows = {row["error of"]: row for row in table if row["study"] == "offsets"}
@@ -105,7 +106,9 @@ def test_sensitivity_as_json_stands_alone(run: Any) -> None:
     found = json.loads(run("sensitivity", "linear-delta", "--step", "0.5", "--json").stdout)
     assert set(found) == set(STUDIES)
     robot = pk.load("linear-delta")
-    expected = pk.sensitivity(robot, pk.sample_poses(robot), 0.5, study_cases(robot, "all-limbs"))
+    expected = pk.sensitivity(
+        robot, pk.sample_poses(robot), 0.5, cases=study_cases(robot, "all-limbs")
+    )
     assert found["all-limbs"]["cases"] == list(expected.cases)
     np.testing.assert_allclose(found["all-limbs"]["exact"], expected.exact)
     np.testing.assert_allclose(found["all-limbs"]["mean"], expected.mean)
@@ -135,7 +138,7 @@ def test_tolerance_prints_what_the_library_finds(run: Any, tmp_path: Path) -> No
     result = run("tolerance", "2tpr2tps", *options, "--seed", "7", "--out", "t")
     robot = pk.load("2tpr2tps")
     found = pk.tolerance(
-        robot, pk.sample_poses(robot, seed=7), {"base*": 0.1, "offset1": 0.02}, 3000, 7
+        robot, pk.sample_poses(robot, seed=7), {"base*": 0.1, "offset1": 0.02}, samples=3000, seed=7
     )
     assert (result.exit_code, result.stderr) == (0, "")
     assert result.stdout == f"{found}\n"
