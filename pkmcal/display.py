@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
+from itertools import islice
 
 _MOST_DECIMALS = 15  # a double has no digits beyond; also what an exact number is given
 
@@ -78,6 +79,18 @@ def displayed(value: float, unit: str) -> tuple[float, str]:
     return (math.degrees(value), "deg") if unit == "rad" else (value, unit)
 
 
+def first_rows(rows: Iterable[int], most: int = 5) -> str:
+    """Number of the first `most` rows, and whether there are more.
+
+    Examples
+    --------
+    >>> first_rows([3, 14, 15]), first_rows(range(100))
+    ('3, 14, 15', '0, 1, 2, 3, 4, …')
+    """
+    shown = [str(row) for row in islice(rows, most + 1)]
+    return ", ".join(shown[:most]) + (", …" if len(shown) > most else "")
+
+
 @dataclass(frozen=True)
 class Table:
     """Columns of text under their headings: as lines for a terminal, or as HTML.
@@ -109,7 +122,7 @@ class Table:
         return "\n".join(
             "  ".join(
                 pad(cell, width) for pad, cell, width in zip(flush, line, widths, strict=True)
-            )
+            ).rstrip()
             for line in lines
         )
 

@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import pkmcal as pk
+from pkmcal.cli import main as cli
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -49,6 +51,10 @@ def as_pkmcal(command: str) -> list[str]:
     return arguments
 
 
+def run(arguments: list[str]) -> Any:
+    return CliRunner().invoke(cli.app, arguments, prog_name="pkmcal")
+
+
 def assert_same(printed: str, shown: str) -> None:
     """The same text, and numbers that differ by one in their last digit at most."""
     assert NUMBER.sub("0", printed).split() == NUMBER.sub("0", shown).split(), printed
@@ -71,9 +77,9 @@ def test_every_block_is_of_a_kind_that_is_checked() -> None:
 
 @pytest.mark.parametrize(("command", "shown"), sessions(), ids=[c for c, _ in sessions()])
 def test_command_prints_what_the_readme_shows(
-    run: Any, command: str, shown: str, beside_the_examples: Path
+    command: str, shown: str, beside_the_examples: Path
 ) -> None:
-    result = run(*as_pkmcal(command))
+    result = run(as_pkmcal(command))
     assert (result.exit_code, result.stderr) == (0, "")
     assert_same(result.stdout, shown)
 
@@ -85,7 +91,7 @@ def test_comparison_sees_a_wrong_digit_and_a_wrong_word() -> None:
             assert_same(printed, "rms 0.0259 mm")
 
 
-def test_options_named_in_the_text_work(run: Any, beside_the_examples: Path) -> None:
+def test_options_named_in_the_text_work(beside_the_examples: Path) -> None:
     calibrate = as_pkmcal(next(c for c, _ in sessions() if "calibrate" in c))
     options = re.findall(r"`(--[a-z]+(?: [^`]+)?)`", README)
     assert len(options) >= 5
@@ -93,17 +99,15 @@ def test_options_named_in_the_text_work(run: Any, beside_the_examples: Path) -> 
         extra = shlex.split(option.replace("DIR", "calibrated"))
         if extra[0] == "--prior":
             extra += ["--free", "radius,angle[12],offset*,rod*"]
-        assert run(*calibrate, *extra).exit_code == 0, option
+        assert run([*calibrate, *extra]).exit_code == 0, option
     assert pk.load("calibrated/robot.toml").name == pk.load(DELTA / "robot.toml").name
 
 
-def test_calibration_from_the_file_of_the_demo_finds_the_same(
-    run: Any, beside_the_examples: Path
-) -> None:
-    assert run("demo").exit_code == 0
+def test_calibration_from_the_file_of_the_demo_finds_the_same(beside_the_examples: Path) -> None:
+    assert run(["demo"]).exit_code == 0
     match = re.search(r"`pkmcal (calibrate [^`]*measured[^`]*)`", README)
     assert match
-    assert run(*shlex.split(match[1]), "--report", "again").exit_code == 0
+    assert run([*shlex.split(match[1]), "--report", "again"]).exit_code == 0
     for name in ("robot.toml", "report.json", "report.html"):
         assert Path("again", name).read_bytes() == Path("pkmcal-demo", name).read_bytes()
 
