@@ -207,7 +207,7 @@ def unlike(robot: Robot) -> Iterator[Finding]:
     circles = {f"{side.side} radius" for side in joints(robot) if _has_circle(side, room)}
     kinds = {KINDS[limb.kind].name for limb in robot.model.limbs}
     for trait in traits(robot):
-        if trait.name in circles:  # said by `off_circle`
+        if trait.name in circles:  # `off_circle` reports it
             continue
         limbs, usual = trait.odd(room)
         if not limbs:

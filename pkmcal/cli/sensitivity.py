@@ -34,7 +34,7 @@ def sensitivity(
     robot: ParallelRobot,
     poses: Poses = None,
     step: Annotated[
-        float, typer.Option(metavar="MM", help="The error; angles get so many mrad.")
+        float, typer.Option(metavar="MM", help="The error in mm; of angles in mrad.")
     ] = 1.0,
     seed: Seed = 0,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the files go.")] = Path(

@@ -1,4 +1,4 @@
-"""Corrections of the actuator commands that bring a machine to the poses asked for (eq. 18)."""
+"""Corrections of the actuator commands that bring a machine to the desired poses (eq. 18)."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Compensation(Result):
         ΔL of eq. 18, mm or rad.
     objective : ndarray (N,)
         E of eq. 18 at the correction of the last pass: 0 for the exact method unless one
-        correction serves all poses, and what the swarm left.
+        correction serves all poses, and the remainder of the swarm.
     history : ndarray (N, passes) or (N, passes · (iterations + 1))
         Exact: E with the correction that was in force at each measurement, which is the error of
         the actuators' readings, as the ideal machine sees them. Of a swarm: its lowest E
@@ -52,7 +52,7 @@ class Compensation(Result):
         The error of the position exceeds ``robot.length``: not one of the geometry but of units,
         of the frame of the measurements, or of the order of their rows.
     method, orientation : str
-        As asked for.
+        The arguments of these names.
     units : tuple of str, n
         Of the actuators, "mm" or "rad".
     """
@@ -137,7 +137,7 @@ def compensate(
     robot : Robot
         The ideal machine: the one whose inverse kinematics makes the commands.
     desired : array_like (N, 6)
-        Poses asked for, mm and rad.
+        Desired poses, mm and rad.
     measured : array_like (N, 6) or (N, 3), or callable
         Poses or positions that were reached with the ideal commands; or a function that takes
         commands (N, n), has them carried out and returns what was measured.

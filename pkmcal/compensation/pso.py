@@ -94,8 +94,8 @@ def pso(
     seed : int
         From 0 to 2⁶⁴ - 1.
     patience : int, optional
-        Stop after so many iterations in which the lowest value fell by no more than `tolerance`
-        in all.
+        Stop after this number of iterations in which the lowest value fell by no more than
+        `tolerance` in all.
     tolerance : float
         See `patience`.
     progress : callable, optional

@@ -35,7 +35,7 @@ Progress = Callable[[int, int], object]
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """One task: so many machines at some poses.
+    """One task: a number of machines at some poses.
 
     Attributes
     ----------

@@ -24,7 +24,7 @@ _GAIN = 0.9  # of the misfit that must not be left for a calibration to be worth
 _CELLS, _DRAWN = 30, 500  # of the map of the workspace along an axis; of poses for its quantiles
 _SHARE = 0.9  # of the way from home to the ends of the workspace
 _MOSTLY, _ONLY = 0.5, 0.99  # of the prior's deviation, above which the prior dominates
-_ELSEWHERE = 1.0  # mm: a pose so far from the one asked for is of another assembly mode
+_ELSEWHERE = 1.0  # mm: a pose so far from the desired one is of another assembly mode
 _NEGLIGIBLE = 1e-3  # share of a parameter in unidentifiable combinations
 
 
@@ -71,17 +71,17 @@ def verdict(found: Identification) -> tuple[str, str]:
     if found.warnings:
         return "bad", f"Not to be trusted: {printable(found.warnings[0], 1000)}"
     if not np.isfinite(found.holdout_rms):
-        said = f"the misfit of the {len(found.rows)} fitted points {_falls(found, 'rms')}"
+        change = f"the misfit of the {len(found.rows)} fitted points {_falls(found, 'rms')}"
         if found.rms > _GAIN * found.rms_before:
-            return "doubtful", f"Little gained: {said}."
-        return "good", f"Calibrated: {said}; no points were held out to confirm it."
+            return "doubtful", f"Little gained: {change}."
+        return "good", f"Calibrated: {change}; no points were held out to confirm it."
     count = int(np.isfinite(found.holdout_off).sum())
-    said = f"the error of {count} points that were not fitted {_falls(found, 'holdout_rms')}"
+    change = f"the error of {count} points that were not fitted {_falls(found, 'holdout_rms')}"
     if found.holdout_rms > found.holdout_expected * (1 + _SPREAD / np.sqrt(2 * count)):
-        return "doubtful", f"Doubtful: {said}, but {_mm(found.holdout_expected)} was expected."
+        return "doubtful", f"Doubtful: {change}, but {_mm(found.holdout_expected)} was expected."
     if found.holdout_rms > _GAIN * found.holdout_rms_before:
-        return "doubtful", f"Little gained: {said}."
-    return "good", f"Calibrated: {said}; {_mm(found.holdout_expected)} was expected."
+        return "doubtful", f"Little gained: {change}."
+    return "good", f"Calibrated: {change}; {_mm(found.holdout_expected)} was expected."
 
 
 def _falls(found: Identification, name: str) -> str:
