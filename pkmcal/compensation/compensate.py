@@ -76,7 +76,7 @@ class Compensation(Result):
         count, parts = len(self.actuators), []
         for rows, why in (
             (self.failed, "have no command, because a limb cannot reach them"),
-            (self.gross, "have errors too large for a geometry: check units, frame, order of rows"),
+            (self.gross, "have implausible errors: check units, frame and order of the rows"),
         ):
             if rows.any():
                 parts.append(

@@ -278,5 +278,5 @@ def test_measurements_in_another_unit_or_frame_are_called_gross(paper: Robot) ->
     shifted[1, :3] *= 1e-3
     found = compensate(paper, desired, shifted)
     assert found.gross.tolist() == [False, True]
-    assert "1 of 2 have errors too large for a geometry" in str(found)
+    assert "1 of 2 have implausible errors" in str(found)
     assert max(map(len, str(found).splitlines())) <= 100
