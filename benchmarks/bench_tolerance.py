@@ -37,9 +37,9 @@ LENGTHS = ROBOT.inverse(ROBOT.home)
 def monte_carlo(samples: int = SAMPLES, threads: int = 1) -> pk.Tolerance:
     """By the package."""
     if threads == 1:
-        return pk.tolerance(ROBOT, ROBOT.home, SIGMA, samples)
+        return pk.tolerance(ROBOT, ROBOT.home, SIGMA, samples=samples)
     with ThreadPoolExecutor(threads) as executor:
-        return pk.tolerance(ROBOT, ROBOT.home, SIGMA, samples, executor=executor)
+        return pk.tolerance(ROBOT, ROBOT.home, SIGMA, samples=samples, executor=executor)
 
 
 def rotation(pose: Array) -> Array:

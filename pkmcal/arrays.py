@@ -75,16 +75,15 @@ def mm_per_unit(units: Sequence[str], length: float) -> FloatArray:
     return np.array([length if unit == "rad" else 1.0 for unit in units])
 
 
-def whole_turns(angles: FloatArray) -> FloatArray:
-    """The whole turns in angles, rad: what is to be taken off to go the short way round.
+def wrapped(angles: FloatArray) -> FloatArray:
+    """Angles in rad the short way round, from -π to π.
 
     Examples
     --------
-    >>> angles = np.array([0.5, 2 * np.pi - 0.5])
-    >>> (angles - whole_turns(angles)).round(12)
+    >>> wrapped(np.array([0.5, 2 * np.pi - 0.5])).round(12)
     array([ 0.5, -0.5])
     """
-    return np.asarray(2 * np.pi * np.rint(angles / (2 * np.pi)))
+    return np.asarray(angles - 2 * np.pi * np.rint(angles / (2 * np.pi)))
 
 
 def rms(values: FloatArray) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 
 import pkmcal as pk
 from pkmcal.core.screws import joint_motions
-from pkmcal.report import error_figures as figures
+from pkmcal.report import drawing
 
 HERE = Path(__file__).parent
 FORTY = (100.0, 64.5275, 108.6284, 150.3439, 128.1933, 77.1071)  # mm
@@ -65,9 +65,10 @@ def draw(robot: pk.Robot, q: object, columns: int, headings: bool) -> plt.Figure
 def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     machine = pk.load("2tpr2tps")
-    figures.save(draw(machine, [450.0, 452.0, 400.0, 405.0], 4, True), folder / "2tpr2tps-modes")
+    four = draw(machine, [450.0, 452.0, 400.0, 405.0], 4, True)
+    drawing.write_both(four, folder / "2tpr2tps-modes")
     forty = pk.load(HERE / "dietmaier.toml")
-    figures.save(draw(forty, FORTY, 8, False), folder / "forty-modes")
+    drawing.write_both(draw(forty, FORTY, 8, False), folder / "forty-modes")
     print(machine.forward_all([450.0, 452.0, 400.0, 405.0]))
 
 

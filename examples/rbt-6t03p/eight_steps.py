@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import pkmcal as pk
-from pkmcal.report import move_figures
+from pkmcal.report import drawing, move_figures
 
 HERE = Path(__file__).parent
 TARGETS = {"(0, 0, 50)": (163.61, 48.96), "(0, 0, -20)": (232.25, 19.68)}  # Table 2
@@ -69,7 +69,7 @@ def rods_by_angles(robot: pk.Robot, height: float = 208.897) -> np.ndarray:
 
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure as PNG."""
-    figure.savefig(path, dpi=80, metadata={"Software": None})
+    drawing.write(figure, path)
     return path
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import pkmcal as pk
+from pkmcal.report import drawing
 from pkmcal.report import error_figures as figures
 
 CELLS = 120  # of a slice, along each axis
@@ -39,15 +40,16 @@ def draw(folder: Path) -> None:
     for name, slices in SLICES.items():
         robot = pk.load(name)
         grids = [pk.workspace(robot, axes) for axes in slices]
-        figures.save(figures.singularities(grids, robot.name), folder / f"{name}-singularities")
+        loci = figures.singularities(grids, robot.name)
+        drawing.write_both(loci, folder / f"{name}-singularities")
 
     grid = pk.workspace(pk.load("rbt-6t03p"), VOLUME)
-    figures.save(figures.workspace_slices(grid, "z"), folder / "rbt-6t03p-slices")
+    drawing.write_both(figures.workspace_slices(grid, "z"), folder / "rbt-6t03p-slices")
     print(grid)
 
     plane = pk.workspace(pk.load("2tpr2tps"), {"y": (-180.0, 180.0, 50), "z": (280.0, 490.0, 50)})
-    found = pk.tolerance(plane.robot, plane.poses, SIGMA, MACHINES)
-    figures.save(figures.tolerance_map(found, plane), folder / "2tpr2tps-tolerance")
+    found = pk.tolerance(plane.robot, plane.poses, SIGMA, samples=MACHINES)
+    drawing.write_both(figures.tolerance_map(found, plane), folder / "2tpr2tps-tolerance")
     print(plane)
 
 

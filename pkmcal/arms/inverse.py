@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from pkmcal import screw
 from pkmcal.arguments import word
 from pkmcal.arms.inputs import Frame, checked_errors
-from pkmcal.arrays import FloatArray, Int32Array, Unit, as_rows, mm_per_unit, whole_turns
+from pkmcal.arrays import FloatArray, Int32Array, Unit, as_rows, mm_per_unit, wrapped
 from pkmcal.core.library import STATUS
 from pkmcal.display import Table, displayed, fixed, long_table
 from pkmcal.exceptions import ArgumentError
@@ -133,7 +133,7 @@ def damped_least_squares(
     begun = theta.copy()
     status, iterations, residual = search.run(theta)
     turning = [unit == "rad" for unit in arm.actuator_units]
-    theta[:, turning] -= whole_turns((theta - begun)[:, turning])
+    theta[:, turning] = (begun + wrapped(theta - begun))[:, turning]
     theta[status != _OK] = np.nan
     return ArmInverse(
         theta.reshape(*shape, n),

@@ -101,9 +101,9 @@ class Identification(Parts, Result):
         ValueError, OSError
             Another ending; a file that cannot be written.
         """
-        from pkmcal.report import residual_figure
+        from pkmcal.report import drawing, residual_figure
 
-        residual_figure.write(self, arguments.path("path", path))
+        drawing.write(residual_figure.residuals(self), arguments.path("path", path))
 
     def report(
         self, folder: str | PathLike[str], files: Mapping[str, bytes] | None = None

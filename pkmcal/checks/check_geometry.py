@@ -1,7 +1,8 @@
-"""What robot files get wrong: limbs that are not alike, wrong units, strokes, singular machines."""
+"""Mistakes in robot files: limbs that differ, wrong units, unusable strokes, singular machines."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from pkmcal.arguments import instance
@@ -11,14 +12,16 @@ from pkmcal.checks.finding import Finding
 from pkmcal.checks.function import singular, unreachable, wrong_unit
 from pkmcal.checks.layout import (
     angles_as_coordinates,
+    contradicted,
     doubled,
     off_circle,
     opposite_order,
     swapped,
     unlike,
 )
-from pkmcal.checks.stated import contradicted
+from pkmcal.display import Table
 from pkmcal.kinematics.robot import Robot
+from pkmcal.result import Result
 
 CHECKS = (
     angles_as_coordinates,
@@ -34,9 +37,9 @@ CHECKS = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class GeometryCheck:
-    """What `check_geometry` found.
+@dataclass(frozen=True, eq=False, repr=False)
+class GeometryCheck(Result):
+    """Suspected mistakes of a machine's geometry.
 
     Attributes
     ----------
@@ -51,7 +54,7 @@ class GeometryCheck:
 
     @property
     def ok(self) -> bool:
-        """Whether nothing was found."""
+        """Whether no problems were found."""
         return not self.findings
 
     @property
@@ -59,20 +62,22 @@ class GeometryCheck:
         """The kinds of findings, each once."""
         return tuple(dict.fromkeys(finding.kind for finding in self.findings))
 
-    def __str__(self) -> str:
+    def _parts(self) -> Iterator[str | Table]:
         count = len(self.findings)
         if not count:
-            return f"{self.robot.name}: nothing found"
-        lines = [f"{self.robot.name}: {count} finding{'s' if count > 1 else ''}"]
-        wide = max(len(finding.kind) for finding in self.findings)
-        for finding in self.findings:
-            lines.append(f"{finding.kind:{wide}}  {finding.what}")
-            lines.append(f"{'':{wide}}  -> {finding.suggestion}")
-        return "\n".join(lines)
+            yield f"{self.robot.name}: no problems found"
+            return
+        yield f"{self.robot.name}: {count} finding{'s' if count > 1 else ''}"
+        rows = [
+            row
+            for finding in self.findings
+            for row in ((finding.kind, finding.what), ("", f"-> {finding.suggestion}"))
+        ]
+        yield Table(["kind", "finding"], rows, left=2)
 
 
 def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
-    """Look for mistakes that tables of a machine's geometry have.
+    """Look for mistakes in the geometry of a machine.
 
     Parameters
     ----------
@@ -82,7 +87,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
     Returns
     -------
     GeometryCheck
-        ``.ok`` where nothing was found; ``print`` shows each finding with a suggestion. Its kinds:
+        ``.ok`` where no problems were found; ``print`` shows each finding. Its kinds:
 
         ========  ==========================================================================
         angle     polar angles used as x and y, or angles in another unit
@@ -107,14 +112,14 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
     Limbs count as alike within 3 % of the base's radius, so that a calibrated machine, which has
     errors of manufacture, raises no alarm; a slip smaller than that is not seen.
 
-    Of a serial arm less can be told: lengths and joint errors in another unit (unit, angle), and
-    neighbouring joints on one axis (double), where ``Finding.limbs`` counts joints.
+    Of a serial arm fewer things can be checked: lengths and joint errors in another unit (unit,
+    angle), and neighbouring joints on one axis (double), where ``Finding.limbs`` counts joints.
 
     Examples
     --------
     >>> import pkmcal as pk
     >>> print(pk.check_geometry(pk.load("hexapod")))
-    hexapod: nothing found
+    hexapod: no problems found
     >>> pk.check_geometry(pk.load("rbt-6t03p-printed")).findings[0].kind
     'angle'
     """

@@ -1,13 +1,16 @@
-"""One mistake that was found, in words and numbers."""
+"""One suspected mistake, in words and numbers."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from pkmcal.display import Table
+from pkmcal.result import Result
 
-@dataclass(frozen=True)
-class Finding:
+
+@dataclass(frozen=True, repr=False)
+class Finding(Result):
     """One thing that a table of geometry probably gets wrong.
 
     Attributes
@@ -27,6 +30,10 @@ class Finding:
     limbs: tuple[int, ...]
     what: str
     suggestion: str
+
+    def _parts(self) -> Iterator[str | Table]:
+        yield f"{self.kind}: {self.what}"
+        yield f"-> {self.suggestion}"
 
 
 def named(limbs: Iterable[int], one: str = "limb") -> str:

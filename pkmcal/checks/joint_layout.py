@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, wrapped
 from pkmcal.core.library import DRIVERS, SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
@@ -144,7 +144,7 @@ def traits(robot: Robot) -> list[Trait]:
     mm = size(robot)
     degree = mm * np.pi / 180
     limbs = robot.model.limbs
-    between = np.degrees(np.abs(np.angle(np.exp(1j * (base.angles - platform.angles)))))
+    between = np.degrees(np.abs(wrapped(base.angles - platform.angles)))
     off_axis = (base.radii > 1e-6 * mm) & (platform.radii > 1e-6 * mm)
     found = [
         Trait("base radius", "mm", base.radii, 1.0),

@@ -8,53 +8,51 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from pkmcal.checks.check_geometry import check_geometry
-from pkmcal.cli.robot_argument import ROBOT_OR_ARM
-from pkmcal.loading import load
+import pkmcal as pk
+from pkmcal.cli.options import Json, RobotOrArm
+from pkmcal.display import first_rows
 from pkmcal.measurements.calibratable import as_machine
-from pkmcal.measurements.measurement_csv import read_measurements
 from pkmcal.report.as_json import as_json
 
 
 def check(
-    robot: Annotated[str, ROBOT_OR_ARM],
+    robot: RobotOrArm,
     measurements: Annotated[
         Path | None,
         typer.Argument(metavar="CSV", help="Measurements of it: columns, units, numbers."),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+    json: Json = False,
 ) -> int:
-    """Look for what tables of a machine's geometry get wrong.
+    """Look for mistakes in the geometry of a machine.
 
-    Limbs that are not alike, joints off their circle, angles used as lengths, other wrong units,
-    strokes that cannot be used, singular machines, contradictions to what the file states; of a
-    serial arm wrong units and joints on one axis; each with its numbers and a suggestion; rows of
-    measurements at which the machine has no pose. Exit code 1: something was found.
+    Limbs that differ, joints off their circle, angles used as lengths, other wrong units, strokes
+    that cannot be used, singular machines, contradictions to what the file states; of a serial arm
+    wrong units and joints on one axis; each with its numbers and a suggestion. Of measurements the
+    rows at which the machine has no pose. Exit code 1: problems were found.
 
     Example: pkmcal check hexapod
     """
-    machine = load(robot)
-    measured = None if measurements is None else read_measurements(measurements, machine)
-    found = check_geometry(machine)
-    lost: list[int] = []
+    machine = pk.load(robot)
+    measured = None if measurements is None else pk.read_measurements(measurements, machine)
+    found = pk.check_geometry(machine)
+    unsolved: list[int] = []
     if measured is not None:
-        lost = np.flatnonzero(~as_machine(machine).forward(measured.actuators).ok).tolist()
+        unsolved = np.flatnonzero(~as_machine(machine).forward(measured.actuators).ok).tolist()
     if json:
         read = None
         if measured is not None:
-            read = {"kind": measured.kind, "rows": len(measured), "without_pose": lost}
+            read = {"kind": measured.kind, "rows": len(measured), "without_pose": unsolved}
         parts = {"robot": machine, "findings": found.findings, "ok": found.ok, "measurements": read}
         typer.echo(as_json(parts))
     else:
-        typer.echo(str(found))
+        typer.echo(found)
         if measured is not None:
             rows = f"{len(measured)} row{'s' * (len(measured) > 1)} of kind {measured.kind}"
             typer.echo(f"{measurements}: {rows}, readable")
-    if lost:
-        first = ", ".join(map(str, lost[:10])) + (", …" if len(lost) > 10 else "")
+    if unsolved:
         typer.echo(
-            f"{measurements}: {machine.name} has no pose at the actuators of {len(lost)} of them"
-            f" (rows {first});\ncheck their units, signs and columns",
+            f"{measurements}: {machine.name} has no pose at the actuators of {len(unsolved)}"
+            f" of them (rows {first_rows(unsolved, 10)});\ncheck their units, signs and columns",
             err=json,
         )
-    return 0 if found.ok and not lost else 1
+    return 0 if found.ok and not unsolved else 1

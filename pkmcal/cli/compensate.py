@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, cast
 
 import numpy as np
 import typer
 
+import pkmcal as pk
 from pkmcal.arrays import FloatArray
-from pkmcal.cli.output import folder
-from pkmcal.cli.robot_argument import ROBOT, contents
+from pkmcal.cli.options import Json, ParallelRobot, Seed
+from pkmcal.cli.output import contents, folder
+from pkmcal.compensation.compensate import Method, Orientation
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
@@ -25,13 +27,13 @@ _BESIDE = re.compile(r"q\d+|sigma(\..+)?|group")  # in a file of measurements, a
 
 
 def compensate(
-    robot: Annotated[str, ROBOT],
-    desired: Annotated[Path, typer.Argument(metavar="DESIRED.csv", help="Poses asked for.")],
+    robot: ParallelRobot,
+    desired: Annotated[Path, typer.Argument(metavar="DESIRED.csv", help="Desired poses.")],
     measured: Annotated[
         Path,
         typer.Argument(
             metavar="MEASURED.csv",
-            help="Where the machine went with the commands of its inverse kinematics, row by row:"
+            help="Where the commands of the inverse kinematics led the machine, row by row:"
             " poses, or positions 'x \\[mm], y \\[mm], z \\[mm]'.",
         ),
     ],
@@ -51,7 +53,7 @@ def compensate(
         typer.Option(metavar="NAMES", help="Coordinates that count: 'x,y,z,alpha'; else all six."),
     ] = None,
     common: Annotated[bool, typer.Option("--common", help="One correction for all poses.")] = False,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the swarm.")] = 0,
+    seed: Seed = 0,
     bounds: Annotated[
         float | None,
         typer.Option(metavar="NUMBER", help="Of the swarm's corrections, mm or rad."),
@@ -60,28 +62,26 @@ def compensate(
         Path | None,
         typer.Option(metavar="DIR", help="Write poses, commands, corrections: DIR/corrected.csv."),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
+    json: Json = False,
 ) -> int:
-    """Correct the commands of a machine by where it went (eq. 18 of the 2TPR&2TPS paper).
+    """Correct the commands of a machine by measured poses (eq. 18 of the 2TPR&2TPS paper).
 
-    Exit code 1: a limb cannot reach some of the poses, or some were measured too far off.
+    Exit code 1: a limb cannot reach some of the poses, or a measured error is implausibly large.
 
     Example: pkmcal compensate 2tpr2tps examples/2tpr2tps-compensation/desired.csv
     examples/2tpr2tps-compensation/measured.csv
     """
-    from pkmcal.compensation.compensate import compensate as corrected
-
     machine = load_parallel(robot)
     poses = read_poses(desired, machine)
     reached = read_reached(measured)
     if len(reached) != len(poses):
         raise ArgumentError(f"{measured}: {len(reached)} rows for the {len(poses)} of {desired}")
-    found = corrected(
+    found = pk.compensate(
         machine,
         poses,
         reached,
-        method=method,
-        orientation=orientation or _orientation(machine, reached, measured),
+        method=cast(Method, method),
+        orientation=cast(Orientation, orientation) or _orientation(machine, reached, measured),
         match=None if match is None else [name.strip() for name in match.split(",")],
         common=common,
         seed=seed,
@@ -127,8 +127,8 @@ def read_reached(path: Path) -> FloatArray:
     )
 
 
-def _orientation(robot: Robot, reached: FloatArray, path: Path) -> str:
-    """Where the orientation comes from when nothing is said."""
+def _orientation(robot: Robot, reached: FloatArray, path: Path) -> Orientation:
+    """Choose where the orientation comes from if the command does not say."""
     if reached.shape[1] == 6:
         return "measured"
     if robot.model.map == "2tpr2tps":
@@ -136,6 +136,6 @@ def _orientation(robot: Robot, reached: FloatArray, path: Path) -> str:
     if robot.model.map == "translation":
         return "assumed"
     raise ArgumentError(
-        f"{path}: positions do not tell the orientation of {robot.name};"
-        " measure it, or take the desired one: --orientation assumed"
+        f"{path}: positions do not determine the orientation of {robot.name};"
+        " measure it, or assume the desired one: --orientation assumed"
     )

@@ -1,25 +1,33 @@
-"""The whole way on a simulated machine: measure, identify, and command it better than before."""
+"""`pkmcal demo`: a simulated machine is measured, identified and commanded with less error."""
 
 from __future__ import annotations
 
 import csv
 import io
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 
 from pkmcal import display
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, rms
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.identify import identify
-from pkmcal.cli.robot_argument import contents
+from pkmcal.cli.options import Json, Seed
+from pkmcal.cli.output import contents, folder
+from pkmcal.cli.progress import progress
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import comment
 from pkmcal.kinematics.robot import Robot
 from pkmcal.loading import load
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
+from pkmcal.report.as_json import as_json
+from pkmcal.report.drawing import BLUE, FAINT, ORANGE, empty_figure, encoded, in_context
+from pkmcal.result import Result
 
 MACHINE = "2tpr2tps"
 SIGMA = 0.5  # mm, of each of its 28 errors
@@ -32,9 +40,34 @@ _HIGHEST = np.array([80.0, 450.0, 20.0, 20.0])
 _MARGIN = 5.0  # mm that a leg keeps from the ends of its stroke, for its errors
 
 
-@dataclass(frozen=True, eq=False)
-class Demonstration:
-    """What `demonstrate` did; poses are x y z in mm and alpha beta gamma in rad.
+def demo(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the files go.")] = Path(
+        "pkmcal-demo"
+    ),
+    seed: Seed = 1,
+    json: Json = False,
+) -> int:
+    """Calibrate a simulated machine from beginning to end.
+
+    A 2TPR&2TPS with 28 unknown errors is measured by a tracker, identified, and sent to poses
+    that were not measured; its error there before and after is printed.
+
+    Example: pkmcal demo --seed 7 --out my-demo
+    """
+    with progress("demonstration"):
+        result = demonstrate(seed)
+        files = result.write(folder(out))
+    if json:
+        typer.echo(as_json(result))
+    else:
+        listed = [[str(path), what] for path, what in files.items()]
+        typer.echo(f"{result}\n\n{display.Table(['file', 'content'], listed, left=2)}")
+    return 0 if result.trusted else 1
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Demonstration(Result):
+    """Result of `demonstrate`; poses are x y z in mm and alpha beta gamma in rad.
 
     Attributes
     ----------
@@ -43,11 +76,11 @@ class Demonstration:
     true_robot : Robot
         The machine with its errors, which the identification does not know.
     measured : Measurements
-        What the tracker read.
+        Measurements by the tracker.
     checked : Measurements
-        What it reads at `poses`, which are held out.
+        The same at `poses`, which are held out.
     identification : Identification
-        What was found from it.
+        The result of the identification.
     poses : ndarray (M, 6)
         Where the machine was to go; none of these was measured.
     ideal, corrected : ndarray (M, n)
@@ -76,36 +109,41 @@ class Demonstration:
 
     @property
     def trusted(self) -> bool:
-        """Whether it went as it should."""
+        """Whether the calibration converged as expected."""
         found = self.identification
-        return found.converged and not found.warnings and _rms(self.after) < 2 * self.expected
+        return found.converged and not found.warnings and rms(self.after) < 2 * self.expected
 
-    def __str__(self) -> str:
+    def _parts(self) -> Iterator[str | display.Table]:
         found = self.identification
-        gone = 100 * (1 - self.after.mean() / self.before.mean())
-        rows = [
-            [name, *(f"{value:.3f}" for value in (error.mean(), _rms(error), error.max()))]
-            for name, error in (("before", self.before), ("after", self.after))
-        ]
-        tilts = (f"{np.degrees(_rms(tilt)):.2f}" for tilt in (self.tilt_before, self.tilt_after))
-        return "\n".join([
+        yield "\n".join([
             f"{self.true_robot.name} with {len(found.free)} unknown errors of its geometry,"
             f" sigma {SIGMA} mm (simulated, seed {self.seed})",
             f"measured    {len(self.measured)} tilted poses within the strokes, by a tracker good"
             f" to {NOISE} mm a coordinate",
-            f"identified  misfit {found.rms_before:.3f} -> {found.rms:.3f} mm rms; positions tell"
-            f" {found.rank} of {len(found.free)} combinations of errors",
+            f"identified  misfit {found.rms_before:.3f} -> {found.rms:.3f} mm rms; rank"
+            f" {found.rank} of {len(found.free)} parameters",
             f"commanded   {len(self.poses)} other poses, by leg lengths of the identified geometry",
             "",
             "distance from the commanded position at these other poses",
-            str(display.Table(["[mm]", "mean", "rms", "largest"], rows, left=1)),
-            f"{gone:.1f} % of the error is gone. Expected: rms {self.expected:.3f} mm; the noise of"
-            f" one measured point is {NOISE * np.sqrt(3):.3f} mm.",
-            f"Tilt error {' -> '.join(tilts)} deg rms: one point cannot tell it, two can.",
         ])  # fmt: skip
+        rows = [
+            [name, *(f"{value:.3f}" for value in (error.mean(), rms(error), error.max()))]
+            for name, error in (("before", self.before), ("after", self.after))
+        ]
+        yield display.Table(["[mm]", "mean", "rms", "largest"], rows, left=1)
+        gone = 100 * (1 - self.after.mean() / self.before.mean())
+        yield (
+            f"The mean falls by {gone:.1f} %. Expected: rms {self.expected:.3f} mm; the noise of"
+            f" one measured point is {NOISE * np.sqrt(3):.3f} mm."
+        )
+        tilts = (f"{np.degrees(rms(tilt)):.2f}" for tilt in (self.tilt_before, self.tilt_after))
+        yield (
+            f"Orientation error {' -> '.join(tilts)} deg rms: positions of one point do not"
+            " determine it, those of two do."
+        )
 
     def write(self, folder: Path) -> dict[Path, str]:
-        """Write what was measured and found to a folder that is there; each file whole.
+        """Write measurements and results to an existing folder.
 
         Returns
         -------
@@ -114,8 +152,8 @@ class Demonstration:
         """
         figure = _figure(self)
         files = {
-            folder / "measured.csv": "what the tracker read",
-            folder / "checked.csv": f"what it read at the {len(self.poses)} other poses",
+            folder / "measured.csv": "measurements by the tracker",
+            folder / "checked.csv": f"the same at the {len(self.poses)} other poses",
             folder / "corrected.csv": "corrected leg lengths for these poses",
             folder / "error.png": "the error of each pose before and after",
             folder / "robot.toml": "the calibrated machine",
@@ -181,7 +219,7 @@ def demonstrate(seed: int = 1) -> Demonstration:
         after=after,
         tilt_before=tilt_before,
         tilt_after=tilt_after,
-        expected=_rms(found.accuracy(poses)),
+        expected=rms(found.accuracy(poses)),
     )
 
 
@@ -195,10 +233,6 @@ def _poses(random: np.random.Generator, robot: Robot, count: int) -> FloatArray:
     reached = ((q > shortest + _MARGIN) & (q < longest - _MARGIN)).all(axis=1)
     kept: FloatArray = poses[reached][:count]
     return kept
-
-
-def _rms(error: FloatArray) -> float:
-    return float(np.sqrt((error**2).mean()))
 
 
 def _commands(result: Demonstration) -> str:
@@ -218,17 +252,16 @@ def _commands(result: Demonstration) -> str:
     return text.getvalue()
 
 
+@in_context
 def _figure(result: Demonstration) -> bytes:
-    """The error of each pose before and after, as PNG."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.5, 4.0), layout="constrained")
+    """Draw the error of each pose before and after, as PNG."""
+    figure = empty_figure(7.5, 4.0)
     axes = figure.subplots()
     number = np.arange(1, len(result.poses) + 1)
-    axes.semilogy(number, result.before, "o", ms=4, color="#d55e00", label="before")
-    axes.semilogy(number, result.after, "o", ms=4, color="#0072b2", label="after")
+    axes.semilogy(number, result.before, "o", ms=4, color=ORANGE, label="before")
+    axes.semilogy(number, result.after, "o", ms=4, color=BLUE, label="after")
     noise = NOISE * np.sqrt(3)
-    axes.axhline(noise, color="0.35", lw=1, ls="--", label="noise of one measured point")
+    axes.axhline(noise, color=FAINT, lw=1, ls="--", label="noise of one measured point")
     axes.set(
         title=f"{result.true_robot.name}: error at poses that were not measured",
         xlabel="pose",
@@ -236,9 +269,6 @@ def _figure(result: Demonstration) -> bytes:
         xlim=(0, len(number) + 1),
     )
     axes.yaxis.set_major_formatter("{x:g}")
-    axes.grid(axis="y", color="0.85")
-    axes.set_axisbelow(True)
-    figure.legend(loc="outside lower center", ncols=3, frameon=False)
-    picture = io.BytesIO()
-    figure.savefig(picture, format="png", dpi=110, metadata={"Software": None})
-    return picture.getvalue()
+    axes.grid(axis="y")
+    figure.legend(loc="outside lower center", ncols=3)
+    return encoded(figure, "png")

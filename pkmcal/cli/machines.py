@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Annotated
 
 import typer
 
 from pkmcal import display, loading
 from pkmcal.arms.arm import SerialArm
+from pkmcal.cli.options import Json
 from pkmcal.core.library import POSE
 from pkmcal.measurements.calibratable import ArmMachine
 from pkmcal.report.as_json import as_json
 
 
-def machines(
-    json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
-) -> int:
+def machines(json: Json = False) -> int:
     """List the built-in machines.
 
     Their names stand wherever a command takes a robot file.

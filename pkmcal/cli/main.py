@@ -15,8 +15,9 @@ from typer.core import TyperGroup
 from pkmcal.cli.calibrate import calibrate
 from pkmcal.cli.check import check
 from pkmcal.cli.compensate import compensate
-from pkmcal.cli.demo import demo
-from pkmcal.cli.kinematics import forward, inverse
+from pkmcal.cli.demonstration import demo
+from pkmcal.cli.forward import forward
+from pkmcal.cli.inverse import inverse
 from pkmcal.cli.machines import machines
 from pkmcal.cli.new import new
 from pkmcal.cli.plan import plan

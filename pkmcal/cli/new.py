@@ -1,39 +1,131 @@
-"""`pkmcal new`."""
+"""`pkmcal new`: a built-in machine as a robot file to start from, every key explained."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from pkmcal.cli.robot_argument import MACHINE
-from pkmcal.cli.robot_template import template
+from pkmcal.arguments import did_you_mean
+from pkmcal.arms.arm_file import is_arm
+from pkmcal.cli.options import BuiltIn, Json
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
+from pkmcal.files.toml_lines import Source
+from pkmcal.geometry import robot_file
+from pkmcal.geometry.limb_kinds import ALIASES, KINDS
 from pkmcal.report.as_json import as_json
+
+_HEAD = """\
+# Made by `pkmcal new {name}`. Change what differs on your machine, measure it, run
+#     pkmcal calibrate {name}.toml measured.csv --report report
+#
+"""
+_PARALLEL = """\
+# units         of every number below; mm, m or in; deg or rad
+# [pose]        map: the coordinates it moves in; home: a pose in the middle of the workspace
+# [parameters]  names for numbers that limbs share: `radius = 160.0` here, "radius" there
+# [calibration] free: what is found unless --free says otherwise; wildcards are allowed
+# [frames]      base, tool: poses of the machine's frames in yours, if they differ
+# [stated]      what a data sheet claims, to compare: `rod = 340.0`
+# [[limb]]      one for each, counted from 1 in the names of its numbers (base1.x, offset1 …)
+"""
+_KEYS = {
+    "kind": "{kinds}",
+    "actuator": "which q drives it, if not its own: several limbs may name one",
+    "base": "its joint on the base: [x, y, z], or {{ radius = …, angle = …, z = … }}",
+    "platform": "its joint on the platform, in the platform's frame",
+    "slider": "direction of the carriage's travel, of any length",
+    "normal": "of the plane that the limb stays in",
+    "revolute": "axis of its joint on the platform, in the platform's frame",
+    "universal": "first axis of its joint on the base, with couple",
+    "couple": "a length: makes its second constraint count too",
+    "weights": "of its constraints beside the length",
+    "axis": "of the crank, at base",
+    "zero": "where the crank points at 0",
+    "crank": "length of the crank",
+    "rod": "length from carriage or crank to the platform joint",
+    "offset, gain": "the drive is at gain · q + offset; 0 and 1 if left out",
+    "branch": "which of the two places that a rod can lead to: 1 or -1",
+    "stroke": "least and most of gain · q + offset",
+    "base_cone": "{{ axis = …, angle = … }}: how far its joint on the base swings",
+    "platform_cone": "the same of its joint on the platform",
+}
+_KINDS = {
+    "UPS": "a leg of variable length",
+    "UPR": "a leg of variable length that keeps to a plane of the platform",
+    "RPS": "a leg of variable length that keeps to a plane of the base",
+    "PUS": "a carriage and a rod",
+    "RUS": "a crank and a rod",
+}
+_ARM = """\
+# units      of every number below; mm, m or in; deg or rad
+# [tool]     home: pose of the tool with all joints at zero
+# [[joint]]  one for each, from the base: kind, axis and a point on it with all joints at zero;
+#            error (optional): dx dy dz dphi dtheta dpsi, what a calibration finds
+"""
 
 
 def new(
-    machine: Annotated[str, MACHINE],
+    machine: BuiltIn,
     file: Annotated[
         Path | None, typer.Argument(metavar="FILE", help="MACHINE.toml by default.")
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+    json: Json = False,
 ) -> int:
-    """Write a robot file to start from, with words on every key.
+    """Write a robot file to start from, with every key explained.
 
-    A file that is there already is left alone, and refused.
+    An existing file is never overwritten.
 
     Example: pkmcal new linear-delta my-printer.toml
     """
     text = template(machine)
     path = Path(f"{machine}.toml") if file is None else file
     if path.exists():
-        raise ArgumentError(f"{path}: is there already; take another name")
+        raise ArgumentError(f"{path} exists already; name another file")
     write_whole(path, text)
     if json:
         typer.echo(as_json({"machine": machine, "file": str(path)}))
     else:
         typer.echo(f"{path}: {machine}; change what differs on your machine")
     return 0
+
+
+def template(machine: str) -> str:
+    """The text of a robot file that loads as the built-in machine.
+
+    Parameters
+    ----------
+    machine : str
+        A name of `pkmcal.machines`.
+
+    Raises
+    ------
+    ValueError
+        No such machine.
+
+    Examples
+    --------
+    >>> print(template("hexapod").splitlines()[0])
+    # Made by `pkmcal new hexapod`. Change what differs on your machine, measure it, run
+    """
+    known = [*robot_file.builtin_names(), *robot_file.builtin_names("arms")]
+    if machine not in known:
+        raise ArgumentError(f"unknown machine {machine!r}{did_you_mean(machine, known)}")
+    content, place, _ = robot_file.located(machine)
+    text, data = content.decode(), Source(content, place).data
+    keys = _ARM if is_arm(data) else _PARALLEL + "".join(_limb_keys(data["limb"]))
+    return f"{_HEAD.format(name=machine)}{keys}#\n{text}"
+
+
+def _limb_keys(limbs: Iterable[dict[str, object]]) -> Iterable[str]:
+    """A line for each key that limbs of these kinds may have."""
+    named = dict.fromkeys(str(limb["kind"]) for limb in limbs)
+    kinds = {kind: ALIASES.get(kind, kind) for kind in named}
+    used = {key for kind in kinds.values() for key in KINDS[kind].keys()}  # noqa: SIM118
+    explained = ("\n#" + 18 * " ").join(f"{name}: {_KINDS[kind]}" for name, kind in kinds.items())
+    for names, words in _KEYS.items():
+        if names.split(",")[0] in used:
+            yield f"#   {names:13}  {words.format(kinds=explained)}\n"

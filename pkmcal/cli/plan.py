@@ -13,10 +13,10 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.optimal_design import CRITERIA
 from pkmcal.calibration.plan_poses import UNKNOWN, Plan, plan_poses
-from pkmcal.cli.calibrate import free_names, read_deviations
-from pkmcal.cli.output import folder
+from pkmcal.cli.geometry_options import free_names, read_deviations
+from pkmcal.cli.options import Free, Json, Prior, RobotOrArm, Seed
+from pkmcal.cli.output import contents, folder
 from pkmcal.cli.progress import progress
-from pkmcal.cli.robot_argument import ROBOT_OR_ARM, contents
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.provenance import comment
 from pkmcal.kinematics.robot import Robot
@@ -32,13 +32,13 @@ _DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out th
 
 
 def plan(
-    robot: Annotated[str, ROBOT_OR_ARM],
+    robot: RobotOrArm,
     count: Annotated[
         int | None, typer.Option(metavar="N", help="How many poses; 30 by default.")
     ] = None,
     accuracy: Annotated[
         float | None,
-        typer.Option(metavar="MM", help="Instead: as few as will do for this predicted error."),
+        typer.Option(metavar="MM", help="Instead: as few as reach this predicted error."),
     ] = None,
     poses: Annotated[
         Path | None,
@@ -50,10 +50,10 @@ def plan(
     ] = None,
     targets: Annotated[
         Path | None,
-        typer.Option(metavar="CSV", help="Where it is to be accurate; by default the candidates."),
+        typer.Option(metavar="CSV", help="Poses where accuracy counts; by default the candidates."),
     ] = None,
     criterion: Annotated[
-        str, typer.Option(metavar="WORD", help="prediction, D or A: what is made least.")
+        str, typer.Option(metavar="WORD", help="prediction, D or A: what is minimised.")
     ] = "prediction",
     kind: Annotated[
         str, typer.Option(metavar="KIND", help="What is measured: position, pose or height.")
@@ -61,29 +61,23 @@ def plan(
     noise: Annotated[
         float, typer.Option(metavar="MM", help="Of the instrument, one standard deviation.")
     ] = 0.02,
-    free: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME", help="What will be identified, as for calibrate."),
-    ] = None,
-    prior: Annotated[
-        list[str] | None,
-        typer.Option(metavar="[NAME=]σ", help="How far numbers may be off, as for calibrate."),
-    ] = None,
+    free: Free = None,
+    prior: Prior = None,
     unknown: Annotated[
         list[str] | None,
-        typer.Option(metavar="WORD", help="frame or target: what is not known of the instrument."),
+        typer.Option(metavar="WORD", help="frame or target: identified too, as for calibrate."),
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the candidates drawn.")] = 0,
+    seed: Seed = 0,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Write poses.csv and commands.csv, the actuators."),
     ] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
+    json: Json = False,
 ) -> int:
     """Choose the poses to measure for a calibration.
 
     To commands.csv add columns of what was measured there, and give it to calibrate.
-    Exit code 1: these poses are too few to tell all parameters.
+    Exit code 1: these poses do not identify all parameters.
 
     Example: pkmcal plan hexapod --kind pose --count 20 --out plan
     """

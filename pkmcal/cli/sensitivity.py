@@ -10,21 +10,20 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from pkmcal.cli.output import folder
+import pkmcal as pk
+from pkmcal.cli.options import Json, ParallelRobot, Poses, Seed
+from pkmcal.cli.output import contents, folder
 from pkmcal.cli.progress import progress
-from pkmcal.cli.robot_argument import ROBOT, contents
 from pkmcal.core.library import POSE
-from pkmcal.error_model.sensitivity import STUDIES, Sensitivity, study_cases
-from pkmcal.error_model.sensitivity import sensitivity as errors_of
+from pkmcal.error_model.sensitivity import STUDIES, Sensitivity, Study, study_cases
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import comment
-from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load_parallel
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
 
-_TITLES = {
+_TITLES: dict[Study, str] = {
     "limb1": "one number of limb 1 in error",
     "offsets": "one zero length in error",
     "all-limbs": "the same error on all limbs",
@@ -32,25 +31,18 @@ _TITLES = {
 
 
 def sensitivity(
-    robot: Annotated[str, ROBOT],
-    poses: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="CSV",
-            help="Poses, with columns such as 'y \\[mm]' and 'alpha \\[deg]'; by default 30"
-            " are drawn in the workspace.",
-        ),
-    ] = None,
+    robot: ParallelRobot,
+    poses: Poses = None,
     step: Annotated[
-        float, typer.Option(metavar="MM", help="The error; angles get so many mrad.")
+        float, typer.Option(metavar="MM", help="The error in mm; of angles in mrad.")
     ] = 1.0,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of the poses drawn.")] = 0,
+    seed: Seed = 0,
     out: Annotated[Path, typer.Option(metavar="DIR", help="Where the files go.")] = Path(
         "pkmcal-sensitivity"
     ),
-    json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
+    json: Json = False,
 ) -> int:
-    """Show what an error of each number of the geometry does to the pose.
+    """Show the pose error that an error of each number of the geometry causes.
 
     Three studies: the numbers of limb 1 one by one, the zero lengths, and each kind of number on
     all limbs together; of each a figure pose by pose and one of the means. Every error is solved
@@ -59,9 +51,9 @@ def sensitivity(
     Example: pkmcal sensitivity 2tpr2tps --out errors
     """
     machine = load_parallel(robot)
-    at = sample_poses(machine, seed=seed) if poses is None else read_poses(poses, machine)
+    at = pk.sample_poses(machine, seed=seed) if poses is None else read_poses(poses, machine)
     found = {
-        name: errors_of(machine, at, step, cases)
+        name: pk.sensitivity(machine, at, step, cases=cases)
         for name in STUDIES
         if (cases := study_cases(machine, name))
     }
@@ -83,9 +75,10 @@ def _as_mapping(found: Sensitivity) -> dict[str, object]:
     return {name: getattr(found, name) for name in names}
 
 
-def _write(found: dict[str, Sensitivity], out: Path, head: str) -> list[Path]:
-    """The table, the poses, and two figures of each study."""
-    from pkmcal.report import error_figures as figures
+def _write(found: dict[Study, Sensitivity], out: Path, head: str) -> list[Path]:
+    """Write the table, the poses, and two figures of each study."""
+    from pkmcal.report.drawing import write_both
+    from pkmcal.report.error_figures import errors_by_pose, mean_errors
 
     first = next(iter(found.values()))
     table, poses = out / "sensitivity.csv", out / "poses.csv"
@@ -96,12 +89,12 @@ def _write(found: dict[str, Sensitivity], out: Path, head: str) -> list[Path]:
         for k, (name, result) in enumerate(found.items()):
             moved(k, len(found))
             title = f"{result.robot.name}: {_TITLES[name]}, {result.step:g} mm"
-            written += figures.save(figures.errors_by_pose(result, title), out / f"{name}-poses")
-            written += figures.save(figures.mean_errors(result, title), out / f"{name}-mean")
+            written += write_both(errors_by_pose(result, title), out / f"{name}-poses")
+            written += write_both(mean_errors(result, title), out / f"{name}-mean")
     return written
 
 
-def _table(found: dict[str, Sensitivity]) -> str:
+def _table(found: dict[Study, Sensitivity]) -> str:
     """Means of all studies as CSV."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

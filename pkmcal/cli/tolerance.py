@@ -9,19 +9,18 @@ from typing import Annotated
 import numpy as np
 import typer
 
+import pkmcal as pk
 from pkmcal.arrays import FloatArray
-from pkmcal.cli.calibrate import read_deviations
-from pkmcal.cli.output import folder
+from pkmcal.cli.geometry_options import read_deviations
+from pkmcal.cli.options import Json, ParallelRobot, Poses, Seed
+from pkmcal.cli.output import contents, folder
 from pkmcal.cli.progress import progress
-from pkmcal.cli.robot_argument import ROBOT, contents
-from pkmcal.error_model.allocation import allocate_tolerance
 from pkmcal.error_model.sensitivity import own_names
 from pkmcal.error_model.tolerance import Sigma, Tolerance
-from pkmcal.error_model.tolerance import tolerance as spread
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.provenance import comment
 from pkmcal.kinematics.robot import Robot
-from pkmcal.kinematics.workspace import reach, sample_poses, workspace
+from pkmcal.kinematics.workspace import reach
 from pkmcal.loading import load_parallel
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
@@ -31,7 +30,7 @@ _MACHINES = 2_000  # of a map: its colours are good to 3 %
 
 
 def tolerance(
-    robot: Annotated[str, ROBOT],
+    robot: ParallelRobot,
     sigma: Annotated[
         list[str] | None,
         typer.Option(
@@ -48,26 +47,19 @@ def tolerance(
             " machines are within this distance?",
         ),
     ] = None,
-    poses: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="CSV",
-            help="Poses, with columns such as 'y \\[mm]' and 'alpha \\[deg]'; by default 30"
-            " are drawn in the workspace.",
-        ),
-    ] = None,
+    poses: Poses = None,
     samples: Annotated[
         int, typer.Option(metavar="N", min=2, help="How many machines are drawn.")
     ] = 100_000,
-    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Of machines and poses.")] = 0,
+    seed: Seed = 0,
     map: Annotated[
         str | None,
         typer.Option(metavar="A,B", help="Draw a map over two coordinates: 'y,z'. With --sigma."),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where files go.")] = None,
-    json: Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")] = False,
+    json: Json = False,
 ) -> int:
-    """Draw machines with random errors of their geometry and see how far off they are.
+    """Predict the pose error of machines whose geometry has random errors.
 
     Machines are solved exactly; beside them the linear propagation and the worst case. Exit code 1:
     some machines have no pose.
@@ -79,27 +71,35 @@ def tolerance(
     if map is not None and (out is None or allowed is not None):
         raise ArgumentError("--map is drawn for --sigma, into the folder of --out")
     machine = load_parallel(robot)
-    at = sample_poses(machine, seed=seed) if poses is None else read_poses(poses, machine)
+    at = pk.sample_poses(machine, seed=seed) if poses is None else read_poses(poses, machine)
     with ThreadPoolExecutor() as executor:
         if allowed is not None:
             with progress("tolerances"):
-                shared = allocate_tolerance(
+                shared = pk.allocate_tolerance(
                     machine, at, allowed, samples=samples, seed=seed, executor=executor
                 )
-            found, told = shared.check, as_json(shared) if json else str(shared)
+            found, text = shared.check, as_json(shared) if json else str(shared)
         else:
             deviations = read_deviations("--sigma", sigma or [], machine, own_names(machine))
             assert deviations is not None
             with progress("machines x poses") as moved:
-                found = spread(machine, at, deviations, samples, seed, executor, moved)
-            told = as_json(found, "position_share") if json else str(found)
+                found = pk.tolerance(
+                    machine,
+                    at,
+                    deviations,
+                    samples=samples,
+                    seed=seed,
+                    executor=executor,
+                    progress=moved,
+                )
+            text = as_json(found, "position_share") if json else str(found)
             if map is not None and out is not None:
                 _draw_map(machine, map, deviations, seed, executor, folder(out))
     if out is not None:
         read = contents(robot, *([] if poses is None else [poses]))
         table = folder(out) / "tolerance.csv"
         write_poses(table, found.poses, _columns(found), comment=comment(read))
-    typer.echo(told)
+    typer.echo(text)
     return 1 if found.failed.any() else 0
 
 
@@ -127,7 +127,8 @@ def _columns(found: Tolerance) -> dict[str, FloatArray]:
 def _draw_map(
     robot: Robot, axes: str, sigma: Sigma, seed: int, executor: ThreadPoolExecutor, out: Path
 ) -> None:
-    from pkmcal.report import error_figures as figures
+    from pkmcal.report.drawing import write_both
+    from pkmcal.report.error_figures import tolerance_map
 
     names = [name.strip() for name in axes.split(",")]
     if len(names) != 2:
@@ -136,7 +137,15 @@ def _draw_map(
     unknown = [name for name in names if name not in ends]
     if unknown:
         raise ArgumentError(f"--map {axes}: {unknown[0]!r} is not one of {', '.join(ends)}")
-    grid = workspace(robot, {name: (*ends[name], _CELLS) for name in names})
+    grid = pk.workspace(robot, {name: (*ends[name], _CELLS) for name in names})
     with progress("map") as moved:
-        found = spread(robot, grid.poses, sigma, _MACHINES, seed, executor, moved)
-    figures.save(figures.tolerance_map(found, grid), out / "map")
+        found = pk.tolerance(
+            robot,
+            grid.poses,
+            sigma,
+            samples=_MACHINES,
+            seed=seed,
+            executor=executor,
+            progress=moved,
+        )
+    write_both(tolerance_map(found, grid), out / "map")

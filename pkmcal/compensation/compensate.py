@@ -1,35 +1,37 @@
-"""Corrections of the actuator commands that bring a machine to the poses asked for (eq. 18)."""
+"""Corrections of the actuator commands that bring a machine to the desired poses (eq. 18)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import display
 from pkmcal.arguments import checked_seed, flag, instance, whole, word
-from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows
+from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows, rms
 from pkmcal.core.swarm import PAPER, SwarmSettings, minimise_eq18
+from pkmcal.display import Table, first_rows, fixed
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.kinematics import Match
 from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.result import Result
 
 Measured = ArrayLike | Callable[[FloatArray], ArrayLike]
 
-METHODS = ("exact", "pso")
-ORIENTATIONS = ("measured", "assumed", "from-position")
+Method = Literal["exact", "pso"]
+Orientation = Literal["measured", "assumed", "from-position"]
 _ASSUMED = {
     "measured": "orientation as measured",
-    "assumed": "orientation assumed as desired: its error stays, and passes for one of position",
+    "assumed": "orientation assumed as desired: its error stays, taken for one of the position",
     "from-position": "beta from the position, the other angles assumed as desired",
 }
 _LISTED = 12  # a longer list of poses is printed with its middle left out
 
 
-@dataclass(frozen=True, eq=False)
-class Compensation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Compensation(Result):
     """Corrected commands. Rows are poses; a row that a limb cannot reach is NaN.
 
     Attributes
@@ -40,17 +42,17 @@ class Compensation:
         ΔL of eq. 18, mm or rad.
     objective : ndarray (N,)
         E of eq. 18 at the correction of the last pass: 0 for the exact method unless one
-        correction serves all poses, and what the swarm left.
+        correction serves all poses, and the remainder of the swarm.
     history : ndarray (N, passes) or (N, passes · (iterations + 1))
-        Exact: E with the correction that was in force at each measurement, which is how far off
-        the actuators' readings were, as the ideal machine sees them. Of a swarm: its lowest E
+        Exact: E with the correction that was in force at each measurement, which is the error of
+        the actuators' readings, as the ideal machine sees them. Of a swarm: its lowest E
         before the first and after every iteration, pass by pass; with one correction for all
         poses, the root mean square of E over them.
     gross : ndarray of bool (N,)
-        The position was off by more than ``robot.length``: no error of a geometry but
-        of units, of the frame of the measurements, or of the order of their rows.
+        The error of the position exceeds ``robot.length``: not one of the geometry but of units,
+        of the frame of the measurements, or of the order of their rows.
     method, orientation : str
-        As asked for.
+        The arguments of these names.
     units : tuple of str, n
         Of the actuators, "mm" or "rad".
     """
@@ -60,46 +62,63 @@ class Compensation:
     objective: FloatArray
     history: FloatArray
     gross: BoolArray
-    method: str
-    orientation: str
+    method: Method
+    orientation: Orientation
     units: tuple[str, ...]
 
-    def __str__(self) -> str:
+    @property
+    def failed(self) -> BoolArray:
+        """Rows without a command (N,): a limb cannot reach the desired or the measured pose."""
+        return np.asarray(np.isnan(self.actuators).any(axis=1))
+
+    def failures(self) -> str:
+        """Say which rows have no command, or an implausible error; empty where there are none."""
+        count, parts = len(self.actuators), []
+        for rows, why in (
+            (self.failed, "have no command, because a limb cannot reach them"),
+            (self.gross, "have implausible errors: check units, frame and order of the rows"),
+        ):
+            if rows.any():
+                parts.append(
+                    f"{rows.sum()} of {count} {why} (rows {first_rows(np.flatnonzero(rows))})"
+                )
+        return "; ".join(parts)
+
+    def _parts(self) -> Iterator[str | Table]:
         count = len(self.actuators)
         title = f"{count} pose{'s' * (count != 1)}"
+        known = self.history[np.isfinite(self.history).all(axis=1)]
+        if not len(known):
+            yield f"{title}; no pose that was both desired and measured is within reach"
+            return
+        each = [rms(column) for column in known.T]
+        unit = " and ".join(sorted(set(self.units)))
+        if self.method == "exact":
+            errors = ", ".join(f"{value:.3g}" for value in each)
+            yield f"{title}; error {errors} {unit} (rms of the actuators, pass by pass)"
+        else:
+            yield f"{title}; swarm from {each[0]:.3g} to {each[-1]:.3g} {unit} (rms of E)"
+        yield _ASSUMED[self.orientation]
         heads = ["row"]
         heads += [f"{q}{i} [{u}]" for q in ("q", "dq") for i, u in enumerate(self.units, 1)]
         rows = [
-            [str(row), *(display.fixed(float(value), 4) for value in (*q, *dq))]
+            [str(row), *(fixed(float(value), 4) for value in (*q, *dq))]
             for row, (q, dq) in enumerate(zip(self.actuators, self.correction, strict=True))
         ]
         if len(rows) > _LISTED:
             rows[_LISTED - 4 : -3] = [["⋮"] * len(heads)]
-        known = self.history[np.isfinite(self.history).all(axis=1)]
-        if not len(known):
-            return f"{title}; no pose that was both asked for and measured is within reach"
-        each = np.sqrt((known**2).mean(axis=0))
-        unit = " and ".join(sorted(set(self.units)))
-        if self.method == "exact":
-            off = ", ".join(f"{value:.3g}" for value in each)
-            story = f"off by {off} {unit} (rms of the actuators, pass by pass)"
-        else:
-            story = f"swarm from {each[0]:.3g} to {each[-1]:.3g} {unit} (rms of E)"
-        lines = [f"{title}; {story}", _ASSUMED[self.orientation], str(display.Table(heads, rows))]
-        if self.gross.any():
-            lines.append(
-                f"{self.gross.sum()} of {count} were off by more than errors of a machine: check"
-                " units, frame and order of the rows"
-            )
-        return "\n".join(lines)
+        yield Table(heads, rows)
+        if self.failures():
+            yield self.failures()
 
 
 def compensate(
     robot: Robot,
     desired: ArrayLike,
     measured: Measured,
-    method: str = "exact",
-    orientation: str = "measured",
+    *,
+    method: Method = "exact",
+    orientation: Orientation = "measured",
     match: Match = None,
     common: bool = False,
     passes: int = 1,
@@ -107,7 +126,7 @@ def compensate(
     bounds: ArrayLike | None = None,
     swarm: SwarmSettings = PAPER,
 ) -> Compensation:
-    """Correct the commands of a machine by where it went.
+    """Correct the commands of a machine by the poses that were measured.
 
     Eq. 18 of the 2TPR&2TPS paper asks for the ΔL that makes E = √Σ(L* - L - ΔL)² least, with L*
     the actuators of the desired pose and L those of the measured one, both through the inverse
@@ -118,7 +137,7 @@ def compensate(
     robot : Robot
         The ideal machine: the one whose inverse kinematics makes the commands.
     desired : array_like (N, 6)
-        Poses asked for, mm and rad.
+        Desired poses, mm and rad.
     measured : array_like (N, 6) or (N, 3), or callable
         Poses or positions that were reached with the ideal commands; or a function that takes
         commands (N, n), has them carried out and returns what was measured.
@@ -144,8 +163,8 @@ def compensate(
         The swarm looks for the correction of a pass between minus and plus this, mm or rad; by
         default twice the largest difference L* - L of any pose.
     swarm : SwarmSettings
-        Size and factors of the swarms; by default the paper's. `pkmcal.core.swarm.CONSTRICTION` are
-        stable ones.
+        Size and factors of the swarms; by default the paper's. `pkmcal.core.swarm.CONSTRICTION`
+        are stable ones.
 
     Returns
     -------
@@ -160,24 +179,24 @@ def compensate(
     Examples
     --------
     >>> import pkmcal as pk
-    >>> from pkmcal.compensate import compensate
     >>> robot = pk.load("hexapod")
     >>> real = robot.replace({"offset1": 0.2})
-    >>> found = compensate(
+    >>> found = pk.compensate(
     ...     robot, [[0, 0, 850, 0, 0, 0]], lambda q: real.forward(q).pose, passes=3
     ... )
     >>> found.correction.round(6) + 0.0
     array([[-0.2,  0. ,  0. ,  0. ,  0. ,  0. ]])
     """
     require_parallel(robot)
-    word("method", method, METHODS)
-    word("orientation", orientation, ORIENTATIONS)
+    word("method", method, get_args(Method))
+    word("orientation", orientation, get_args(Orientation))
     flag("common", common)
     instance("swarm", swarm, SwarmSettings)
     if orientation == "from-position" and robot.model.map != "2tpr2tps":
         raise ArgumentError(
-            "orientation='from-position' is for machines whose position tells their orientation,"
-            f" those of the pose map 2tpr2tps; {robot.name} has the map {robot.model.map}"
+            "orientation='from-position' is for machines whose position determines their"
+            f" orientation, those of the pose map 2tpr2tps; {robot.name} has the map"
+            f" {robot.model.map}"
         )
     if whole("passes", passes, 1) > 1 and not callable(measured):
         raise ArgumentError("passes: more than one needs measured to be a function of the commands")
@@ -250,7 +269,7 @@ def _by_swarm(
     )
 
 
-def _pose_of(reached: ArrayLike, desired: FloatArray, orientation: str) -> FloatArray:
+def _pose_of(reached: ArrayLike, desired: FloatArray, orientation: Orientation) -> FloatArray:
     """The measured poses, their orientation from where `orientation` says."""
     given = as_numbers("measured", reached, 6)
     width = given.shape[-1] if given.ndim else 0
@@ -258,7 +277,7 @@ def _pose_of(reached: ArrayLike, desired: FloatArray, orientation: str) -> Float
         rows, shape = as_rows("measured", given, 3)
     elif width == 3:
         raise ArgumentError(
-            "measured: positions do not tell the orientation; give poses (N, 6), or"
+            "measured: positions do not determine the orientation; give poses (N, 6), or"
             " orientation='assumed'"
         )
     else:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from os import PathLike
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import display
 from pkmcal.arguments import word
-from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.arrays import BoolArray, FloatArray, as_rows, rms
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.files.atomic import write_whole
@@ -22,12 +22,15 @@ from pkmcal.kinematics.kinematics import Match
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.kinematics.workspace import require_moved
+from pkmcal.result import Result
 
-METHODS = {"linear": 2, "cubic": 4}  # nodes an axis needs
+Interpolation = Literal["linear", "cubic"]
+
+METHODS: dict[Interpolation, int] = {"linear": 2, "cubic": 4}  # nodes an axis needs
 
 
-@dataclass(frozen=True, eq=False)
-class CorrectionGrid:
+@dataclass(frozen=True, eq=False, repr=False)
+class CorrectionGrid(Result):
     """Corrections of the actuator commands at the nodes of a grid of poses.
 
     Attributes
@@ -48,7 +51,7 @@ class CorrectionGrid:
         nodes: at the middles of all edges, faces and cells. At one of them it is largest where
         the correction bends evenly.
     position_error, position_error_rms : float
-        How far, mm, the machine is off at these places by interpolation alone.
+        Error of the position there, mm, by interpolation alone: largest and root mean square.
     checked, reached : int
         How many such places there are, and at how many the correction is known.
     actuator_units : tuple of str
@@ -59,7 +62,7 @@ class CorrectionGrid:
     axes: tuple[FloatArray, ...]
     origin: FloatArray
     corrections: FloatArray
-    method: str
+    method: Interpolation
     error: FloatArray
     position_error: float
     position_error_rms: float
@@ -112,30 +115,43 @@ class CorrectionGrid:
             writer.writerow([*(f"{v:.9g}" for v in shown), *(display.fixed(v, 6) for v in dq)])
         write_whole(path, text.getvalue())
 
-    def __str__(self) -> str:
+    @property
+    def failed(self) -> BoolArray:
+        """Nodes without a correction (*nodes,): a limb of one machine cannot reach them."""
+        return np.asarray(np.isnan(self.corrections).any(axis=-1))
+
+    def failures(self) -> str:
+        """Say how many nodes have no correction; empty where all have one."""
+        failed = int(self.failed.sum())
+        return f"{failed} of {self.failed.size} nodes have no correction" if failed else ""
+
+    def _parts(self) -> Iterator[str | display.Table]:
         spans = ", ".join(
-            f"{name} {len(nodes)} nodes" for name, nodes in zip(self.coordinates, self.axes,
-                                                                strict=True)
-        )  # fmt: skip
+            f"{name} {len(nodes)} nodes"
+            for name, nodes in zip(self.coordinates, self.axes, strict=True)
+        )
         held = ", ".join(
             f"{name} {display.displayed(float(value), 'rad' if k >= 3 else 'mm')[0]:.6g}"
             for k, (name, value) in enumerate(zip(POSE, self.origin, strict=True))
             if name not in self.coordinates
         )
         worst = ", ".join(f"{value:.2g}" for value in self.error)
-        return "\n".join([
-            f"corrections over {spans}; other coordinates {held or 'none'} (mm, deg)",
+        yield f"corrections over {spans}; other coordinates {held or 'none'} (mm, deg)"
+        yield (
             f"interpolation ({self.method}) half-way between nodes, at {self.reached} of"
-            f" {self.checked} places: position off by {self.position_error:.2g} mm at most,"
-            f" {self.position_error_rms:.2g} mm rms; actuators by {worst} at most",
-        ])  # fmt: skip
+            f" {self.checked} places: error of the position {self.position_error:.2g} mm at most,"
+            f" {self.position_error_rms:.2g} mm rms; of the actuators {worst} at most"
+        )
+        if self.failures():
+            yield self.failures()
 
 
 def correction_grid(
     robot: Robot,
     calibrated: Robot,
     axes: Mapping[str, ArrayLike],
-    method: str = "linear",
+    *,
+    method: Interpolation = "linear",
     origin: ArrayLike | None = None,
     match: Match = None,
 ) -> CorrectionGrid:
@@ -211,7 +227,7 @@ def correction_grid(
     known = np.asarray(np.isfinite(found - exact).all(axis=1))
     if not known.any():
         raise ArgumentError("axes: the machines cannot take the poses half-way between the nodes")
-    off = np.abs(found - exact)[known]
+    errors = np.abs(found - exact)[known]
     reached, aimed = (
         calibrated.forward(commands[known] + dq[known], guess=poses[known]).pose
         for dq in (found, exact)
@@ -223,16 +239,16 @@ def correction_grid(
         origin=base[0],
         corrections=corrections,
         method=method,
-        error=off.max(axis=0),
+        error=errors.max(axis=0),
         position_error=float(missed.max()),
-        position_error_rms=float(np.sqrt((missed**2).mean())),
+        position_error_rms=rms(missed),
         checked=len(known),
         reached=int(known.sum()),
         actuator_units=tuple(robot.actuator_units),
     )
 
 
-def _interpolator(axes: tuple[FloatArray, ...], values: FloatArray, method: str) -> Any:
+def _interpolator(axes: tuple[FloatArray, ...], values: FloatArray, method: Interpolation) -> Any:
     from scipy.interpolate import RegularGridInterpolator
 
     interpolator: Any = RegularGridInterpolator

@@ -1,8 +1,12 @@
-"""Minimisation by a particle swarm (eq. 19 of the 2TPR&2TPS paper), for any objective."""
+"""Minimisation by a particle swarm (eq. 19 of the 2TPR&2TPS paper), for any objective.
+
+Own code, because one swarm in C serves this function and `compensate`: the published iteration, and
+the same bits on every processor for one seed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,15 +15,17 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import checked_seed, function, number, whole
 from pkmcal.arrays import FloatArray, as_numbers
 from pkmcal.core.swarm import Swarm, SwarmSettings
+from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.result import Result
 
 _WIDEST = 1e150  # of a bound, so that no step of the swarm overflows
 
 Objective = Callable[[FloatArray], ArrayLike]
 
 
-@dataclass(frozen=True, eq=False)
-class SwarmResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class SwarmResult(Result):
     """The best that a swarm found.
 
     Attributes
@@ -42,10 +48,10 @@ class SwarmResult:
     evaluations: int
     stagnated: bool
 
-    def __str__(self) -> str:
+    def _parts(self) -> Iterator[str | Table]:
         position = ", ".join(f"{x:.6g}" for x in self.position)
         why = ", then stagnation" if self.stagnated else ""
-        return (
+        yield (
             f"{self.value:.6g} at ({position}) after {len(self.history) - 1} iterations"
             f" ({self.evaluations} evaluations){why}"
         )
@@ -55,6 +61,7 @@ def pso(
     objective: Objective,
     lower: ArrayLike,
     upper: ArrayLike,
+    *,
     particles: int = 100,
     iterations: int = 200,
     inertia: float = 0.8,
@@ -87,8 +94,8 @@ def pso(
     seed : int
         From 0 to 2⁶⁴ - 1.
     patience : int, optional
-        Stop after so many iterations in which the lowest value fell by no more than `tolerance`
-        in all.
+        Stop after this number of iterations in which the lowest value fell by no more than
+        `tolerance` in all.
     tolerance : float
         See `patience`.
     progress : callable, optional

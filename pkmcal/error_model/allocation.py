@@ -1,23 +1,29 @@
-"""Which tolerance each joint may have, so that the pose error stays below what is allowed."""
+"""Tolerance of each joint that keeps the pose error below a limit.
+
+SciPy's SLSQP finds the shares of least cost; around it stands own code that hands over only those
+limits that some trial broke, since there is one for each pose, and that scales the shares until the
+exact machines keep them.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import display
 from pkmcal.arguments import did_you_mean, number, words
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import POSE
+from pkmcal.display import Table, displayed
 from pkmcal.error_model.tolerance import Tolerance, tolerance
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.result import Result
 
 DISTANCE = "distance"
 _SLACK = 1e-6  # of a limit, by which shares may overdraw it before they are scaled to it
@@ -26,8 +32,8 @@ _JOINT = re.compile(r"([a-z_]+[0-9]+)\.[xyz]")  # base1.x belongs to base1.*
 Allowed = float | Mapping[str, float]
 
 
-@dataclass(frozen=True, eq=False)
-class Allocation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Allocation(Result):
     """Tolerances by joint, and what they lead to.
 
     Attributes
@@ -59,34 +65,31 @@ class Allocation:
     contribution: FloatArray
     check: Tolerance
 
-    def __str__(self) -> str:
+    def _parts(self) -> Iterator[str | Table]:
         geometry = self.check.robot.geometry
+        how = "equal contributions" if self.cost is None else "least cost"
+        yield f"{self.check.robot.name}: tolerances by {how}, {self.check.poses.size // 6} poses"
         rows = []
         for joint, sigma, share in zip(self.joints, self.sigma, self.contribution, strict=True):
             first = geometry.names.index(geometry.match(joint)[0])
-            value, unit = display.displayed(float(sigma), geometry.units[first])
+            value, unit = displayed(float(sigma), geometry.units[first])
             rows.append([f"{joint} [{unit}]", f"{value:.4g}", f"{share:.1f}"])
-        how = "equal contributions" if self.cost is None else "least cost"
-        lines = [
-            f"{self.check.robot.name}: tolerances by {how}, {self.check.poses.size // 6} poses",
-            str(display.Table(["joint", "sigma", "share [%]"], rows, left=1)),
-            "",
-        ]
+        yield Table(["joint", "sigma", "share [%]"], rows, left=1)
         for name, limit in self.allowed.items():
             quantity = "rad" if name in POSE[3:] else "mm"
-            most, shown = display.displayed(limit, quantity)
-            reached, _ = display.displayed(self.reached[name], quantity)
-            lines.append(
+            most, shown = displayed(limit, quantity)
+            reached, _ = displayed(self.reached[name], quantity)
+            yield (
                 f"{name}: {most:.4g} {shown} allowed; 99.7 % of {self.check.samples} machines stay"
                 f" within {reached:.4g} {shown} at the worst pose"
             )
-        return "\n".join(lines)
 
 
 def allocate_tolerance(
     robot: Robot,
     poses: ArrayLike,
     allowed: Allowed,
+    *,
     joints: str | Sequence[str] | None = None,
     cost: float | Mapping[str, float] | None = None,
     samples: int = 100_000,
@@ -135,7 +138,9 @@ def allocate_tolerance(
     --------
     >>> import pkmcal as pk
     >>> robot = pk.load("2tpr2tps")
-    >>> found = pk.allocate_tolerance(robot, robot.home, 0.5, ["base*", "platform*", "offset*"])
+    >>> found = pk.allocate_tolerance(
+    ...     robot, robot.home, 0.5, joints=["base*", "platform*", "offset*"]
+    ... )
     >>> found.contribution.round(1)
     array([33.3, 33.3, 33.3])
     """
@@ -247,10 +252,10 @@ def _simulate(
     deviations = np.zeros(len(robot.geometry))
     for places, each in zip(groups.values(), sigma, strict=True):
         deviations[places] = each if np.isfinite(each) else 0.0
-    found = tolerance(robot, poses, deviations, samples, seed, executor)
-    if lost := int(found.failed.max()):
+    found = tolerance(robot, poses, deviations, samples=samples, seed=seed, executor=executor)
+    if unsolved := int(found.failed.max()):
         raise ArgumentError(
-            f"allowed: errors that use it up leave {lost} of {samples} machines without a pose;"
+            f"allowed: errors that use it up leave {unsolved} of {samples} machines without a pose;"
             " allow less"
         )
     return found

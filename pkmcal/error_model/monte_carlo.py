@@ -1,7 +1,8 @@
 """Many machines with random errors, solved exactly, in chunks of a fixed size.
 
-Each chunk has a seed of its own and is combined in its place, so that the numbers depend neither on
-how many workers there are nor on which is first.
+Own code, because memory must not grow with the number of machines and the result must be the same
+bits with any executor. Each chunk has a seed of its own and is combined in its place, so that the
+numbers depend neither on how many workers there are nor on which is first.
 """
 
 from __future__ import annotations
@@ -14,8 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pkmcal.arguments import executor as checked_executor
-from pkmcal.arguments import function
+from pkmcal import arguments
 from pkmcal.arrays import FloatArray
 from pkmcal.core.random import Normals
 from pkmcal.core.statistics import Bins, Stream
@@ -26,7 +26,7 @@ from pkmcal.kinematics.robot import Robot
 CHUNK = 16_384  # machines that share a seed
 BATCH = 2_048  # of these solved at a time: what fits the cache
 POSES = 16  # solved by one task
-PILOT = 1_024  # machines that tell how wide the bins must be; one batch
+PILOT = 1_024  # machines that determine how wide the bins must be; one batch
 AHEAD = 32  # tasks that are handed to an executor before the first of them is looked at
 
 QUANTITIES = ("x", "y", "z", "alpha", "beta", "gamma", "distance")
@@ -35,7 +35,7 @@ Progress = Callable[[int, int], object]
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """One task: so many machines at some poses.
+    """One task: a number of machines at some poses.
 
     Attributes
     ----------
@@ -107,9 +107,9 @@ def simulate(
     Stream
         Of `QUANTITIES`, for each pose; the same bits with any executor.
     """
-    workers = checked_executor(executor)
+    workers = arguments.executor(executor)
     if progress is not None:
-        function("progress", progress)
+        arguments.function("progress", progress)
     chunks = -(-draw.count // CHUNK)
     pilot_seed, *seeds = draw.seed.spawn(chunks + 1)
     sizes = [CHUNK] * (chunks - 1) + [draw.count - CHUNK * (chunks - 1)]

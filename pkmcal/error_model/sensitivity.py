@@ -1,29 +1,32 @@
-"""What an error of each number of the geometry does to the pose (eq. 14 to 17)."""
+"""Pose error caused by an error of each number of the geometry (eq. 14 to 17)."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from pkmcal import display
 from pkmcal.arguments import number, word, words
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.library import POSE
+from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import ideal, off
 from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.result import Result
 
 PER_STEP = {"mm": 1.0, "rad": 1e-3, "1": 1e-3}  # what a step of 1 is: 1 mm, 1 mrad, a ratio's 0.001
-STUDIES = ("limb1", "offsets", "all-limbs")
+Study = Literal["limb1", "offsets", "all-limbs"]
+STUDIES: tuple[Study, ...] = get_args(Study)
 _NUMBERED = re.compile(r"([a-z_]+)[0-9]+(.*)")
 
 
-@dataclass(frozen=True, eq=False)
-class Sensitivity:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensitivity(Result):
     """Pose errors, case by case: pose with erroneous geometry minus ideal pose (eq. 16).
 
     Attributes
@@ -61,10 +64,10 @@ class Sensitivity:
         return _mean_size(self.linear)
 
     @property
-    def failed(self) -> NDArray[np.intp]:
+    def failed(self) -> IntArray:
         """How many poses were not solved, (c,)."""
         missing = np.isnan(self.exact).any(axis=-1)
-        counted: NDArray[np.intp] = missing.reshape(len(self.cases), -1).sum(axis=1)
+        counted: IntArray = missing.reshape(len(self.cases), -1).sum(axis=1)
         return counted
 
     def __getitem__(self, case: str) -> FloatArray:
@@ -74,29 +77,41 @@ class Sensitivity:
         found: FloatArray = self.exact[self.cases.index(case)]
         return found
 
-    def __str__(self) -> str:
+    def failures(self) -> str:
+        """Say which cases have no pose where; empty where all were solved."""
+        count = self.poses.size // 6
+        return "; ".join(
+            f"{bad} of {count} poses not solved with an error of {case}"
+            for case, bad in zip(self.cases, self.failed, strict=True)
+            if bad
+        )
+
+    def _parts(self) -> Iterator[str | Table]:
         count = self.poses.size // 6
         sizes = np.concatenate([self.mean[:, :3], np.degrees(self.mean[:, 3:])], axis=1)
+        yield (
+            f"{self.robot.name}: mean size of the pose error over {count} pose{'s' * (count != 1)}"
+            f"\nfor an error of {self.step:g} mm (angles {self.step:g} mrad, ratios"
+            f" {self.step / 1000:g})"
+        )
         rows = [
-            [case, *(f"{v:.4f}" for v in size), *([str(bad)] if self.failed.any() else [])]
-            for case, size, bad in zip(self.cases, sizes, self.failed, strict=True)
+            [case, *(f"{v:.4f}" for v in size)]
+            for case, size in zip(self.cases, sizes, strict=True)
         ]
-        heading = ["error of", *(f"{name} [{'mm' if name in 'xyz' else 'deg'}]" for name in POSE)]
+        heading = [f"{name} [{'mm' if name in 'xyz' else 'deg'}]" for name in POSE]
+        yield Table(["error of", *heading], rows, left=1)
         if self.failed.any():
-            heading.append("not solved")
-        return "\n".join([
-            f"{self.robot.name}: mean size of the pose error over {count}"
-            f" pose{'s' * (count != 1)},",
-            f"for an error of {self.step:g} mm (angles {self.step:g} mrad, ratios"
-            f" {self.step / 1000:g})",
-            str(display.Table(heading, rows, left=1)),
-        ])  # fmt: skip
+            yield self.failures()
 
 
 def sensitivity(
-    robot: Robot, poses: ArrayLike, step: float = 1.0, cases: str | Sequence[str] | None = None
+    robot: Robot,
+    poses: ArrayLike,
+    step: float = 1.0,
+    *,
+    cases: str | Sequence[str] | None = None,
 ) -> Sensitivity:
-    """Give each number of the geometry an error and see where the machine goes.
+    """Compute the pose error that an error of each number of the geometry causes.
 
     Parameters
     ----------
@@ -167,13 +182,13 @@ def sensitivity(
 
 
 def own_names(robot: Robot) -> list[str]:
-    """Every number of the geometry that can be replaced, parameters too."""
+    """List every number of the geometry that can be replaced, parameters too."""
     geometry = robot.geometry
     return [name for name, tied in zip(geometry.names, geometry.tied, strict=True) if not tied]
 
 
-def study_cases(robot: Robot, study: str) -> list[str]:
-    """Cases of the three studies of §3.3, for any robot.
+def study_cases(robot: Robot, study: Study) -> list[str]:
+    """List the cases of one of the three studies of §3.3, for any robot.
 
     Parameters
     ----------
@@ -210,7 +225,7 @@ def study_cases(robot: Robot, study: str) -> list[str]:
 
 
 def step_size(step: float) -> float:
-    """A step as a number other than 0.
+    """Check that a step is a number other than 0.
 
     Raises
     ------

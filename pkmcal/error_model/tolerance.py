@@ -1,22 +1,24 @@
-"""How far off a machine is whose geometry has random errors: Monte Carlo, linear, worst case."""
+"""Pose error of machines whose geometry has random errors: Monte Carlo, linear, worst case."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from pkmcal import display
 from pkmcal.arguments import checked_seed, number, whole
-from pkmcal.arrays import FloatArray, as_numbers
+from pkmcal.arrays import FloatArray, IntArray, as_numbers, rms
 from pkmcal.core.library import POSE
+from pkmcal.display import Table
 from pkmcal.error_model.monte_carlo import Draw, Progress, simulate
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.result import Result
 
 WORST = 3.0  # standard deviations by which every number is off in the worst case
 SHARES = {"interval95": (0.025, 0.975), "interval997": (0.0015, 0.9985)}
@@ -25,8 +27,8 @@ _LISTED = 12  # numbers of the geometry that are printed
 Sigma = float | Mapping[str, float] | ArrayLike
 
 
-@dataclass(frozen=True, eq=False)
-class Tolerance:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tolerance(Result):
     """Spread of the pose error, for poses of any leading shape; mm and rad.
 
     Attributes
@@ -74,7 +76,7 @@ class Tolerance:
     linear_std: FloatArray
     worst_case: FloatArray
     contribution: FloatArray
-    failed: NDArray[np.intp]
+    failed: IntArray
 
     @property
     def position_share(self) -> FloatArray:
@@ -86,9 +88,19 @@ class Tolerance:
         share: FloatArray = 100 * total / total.sum() if total.any() else total
         return share
 
-    def __str__(self) -> str:
+    def failures(self) -> str:
+        """Say how many machines have no pose; empty where all were solved."""
+        failed = int(np.sum(self.failed))
+        total = self.samples * (self.poses.size // 6)
+        return f"{failed} of {total} machines and poses were not solved" if failed else ""
+
+    def _parts(self) -> Iterator[str | Table]:
         count = self.poses.size // 6
         over = "" if count == 1 else f", root mean square over {count} poses"
+        yield (
+            f"{self.robot.name}: errors of {len(self.names)} numbers, {self.samples} machines"
+            f" (seed {self.seed}){over}"
+        )
         columns = [
             *(self.mean, self.std, self.linear_std),
             *((ends[..., 1] - ends[..., 0]) / 2 for ends in (self.interval95, self.interval997)),
@@ -98,38 +110,20 @@ class Tolerance:
         for i, name in enumerate(POSE):
             factor, unit = (1.0, "mm") if i < 3 else (180 / np.pi, "deg")
             rows.append([f"{name} [{unit}]", *(_shown(v[..., i] * factor) for v in columns)])
+        heading = ["mean", "std", "linear", "95 % ±", "99.7 % ±", f"worst, {WORST:g} sigma"]
+        yield Table(["error", *heading], rows, left=1)
         distance = (self.distance_rms, self.distance95, self.distance997)
-        rms, most95, most997 = (_shown(v) for v in distance)
+        typical, most95, most997 = (_shown(v) for v in distance)
+        yield (
+            f"distance: {typical} mm rms; 95 % of the machines within {most95} mm, 99.7 % within"
+            f" {most997} mm\n"
+        )
         share = self.position_share
         order = np.argsort(-share, kind="stable")[:_LISTED]
         listed = [[*self._with_unit(k), display.fixed(float(share[k]), 1)] for k in order]
-        failed = int(np.sum(self.failed))
-        lines = [
-            f"{self.robot.name}: errors of {len(self.names)} numbers, {self.samples} machines"
-            f" (seed {self.seed}){over}",
-            str(
-                display.Table(
-                    [
-                        "error",
-                        "mean",
-                        "std",
-                        "linear",
-                        "95 % ±",
-                        "99.7 % ±",
-                        f"worst, {WORST:g} sigma",
-                    ],
-                    rows,
-                    left=1,
-                )
-            ),
-            f"distance: {rms} mm rms; 95 % of the machines within {most95} mm, 99.7 % within"
-            f" {most997} mm",
-            "",
-            str(display.Table(["number", "sigma", "share of position [%]"], listed, left=1)),
-        ]
-        if failed:
-            lines.append(f"{failed} of {self.samples * count} machines and poses were not solved")
-        return "\n".join(lines)
+        yield Table(["number", "sigma", "share of position [%]"], listed, left=1)
+        if self.failures():
+            yield self.failures()
 
     def _with_unit(self, k: int) -> tuple[str, str]:
         geometry = self.robot.geometry
@@ -139,23 +133,24 @@ class Tolerance:
 
 
 def _shown(values: FloatArray) -> str:
-    """One value as it is, of several their root mean square."""
+    """Show one value as it is, several by their root mean square."""
     good = values[np.isfinite(values)]
     if not good.size:
         return "nan"
-    return display.fixed(float(good[0] if values.size == 1 else np.sqrt((good**2).mean())), 4)
+    return display.fixed(float(good[0]) if values.size == 1 else rms(good), 4)
 
 
 def tolerance(
     robot: Robot,
     poses: ArrayLike,
     sigma: Sigma,
+    *,
     samples: int = 100_000,
     seed: int = 0,
     executor: Executor | None = None,
     progress: Progress | None = None,
 ) -> Tolerance:
-    """Draw machines with errors of their geometry and see how far off they are.
+    """Predict the pose error of machines whose geometry has random errors.
 
     Every error is normally distributed about 0 and independent of the others; one machine has the
     same errors at all poses. Poses are found by the exact kinematics at the ideal actuator
@@ -230,7 +225,7 @@ def tolerance(
             stream.quantile(0.997)[6],
             stream.failed,
         ])  # fmt: skip
-    mean, std, within95, within997, rms, far95, far997, failed = (
+    mean, std, within95, within997, distance_rms, far95, far997, failed = (
         np.array(column).reshape((*at.shape, *np.shape(column[0])))
         for column in zip(*columns, strict=True)
     )
@@ -245,7 +240,7 @@ def tolerance(
         std,
         within95,
         within997,
-        rms,
+        distance_rms,
         far95,
         far997,
         np.sqrt(total[..., 0]).reshape(*at.shape, 6),
@@ -255,8 +250,8 @@ def tolerance(
     )
 
 
-def sigma_of(robot: Robot, sigma: Sigma) -> tuple[NDArray[np.intp], FloatArray]:
-    """Places in ``geometry.names`` that have errors, and their standard deviations.
+def sigma_of(robot: Robot, sigma: Sigma) -> tuple[IntArray, FloatArray]:
+    """Find the places in ``geometry.names`` that have errors, and their standard deviations.
 
     Raises
     ------

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pkmcal.arrays import FloatArray, as_rows, whole_turns
+from pkmcal.arrays import FloatArray, as_rows, wrapped
 from pkmcal.core.machine import with_errors
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.geometry import Geometry
@@ -153,7 +153,7 @@ def forward_of(
 def off(poses: FloatArray, from_poses: FloatArray) -> FloatArray:
     """Pose errors (..., 6), eq. 16: angles the short way round."""
     error = poses - from_poses
-    error[..., 3:] -= whole_turns(error[..., 3:])
+    error[..., 3:] = wrapped(error[..., 3:])
     return error
 
 
@@ -161,6 +161,6 @@ def quantities_off(poses: FloatArray, from_pose: FloatArray) -> FloatArray:
     """Errors of poses (N, 6) from one pose and the distance of their positions, (7, N)."""
     found = np.empty((7, len(poses)))
     np.subtract(poses.T, from_pose[:, None], out=found[:6])
-    found[3:6] -= whole_turns(found[3:6])
+    found[3:6] = wrapped(found[3:6])
     np.sqrt(found[0] ** 2 + found[1] ** 2 + found[2] ** 2, out=found[6])
     return found

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, whole_turns
+from pkmcal.arrays import FloatArray, wrapped
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.measurements.components import Kind
@@ -110,7 +110,7 @@ def difference(kind: Kind, values: FloatArray, predicted: FloatArray) -> FloatAr
     """Measured less predicted, (N, k); angles the short way round."""
     residual: FloatArray = values.reshape(predicted.shape) - predicted
     if kind == "pose":
-        residual[:, 3:] -= whole_turns(residual[:, 3:])
+        residual[:, 3:] = wrapped(residual[:, 3:])
     return residual
 
 

@@ -1,4 +1,4 @@
-"""What a calibration report says, as numbers and sentences; `pkmcal.report` gives it its looks."""
+"""What a calibration report says, as numbers and sentences; `report` renders it."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ _SPREAD = 3.0  # deviations by which held-out points may miss what is expected
 _GAIN = 0.9  # of the misfit that must not be left for a calibration to be worth it
 _CELLS, _DRAWN = 30, 500  # of the map of the workspace along an axis; of poses for its quantiles
 _SHARE = 0.9  # of the way from home to the ends of the workspace
-_TOLD, _ALONE = 0.5, 0.99  # of the prior's deviation: to what measurements narrow it down
-_ELSEWHERE = 1.0  # mm
-_NOTHING = 1e-3  # share of a parameter in what cannot be told that does not count
+_MOSTLY, _ONLY = 0.5, 0.99  # of the prior's deviation, above which the prior dominates
+_ELSEWHERE = 1.0  # mm: a pose so far from the desired one is of another assembly mode
+_NEGLIGIBLE = 1e-3  # share of a parameter in unidentifiable combinations
 
 
 @dataclass(frozen=True, eq=False)
 class WorkspaceAccuracy:
-    """How far off the calibrated machine is expected to be, one standard deviation, mm.
+    """Expected error of the calibrated machine over its workspace, one standard deviation, mm.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class WorkspaceAccuracy:
     positions : ndarray (N, 3)
         Of the tool there, mm.
     accuracy : ndarray (N,)
-        inf where the measurements do not tell.
+        inf where the measurements do not determine it.
     where : str
         How the poses were chosen.
     """
@@ -51,8 +51,8 @@ class WorkspaceAccuracy:
     where: str
 
     @property
-    def told(self) -> FloatArray:
-        """Those that are finite."""
+    def predicted(self) -> FloatArray:
+        """Those of `accuracy` that are finite."""
         return self.accuracy[np.isfinite(self.accuracy)]
 
 
@@ -66,38 +66,38 @@ class Slice:
 
 
 def verdict(found: Identification) -> tuple[str, str]:
-    """How it went: "good", "doubtful" or "bad", and one sentence."""
+    """Judge the calibration: "good", "doubtful" or "bad", and one sentence."""
     if not found.converged:
         return "bad", "Not to be trusted: the least squares did not converge."
     if found.warnings:
         return "bad", f"Not to be trusted: {printable(found.warnings[0], 1000)}"
     if not np.isfinite(found.holdout_rms):
-        said = f"the misfit of the {len(found.rows)} fitted points {_falls(found, 'rms')}"
+        change = f"the misfit of the {len(found.rows)} fitted points {_falls(found, 'rms')}"
         if found.rms > _GAIN * found.rms_before:
-            return "doubtful", f"Little gained: {said}."
-        return "good", f"Calibrated: {said}; no points were held out to confirm it."
+            return "doubtful", f"Little gained: {change}."
+        return "good", f"Calibrated: {change}; no points were held out to confirm it."
     count = int(np.isfinite(found.holdout_off).sum())
-    said = f"the error of {count} points that were not fitted {_falls(found, 'holdout_rms')}"
+    change = f"the error of {count} points that were not fitted {_falls(found, 'holdout_rms')}"
     if found.holdout_rms > found.holdout_expected * (1 + _SPREAD / np.sqrt(2 * count)):
-        return "doubtful", f"Doubtful: {said}, but {_mm(found.holdout_expected)} was expected."
+        return "doubtful", f"Doubtful: {change}, but {_mm(found.holdout_expected)} was expected."
     if found.holdout_rms > _GAIN * found.holdout_rms_before:
-        return "doubtful", f"Little gained: {said}."
-    return "good", f"Calibrated: {said}; {_mm(found.holdout_expected)} was expected."
+        return "doubtful", f"Little gained: {change}."
+    return "good", f"Calibrated: {change}; {_mm(found.holdout_expected)} was expected."
 
 
 def _falls(found: Identification, name: str) -> str:
-    """What a misfit does."""
+    """Say how a misfit changed."""
     before, after = getattr(found, f"{name}_before"), getattr(found, name)
     return f"{'falls' if after < before else 'goes'} from {_mm(before)} to {_mm(after)} rms"
 
 
-def instrument_sought(found: Identification) -> bool:
-    """Whether a frame or points of the instrument are among the parameters."""
+def instrument_identified(found: Identification) -> bool:
+    """Say whether a frame or points of the instrument are among the parameters."""
     return len(found.free) > len(found.fit.parameters.places)
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:
-    """Residuals of each measured component: mean, rms and largest, before and after; mm and rad."""
+    """List mean, rms and largest residual of each component, before and after; mm and rad."""
     names: dict[str, tuple[str, list[FloatArray], list[FloatArray]]] = {}
     parts = zip(found.fit.equations.sets, found.fit.start.residuals, found.residuals, strict=True)
     for measured, first, last in parts:
@@ -118,7 +118,7 @@ def directions(found: Identification) -> list[dict[str, Any]]:
 
 
 def points(found: Identification) -> list[dict[str, Any]]:
-    """Every fitted row: its number, where the machine is, how far off before and after, mm."""
+    """List every fitted row: its number, the pose, the distance before and after, mm."""
     equations = found.fit.equations
     off_before = equations.distances(found.fit.start)
     off = equations.distances(found.fit.end)
@@ -137,20 +137,20 @@ def points(found: Identification) -> list[dict[str, Any]]:
 
 
 def worst(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The rows that are furthest off after the calibration."""
+    """Select the rows with the largest distances after the calibration."""
     return sorted(rows, key=lambda row: -row["after"])[:_WORST]
 
 
 def moved(rows: list[dict[str, Any]]) -> list[tuple[int, str, str, int]]:
-    """The coordinates that are not always 0: place, name, unit, and decimals that are shown."""
+    """List the coordinates that are not always 0: place, name, unit, and decimals to show."""
     some = np.any([row["pose"] for row in rows], axis=0)
     units = [("mm", 1)] * 3 + [("rad", 2)] * 3
     return [(k, POSE[k], *units[k]) for k in range(len(POSE)) if some[k]]
 
 
 def parameters(found: Identification) -> list[dict[str, Any]]:
-    """Each parameter before and after, and in words how well it is known."""
-    untold = _share_untold(found)
+    """List each parameter before and after, and in words how well it is determined."""
+    share = _unidentifiable_share(found)
     rows = []
     for i in range(len(found.free)):
         prior = float(found.fit.parameters.prior[i])
@@ -160,39 +160,44 @@ def parameters(found: Identification) -> list[dict[str, Any]]:
             "before": float(found.start[i]),
             "after": float(found.values[i]),
             "stderr": float(found.stderr[i]),
-            "told": bool(np.isfinite(found.stderr[i])),
+            "identifiable": bool(np.isfinite(found.stderr[i])),
+            "told": bool(np.isfinite(found.stderr[i])),  # the former name, for readers of JSON
             "prior": prior,
-            "knowledge": _knowledge(found, i, prior, float(untold[i])),
+            "knowledge": _knowledge(found, i, prior, float(share[i])),
         })  # fmt: skip
     return rows
 
 
-def _share_untold(found: Identification) -> FloatArray:
-    """How much of each parameter lies along combinations that measurements do not tell, 0 to 1."""
+def _unidentifiable_share(found: Identification) -> FloatArray:
+    """Return how much of each parameter lies in unidentifiable combinations, 0 to 1."""
     share: FloatArray = np.linalg.norm(found.fit.estimate.state.measured.unidentifiable, axis=1)
     return share
 
 
-def _knowledge(found: Identification, i: int, prior: float, untold: float) -> str:
+def _knowledge(found: Identification, i: int, prior: float, share: float) -> str:
     if found.free[i] in found.at_bounds:
-        return "stopped at its bound"
+        return "at its bound"
     sigma = float(found.stderr[i])
     if not np.isfinite(sigma):
-        return "not told"
-    if np.isfinite(prior) and sigma > _ALONE * prior:
-        return "the prior alone"
-    if np.isfinite(prior) and sigma > _TOLD * prior:
-        return "mostly the prior"
-    return "well told" if untold < _NOTHING or np.isfinite(prior) else "told in part"
+        return "not identifiable"
+    if np.isfinite(prior) and sigma > _ONLY * prior:
+        return "prior only"
+    if np.isfinite(prior) and sigma > _MOSTLY * prior:
+        return "mostly prior"
+    identified = share < _NEGLIGIBLE or np.isfinite(prior)
+    return "identified" if identified else "partly determined"
 
 
 def correlation(found: Identification) -> FloatArray:
-    """Correlations (n, n); NaN beside parameters that are not told."""
-    return found.correlation_matrix
+    """Return the correlations (n, n); NaN for parameters that are not identifiable."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        scale = np.where(np.isfinite(found.stderr) & (found.stderr > 0), found.stderr, np.nan)
+        matrix: FloatArray = found.covariance / np.outer(scale, scale)
+    return matrix
 
 
 def iso9283(found: Identification) -> list[dict[str, Any]]:
-    """AP, RP and AD of every set of positions or poses, before and after the calibration."""
+    """Compute AP, RP and AD of every set of positions or poses, before and after."""
     equations = found.fit.equations
     scores = []
     for i, measured in enumerate(equations.sets):
@@ -220,16 +225,17 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
 
 
 def expected(found: Identification, places: FloatArray) -> FloatArray:
-    """Standard deviation of the tool, mm (N,), at poses (N, 6), of an arm at joints (N, n).
+    """Predict the standard deviation of the tool, mm (N,), at poses (N, 6) or joints (N, n).
 
-    Where the instrument's frame or targets were sought, that of the first target as the
-    instrument sees it: in the base frame it holds what nobody can know of where the base is.
+    Where the instrument's frame or targets were identified too, that of the first target in the
+    instrument's frame: in the base frame it would contain the pose of the base, which no
+    measurement determines.
     """
-    return as_seen(found, places) if instrument_sought(found) else found.accuracy(places)
+    return as_seen(found, places) if instrument_identified(found) else found.accuracy(places)
 
 
 def as_seen(found: Identification, places: FloatArray) -> FloatArray:
-    """Standard deviation of the first row's target in the instrument's frame, as `expected`."""
+    """Predict that of the first row's target in the instrument's frame, as `expected` does."""
     known = found.fit.equations
     at, q, _ = as_machine(found.robot).commanded(places)
     like = known.datasets[0]
@@ -239,16 +245,17 @@ def as_seen(found: Identification, places: FloatArray) -> FloatArray:
     point = equations.at(found.fit.end.theta)
     jacobian = equations.jacobian(point)[0][:, :3]
     jacobian *= known.parameters.scale
-    variance = propagate(jacobian, found.fit.estimate.covariance)
-    untold = jacobian @ found.fit.undetermined()
-    sure = np.linalg.norm(untold, axis=(1, 2)) < _NOTHING
-    off = np.abs(point.pose[equations.pose_of[0]] - at)[:, :3].max(axis=1)
-    sure &= off < _ELSEWHERE  # another assembly mode is another place
+    covariance = found.fit.estimate.covariance
+    variance = propagate(jacobian, covariance)
+    undetermined = jacobian @ found.fit.undetermined()
+    sure = np.linalg.norm(undetermined, axis=(1, 2)) < _NEGLIGIBLE
+    distance = np.abs(point.pose[equations.pose_of[0]] - at)[:, :3].max(axis=1)
+    sure &= distance < _ELSEWHERE
     return np.where(sure, np.sqrt(variance), np.inf)
 
 
 def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice | None] | str:
-    """The accuracy that the covariance predicts over the workspace, or why there is none."""
+    """Predict the accuracy over the workspace from the covariance, or say why that fails."""
     machine = found.robot
     if isinstance(machine, SerialArm):
         q = found.fit.equations.actuators
@@ -280,12 +287,12 @@ def _mm(value: float) -> str:
 
 
 def _largest(values: FloatArray) -> float:
-    told = np.abs(values[np.isfinite(values)])
-    return float(told.max()) if told.size else float("nan")
+    finite = np.abs(values[np.isfinite(values)])
+    return float(finite.max()) if finite.size else float("nan")
 
 
 def shown(value: float, unit: str, sigma: float) -> str:
-    """A number in the unit people read, to the digits that `sigma` supports."""
+    """Show a number in the unit people read, to the digits that `sigma` supports."""
     number, _ = display.displayed(value, unit)
     deviation, _ = display.displayed(sigma, unit)
     return display.fixed(number, display.decimals(deviation) if np.isfinite(deviation) else 4)

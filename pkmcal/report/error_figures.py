@@ -1,9 +1,7 @@
-"""Pictures of errors and workspaces, as PNG and SVG."""
+"""Figures of errors and workspaces."""
 
 from __future__ import annotations
 
-import io
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,37 +11,22 @@ from pkmcal.core.library import POSE
 from pkmcal.error_model.sensitivity import Sensitivity
 from pkmcal.error_model.tolerance import Tolerance
 from pkmcal.exceptions import ArgumentError
-from pkmcal.files.atomic import write_whole
 from pkmcal.kinematics.workspace import Workspace
+from pkmcal.report.drawing import BLUE, GREEN, ORANGE, empty_figure, in_context
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 LETTERS = ("x", "y", "z", "α", "β", "γ")
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#0072b2", "#d55e00", "#009e73")
-_MARKS = ("o", "s", "^", "o", "s", "^")
+_COLOURS = (BLUE, ORANGE, GREEN) * 2
+_MARKS = ("o", "s", "^") * 2
 _SEEN = 1e-9  # mm, rad: less is rounding, and not drawn
-_DPI = 120
 
 
-def save(figure: Figure, path: Path) -> list[Path]:
-    """Write `path`.png and `path`.svg, the same bytes for the same picture."""
-    import matplotlib
-
-    written = []
-    for kind, metadata in (("png", {"Software": None}), ("svg", {"Date": None, "Creator": None})):
-        content = io.BytesIO()
-        with matplotlib.rc_context({"svg.hashsalt": "pkmcal", "svg.fonttype": "none"}):
-            figure.savefig(content, format=kind, dpi=_DPI, metadata=metadata)
-            figure.set_layout_engine("none")  # it is laid out now
-        written.append(path.with_name(f"{path.name}.{kind}"))
-        write_whole(written[-1], content.getvalue())
-    return written
-
-
+@in_context
 def errors_by_pose(found: Sensitivity, title: str) -> Figure:
-    """Fig. 4, 6, 8: the error of each pose, a column a case; exact with marks, linear dashed.
+    """Draw Fig. 4, 6, 8: the error of each pose, a column a case; exact with marks, linear dashed.
 
     Parameters
     ----------
@@ -54,7 +37,7 @@ def errors_by_pose(found: Sensitivity, title: str) -> Figure:
     """
     groups = _groups(found)
     columns = len(found.cases)
-    figure = _figure(1.2 + 1.75 * columns, 0.9 + 2.2 * len(groups))
+    figure = empty_figure(1.2 + 1.75 * columns, 0.9 + 2.2 * len(groups))
     axes = figure.subplots(len(groups), columns, sharex=True, sharey="row", squeeze=False)
     number = np.arange(1, found.exact.shape[1] + 1)
     for row, (group, unit, factor) in zip(axes, groups, strict=True):
@@ -72,17 +55,18 @@ def errors_by_pose(found: Sensitivity, title: str) -> Figure:
                 )
             _grid(panel)
         row[0].set_ylabel(f"error [{unit}]")
-        row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+        row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     for panel, case in zip(axes[0], found.cases, strict=True):
         panel.set_title(case, fontsize="medium")
     for panel in axes[-1]:
         panel.set_xlabel("pose")
-    figure.suptitle(f"{title}\nmarks: solved again; dashed: linear prediction", fontsize="medium")
+    figure.suptitle(f"{title}\nmarks: solved exactly; dashed: linear prediction", fontsize="medium")
     return figure
 
 
+@in_context
 def mean_errors(found: Sensitivity, title: str) -> Figure:
-    """Fig. 5, 7, 9: the mean size of the error over the poses, case by case.
+    """Draw Fig. 5, 7, 9: the mean size of the error over the poses, case by case.
 
     Parameters
     ----------
@@ -93,7 +77,7 @@ def mean_errors(found: Sensitivity, title: str) -> Figure:
     """
     groups = _groups(found)
     columns = len(found.cases)
-    figure = _figure(1.5 + (0.9 + 0.62 * columns) * len(groups), 3.6)
+    figure = empty_figure(1.5 + (0.9 + 0.62 * columns) * len(groups), 3.6)
     axes = figure.subplots(1, len(groups), squeeze=False)[0]
     place = np.arange(columns)
     for panel, (group, unit, factor) in zip(axes, groups, strict=True):
@@ -115,7 +99,6 @@ def mean_errors(found: Sensitivity, title: str) -> Figure:
             labels[1:] + labels[:1],
             loc="lower center",
             bbox_to_anchor=(0.5, 1.0),
-            frameon=False,
             fontsize="small",
             ncols=4,
         )
@@ -134,8 +117,9 @@ def _groups(found: Sensitivity) -> list[tuple[list[int], str, float]]:
     return groups or [([0, 1, 2], "mm", 1.0)]  # nothing was solved: empty panels
 
 
+@in_context
 def tolerance_map(found: Tolerance, grid: Workspace, levels: int = 12) -> Figure:
-    """Heat map: the distance that 95 % of the machines keep within, over a slice of the workspace.
+    """Draw a heat map of the distance that 95 % of the machines keep within, over a slice.
 
     Parameters
     ----------
@@ -147,7 +131,7 @@ def tolerance_map(found: Tolerance, grid: Workspace, levels: int = 12) -> Figure
         Steps of the colours.
     """
     _require_axes(grid, 2)
-    figure = _figure(5.6, 4.4)
+    figure = empty_figure(5.6, 4.4)
     panel = figure.subplots()
     shown = np.where(grid.inside, found.distance95, np.nan)
     filled = panel.contourf(*_plane(grid), shown.T, levels=levels, cmap="viridis")
@@ -157,8 +141,9 @@ def tolerance_map(found: Tolerance, grid: Workspace, levels: int = 12) -> Figure
     return figure
 
 
+@in_context
 def singularities(grids: list[Workspace], title: str) -> Figure:
-    """Slices coloured by conditioning, with the singularity loci and the limits.
+    """Draw slices coloured by conditioning, with the singularity loci and the limits.
 
     Parameters
     ----------
@@ -167,14 +152,14 @@ def singularities(grids: list[Workspace], title: str) -> Figure:
     title : str
         Above all.
     """
-    figure = _figure(0.8 + 3.9 * len(grids), 4.3)
+    figure = empty_figure(0.8 + 3.9 * len(grids), 4.3)
     panels = figure.subplots(1, len(grids), squeeze=False)[0]
     for panel, grid in zip(panels, grids, strict=True):
         _require_axes(grid, 2)
         plane = _plane(grid)
         conditioning = grid.dexterity.conditioning
         filled = panel.contourf(*plane, conditioning.T, levels=12, cmap="viridis")
-        panel.contour(*plane, grid.dexterity.determinant.T, levels=[0.0], colors="#d55e00")
+        panel.contour(*plane, grid.dexterity.determinant.T, levels=[0.0], colors=ORANGE)
         panel.patch.set(facecolor="0.85", hatch="///", edgecolor="0.7")
         _limits(panel, grid)
         figure.colorbar(filled, ax=panel, location="bottom", label="conditioning σmin/σmax")
@@ -185,8 +170,9 @@ def singularities(grids: list[Workspace], title: str) -> Figure:
     return figure
 
 
+@in_context
 def workspace_slices(grid: Workspace, axis: str, count: int = 6) -> Figure:
-    """Reachable workspace with limits, as slices across one axis, and its volume.
+    """Draw the reachable workspace with limits, as slices across one axis, and its volume.
 
     Parameters
     ----------
@@ -206,7 +192,7 @@ def workspace_slices(grid: Workspace, axis: str, count: int = 6) -> Figure:
     spread = np.linspace(0, filled.size - 1, min(count, filled.size) + 2)[1:-1]  # not the tips
     chosen = filled[spread.round().astype(int)]
     others = [k for k in range(3) if k != place]
-    figure = _figure(0.6 + 2.3 * len(chosen), 3.4)
+    figure = empty_figure(0.6 + 2.3 * len(chosen), 3.4)
     panels = figure.subplots(1, len(chosen), sharex=True, sharey=True, squeeze=False)[0]
     first, second = (_shown(grid, k) for k in others)
     for panel, k in zip(panels, chosen, strict=True):
@@ -223,15 +209,8 @@ def workspace_slices(grid: Workspace, axis: str, count: int = 6) -> Figure:
     return figure
 
 
-def _figure(width: float, height: float) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
-
-
 def _grid(panel: Axes) -> None:
-    panel.grid(axis="y", color="0.88")
-    panel.set_axisbelow(True)
+    panel.grid(axis="y")
     panel.axhline(0.0, color="0.6", lw=0.8)
 
 

@@ -10,8 +10,8 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
 from pkmcal.files.provenance import printable
 from pkmcal.report.contents import Slice, WorkspaceAccuracy
+from pkmcal.report.drawing import BLUE, FAINT, GREEN, ORANGE, empty_figure, in_context
 from pkmcal.report.skeleton import Skeleton, exaggerated
-from pkmcal.report.svg import BLUE, FAINT, GREEN, ORANGE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,32 +24,34 @@ _FEW = 50  # largest over least below which numbers between the powers of ten ar
 _NAMED = 40  # parameters up to which a correlation picture names each
 
 
+@in_context
 def before_after(groups: dict[str, tuple[FloatArray, FloatArray]]) -> Figure:
-    """Which share of the points is how far off, before and after: a panel for each group.
+    """Draw the cumulative share of points over their distance: a panel for each group.
 
     Parameters
     ----------
     groups : dict of str to (ndarray, ndarray)
         By title; distances before and after, mm.
     """
-    figure = _figure(3.4)
+    figure = empty_figure(_WIDTH, 3.4)
     panels = figure.subplots(1, len(groups), sharey=True, squeeze=False)[0]
     for panel, (title, pair) in zip(panels, groups.items(), strict=True):
         for values, colour, label in zip(pair, (ORANGE, BLUE), ("before", "after"), strict=True):
             off = np.sort(np.maximum(values[np.isfinite(values)], _LEAST))
             share = 100 * (np.arange(len(off)) + 0.5) / max(len(off), 1)
             panel.plot(share, off, marker="o", ms=3, lw=1, color=colour, label=label)
-        panel.set(title=title, xlabel="points less far off [%]", xlim=(0, 100), yscale="log")
+        panel.set(title=title, xlabel="cumulative share of points [%]", xlim=(0, 100), yscale="log")
         _grid(panel)
     panels[0].set_ylabel("distance, measured from predicted [mm]")
-    panels[0].legend(frameon=False)
+    panels[0].legend()
     return figure
 
 
+@in_context
 def machine(found: Identification) -> Figure | None:
-    """The machine as it was thought to be, and with its errors exaggerated, at the same commands.
+    """Draw the nominal machine and, with its change exaggerated, the calibrated one.
 
-    None where it has no pose.
+    Both at the same commands; None where one has no pose.
     """
     equations = found.fit.equations
     middle = len(equations.actuators) // 2
@@ -58,14 +60,14 @@ def machine(found: Identification) -> Figure | None:
     drawn = exaggerated(equations.parameters, before, after, q, pose)
     if drawn is None:
         return None
-    figure = _figure(4.8)
+    figure = empty_figure(_WIDTH, 4.8)
     assumed, calibrated, times = drawn
     panels = [figure.add_subplot(1, 2, k + 1, projection="3d", proj_type="ortho") for k in range(2)]
     for panel, (elevation, turn), title in zip(
-        panels, ((22, -60), (90, -90)), ("from the side", "from above"), strict=True
+        panels, ((22, -60), (90, -90)), ("side view", "top view"), strict=True
     ):
-        _lines(panel, assumed, FAINT, "as assumed")
-        _lines(panel, calibrated, BLUE, f"as calibrated, change × {times}")
+        _lines(panel, assumed, FAINT, "nominal")
+        _lines(panel, calibrated, BLUE, f"calibrated, change × {times}")
         panel.set_title(title, fontsize="medium")
         panel.view_init(elevation, turn)
         panel.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="" if elevation == 90 else "z [mm]")
@@ -77,7 +79,7 @@ def machine(found: Identification) -> Figure | None:
         if elevation == 90:
             panel.set_zticks([])
     handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, frameon=False)
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
     return figure
 
 
@@ -85,12 +87,13 @@ def _lines(panel: Any, drawn: Skeleton, colour: str, label: str) -> None:
     for outline in (drawn.base, drawn.platform):
         panel.plot(*outline.T, color=colour, lw=1, ls=":" if outline is drawn.base else "-")
     for k, limb in enumerate(drawn.limbs):
-        told = label if k == 0 else None
-        panel.plot(*limb.T, color=colour, lw=2, marker="o", ms=3.5, label=told)
+        once = label if k == 0 else None
+        panel.plot(*limb.T, color=colour, lw=2, marker="o", ms=3.5, label=once)
 
 
+@in_context
 def correlation(matrix: FloatArray, names: tuple[str, ...]) -> Figure:
-    """Correlations of the parameters; empty where they are not told.
+    """Draw the correlations of the parameters; empty where one is not identifiable.
 
     Parameters
     ----------
@@ -100,7 +103,8 @@ def correlation(matrix: FloatArray, names: tuple[str, ...]) -> Figure:
         Of the parameters.
     """
     n = len(names)
-    figure = _figure(min(2.2 + 0.17 * n, 8.0), min(4.0 + 0.17 * n, _WIDTH))
+    side = min(max(0.17 * n, 2.0), 6.0)
+    figure = empty_figure(side + 2.2, side + 1.0)  # room for names, and for the bar beside
     panel = figure.subplots()
     shown = panel.imshow(matrix, cmap="RdBu_r", vmin=-1, vmax=1)
     if n <= _NAMED:
@@ -109,12 +113,13 @@ def correlation(matrix: FloatArray, names: tuple[str, ...]) -> Figure:
         panel.set_yticks(range(n), labels, fontsize="small")
     else:
         panel.set(xlabel="parameter, in the order of the table", ylabel="parameter")
-    figure.colorbar(shown, ax=panel, label="correlation", shrink=0.8)
+    figure.colorbar(shown, ax=panel, label="correlation", pad=0.02)
     return figure
 
 
+@in_context
 def convergence(history: tuple[float, ...]) -> Figure:
-    """Misfit after each step of the search.
+    """Draw the misfit after each step of the least squares.
 
     Parameters
     ----------
@@ -123,7 +128,7 @@ def convergence(history: tuple[float, ...]) -> Figure:
     """
     from matplotlib.ticker import MaxNLocator
 
-    figure = _figure(2.6)
+    figure = empty_figure(_WIDTH, 2.6)
     panel = figure.subplots()
     values = np.maximum(history, _LEAST)
     panel.plot(np.arange(len(values)), values, marker="o", ms=4, lw=1, color=BLUE)
@@ -133,9 +138,10 @@ def convergence(history: tuple[float, ...]) -> Figure:
     return figure
 
 
+@in_context
 def accuracy(sampled: WorkspaceAccuracy, area: Slice | None) -> Figure:
-    """How far off the machine is expected to be: over a slice, and over the poses drawn."""
-    figure = _figure(3.8)
+    """Draw the expected error of the machine: over a slice, and over the poses drawn."""
+    figure = empty_figure(_WIDTH, 3.8)
     left, right = figure.subplots(1, 2)
     if area is not None and np.isfinite(area.accuracy).any():
         first, second = area.values
@@ -144,32 +150,35 @@ def accuracy(sampled: WorkspaceAccuracy, area: Slice | None) -> Figure:
         )
         figure.colorbar(filled, ax=left, label="one standard deviation [mm]")
         left.set(xlabel=f"{area.axes[0]} [mm]", ylabel=f"{area.axes[1]} [mm]")
-        left.set_title("through home", fontsize="medium")
+        left.set_title("slice through home", fontsize="medium")
     else:
-        told = np.isfinite(sampled.accuracy)
-        x, y = sampled.positions[told, :2].T
-        marks = left.scatter(x, y, c=sampled.accuracy[told], cmap="viridis", s=12)
+        finite = np.isfinite(sampled.accuracy)
+        x, y = sampled.positions[finite, :2].T
+        marks = left.scatter(x, y, c=sampled.accuracy[finite], cmap="viridis", s=12)
         figure.colorbar(marks, ax=left, label="one standard deviation [mm]")
         left.set(xlabel="x [mm]", ylabel="y [mm]")
-        left.set_title("poses drawn, from above", fontsize="medium")
-    told_off = np.sort(sampled.told)
-    share = 100 * (np.arange(len(told_off)) + 0.5) / len(sampled.accuracy)
-    right.plot(share, told_off, color=BLUE)
-    right.set(xlabel="poses with less [%]", ylabel="one standard deviation [mm]", xlim=(0, 100))
+        left.set_title("poses drawn, top view", fontsize="medium")
+    errors = np.sort(sampled.predicted)
+    share = 100 * (np.arange(len(errors)) + 0.5) / len(sampled.accuracy)
+    right.plot(share, errors, color=BLUE)
+    right.set(
+        xlabel="cumulative share of poses [%]", ylabel="one standard deviation [mm]", xlim=(0, 100)
+    )
     right.set_ylim(bottom=0)
     _grid(right)
     return figure
 
 
+@in_context
 def poses(score: dict[str, Any]) -> Figure:
-    """AP before and after and RP of each pose of one set.
+    """Draw AP before and after and RP of each pose of one set.
 
     Parameters
     ----------
     score : dict
-        Of `report_data.iso9283`.
+        Of `contents.iso9283`.
     """
-    figure = _figure(3.0)
+    figure = empty_figure(_WIDTH, 3.0)
     panel = figure.subplots()
     number = np.arange(1, score["poses"] + 1)
     for key, colour, mark, label in (
@@ -182,15 +191,9 @@ def poses(score: dict[str, Any]) -> Figure:
             shown = np.maximum(values, _LEAST)
             panel.plot(number, shown, ls="", marker=mark, ms=4, color=colour, label=label)
     panel.set(xlabel="pose and target", ylabel="[mm]", yscale="log")
-    panel.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     _grid(panel)
     return figure
-
-
-def _figure(height: float, width: float = _WIDTH) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
 
 
 def _grid(panel: Axes) -> None:
@@ -204,4 +207,3 @@ def _grid(panel: Axes) -> None:
             panel.yaxis.set_minor_locator(LogLocator(subs=(2, 5)))
             panel.yaxis.set_minor_formatter("{x:g}")
     panel.grid(axis="y")
-    panel.set_axisbelow(True)

@@ -1,9 +1,9 @@
-"""Pictures of moves: actuators against time, and the machine in space at chosen times."""
+"""Figures of moves: actuators against time, and the machine in space at chosen times."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,19 +13,20 @@ from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.core.library import SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
+from pkmcal.report.drawing import BLUE, FAINT, ORANGE, empty_figure, in_context
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from pkmcal.moves.move import Move
 
-_BLUE, _RED, _GREY = "#0072b2", "#d55e00", "0.45"
 _POINTS = 400
 _LEAD = 0.08  # of the duration, shown before and after the move
 
 
+@in_context
 def curves(moves: Sequence[Move], labels: Sequence[str], title: str) -> Figure:
-    """Actuator coordinates, their velocities and accelerations against time, a column a move.
+    """Draw actuator coordinates, their velocities and accelerations against time, a column a move.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ def curves(moves: Sequence[Move], labels: Sequence[str], title: str) -> Figure:
     title : str
         Above all.
     """
-    figure = _figure(1.4 + 4.0 * len(moves), 7.2)
+    figure = empty_figure(1.4 + 4.0 * len(moves), 7.2)
     panels = figure.subplots(3, len(moves), sharex="col", sharey="row", squeeze=False)
     unit = moves[0].robot.actuator_units[0]
     factor, shown = display.displayed(1.0, unit)
@@ -56,18 +57,19 @@ def curves(moves: Sequence[Move], labels: Sequence[str], title: str) -> Figure:
             panel = panels[row, column]
             for i, curve in enumerate(values.T):
                 panel.plot(time, curve * factor, lw=1.3, label=f"q{i + 1}")
-            panel.grid(color="0.9")
+            panel.grid()
             if column == 0:
                 panel.set_ylabel(name)
         panels[0, column].set_title(label, fontsize="medium")
         panels[-1, column].set_xlabel("time [s]")
-    panels[0, -1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    panels[0, -1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     figure.suptitle(title, fontsize="medium")
     return figure
 
 
+@in_context
 def in_space(robot: Robot, poses: ArrayLike, labels: Sequence[str], title: str) -> Figure:
-    """The machine in space at each pose: base, limbs with their moving anchors, and platform.
+    """Draw the machine in space at each pose: base, limbs with their moving anchors, and platform.
 
     Parameters
     ----------
@@ -83,7 +85,7 @@ def in_space(robot: Robot, poses: ArrayLike, labels: Sequence[str], title: str) 
     rows, _ = as_rows("poses", poses, 6)
     own = np.ascontiguousarray(robot.frames.inward(rows))
     base, anchors, joints = places(robot, own)
-    figure = _figure(0.4 + 3.7 * len(rows), 4.3, None)  # layouts leave no room for 3-D labels
+    figure = empty_figure(0.4 + 3.7 * len(rows), 4.3, None)  # layouts leave no room for 3-D labels
     figure.subplots_adjust(left=0.01, right=0.95, bottom=0.05, top=0.88, wspace=0.02)
     seen = np.concatenate([base.reshape(-1, 3), anchors.reshape(-1, 3), joints.reshape(-1, 3)])
     low, high = seen.min(axis=0), seen.max(axis=0)
@@ -95,10 +97,10 @@ def in_space(robot: Robot, poses: ArrayLike, labels: Sequence[str], title: str) 
                 rail = anchors[[way.argmin(), way.argmax()], i]
                 panel.plot(*rail.T, color="0.75", lw=3, solid_capstyle="butt")
             elif KINDS[limb.kind].driver == "crank":
-                panel.plot(*np.array([base[i], anchors[k, i]]).T, color=_GREY, lw=3)
-            panel.plot(*np.array([anchors[k, i], joints[k, i]]).T, color=_BLUE, lw=1.6)
+                panel.plot(*np.array([base[i], anchors[k, i]]).T, color=FAINT, lw=3)
+            panel.plot(*np.array([anchors[k, i], joints[k, i]]).T, color=BLUE, lw=1.6)
             panel.text(*anchors[k, i], f" {i + 1}", fontsize=8)
-        for points, colour in ((anchors[k], _GREY), (joints[k], _RED)):
+        for points, colour in ((anchors[k], FAINT), (joints[k], ORANGE)):
             ring = _ring(points)
             panel.plot(*ring.T, color=colour, lw=1.2, marker="o", ms=3)
         panel.set_xlim(low[0], high[0])
@@ -114,7 +116,7 @@ def in_space(robot: Robot, poses: ArrayLike, labels: Sequence[str], title: str) 
 
 
 def places(robot: Robot, own: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Base joints (limbs, 3), anchors and platform joints (N, limbs, 3) at own poses (N, 6)."""
+    """Return base joints (limbs, 3), anchors and platform joints (N, limbs, 3) at own poses."""
     slots = robot.slots
     drive, direction, _ = robot.machine.limbs(slots, own)
     platform = np.column_stack([slots[:, 3:6], np.ones(len(slots))])
@@ -126,15 +128,7 @@ def places(robot: Robot, own: FloatArray) -> tuple[FloatArray, FloatArray, Float
 
 
 def _ring(points: FloatArray) -> FloatArray:
-    """The points in order around their middle, closed."""
+    """Return the points in order around their middle, closed."""
     middle = points.mean(axis=0)
     order = np.argsort(np.arctan2(points[:, 1] - middle[1], points[:, 0] - middle[0]))
     return points[[*order, order[0]]]
-
-
-def _figure(
-    width: float, height: float, layout: Literal["constrained"] | None = "constrained"
-) -> Figure:
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout=layout)

@@ -1,4 +1,4 @@
-"""A calibration as one HTML file that needs nothing else, and the same as data."""
+"""A calibration as one HTML file that needs nothing else, and the same as contents."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import checksums, comment, printable, version
-from pkmcal.report import contents as data
+from pkmcal.report import contents
 from pkmcal.report.as_json import as_json
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def write(found: Identification, folder: Path, files: Mapping[str, bytes]) -> li
     found : Identification
         What is reported.
     folder : Path
-        It is there.
+        An existing folder.
     files : mapping of str to bytes
         What was read, by name: the report states the checksums.
 
@@ -49,33 +49,33 @@ def write(found: Identification, folder: Path, files: Mapping[str, bytes]) -> li
 
 
 def gather(found: Identification, files: Mapping[str, bytes]) -> dict[str, Any]:
-    """Everything that the report says; the calibration itself is ``found``."""
-    state, sentence = data.verdict(found)
-    points = data.points(found)
-    predicted = data.over_the_workspace(found)
+    """Collect everything that the report says; the calibration itself is ``found``."""
+    state, sentence = contents.verdict(found)
+    points = contents.points(found)
+    predicted = contents.over_the_workspace(found)
     return {
         "state": state,
         "verdict": sentence,
         "found": found,
         "points": points,
-        "worst": data.worst(points),
-        "moved": data.moved(points),
-        "directions": data.directions(found),
-        "parameters": data.parameters(found),
-        "correlation": data.correlation(found),
-        "iso9283": data.iso9283(found),
+        "worst": contents.worst(points),
+        "moved": contents.moved(points),
+        "directions": contents.directions(found),
+        "parameters": contents.parameters(found),
+        "correlation": contents.correlation(found),
+        "iso9283": contents.iso9283(found),
         "accuracy": None if isinstance(predicted, str) else predicted[0],
         "slice": None if isinstance(predicted, str) else predicted[1],
         "no_accuracy": predicted if isinstance(predicted, str) else "",
         "inputs": checksums(files),
-        "instrument_sought": data.instrument_sought(found),
+        "instrument_sought": contents.instrument_identified(found),
         "arm": isinstance(found.robot, SerialArm),
         "version": version(),
     }
 
 
 def html(facts: Mapping[str, Any]) -> str:
-    """The page. Names come from files that anybody may have written: all text is escaped."""
+    """Return the page. Names come from files that anybody may have written: all text is escaped."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -88,7 +88,7 @@ def html(facts: Mapping[str, Any]) -> str:
     )
     environment.filters |= {
         "short": _short,
-        "shown": data.shown,
+        "shown": contents.shown,
         "fixed": lambda value, unit, places: display.fixed(
             display.displayed(value, unit)[0], places
         ),
@@ -103,17 +103,17 @@ def html(facts: Mapping[str, Any]) -> str:
 
 
 def _as_data(facts: Mapping[str, Any]) -> dict[str, Any]:
-    """What goes into the JSON file: the facts, and every attribute of the calibration."""
+    """Select what goes into the JSON file: the facts, and every attribute of the calibration."""
     left_out = ("found", "worst", "moved", "arm")
     kept = {name: value for name, value in facts.items() if name not in left_out}
     return kept | {"calibration": facts["found"]}
 
 
 def _figures(facts: Mapping[str, Any]) -> dict[str, str]:
-    """SVG elements by name."""
-    from pkmcal.report import figures as draw
-    from pkmcal.report import residual_figure
-    from pkmcal.report.svg import inline_svg, style
+    """Draw all figures as SVG elements, by name."""
+    from pkmcal.report import figures
+    from pkmcal.report.residual_figure import residuals
+    from pkmcal.report.svg import inline_svg
 
     found: Identification = facts["found"]
     fitted = np.array([[row["before"], row["after"]] for row in facts["points"]]).T
@@ -123,33 +123,32 @@ def _figures(facts: Mapping[str, Any]) -> dict[str, str]:
         pair = (found.holdout_off_before, found.holdout_off)
         groups = {f"held out, {held} points": pair} | groups
     wanted: dict[str, tuple[Callable[[], Figure | None], str]] = {
-        "points": (lambda: draw.before_after(groups), "Distances before and after"),
-        "residuals": (lambda: residual_figure.residuals(found), "Residuals by row and direction"),
-        "machine": (lambda: draw.machine(found), "The machine with exaggerated errors"),
+        "points": (lambda: figures.before_after(groups), "Distances before and after"),
+        "residuals": (lambda: residuals(found), "Residuals by row and direction"),
+        "machine": (lambda: figures.machine(found), "The nominal and the calibrated machine"),
         "correlation": (
-            lambda: draw.correlation(facts["correlation"], found.free),
+            lambda: figures.correlation(facts["correlation"], found.free),
             "Correlations of the parameters",
         ),
-        "convergence": (lambda: draw.convergence(found.history), "Misfit after each step"),
+        "convergence": (lambda: figures.convergence(found.history), "Misfit after each step"),
     }
-    if facts["accuracy"] is not None and facts["accuracy"].told.size:
+    if facts["accuracy"] is not None and facts["accuracy"].predicted.size:
         wanted["accuracy"] = (
-            lambda: draw.accuracy(facts["accuracy"], facts["slice"]),
+            lambda: figures.accuracy(facts["accuracy"], facts["slice"]),
             "Expected accuracy over the workspace",
         )
     for k, score in enumerate(facts["iso9283"]):
-        wanted[f"iso{k}"] = (lambda score=score: draw.poses(score), "Accuracy of each pose")  # type: ignore[misc]
+        wanted[f"iso{k}"] = (lambda score=score: figures.poses(score), "Accuracy of each pose")  # type: ignore[misc]
     drawn = {}
-    for name, (figure, text) in wanted.items():
-        with style():
-            made = figure()
+    for name, (draw, text) in wanted.items():
+        made = draw()
         if made is not None:
             drawn[name] = inline_svg(made, name, text)
     return drawn
 
 
 def _short(value: float) -> str:
-    """Three digits that mean something."""
+    """Show a number with three significant digits."""
     if not np.isfinite(value):
         return "–"
     return (

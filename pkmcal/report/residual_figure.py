@@ -1,17 +1,15 @@
-"""What a calibration left over, as a picture: by row, over the workspace, as quantiles."""
+"""Residuals of a calibration as a figure: by row, over the workspace, as quantiles."""
 
 from __future__ import annotations
 
-import io
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pkmcal.arrays import propagate
 from pkmcal.display import displayed
-from pkmcal.exceptions import ArgumentError
-from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import printable
+from pkmcal.report.drawing import BLUE, GREEN, ORANGE, PINK, empty_figure, in_context
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,60 +19,35 @@ if TYPE_CHECKING:
 
 
 _LOOKS = {
-    "x": ("#0072b2", "o"),
-    "y": ("#d55e00", "s"),
-    "z": ("#009e73", "^"),
-    "distance": ("#cc79a7", "D"),
-    "alpha": ("#0072b2", "o"),
-    "beta": ("#d55e00", "s"),
-    "gamma": ("#009e73", "^"),
+    "x": (BLUE, "o"),
+    "y": (ORANGE, "s"),
+    "z": (GREEN, "^"),
+    "distance": (PINK, "D"),
+    "alpha": (BLUE, "o"),
+    "beta": (ORANGE, "s"),
+    "gamma": (GREEN, "^"),
 }
-_FORMATS = {".png": {"Software": None}, ".svg": {"Date": None, "Creator": None}}
 
 
-def write(found: Identification, path: Path) -> None:
-    """Write `residuals` as PNG or SVG, by the ending of the path.
-
-    Raises
-    ------
-    ValueError
-        Another ending.
-    OSError
-        The file cannot be written.
-    """
-    import matplotlib
-
-    ending = path.suffix.lower()
-    if ending not in _FORMATS:
-        raise ArgumentError(f"path must end in {' or '.join(_FORMATS)}, found {str(path)!r}")
-    picture = io.BytesIO()
-    with matplotlib.rc_context(
-        {"svg.hashsalt": "pkmcal", "svg.fonttype": "none", "text.parse_math": False}
-    ):
-        residuals(found).savefig(picture, format=ending[1:], dpi=110, metadata=_FORMATS[ending])
-    write_whole(path, picture.getvalue())
-
-
+@in_context
 def residuals(found: Identification) -> Figure:
-    """Residuals row by row, over the workspace with their direction, and as quantiles."""
-    from matplotlib.figure import Figure
-
+    """Draw residuals row by row, over the workspace with their direction, and as quantiles."""
     units = [
         unit for unit in ("mm", "rad") if any(unit in m.units for m in found.fit.equations.sets)
     ]
-    figure = Figure(figsize=(11.0, 3.0 * len(units) + 4.2), layout="constrained")
+    figure = empty_figure(11.0, 3.0 * len(units) + 4.2)
     heights = [3.0] * len(units) + [4.2]
     grid = figure.add_gridspec(len(units) + 1, 2, height_ratios=heights)
     for k, unit in enumerate(units):
         _by_row(figure.add_subplot(grid[k, :]), found, unit)
     _over_the_workspace(figure.add_subplot(grid[-1, 0]), found)
     _quantiles(figure.add_subplot(grid[-1, 1]), found)
-    figure.suptitle(f"{printable(found.robot.name)}: what the identified geometry leaves over")
+    figure.suptitle(f"{printable(found.robot.name)}: residuals of the calibration")
     return figure
 
 
 def _by_row(panel: Axes, found: Identification, unit: str) -> None:
-    """One mark per row and component, rows that are outliers ringed."""
+    """Draw one mark per row and component, rows that are outliers ringed."""
     equations, seen = found.fit.equations, set()
     shown = displayed(0.0, unit)[1]
     for i, (measured, residual) in enumerate(zip(equations.sets, found.residuals, strict=True)):
@@ -90,14 +63,13 @@ def _by_row(panel: Axes, found: Identification, unit: str) -> None:
             panel.plot(rows[odd], values[odd], ls="", marker="o", ms=11, mfc="none", color="0.2")
             seen.add(name)
     panel.axhline(0.0, color="0.6", lw=0.8)
-    panel.grid(axis="y", color="0.88")
-    panel.set_axisbelow(True)
+    panel.grid(axis="y")
     panel.set(xlabel="row", ylabel=f"measured − predicted [{shown}]")
-    panel.legend(loc="upper right", ncols=len(seen), frameon=False)
+    panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(seen))
 
 
 def _over_the_workspace(panel: Axes, found: Identification) -> None:
-    """Arrows for residuals in x and y, colours for the other one, at the poses they belong to."""
+    """Draw residuals at their poses: arrows in x and y, a colour for the other component."""
     equations, pose = found.fit.equations, found.fit.end.pose
     at, along, other = [], [], []
     for place, residual in zip(equations.pose_of, found.residuals, strict=True):
@@ -127,7 +99,7 @@ def _over_the_workspace(panel: Axes, found: Identification) -> None:
 
 
 def _quantiles(panel: Axes, found: Identification) -> None:
-    """Residuals in units of their own deviation: on the line if noise is normal and as stated."""
+    """Draw residuals over their own deviation: on the line if noise is normal and as stated."""
     from scipy.special import ndtri
 
     estimate = found.fit.estimate
@@ -135,13 +107,12 @@ def _quantiles(panel: Axes, found: Identification) -> None:
         estimate.jacobian
         * np.sqrt(np.repeat(estimate.weights, found.fit.equations.components))[:, None]
     )
-    left = 1.0 - np.einsum("ij,jk,ik->i", weighted, estimate.covariance, weighted)
-    told = left > 1e-6
-    scaled = np.sort(estimate.residual[told] / np.sqrt(left[told]))
+    redundancy = 1.0 - propagate(weighted[:, None], estimate.covariance)
+    checked = redundancy > 1e-6  # the others are fitted exactly, whatever was measured
+    scaled = np.sort(estimate.residual[checked] / np.sqrt(redundancy[checked]))
     normal = ndtri((np.arange(len(scaled)) + 0.5) / max(len(scaled), 1))
-    panel.plot(normal, scaled, ls="", marker="o", ms=3.5, color="#0072b2")
+    panel.plot(normal, scaled, ls="", marker="o", ms=3.5, color=BLUE)
     ends = np.array([-3.0, 3.0])
     panel.plot(ends, ends, color="0.5", lw=0.8)
-    panel.grid(color="0.88")
-    panel.set_axisbelow(True)
+    panel.grid()
     panel.set(xlabel="normal quantile", ylabel="residual over its standard deviation")

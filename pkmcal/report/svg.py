@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import io
-import warnings
-from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree
+
+from pkmcal.report.drawing import BLUE, FAINT, GREEN, GRID, INK, ORANGE, PINK, encoded
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-INK, GRID, FAINT = "#1b1b1b", "#e0e0e0", "#808080"
-BLUE, ORANGE, GREEN, PINK = "#0072b2", "#d55e00", "#009e73", "#cc79a7"
 
 # What a page may change, by the name of its CSS variable; others stay as they are drawn.
 _VARIABLES = {
@@ -23,30 +19,6 @@ _VARIABLES = {
 }
 _SVG = "http://www.w3.org/2000/svg"
 _LINK = "{http://www.w3.org/1999/xlink}href"
-_STYLE: Any = {
-    "svg.fonttype": "none",
-    "text.parse_math": False,  # a name may have a $
-    "text.color": INK,
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": INK,
-    "axes.titlecolor": INK,
-    "xtick.color": FAINT,
-    "ytick.color": FAINT,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "axes.facecolor": "none",
-    "figure.facecolor": "none",
-    "savefig.facecolor": "none",
-    "legend.facecolor": "none",
-    "grid.color": GRID,
-}
-
-
-def style() -> AbstractContextManager[None]:
-    """Return the context in which a figure for `inline_svg` is drawn."""
-    import matplotlib
-
-    return matplotlib.rc_context(_STYLE)
 
 
 def inline_svg(figure: Figure, name: str, text: str) -> str:
@@ -55,21 +27,15 @@ def inline_svg(figure: Figure, name: str, text: str) -> str:
     Parameters
     ----------
     figure : Figure
-        Drawn within `style`.
+        Drawn `in_context`.
     name : str
         Of letters and digits; its ids are no others' on the page.
     text : str
         What it shows, for those who cannot see it.
     """
-    import matplotlib
-
-    out = io.BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": name, **_STYLE}), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing", UserWarning)  # the browser has it
-        figure.savefig(out, format="svg", dpi=110, metadata={"Date": None, "Creator": None})
     ElementTree.register_namespace("", _SVG)
     ElementTree.register_namespace("xlink", "http://www.w3.org/1999/xlink")
-    root = ElementTree.fromstring(out.getvalue())
+    root = ElementTree.fromstring(encoded(figure, "svg", name, "none"))
     metadata = root.find(f"{{{_SVG}}}metadata")
     if metadata is not None:
         root.remove(metadata)

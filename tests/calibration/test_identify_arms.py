@@ -7,6 +7,7 @@ import pickle
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -277,21 +278,18 @@ def test_coordinates_that_are_not_finite_are_refused_by_row() -> None:
         machine.measure([[0.0] * 6, [1e6] * 6, [1.0] * 6])
 
 
-def test_the_command_calibrates_an_arm_too(tmp_path: Path) -> None:
-    from typer.testing import CliRunner
-
-    from pkmcal.cli.main import app
+def test_the_command_calibrates_an_arm_too(run: Any, tmp_path: Path) -> None:
 
     erring(ARM).replace(np.zeros((6, 6))).save(tmp_path / "arm.toml")
     VirtualMachine(erring(ARM)).measure(coordinates(ARM, 40), target=TARGET).write(
         tmp_path / "tracker.csv"
     )
     files = [str(tmp_path / name) for name in ("arm.toml", "tracker.csv")]
-    done = CliRunner().invoke(app, ["calibrate", *files, "--out", str(tmp_path / "found")])
+    done = run("calibrate", *files, "--out", str(tmp_path / "found"))
     assert done.exit_code == 0, done.output
     found = pk.load(tmp_path / "found" / "robot.toml")
     assert off(found, erring(ARM), TARGET).max() < 0.1
-    printed = json.loads(CliRunner().invoke(app, ["calibrate", *files, "--json"]).stdout)
+    printed = json.loads(run("calibrate", *files, "--json").stdout)
     numbers = dict(zip(printed["free"], found.joint_errors.ravel(), strict=True))
     assert printed["robot"] == {"name": "six joints", "geometry": pytest.approx(numbers)}
     assert printed["parameters"]["joint2.dtheta"]["value"] == numbers["joint2.dtheta"]

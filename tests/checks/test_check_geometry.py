@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal.cli import main as cli
 
 from ..mutations import MUTATIONS, manufactured, similar, with_model, with_slots
 
@@ -182,7 +180,7 @@ def test_affine_images_that_are_not_similar_are_singular_too() -> None:
     assert "singular" in pk.check_geometry(with_slots(robot, slots)).kinds
 
 
-def test_a_singular_home_is_told_from_a_singular_machine() -> None:
+def test_a_singular_home_is_distinguished_from_a_singular_machine() -> None:
     robot = pk.load("hexapod")
     home = np.array([0, 0, 800, 0, 0, np.pi / 2])  # a quarter turn: Fichter's singularity
     check = pk.check_geometry(with_model(robot, home=home, limbs=tuple(
@@ -302,45 +300,41 @@ def test_neighbours_on_one_axis_are_found_and_lose_a_rank(kind: str, sense: floa
 # --- the command -----------------------------------------------------------------------------
 
 
-def run(*arguments: str) -> Any:
-    return CliRunner().invoke(cli.app, list(arguments), prog_name="pkmcal")
-
-
-def test_exit_code_says_whether_something_was_found() -> None:
+def test_exit_code_says_whether_something_was_found(run: Any) -> None:
     good, bad = run("check", "hexapod"), run("check", "rbt-6t03p-printed")
-    assert (good.exit_code, good.stdout) == (0, "hexapod: nothing found\n")
+    assert (good.exit_code, good.stdout) == (0, "hexapod: no problems found\n")
     assert bad.exit_code == 1
     assert bad.stdout == f"{pk.check_geometry(pk.load('rbt-6t03p-printed'))}\n"
     assert run("check", "hexapd").exit_code == 2
     arm = run("check", "3r")
-    assert (arm.exit_code, arm.stdout) == (0, "3R arm: nothing found\n")
+    assert (arm.exit_code, arm.stdout) == (0, "3R arm: no problems found\n")
 
 
-def test_json_has_the_findings() -> None:
+def test_json_has_the_findings(run: Any) -> None:
     result = json.loads(run("check", "rbt-6t03p-printed", "--json").stdout)
     assert result["ok"] is False
     assert [each["kind"] for each in result["findings"]][:2] == ["angle", "alike"]
     assert result["measurements"] is None
 
 
-def test_measurements_are_read_by_line_and_column(tmp_path: Path) -> None:
+def test_measurements_are_read_by_line_and_column(run: Any, tmp_path: Path) -> None:
     file = tmp_path / "m.csv"
     columns = ",".join(f"q{i} [mm]" for i in range(1, 7))
     file.write_text(f"{columns},z [mm]\n800,800,800,800,800,800,750\n")
     result = run("check", "hexapod", str(file))
     assert result.exit_code == 0
     assert "1 row of kind height" in result.stdout
-    told = json.loads(run("check", "hexapod", str(file), "--json").stdout)
-    assert told["measurements"] == {"kind": "height", "rows": 1, "without_pose": []}
+    found = json.loads(run("check", "hexapod", str(file), "--json").stdout)
+    assert found["measurements"] == {"kind": "height", "rows": 1, "without_pose": []}
     file.write_text(f"{columns},z [mm]\n800,800,x8,800,800,800,750\n")
     wrong = run("check", "hexapod", str(file))
     assert (wrong.exit_code, wrong.stdout) == (2, "")
     assert "line 2" in wrong.stderr and "q3" in wrong.stderr
 
 
-def test_rows_without_a_pose_are_told_in_json_too(tmp_path: Path) -> None:
+def test_rows_without_a_pose_are_listed_in_json_too(run: Any, tmp_path: Path) -> None:
     log = tmp_path / "m.csv"
     log.write_text("q1 [rad],q2 [rad],q3 [rad],z [mm]\n0,0,0,520\n0,1e6,0,520\n")
-    told = run("check", "3r", str(log), "--json")
-    assert told.exit_code == 1
-    assert json.loads(told.stdout)["measurements"]["without_pose"] == [1]
+    found = run("check", "3r", str(log), "--json")
+    assert found.exit_code == 1
+    assert json.loads(found.stdout)["measurements"]["without_pose"] == [1]

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal.cli import main as cli
 from pkmcal.files.csv_table import Table
 from pkmcal.measurements.pose_csv import write_poses
 
@@ -36,24 +33,9 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, np.ndar
     return robot, desired, reached
 
 
-def run(*arguments: str | Path) -> Any:
-    result = CliRunner().invoke(cli.app, ["compensate", *map(str, arguments)], prog_name="pkmcal")
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return result
-
-
-def refused(*arguments: str | Path) -> str:
-    result = run(*arguments)
-    assert result.exit_code == 2
-    assert result.stdout == ""
-    assert re.fullmatch(r"pkmcal: [^\n]+\n", result.stderr), result.stderr
-    return result.stderr
-
-
-def test_commands_are_those_of_the_library(files: Any) -> None:
+def test_commands_are_those_of_the_library(run: Any, files: Any) -> None:
     robot, desired, reached = files
-    result = run("2tpr2tps", "desired.csv", "poses.csv", "--out", "new")
+    result = run("compensate", "2tpr2tps", "desired.csv", "poses.csv", "--out", "new")
     assert result.exit_code == 0
     assert "orientation as measured" in result.stdout
     expected = pk.compensate(robot, desired, reached)
@@ -64,60 +46,73 @@ def test_commands_are_those_of_the_library(files: Any) -> None:
     np.testing.assert_allclose(table.numbers("beta", "rad")[0], desired[:, 4], atol=1e-8)
 
 
-def test_positions_are_read_as_the_machine_allows(files: Any) -> None:
+def test_positions_are_read_as_the_machine_allows(run: Any, refused: Any, files: Any) -> None:
     robot, desired, reached = files
-    result = run("2tpr2tps", "desired.csv", "positions.csv", "--json")
+    result = run("compensate", "2tpr2tps", "desired.csv", "positions.csv", "--json")
     found = json.loads(result.stdout)
     expected = pk.compensate(robot, desired, reached[:, :3], orientation="from-position")
     assert found["orientation"] == "from-position"
     np.testing.assert_allclose(found["correction"], expected.correction, atol=1e-5)
-    assumed = run("2tpr2tps", "desired.csv", "positions.csv", "--orientation", "assumed")
+    assumed = run(
+        "compensate", "2tpr2tps", "desired.csv", "positions.csv", "--orientation", "assumed"
+    )
     assert "orientation assumed as desired: its error stays" in assumed.stdout
-    assert "--orientation assumed" in refused("hexapod", "desired.csv", "positions.csv")
+    assert "--orientation assumed" in refused(
+        "compensate", "hexapod", "desired.csv", "positions.csv"
+    )
 
 
-def test_a_swarm_by_the_command_line_is_reproducible(files: Any) -> None:
+def test_a_swarm_by_the_command_line_is_reproducible(run: Any, files: Any) -> None:
     arguments = ("2tpr2tps", "desired.csv", "poses.csv", "--method", "pso", "--seed", "5", "--json")
-    first, again = (json.loads(run(*arguments).stdout) for _ in range(2))
+    first, again = (json.loads(run("compensate", *arguments).stdout) for _ in range(2))
     assert first == again
     assert len(first["history"][0]) == 201
-    bounded = json.loads(run(*arguments, "--bounds", "0.1", "--common").stdout)
+    bounded = json.loads(run("compensate", *arguments, "--bounds", "0.1", "--common").stdout)
     assert np.abs(bounded["correction"]).max() <= 0.1
 
 
-def test_a_pose_out_of_reach_is_exit_code_1(files: Any) -> None:
+def test_a_pose_out_of_reach_is_exit_code_1(run: Any, files: Any) -> None:
     robot = pk.load("linear-delta")
     poses = np.tile(robot.home, (2, 1))
     write_poses("reached.csv", poses)
     poses[1, 0] = 1e4
     write_poses("far.csv", poses)
-    result = run("linear-delta", "far.csv", "reached.csv")
+    result = run("compensate", "linear-delta", "far.csv", "reached.csv")
     assert result.exit_code == 1
     assert "nan" in result.stdout
 
 
-def test_what_does_not_fit_is_one_line(files: Any) -> None:
+def test_what_does_not_fit_is_one_line(refused: Any, files: Any) -> None:
     Path("one.csv").write_text("x [mm],y [mm],z [mm]\n1,2,400\n")
-    assert "1 rows for the 6 of desired.csv" in refused("2tpr2tps", "desired.csv", "one.csv")
+    assert "1 rows for the 6 of desired.csv" in refused(
+        "compensate", "2tpr2tps", "desired.csv", "one.csv"
+    )
     Path("half.csv").write_text("x [mm],y [mm],z [mm],beta [deg]\n1,2,400,0\n")
-    assert "missing column 'alpha'" in refused("2tpr2tps", "desired.csv", "half.csv")
+    assert "missing column 'alpha'" in refused("compensate", "2tpr2tps", "desired.csv", "half.csv")
     Path("named.csv").write_text("x [mm],y [mm],zz [mm]\n1,2,400\n")
-    assert "unknown column 'zz'" in refused("2tpr2tps", "desired.csv", "named.csv")
-    wrong = refused("2tpr2tps", "desired.csv", "poses.csv", "--method", "fast")
+    assert "unknown column 'zz'" in refused("compensate", "2tpr2tps", "desired.csv", "named.csv")
+    wrong = refused("compensate", "2tpr2tps", "desired.csv", "poses.csv", "--method", "fast")
     assert "method must be one of exact, pso" in wrong
 
 
-def test_the_example_runs_on_the_command_line(tmp_path: Path) -> None:
-    result = run("2tpr2tps", EXAMPLE / "desired.csv", EXAMPLE / "measured.csv", "--out", tmp_path)
+def test_the_example_runs_on_the_command_line(run: Any, tmp_path: Path) -> None:
+    result = run(
+        "compensate",
+        "2tpr2tps",
+        EXAMPLE / "desired.csv",
+        EXAMPLE / "measured.csv",
+        "--out",
+        tmp_path,
+    )
     assert result.exit_code == 0
     assert "30 poses" in result.stdout
     assert "beta from the position" in result.stdout
 
 
-def test_rows_measured_grossly_off_are_done_but_not_trusted(tmp_path: Path) -> None:
+def test_rows_measured_grossly_off_are_done_but_not_trusted(run: Any, tmp_path: Path) -> None:
     far = pk.load("2tpr2tps").home[None] + np.array([[0, 0, 9000, 0, 0, 0]])
     write_poses(tmp_path / "desired.csv", pk.load("2tpr2tps").home[None])
     write_poses(tmp_path / "far.csv", far)
-    result = run("2tpr2tps", tmp_path / "desired.csv", tmp_path / "far.csv")
+    result = run("compensate", "2tpr2tps", tmp_path / "desired.csv", tmp_path / "far.csv")
     assert result.exit_code == 1
     assert "check units, frame and order of the rows" in result.stdout

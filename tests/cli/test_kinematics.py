@@ -8,24 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal.cli import main as cli
 from pkmcal.measurements.command_csv import read_commands, write_commands
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 
 
-@pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
-def run(*arguments: str) -> Any:
-    return CliRunner().invoke(cli.app, list(arguments), prog_name="pkmcal")
-
-
-def test_pose_on_the_line_is_in_degrees_or_radians() -> None:
+def test_pose_on_the_line_is_in_degrees_or_radians(run: Any) -> None:
     robot = pk.load("hexapod")
     pose = [20, -10, 860, 5, 0, 3]
     in_rad = [*pose[:3], *np.radians(pose[3:]).tolist()]
@@ -38,7 +27,7 @@ def test_pose_on_the_line_is_in_degrees_or_radians() -> None:
         np.testing.assert_allclose(found["actuators"], expected[None], rtol=0, atol=1e-12)
 
 
-def test_forward_takes_back_what_inverse_gives_through_files(tmp_path: Path) -> None:
+def test_forward_takes_back_what_inverse_gives_through_files(run: Any, tmp_path: Path) -> None:
     robot = pk.load("6-rus")
     poses = pk.sample_poses(robot, 5)
     write_poses("poses.csv", poses)
@@ -52,12 +41,12 @@ def test_forward_takes_back_what_inverse_gives_through_files(tmp_path: Path) -> 
     assert "sha256" in Path("there/commands.csv").read_text(encoding="utf-8")
 
 
-def test_first_number_may_be_negative() -> None:
+def test_first_number_may_be_negative(run: Any) -> None:
     result = run("forward", "linear-delta", "-30,-30,-30")
     assert result.exit_code == 0 and "x [mm]" in result.stdout
 
 
-def test_arm_goes_forward_and_its_inverse_is_refused() -> None:
+def test_arm_goes_forward_and_its_inverse_is_refused(run: Any) -> None:
     found = json.loads(run("forward", "3r", "10,20,30", "--json").stdout)
     at = pk.load("3r").forward(np.radians([10, 20, 30]))
     np.testing.assert_allclose(found["pose"][0][:3], at[:3, 3])
@@ -65,7 +54,7 @@ def test_arm_goes_forward_and_its_inverse_is_refused() -> None:
     assert result.exit_code == 2 and "parallel machine is needed" in result.stderr
 
 
-def test_rows_out_of_reach_are_named_and_end_with_1() -> None:
+def test_rows_out_of_reach_are_named_and_end_with_1(run: Any) -> None:
     result = run("inverse", "linear-delta", "0,0,300,0,0,0")
     assert result.exit_code in (0, 1)
     result = run("inverse", "linear-delta", "900,0,0,0,0,0")
@@ -74,7 +63,7 @@ def test_rows_out_of_reach_are_named_and_end_with_1() -> None:
     assert result.exit_code == 1 and "row 0: " in result.stdout
 
 
-def test_match_completes_the_pose_that_the_machine_takes() -> None:
+def test_match_completes_the_pose_that_the_machine_takes(run: Any) -> None:
     robot = pk.load("2tpr2tps-spatial")
     wrong = [0, 10, 400, 5, 10, 0]
     found = json.loads(
@@ -93,7 +82,7 @@ def test_match_completes_the_pose_that_the_machine_takes() -> None:
         (["inverse", "hexapod", "1,2,3,4,5,6", "--jsn"], "pkmcal inverse --help"),
     ],
 )
-def test_wrong_input_is_refused_in_one_line(arguments: list[str], words: str) -> None:
+def test_wrong_input_is_refused_in_one_line(run: Any, arguments: list[str], words: str) -> None:
     result = run(*arguments)
     assert (result.exit_code, result.stdout) == (2, "")
     assert words in result.stderr and len(result.stderr.splitlines()) == 1

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
-from typer.testing import CliRunner
-
-from pkmcal.cli import main as cli
 
 ROOT = Path(__file__).resolve().parents[2]
 LINEAR_DELTA = ROOT / "examples" / "linear-delta"
@@ -26,12 +24,12 @@ LINEAR_DELTA = ROOT / "examples" / "linear-delta"
     ids=lambda argument: argument[0] if isinstance(argument, list) else "",
 )
 def test_a_bar_is_drawn_on_a_terminal_and_nowhere_else(
-    arguments: list[str], work: str, monkeypatch: pytest.MonkeyPatch
+    run: Any, arguments: list[str], work: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("FORCE_COLOR", raising=False)
-    piped = CliRunner().invoke(cli.app, arguments)
+    piped = run(*arguments)
     monkeypatch.setenv("FORCE_COLOR", "1")  # by which rich takes a pipe for a terminal
     monkeypatch.setenv("TERM", "xterm")
-    shown = CliRunner().invoke(cli.app, arguments)
+    shown = run(*arguments)
     assert piped.stderr == "" and work in shown.stderr
     assert shown.stdout == piped.stdout != ""

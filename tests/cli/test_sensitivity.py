@@ -11,20 +11,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal.cli import main as cli
 from pkmcal.cli import tolerance as cli_tolerance
-from pkmcal.cli.calibrate import read_deviations
+from pkmcal.cli.geometry_options import read_deviations
 from pkmcal.error_model.sensitivity import STUDIES, own_names, study_cases
 from pkmcal.measurements.pose_csv import read_poses, write_poses
+from pkmcal.report import drawing
 from pkmcal.report import error_figures as figures
-
-
-@pytest.fixture(autouse=True)
-def in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
 
 
 @pytest.fixture
@@ -32,26 +26,12 @@ def without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Drawing takes seconds; one test draws all."""
     for name in ("errors_by_pose", "mean_errors"):
         monkeypatch.setattr(figures, name, lambda found, title: None)
-    monkeypatch.setattr(figures, "save", lambda figure, path: [path.with_suffix(".png")])
-
-
-def run(*arguments: str) -> Any:
-    result = CliRunner().invoke(cli.app, list(arguments), prog_name="pkmcal")
-    if result.exception is not None and not isinstance(result.exception, SystemExit):
-        raise result.exception
-    return result
-
-
-def refused(*arguments: str) -> str:
-    result = run(*arguments)
-    assert (result.exit_code, result.stdout) == (2, "")
-    assert re.fullmatch(r"pkmcal: [^\n]+\n", result.stderr), result.stderr
-    return str(result.stderr)
+    monkeypatch.setattr(drawing, "write_both", lambda figure, path: [path.with_suffix(".png")])
 
 
 @pytest.mark.usefixtures("without_figures")
 @pytest.mark.parametrize("verb", ["sensitivity", "tolerance"])
-def test_help_shows_an_example_that_runs(verb: str) -> None:
+def test_help_shows_an_example_that_runs(run: Any, verb: str) -> None:
     words = " ".join(run(verb, "--help").stdout.split())
     match = re.search(r"Example: (pkmcal .*?) [╭+]", words)
     assert match
@@ -74,7 +54,7 @@ def _rows(table: Path) -> list[dict[str, str]]:
         (["tolerance", "--sigma", "0.1", "--samples", "100"], ["tolerance.csv"]),
     ],
 )
-def test_tables_say_what_they_were_made_of(verb: list[str], files: list[str]) -> None:
+def test_tables_say_what_they_were_made_of(run: Any, verb: list[str], files: list[str]) -> None:
     write_poses("at.csv", pk.sample_poses(pk.load("2tpr2tps"), 3))
     assert run(verb[0], "2tpr2tps", "--poses", "at.csv", *verb[1:], "--out", "out").exit_code == 0
     digest = hashlib.sha256(Path("at.csv").read_bytes()).hexdigest()
@@ -88,7 +68,7 @@ def test_tables_say_what_they_were_made_of(verb: list[str], files: list[str]) ->
 # --- sensitivity -----------------------------------------------------------------------------
 
 
-def test_one_command_draws_the_six_figures_and_writes_the_table(tmp_path: Path) -> None:
+def test_one_command_draws_the_six_figures_and_writes_the_table(run: Any, tmp_path: Path) -> None:
     result = run("sensitivity", "2tpr2tps", "--out", "errors")
     assert (result.exit_code, result.stderr) == (0, "")
     expected = {
@@ -100,7 +80,7 @@ def test_one_command_draws_the_six_figures_and_writes_the_table(tmp_path: Path) 
     files = {path.name for path in (tmp_path / "errors").iterdir()}
     assert files == expected | {"sensitivity.csv", "poses.csv"}
     robot = pk.load("2tpr2tps")
-    found = pk.sensitivity(robot, pk.sample_poses(robot), 1.0, study_cases(robot, "offsets"))
+    found = pk.sensitivity(robot, pk.sample_poses(robot), 1.0, cases=study_cases(robot, "offsets"))
     assert str(found) in result.stdout
     table = _rows(tmp_path / "errors" / "sensitivity.csv")
     rows = {row["error of"]: row for row in table if row["study"] == "offsets"}
@@ -113,7 +93,7 @@ def test_one_command_draws_the_six_figures_and_writes_the_table(tmp_path: Path) 
 
 
 @pytest.mark.usefixtures("without_figures")
-def test_the_poses_it_wrote_give_the_same_again() -> None:
+def test_the_poses_it_wrote_give_the_same_again(run: Any) -> None:
     first = run("sensitivity", "2tpr2tps", "--out", "one", "--seed", "3")
     again = run("sensitivity", "2tpr2tps", "--out", "two", "--poses", "one/poses.csv")
     tables = [r.stdout.split("\none/")[0].split("\ntwo/")[0] for r in (first, again)]
@@ -122,25 +102,27 @@ def test_the_poses_it_wrote_give_the_same_again() -> None:
 
 
 @pytest.mark.usefixtures("without_figures")
-def test_sensitivity_as_json_stands_alone() -> None:
+def test_sensitivity_as_json_stands_alone(run: Any) -> None:
     found = json.loads(run("sensitivity", "linear-delta", "--step", "0.5", "--json").stdout)
     assert set(found) == set(STUDIES)
     robot = pk.load("linear-delta")
-    expected = pk.sensitivity(robot, pk.sample_poses(robot), 0.5, study_cases(robot, "all-limbs"))
+    expected = pk.sensitivity(
+        robot, pk.sample_poses(robot), 0.5, cases=study_cases(robot, "all-limbs")
+    )
     assert found["all-limbs"]["cases"] == list(expected.cases)
     np.testing.assert_allclose(found["all-limbs"]["exact"], expected.exact)
     np.testing.assert_allclose(found["all-limbs"]["mean"], expected.mean)
 
 
 @pytest.mark.usefixtures("without_figures")
-def test_poses_that_are_not_solved_make_exit_code_1(tmp_path: Path) -> None:
+def test_poses_that_are_not_solved_make_exit_code_1(run: Any, tmp_path: Path) -> None:
     Path("far.csv").write_text("x [mm],z [mm]\n0,120\n5000,120\n", encoding="utf-8")
     result = run("sensitivity", "linear-delta", "--poses", "far.csv")
     assert result.exit_code == 1
     assert "not solved" in result.stdout
 
 
-def test_wrong_input_is_refused_in_one_line() -> None:
+def test_wrong_input_is_refused_in_one_line(refused: Any) -> None:
     assert "did you mean 'hexapod'" in refused("sensitivity", "hexapd")
     assert "step must not be 0, found 0" in refused("sensitivity", "hexapod", "--step", "0")
     assert "home breaks a limit or is singular" in refused("sensitivity", "rbt-6t03p-printed")
@@ -151,12 +133,12 @@ def test_wrong_input_is_refused_in_one_line() -> None:
 # --- tolerance -------------------------------------------------------------------------------
 
 
-def test_tolerance_prints_what_the_library_finds(tmp_path: Path) -> None:
+def test_tolerance_prints_what_the_library_finds(run: Any, tmp_path: Path) -> None:
     options = ["--sigma", "base*=0.1", "--sigma", "offset1=20um", "--samples", "3000"]
     result = run("tolerance", "2tpr2tps", *options, "--seed", "7", "--out", "t")
     robot = pk.load("2tpr2tps")
     found = pk.tolerance(
-        robot, pk.sample_poses(robot, seed=7), {"base*": 0.1, "offset1": 0.02}, 3000, 7
+        robot, pk.sample_poses(robot, seed=7), {"base*": 0.1, "offset1": 0.02}, samples=3000, seed=7
     )
     assert (result.exit_code, result.stderr) == (0, "")
     assert result.stdout == f"{found}\n"
@@ -167,7 +149,7 @@ def test_tolerance_prints_what_the_library_finds(tmp_path: Path) -> None:
 
 
 def test_a_map_is_drawn_over_two_coordinates(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cli_tolerance, "_MACHINES", 100)
     options = ["--sigma", "0.1", "--samples", "100", "--map", "y,z", "--out", "t"]
@@ -175,7 +157,7 @@ def test_a_map_is_drawn_over_two_coordinates(
     assert {p.name for p in (tmp_path / "t").iterdir()} == {"map.png", "map.svg", "tolerance.csv"}
 
 
-def test_allowed_asks_the_inverse_question() -> None:
+def test_allowed_asks_the_inverse_question(run: Any) -> None:
     options = ["--allowed", "0.2", "--samples", "3000"]
     robot = pk.load("2tpr2tps")
     expected = pk.allocate_tolerance(robot, pk.sample_poses(robot), 0.2, samples=3000)
@@ -186,7 +168,7 @@ def test_allowed_asks_the_inverse_question() -> None:
     assert found["reached"] == {"distance": expected.reached["distance"]}
 
 
-def test_tolerance_as_json_holds_the_attributes_of_the_result() -> None:
+def test_tolerance_as_json_holds_the_attributes_of_the_result(run: Any) -> None:
     options = ["--sigma", "0.1", "--samples", "500", "--json"]
     found = json.loads(run("tolerance", "2tpr2tps", *options).stdout)
     for name in ("mean", "std", "interval95", "linear_std", "worst_case", "contribution", "names"):
@@ -205,7 +187,7 @@ def test_sigma_has_the_units_of_prior() -> None:
     assert read["rod*"] == pytest.approx(0.01)
 
 
-def test_wrong_options_are_refused_in_one_line() -> None:
+def test_wrong_options_are_refused_in_one_line(refused: Any) -> None:
     assert "--sigma or --allowed" in refused("tolerance", "2tpr2tps")
     assert "--sigma or --allowed" in refused(
         "tolerance", "2tpr2tps", "--sigma", "0.1", "--allowed", "1"
@@ -245,7 +227,7 @@ def test_a_column_that_is_missing_is_that_of_home(tmp_path: Path) -> None:
     assert (found[:, [0, 1, 4, 5]] == 0).all()
 
 
-def test_an_error_at_which_nothing_is_solved_leaves_empty_figures() -> None:
+def test_an_error_at_which_nothing_is_solved_leaves_empty_figures(run: Any) -> None:
     result = run("sensitivity", "2tpr2tps", "--step", "500")
     assert result.exit_code == 1
     assert "not solved" in result.stdout

@@ -254,7 +254,7 @@ def test_shapes_are_checked(paper: Robot) -> None:
         compensate(paper, desired[0], desired[0])
     with pytest.raises(ValueError, match="one row for each of 3 poses"):
         compensate(paper, desired, desired[:2])
-    with pytest.raises(ValueError, match="positions do not tell the orientation"):
+    with pytest.raises(ValueError, match="positions do not determine the orientation"):
         compensate(paper, desired, desired[:, :3])
     with pytest.raises(ValueError, match="from-position"):
         compensate(pk.load("hexapod"), desired, desired, orientation="from-position")
@@ -266,9 +266,9 @@ def test_poses_none_of_which_is_reached_are_nan_and_said(
     paper: Robot, method: str, common: bool
 ) -> None:
     desired = np.tile(paper.home, (3, 1))
-    found = compensate(paper, desired, np.full((3, 6), np.nan), method, common=common)
+    found = compensate(paper, desired, np.full((3, 6), np.nan), method=method, common=common)
     assert np.isnan(found.actuators).all()
-    assert str(found) == "3 poses; no pose that was both asked for and measured is within reach"
+    assert str(found) == "3 poses; no pose that was both desired and measured is within reach"
 
 
 def test_measurements_in_another_unit_or_frame_are_called_gross(paper: Robot) -> None:
@@ -278,5 +278,5 @@ def test_measurements_in_another_unit_or_frame_are_called_gross(paper: Robot) ->
     shifted[1, :3] *= 1e-3
     found = compensate(paper, desired, shifted)
     assert found.gross.tolist() == [False, True]
-    assert "1 of 2 were off by more than errors of a machine" in str(found)
+    assert "1 of 2 have implausible errors" in str(found)
     assert max(map(len, str(found).splitlines())) <= 100

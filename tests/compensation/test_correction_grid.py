@@ -73,7 +73,9 @@ def test_half_the_spacing_leaves_a_quarter_of_the_error(robot: Robot, calibrated
 
 
 def test_cubic_is_better_than_linear(robot: Robot, calibrated: Robot) -> None:
-    linear, cubic = (correction_grid(robot, calibrated, AXES, m) for m in ("linear", "cubic"))
+    linear, cubic = (
+        correction_grid(robot, calibrated, AXES, method=m) for m in ("linear", "cubic")
+    )
     assert cubic.position_error < 0.2 * linear.position_error
 
 
@@ -93,7 +95,7 @@ def test_outside_and_out_of_reach_is_nan() -> None:
 def test_written_table_reads_back(grid: CorrectionGrid, tmp_path: Path) -> None:
     grid.write(tmp_path / "grid.csv")
     text = (tmp_path / "grid.csv").read_text()
-    assert "position off by" in text.splitlines()[1]
+    assert "error of the position" in text.splitlines()[1]
     assert "y [mm],z [mm],alpha [deg],beta [deg],dq1 [mm]" in text
     table = Table(tmp_path / "grid.csv")
     values = np.stack([table.numbers(f"dq{i}", "mm")[0] for i in range(1, 5)], axis=1)

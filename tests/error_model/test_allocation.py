@@ -40,7 +40,7 @@ def test_machines_with_these_tolerances_keep_what_is_allowed(name: str, cost: An
     found = pk.allocate_tolerance(robot, poses(name, 4), 0.2, cost=cost, samples=SAMPLES)
     assert found.reached["distance"] == pytest.approx(0.2, rel=NOISE)
     wider = {j: 1.2 * s for j, s in zip(found.joints, found.sigma, strict=True) if np.isfinite(s)}
-    again = pk.tolerance(robot, poses(name, 4), wider, SAMPLES, seed=9)
+    again = pk.tolerance(robot, poses(name, 4), wider, samples=SAMPLES, seed=9)
     assert again.distance997.max() > 0.2 * (1.2 - 2 * NOISE)
 
 
@@ -83,7 +83,9 @@ def test_no_other_sigmas_are_cheaper() -> None:
 def test_at_one_pose_the_cheapest_is_the_closed_form() -> None:
     robot = pk.load("2tpr2tps")
     cost = {"offset1": 8.0, "offset2": 1.0, "offset3": 1.0, "offset4": 27.0}
-    found = pk.allocate_tolerance(robot, robot.home, 0.3, list(cost), cost, SAMPLES)
+    found = pk.allocate_tolerance(
+        robot, robot.home, 0.3, joints=list(cost), cost=cost, samples=SAMPLES
+    )
     places = [robot.geometry.names.index(name) for name in cost]
     use = (robot.error_jacobian(robot.home)[:3, places] ** 2).sum(axis=0)
     expected = np.cbrt(np.array(list(cost.values())) / use)  # Lagrange: cost/sigma² ~ use·sigma
@@ -93,8 +95,10 @@ def test_at_one_pose_the_cheapest_is_the_closed_form() -> None:
 def test_a_dearer_joint_gets_a_wider_tolerance() -> None:
     robot = pk.load("2tpr2tps")
     joints = ["base*", "platform*", "offset*"]
-    cheap = pk.allocate_tolerance(robot, robot.home, 0.3, joints, 1.0, SAMPLES)
-    dear = pk.allocate_tolerance(robot, robot.home, 0.3, joints, {"base*": 10.0}, SAMPLES)
+    cheap = pk.allocate_tolerance(robot, robot.home, 0.3, joints=joints, cost=1.0, samples=SAMPLES)
+    dear = pk.allocate_tolerance(
+        robot, robot.home, 0.3, joints=joints, cost={"base*": 10.0}, samples=SAMPLES
+    )
     ratio = dear.sigma / cheap.sigma
     assert ratio[0] > 1.0 > ratio[1] and ratio[2] < 1.0
 
@@ -110,7 +114,9 @@ def test_several_limits_hold_together() -> None:
 
 def test_what_has_no_effect_may_be_as_wide_as_it_likes() -> None:
     robot = pk.load("3rrr-planar")
-    found = pk.allocate_tolerance(robot, robot.home, 0.1, ["rod*", "base*.z"], None, 1000)
+    found = pk.allocate_tolerance(
+        robot, robot.home, 0.1, joints=["rod*", "base*.z"], cost=None, samples=1000
+    )
     assert found.sigma[1] == np.inf and np.isfinite(found.sigma[0])
     assert found.contribution == pytest.approx([100.0, 0.0])
     assert "inf" in str(found)
@@ -155,10 +161,10 @@ def test_a_limit_so_wide_that_machines_have_no_pose_is_refused() -> None:
 def test_joints_are_one_name_or_several_but_not_none() -> None:
     robot = pk.load("2tpr2tps")
     one, listed = (
-        pk.allocate_tolerance(robot, robot.home, 0.5, joints, samples=500)
+        pk.allocate_tolerance(robot, robot.home, 0.5, joints=joints, samples=500)
         for joints in ("offset*", ["offset*"])
     )
     assert one.joints == listed.joints == ("offset*",)
     assert one.sigma == listed.sigma
     with pytest.raises(ValueError, match="joints: name at least one"):
-        pk.allocate_tolerance(robot, robot.home, 0.5, [])
+        pk.allocate_tolerance(robot, robot.home, 0.5, joints=[])

@@ -53,7 +53,7 @@ def test_linear_prediction_is_the_limit_of_the_exact_error(name: str) -> None:
 @given(step=st.floats(-5.0, 5.0).filter(lambda s: abs(s) > 1e-3), axis=st.sampled_from("xyz"))
 def test_all_base_joints_moved_alike_move_the_platform_alike(step: float, axis: str) -> None:
     robot = pk.load("hexapod")
-    found = pk.sensitivity(robot, poses("hexapod", 4), step, [f"base*.{axis}"])
+    found = pk.sensitivity(robot, poses("hexapod", 4), step, cases=[f"base*.{axis}"])
     expected = np.zeros(6)
     expected["xyz".index(axis)] = step
     np.testing.assert_allclose(found.exact[0], np.tile(expected, (4, 1)), atol=1e-9)
@@ -74,7 +74,7 @@ def test_a_wildcard_puts_all_that_match_in_error_together() -> None:
 def test_an_error_of_a_parameter_is_that_of_all_it_ties() -> None:
     tied, untied = pk.load(DELTA), pk.load("linear-delta")
     at = tied.home + np.array([[30.0, -20, 15, 0, 0, 0], [0, 40, 0, 0, 0, 0]])
-    found = pk.sensitivity(tied, at, 0.5, ["radius"])
+    found = pk.sensitivity(tied, at, 0.5, cases=["radius"])
     bigger = tied.replace({"radius": tied.geometry["radius"] + 0.5})
     assert (bigger.geometry.slots != tied.geometry.slots).sum() > 3
     alike = twin.forward(tied.model, tied.inverse(at[0]), bigger.geometry.slots, at[0])
@@ -112,7 +112,7 @@ def test_mean_is_that_of_the_sizes() -> None:
 def test_a_pose_off_the_closures_is_completed_first(name: str) -> None:
     robot = pk.load(name)
     off = robot.home + np.array([3.0, -2.0, 5.0, 0.05, 0.04, 0.02])
-    found = pk.sensitivity(robot, off, 1e-6, ["offset1"])
+    found = pk.sensitivity(robot, off, 1e-6, cases=["offset1"])
     np.testing.assert_allclose(found.poses, robot.complete(off), atol=1e-8)
     assert np.abs(found.exact).max() < 1e-4
 

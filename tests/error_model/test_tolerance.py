@@ -43,7 +43,7 @@ def several_poses() -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def reference() -> Tolerance:
-    return pk.tolerance(pk.load("2tpr2tps"), several_poses(), 0.1, SAMPLES, seed=5)
+    return pk.tolerance(pk.load("2tpr2tps"), several_poses(), 0.1, samples=SAMPLES, seed=5)
 
 
 # --- one geometry per row --------------------------------------------------------------------
@@ -71,7 +71,7 @@ def test_errors_are_those_of_the_tool_in_the_users_frame() -> None:
     plain = pk.load("hexapod")
     base, tool = np.array([50.0, -20, 300, 0, 0, np.pi / 2]), np.array([0, 0, 120.0, 0, 0, 0])
     robot = Robot(replace(plain.model, base_frame=base, tool_frame=tool))
-    found = pk.tolerance(robot, robot.home, {"base*.z": 0.01}, 30_000)
+    found = pk.tolerance(robot, robot.home, {"base*.z": 0.01}, samples=30_000)
     np.testing.assert_allclose(found.std, found.linear_std, rtol=0.02)
     assert robot.home[:3] == pytest.approx([50, -20, 300 + plain.home[2] + 120])
     # after a quarter turn x is the machine's -y, and a tilt dalpha moves the tool by -120 dalpha
@@ -88,7 +88,7 @@ def test_errors_are_those_of_the_tool_in_the_users_frame() -> None:
 @pytest.mark.parametrize("name", MACHINES)
 def test_small_errors_spread_as_linear_propagation_says(name: str) -> None:
     robot = pk.load(name)
-    found = pk.tolerance(robot, robot.complete(poses(name, 2)), 1e-4, 20_000)
+    found = pk.tolerance(robot, robot.complete(poses(name, 2)), 1e-4, samples=20_000)
     moved = found.linear_std > 1e-7
     ratio = found.std[moved] / found.linear_std[moved]
     np.testing.assert_allclose(ratio, 1.0, atol=5 / np.sqrt(2 * 20_000))
@@ -154,7 +154,7 @@ def test_intervals_are_quantiles_of_the_machines_that_were_drawn(
     monkeypatch.setattr(
         monte_carlo.Stream, "add", lambda self, v: (kept.append(v.copy()), add(self, v))[1]
     )
-    found = pk.tolerance(pk.load("2tpr2tps"), [10, 20, 400, 0.2, 0.1, 0], 0.5, SAMPLES)
+    found = pk.tolerance(pk.load("2tpr2tps"), [10, 20, 400, 0.2, 0.1, 0], 0.5, samples=SAMPLES)
     drawn = np.concatenate(kept, axis=1)
     assert drawn.shape == (7, SAMPLES)
     bin_width = drawn.std(axis=1) / 100  # a 128th of the pilot's spread
@@ -185,22 +185,26 @@ def test_large_errors_are_biased_as_the_second_order_says() -> None:
 
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others(reference: Tolerance) -> None:
     robot = pk.load("2tpr2tps")
-    assert_same_bits(pk.tolerance(robot, several_poses(), 0.1, SAMPLES, seed=5), reference)
-    other = pk.tolerance(robot, several_poses(), 0.1, SAMPLES, seed=6)
+    assert_same_bits(pk.tolerance(robot, several_poses(), 0.1, samples=SAMPLES, seed=5), reference)
+    other = pk.tolerance(robot, several_poses(), 0.1, samples=SAMPLES, seed=6)
     assert (other.mean[:, :5] != reference.mean[:, :5]).all()
 
 
 @pytest.mark.parametrize("workers", [1, 2, 5])
 def test_threads_give_the_same_bits(workers: int, reference: Tolerance) -> None:
     with ThreadPoolExecutor(workers) as executor:
-        found = pk.tolerance(pk.load("2tpr2tps"), several_poses(), 0.1, SAMPLES, 5, executor)
+        found = pk.tolerance(
+            pk.load("2tpr2tps"), several_poses(), 0.1, samples=SAMPLES, seed=5, executor=executor
+        )
     assert_same_bits(found, reference)
 
 
 def test_processes_give_the_same_bits(reference: Tolerance) -> None:
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(2, mp_context=context) as executor:
-        found = pk.tolerance(pk.load("2tpr2tps"), several_poses(), 0.1, SAMPLES, 5, executor)
+        found = pk.tolerance(
+            pk.load("2tpr2tps"), several_poses(), 0.1, samples=SAMPLES, seed=5, executor=executor
+        )
     assert_same_bits(found, reference)
 
 
@@ -224,13 +228,15 @@ class Backwards(Executor):
 
 
 def test_the_order_in_which_chunks_are_done_does_not_matter(reference: Tolerance) -> None:
-    found = pk.tolerance(pk.load("2tpr2tps"), several_poses(), 0.1, SAMPLES, 5, Backwards())
+    found = pk.tolerance(
+        pk.load("2tpr2tps"), several_poses(), 0.1, samples=SAMPLES, seed=5, executor=Backwards()
+    )
     assert_same_bits(found, reference)
 
 
 def test_poses_do_not_influence_each_other(reference: Tolerance) -> None:
     robot = pk.load("2tpr2tps")
-    alone = pk.tolerance(robot, several_poses()[1], 0.1, SAMPLES, 5)
+    alone = pk.tolerance(robot, several_poses()[1], 0.1, samples=SAMPLES, seed=5)
     for name in ARRAYS:
         expected = getattr(reference, name)[1]
         np.testing.assert_allclose(getattr(alone, name), expected, rtol=1e-12, atol=1e-15)
@@ -239,7 +245,7 @@ def test_poses_do_not_influence_each_other(reference: Tolerance) -> None:
 def test_more_poses_than_a_task_takes_come_back_in_their_order() -> None:
     robot = pk.load("2tpr2tps")
     at = poses("2tpr2tps", 2 * monte_carlo.POSES + 3)
-    found = pk.tolerance(robot, at.reshape(5, 7, 6), 1e-3, 5_000)
+    found = pk.tolerance(robot, at.reshape(5, 7, 6), 1e-3, samples=5_000)
     assert found.std.shape == (5, 7, 6) and found.interval95.shape == (5, 7, 6, 2)
     assert found.distance95.shape == found.failed.shape == (5, 7)
     np.testing.assert_allclose(found.std[..., 1:5], found.linear_std[..., 1:5], rtol=0.05)
@@ -253,7 +259,9 @@ def test_a_failing_worker_is_heard_and_the_rest_is_called_off() -> None:
             return future
 
     with Broken(1) as executor, pytest.raises(OSError, match="no worker"):
-        pk.tolerance(pk.load("2tpr2tps"), several_poses(), 0.1, SAMPLES, 5, executor)
+        pk.tolerance(
+            pk.load("2tpr2tps"), several_poses(), 0.1, samples=SAMPLES, seed=5, executor=executor
+        )
 
 
 def test_memory_does_not_grow_with_the_samples() -> None:
@@ -261,7 +269,7 @@ def test_memory_does_not_grow_with_the_samples() -> None:
     peaks = []
     for chunks in (2, 12):
         tracemalloc.start()
-        pk.tolerance(robot, robot.home, 0.1, chunks * monte_carlo.CHUNK)
+        pk.tolerance(robot, robot.home, 0.1, samples=chunks * monte_carlo.CHUNK)
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.1 * peaks[0]
@@ -274,7 +282,7 @@ def test_progress_grows_to_the_whole() -> None:
         pk.load("2tpr2tps"),
         several_poses(),
         0.1,
-        SAMPLES,
+        samples=SAMPLES,
         progress=lambda done, total: steps.append((done, total)),
     )
     done = [step[0] for step in steps]
@@ -287,7 +295,7 @@ def test_progress_grows_to_the_whole() -> None:
 
 def test_machines_without_a_pose_are_counted_and_left_out() -> None:
     robot = pk.load("linear-delta")
-    found = pk.tolerance(robot, robot.home, {"rod*": 60.0}, 5_000)
+    found = pk.tolerance(robot, robot.home, {"rod*": 60.0}, samples=5_000)
     assert 0 < found.failed < 5_000
     assert np.isfinite(found.std[:3]).all()
     assert f"{int(found.failed)} of 5000" in str(found)
@@ -295,7 +303,7 @@ def test_machines_without_a_pose_are_counted_and_left_out() -> None:
 
 def test_a_pose_out_of_reach_is_nan() -> None:
     robot = pk.load("linear-delta")
-    found = pk.tolerance(robot, [robot.home, [5000.0, 0, 0, 0, 0, 0]], 0.1, 1_000)
+    found = pk.tolerance(robot, [robot.home, [5000.0, 0, 0, 0, 0, 0]], 0.1, samples=1_000)
     assert found.failed.tolist() == [0, 1_000]
     for name in ARRAYS[:-1]:
         assert np.isnan(getattr(found, name)[1]).all(), name
@@ -314,13 +322,13 @@ def test_one_sigma_is_for_every_length() -> None:
 def test_later_entries_override_and_arrays_go_by_place() -> None:
     robot = pk.load("2tpr2tps")
     given = {"base*": 0.1, "base2.*": 0.3, "base2.y": 0.0, "offset1": 0.05}
-    by_name = pk.tolerance(robot, robot.home, given, 2)
+    by_name = pk.tolerance(robot, robot.home, given, samples=2)
     sigma = dict(zip(by_name.names, by_name.sigma, strict=True))
     assert sigma["base1.x"] == 0.1 and sigma["base2.z"] == 0.3 and sigma["offset1"] == 0.05
     assert "base2.y" not in sigma and len(sigma) == 12
     array = np.zeros(len(robot.geometry))
     array[[robot.geometry.names.index(name) for name in sigma]] = list(sigma.values())
-    assert_same_bits(pk.tolerance(robot, robot.home, array, 2), by_name)
+    assert_same_bits(pk.tolerance(robot, robot.home, array, samples=2), by_name)
 
 
 @pytest.mark.parametrize(
@@ -338,34 +346,36 @@ def test_later_entries_override_and_arrays_go_by_place() -> None:
 def test_a_wrong_sigma_is_named(sigma: Any, error: type, words: str) -> None:
     robot = pk.load("2tpr2tps")
     with pytest.raises(error, match=words):
-        pk.tolerance(robot, robot.home, sigma, 10)
+        pk.tolerance(robot, robot.home, sigma, samples=10)
 
 
 def test_a_tied_number_has_no_sigma_of_its_own() -> None:
     robot = pk.load(DELTA)
     with pytest.raises(ValueError, match="driven by the parameter"):
-        pk.tolerance(robot, robot.home, {"base1.x": 0.1}, 10)
+        pk.tolerance(robot, robot.home, {"base1.x": 0.1}, samples=10)
     sigma = np.zeros(len(robot.geometry))
     sigma[robot.geometry.names.index("base1.x")] = 0.1
     with pytest.raises(ValueError, match="driven by the parameter"):
-        pk.tolerance(robot, robot.home, sigma, 10)
+        pk.tolerance(robot, robot.home, sigma, samples=10)
 
 
 @pytest.mark.parametrize("samples", [0, 1, 2.5, True, "many"])
 def test_samples_are_a_whole_number_from_two(samples: Any) -> None:
     robot = pk.load("2tpr2tps")
     with pytest.raises(ValueError, match="samples must be a whole number from 2"):
-        pk.tolerance(robot, robot.home, 0.1, samples)
+        pk.tolerance(robot, robot.home, 0.1, samples=samples)
 
 
 def test_no_poses_are_refused() -> None:
     with pytest.raises(ValueError, match="poses must be at least one"):
-        pk.tolerance(pk.load("2tpr2tps"), np.empty((0, 6)), 0.1, 10)
+        pk.tolerance(pk.load("2tpr2tps"), np.empty((0, 6)), 0.1, samples=10)
 
 
 def test_the_report_lists_what_matters_most_first() -> None:
     robot = pk.load("2tpr2tps")
-    found = pk.tolerance(robot, robot.home, {"offset1": 0.2, "offset3": 0.1, "base*.x": 0.01}, 500)
+    found = pk.tolerance(
+        robot, robot.home, {"offset1": 0.2, "offset3": 0.1, "base*.x": 0.01}, samples=500
+    )
     listed = [line.split()[0] for line in str(found).splitlines()[-6:]]
     order = np.argsort(-found.position_share, kind="stable")
     assert listed == [found.names[k] for k in order]

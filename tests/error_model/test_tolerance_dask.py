@@ -39,7 +39,9 @@ def spread(executor: Any = None, progress: Any = None) -> Tolerance:
     robot = pk.load("2tpr2tps")
     at = poses("2tpr2tps", monte_carlo.POSES + 2)
     samples = CHUNKS // 2 * monte_carlo.CHUNK - 100
-    return pk.tolerance(robot, at, 0.1, samples, 3, executor, progress)
+    return pk.tolerance(
+        robot, at, 0.1, samples=samples, seed=3, executor=executor, progress=progress
+    )
 
 
 def assert_same_bits(one: Tolerance, other: Tolerance) -> None:

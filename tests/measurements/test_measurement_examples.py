@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal.cli import main as cli
 from pkmcal.files.csv_table import Table
 from pkmcal.files.xlsx_rows import xlsx_rows
 from pkmcal.measurements.command_csv import read_commands
@@ -62,19 +60,21 @@ def machine_with(actuators: int, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize("path", WRONG, ids=lambda path: path.name)
-def test_check_says_in_one_line_what_is_wrong_with_a_file(path: Path, tmp_path: Path) -> None:
+def test_check_says_in_one_line_what_is_wrong_with_a_file(
+    run: Any, path: Path, tmp_path: Path
+) -> None:
     said, names, *_ = path.read_text(encoding="utf-8").splitlines()
     robot = machine_with(len(re.findall(r"\bq[0-9]", names)), tmp_path)
-    result = CliRunner().invoke(cli.app, ["check", str(robot), str(path)])
+    result = run("check", str(robot), str(path))
     assert (result.exit_code, result.stdout) == (2, "")
     assert result.stderr.startswith(f"pkmcal: {path}")
     assert said.removeprefix("# says: ") in result.stderr and result.stderr.count("\n") == 1
 
 
-def test_check_reads_a_log_in_any_spelling() -> None:
+def test_check_reads_a_log_in_any_spelling(run: Any) -> None:
     for path in SAME:
         if path.suffix != ".xlsx":
-            result = CliRunner().invoke(cli.app, ["check", "2tpr2tps", str(path)])
+            result = run("check", "2tpr2tps", str(path))
             assert f"{path}: 3 rows of kind position, readable\n" in result.stdout
 
 

@@ -57,7 +57,7 @@ LEVEL = ("level0", "level1")
 
 @cache
 def mean(case: str, poses: str) -> Array:
-    found: Array = pk.sensitivity(machine(), choice(poses), UNIT, [case]).mean[0]
+    found: Array = pk.sensitivity(machine(), choice(poses), UNIT, cases=[case]).mean[0]
     return found
 
 
@@ -80,7 +80,7 @@ def test_eq_14_15_there_are_28_errors() -> None:
 def test_eq_16_is_forward_with_errors_minus_forward_without(poses: str) -> None:
     """Solved by a model that shares nothing with this package."""
     robot, at = machine(), choice(poses)[:3]
-    found = pk.sensitivity(robot, at, UNIT, robot.model.free)
+    found = pk.sensitivity(robot, at, UNIT, cases=robot.model.free)
     for case, errors in zip(found.cases, found.exact, strict=True):
         slots = robot.replace({case: robot.geometry[case] + UNIT}).geometry.slots
         for pose, error in zip(at, errors, strict=True):
@@ -90,7 +90,7 @@ def test_eq_16_is_forward_with_errors_minus_forward_without(poses: str) -> None:
 
 
 def test_eq_17_prints_p_x_twice_and_the_pose_has_six_different_numbers() -> None:
-    found = pk.sensitivity(machine(), choice("tilted0"), UNIT, ["platform1.z"])
+    found = pk.sensitivity(machine(), choice("tilted0"), UNIT, cases=["platform1.z"])
     assert found.exact.shape == (1, 30, 6)
     assert (np.abs(found.exact[0, :, X] - found.exact[0, :, Y]) > 1e-3).all()
 
@@ -98,7 +98,7 @@ def test_eq_17_prints_p_x_twice_and_the_pose_has_six_different_numbers() -> None
 @pytest.mark.parametrize("poses", TILTED)
 def test_the_model_keeps_eq_7_under_error(poses: str) -> None:
     at = choice(poses)
-    found = pk.sensitivity(machine(), at, UNIT, machine().model.free)
+    found = pk.sensitivity(machine(), at, UNIT, cases=machine().model.free)
     after = at + found.exact
     np.testing.assert_allclose(after[..., X], after[..., Z] * np.tan(after[..., BETA]), atol=1e-9)
     assert np.abs(after[..., GAMMA]).max() == 0.0  # "not analysed" in the paper
@@ -112,7 +112,7 @@ def test_the_studies_are_those_of_fig_4_to_9() -> None:
 
 @pytest.mark.parametrize("study", STUDIES)
 def test_one_unit_is_small_enough_for_the_linear_prediction(study: str) -> None:
-    found = pk.sensitivity(machine(), choice("tilted0"), UNIT, study_cases(machine(), study))
+    found = pk.sensitivity(machine(), choice("tilted0"), UNIT, cases=study_cases(machine(), study))
     gap = np.abs(found.exact - found.linear)
     assert gap[..., :3].max() < 0.03 and np.degrees(gap[..., 3:]).max() < 0.003
 
@@ -214,7 +214,7 @@ def test_the_same_error_on_all_branches_moves_one_direction_most(
 
 @pytest.mark.parametrize("poses", [*TILTED, *LEVEL])
 def test_base_y_on_all_branches_moves_y_by_exactly_as_much(poses: str) -> None:
-    found = pk.sensitivity(machine(), choice(poses), UNIT, ["base*.y"]).exact[0]
+    found = pk.sensitivity(machine(), choice(poses), UNIT, cases=["base*.y"]).exact[0]
     np.testing.assert_allclose(found, np.tile([0.0, UNIT, 0, 0, 0, 0], (30, 1)), atol=1e-9)
 
 
@@ -227,7 +227,7 @@ def test_platform_z_on_all_branches_moves_all_directions_of_tilted_poses(poses: 
 
 @pytest.mark.parametrize("poses", LEVEL)
 def test_platform_z_on_all_branches_moves_level_poses_in_z_alone(poses: str) -> None:
-    found = pk.sensitivity(machine(), choice(poses), UNIT, ["platform*.z"]).exact[0]
+    found = pk.sensitivity(machine(), choice(poses), UNIT, cases=["platform*.z"]).exact[0]
     np.testing.assert_allclose(found, np.tile([0, 0, -UNIT, 0, 0, 0], (30, 1)), atol=1e-9)
 
 

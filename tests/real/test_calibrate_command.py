@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
-from pkmcal.cli import main as cli
 from pkmcal.measurements.measurements import Measurements
 
 ROOT = Path(__file__).parents[2]
@@ -34,25 +33,31 @@ def probe(tmp_path: Path) -> Path:
     return tmp_path / "probe.csv"
 
 
-def calibrate(probe: Path, *options: str) -> str:
-    robot = ROOT / "examples" / "linear-delta" / "robot.toml"
-    arguments = ["calibrate", str(robot), str(probe), *options]
-    result = CliRunner().invoke(cli.app, arguments)
-    assert (result.exit_code, result.stderr) == (0, "")
-    return str(result.stdout)
+@pytest.fixture
+def calibrate(run: Any, probe: Path) -> Callable[..., str]:
+    """What calibrating the linear delta from the log prints, with these options."""
+
+    def printed(*options: str) -> str:
+        robot = ROOT / "examples" / "linear-delta" / "robot.toml"
+        result = run("calibrate", robot, probe, *options)
+        assert (result.exit_code, result.stderr) == (0, "")
+        return str(result.stdout)
+
+    return printed
 
 
-def as_json(probe: Path, *options: str) -> Any:
-    return json.loads(calibrate(probe, "--json", *options))
+@pytest.fixture
+def as_json(calibrate: Callable[..., str]) -> Callable[..., Any]:
+    return lambda *options: json.loads(calibrate("--json", *options))
 
 
-def test_six_parameters_fit_the_log(probe: Path) -> None:
-    assert as_json(probe)["rms"] <= 0.0392
+def test_six_parameters_fit_the_log(as_json: Any) -> None:
+    assert as_json()["rms"] <= 0.0392
 
 
-def test_three_rods_more_fit_better_but_are_hardly_known(probe: Path) -> None:
-    found = as_json(probe, "--free", RODS)
+def test_three_rods_more_fit_better_but_are_hardly_known(calibrate: Any, as_json: Any) -> None:
+    found = as_json("--free", RODS)
     assert found["rms"] <= 0.0311
     sigmas = [found["parameters"][f"rod{i}"]["stderr"] for i in (1, 2, 3)]
     assert sigmas == pytest.approx([1.37] * 3, abs=0.03)
-    assert re.search(r"rod1 +334\.7 ± 1\.4", calibrate(probe, "--free", RODS))
+    assert re.search(r"rod1 +334\.7 ± 1\.4", calibrate("--free", RODS))

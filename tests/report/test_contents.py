@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
-from pkmcal.report.contents import as_seen, expected, instrument_sought
+from pkmcal.report.contents import as_seen, expected, instrument_identified
 
 from ..simulated import hexapod_poses
 
@@ -22,7 +22,7 @@ def test_accuracy_as_seen_is_that_of_the_point_where_all_of_the_instrument_is_kn
     measured = pk.VirtualMachine(robot, noise=0.02).measure(q, target=point)
     found = pk.identify(robot, measured, free=["offset*", "base*.z"], prior=0.5)
     places = hexapod_poses(robot, 10, np.random.default_rng(1))
-    assert not instrument_sought(found)
+    assert not instrument_identified(found)
     np.testing.assert_allclose(
         as_seen(found, places), found.accuracy(places, target=point), rtol=1e-9
     )
@@ -50,7 +50,7 @@ def test_machine_is_as_far_off_as_expected_where_the_instrument_stands_anywhere(
         pk.Measurements(q, values, sigma=0.02, target_index=index),
         free=free, frame="unknown", target="unknown",
     )  # fmt: skip
-    assert instrument_sought(found)
+    assert instrument_identified(found)
 
     places = hexapod_poses(robot, 60, np.random.default_rng(9))
     commands = found.robot.inverse(places)

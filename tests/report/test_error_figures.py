@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.report import drawing
 from pkmcal.report import error_figures as figures
 
 from ..workspaces import poses
@@ -26,7 +27,7 @@ def plane() -> pk.Workspace:
 def test_files_are_the_same_bytes_each_time(errors: pk.Sensitivity, tmp_path: Path) -> None:
     found = []
     for name in ("one", "two"):
-        written = figures.save(figures.mean_errors(errors, "title"), tmp_path / name)
+        written = drawing.write_both(figures.mean_errors(errors, "title"), tmp_path / name)
         assert [path.suffix for path in written] == [".png", ".svg"]
         found.append([path.read_bytes() for path in written])
     assert found[0] == found[1]
@@ -58,7 +59,7 @@ def test_what_does_not_move_is_not_drawn() -> None:
 
 
 def test_a_map_is_drawn_inside_the_limits(plane: pk.Workspace) -> None:
-    found = pk.tolerance(plane.robot, plane.poses, 0.1, 500)
+    found = pk.tolerance(plane.robot, plane.poses, 0.1, samples=500)
     figure = figures.tolerance_map(found, plane)
     assert figure.axes[0].get_xlabel() == "y [mm]" and figure.axes[0].get_ylabel() == "z [mm]"
     low, high = figure.axes[1].get_ylim()
@@ -75,7 +76,7 @@ def test_singularities_are_drawn_where_the_determinant_vanishes(tmp_path: Path) 
     for angle in (gamma.min(), gamma.max()):
         near = pk.dexterity(robot, np.add(robot.home, [0, 0, 0, 0, 0, np.radians(angle)]))
         assert near.conditioning < 0.01
-    figures.save(figure, tmp_path / "loci")
+    drawing.write_both(figure, tmp_path / "loci")
 
 
 def test_slices_show_what_is_inside(tmp_path: Path) -> None:
@@ -88,7 +89,7 @@ def test_slices_show_what_is_inside(tmp_path: Path) -> None:
     heights = [float(panel.get_title().split()[2]) for panel in figure.axes]
     chosen = [int(np.argmin(np.abs(grid.values[2] - height))) for height in heights]
     assert shown == grid.inside[:, :, chosen].sum()
-    figures.save(figure, tmp_path / "slices")
+    drawing.write_both(figure, tmp_path / "slices")
 
 
 def test_grids_of_other_axes_are_refused(plane: pk.Workspace) -> None:

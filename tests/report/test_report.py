@@ -13,11 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib import image
-from typer.testing import CliRunner
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
-from pkmcal.cli import main as cli
 from pkmcal.report import contents as report_data
 from pkmcal.report import report
 from pkmcal.report.contents import verdict
@@ -202,15 +200,18 @@ def test_an_arm_has_a_report(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "report.json").read_text())["calibration"]["robot"]["geometry"]
 
 
-def test_what_cannot_be_told_is_said(tmp_path: Path) -> None:
+def test_unidentifiable_parameters_are_named(tmp_path: Path) -> None:
     robot = pk.load("hexapod")
     q = robot.inverse(hexapod_poses(robot, 20, np.random.default_rng(3)))
     measured = pk.VirtualMachine(robot, noise=0.01).measure(q, "height")
     found = pk.identify(robot, measured, free=["offset*", "base*.x"])
     assert found.rank < len(found.free)
-    told = {row["name"]: row["knowledge"] for row in report_data.parameters(found)}
-    untold = [n for n, s in zip(found.free, found.stderr, strict=True) if not np.isfinite(s)]
-    assert untold and all(told[name] == "not told" for name in untold)
+    status = {row["name"]: row["knowledge"] for row in report_data.parameters(found)}
+    unidentifiable = [
+        n for n, s in zip(found.free, found.stderr, strict=True) if not np.isfinite(s)
+    ]
+    assert unidentifiable
+    assert all(status[name] == "not identifiable" for name in unidentifiable)
     found.report(tmp_path)
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert all(html.escape(words) in text for words in found.unidentifiable)
@@ -295,12 +296,12 @@ def test_page_prints(folder: Path, tmp_path: Path) -> None:
 
 
 def test_calibrate_writes_the_report_and_says_where(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     delta = Path(__file__).resolve().parents[2] / "examples" / "linear-delta"
     monkeypatch.chdir(tmp_path)
     files = [str(delta / "robot.toml"), str(delta / "probe.csv")]
-    result = CliRunner().invoke(cli.app, ["calibrate", *files, "--report", "out"])
+    result = run("calibrate", *files, "--report", "out")
     assert result.exit_code == 0
     assert result.stdout.endswith("\nreport: out/report.html\n")
     assert {path.name for path in Path("out").iterdir()} == {
@@ -311,9 +312,9 @@ def test_calibrate_writes_the_report_and_says_where(
     assert list(said["inputs"].values()) == digests
 
 
-def test_report_does_not_replace_the_robot_it_reads(tmp_path: Path) -> None:
+def test_report_does_not_replace_the_robot_it_reads(run: Any, tmp_path: Path) -> None:
     delta = Path(__file__).resolve().parents[2] / "examples" / "linear-delta"
     arguments = [str(delta / "robot.toml"), str(delta / "probe.csv"), "--report", str(delta)]
-    result = CliRunner().invoke(cli.app, ["calibrate", *arguments])
-    assert result.exit_code == 2 and "would replace" in result.stderr
+    result = run("calibrate", *arguments)
+    assert result.exit_code == 2 and "would overwrite" in result.stderr
     assert not (delta / "report.html").exists()

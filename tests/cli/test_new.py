@@ -9,25 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal.cli import main as cli
-from pkmcal.cli.robot_template import template
+from pkmcal.cli.new import template
 from pkmcal.geometry.limb_kinds import KINDS
 
 
-@pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
-def run(*arguments: str) -> Any:
-    return CliRunner().invoke(cli.app, list(arguments), prog_name="pkmcal")
-
-
 @pytest.mark.parametrize("name", pk.machines())
-def test_written_file_loads_as_the_machine(name: str, tmp_path: Path) -> None:
+def test_written_file_loads_as_the_machine(run: Any, name: str, tmp_path: Path) -> None:
     result = run("new", name)
     assert (result.exit_code, result.stderr) == (0, "")
     made, built_in = pk.load(tmp_path / f"{name}.toml"), pk.load(name)
@@ -47,7 +36,7 @@ def test_written_file_loads_as_the_machine(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", sorted({*pk.machines()} - {"3r"}))
 def test_every_key_that_a_limb_may_have_is_explained(name: str) -> None:
     head = template(name).partition("#\n# ")[2]
-    told = {
+    explained = {
         word
         for names in re.findall(r"^#   ([a-z_, ]+?)  ", template(name), re.MULTILINE)
         for word in names.split(", ")
@@ -55,7 +44,7 @@ def test_every_key_that_a_limb_may_have_is_explained(name: str) -> None:
     assert head
     kinds = [KINDS[limb.kind] for limb in pk.load(name).model.limbs]
     keys = {key for kind in kinds for key in kind.keys()}  # noqa: SIM118
-    assert {key for key in keys if not key.endswith("_tilt")} <= told
+    assert {key for key in keys if not key.endswith("_tilt")} <= explained
 
 
 def test_lines_are_short_enough_to_read() -> None:
@@ -65,23 +54,23 @@ def test_lines_are_short_enough_to_read() -> None:
         assert max(map(len, lines[:end])) <= 100, name
 
 
-def test_a_file_that_is_there_is_left_alone(tmp_path: Path) -> None:
+def test_an_existing_file_is_left_alone(run: Any, tmp_path: Path) -> None:
     (tmp_path / "hexapod.toml").write_text("mine")
     result = run("new", "hexapod")
-    assert result.exit_code == 2 and "is there already" in result.stderr
+    assert result.exit_code == 2 and "exists already" in result.stderr
     assert (tmp_path / "hexapod.toml").read_text() == "mine"
 
 
-def test_a_mistyped_machine_is_refused_with_the_one_that_is_near() -> None:
+def test_a_mistyped_machine_is_refused_with_the_one_that_is_near(run: Any) -> None:
     result = run("new", "hexapd", "mine.toml")
     assert (result.exit_code, Path("mine.toml").exists()) == (2, False)
     assert result.stderr == "pkmcal: unknown machine 'hexapd'; did you mean 'hexapod'?\n"
 
 
-def test_a_path_is_no_machine(tmp_path: Path) -> None:
+def test_a_path_is_no_machine(run: Any, tmp_path: Path) -> None:
     assert run("new", str(tmp_path / "x.toml")).exit_code == 2
 
 
-def test_json_names_the_file() -> None:
+def test_json_names_the_file(run: Any) -> None:
     said = json.loads(run("new", "3rps", "mine.toml", "--json").stdout)
     assert said == {"machine": "3rps", "file": "mine.toml"}

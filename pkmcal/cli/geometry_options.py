@@ -1,0 +1,109 @@
+"""Options that speak of numbers of the geometry: which are free, and their standard deviations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from fnmatch import fnmatchcase
+
+from pkmcal.core.library import POSE
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.csv_table import UNITS
+from pkmcal.measurements.calibratable import Calibratable
+
+_FRAME = dict(zip(POSE, ("mm", "mm", "mm", "rad", "rad", "rad"), strict=True))
+_DEVIATION = re.compile(
+    r"(?:(?P<name>[^=]+)=)?\s*"
+    r"(?P<number>[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(?P<unit>\D*)"
+)
+
+
+def free_names(robot: Calibratable, given: Sequence[str] | None) -> list[str]:
+    """Names that ``--free`` chooses, or the robot's default set.
+
+    Raises
+    ------
+    ValueError
+        A name that the robot does not have, or that a parameter drives.
+    """
+    if not given:
+        return list(robot.model.free)
+    patterns = [name.strip() for text in given for name in text.split(",")]
+    try:
+        return robot.geometry.match(patterns)
+    except ValueError as error:
+        raise ArgumentError(f"--free: {error}") from None
+
+
+def read_deviations(
+    option: str, given: Sequence[str], robot: Calibratable, names: Sequence[str]
+) -> float | Mapping[str, float] | None:
+    """Standard deviations from the command line; None where none is given.
+
+    Parameters
+    ----------
+    option : str
+        Which option gave them, for messages: ``--prior`` of identification, ``--sigma`` of
+        tolerances.
+    given : sequence of str
+        "σ" for all numbers in mm, or "NAME=σ"; σ may have a unit, and for angles must.
+    robot : Calibratable
+        The machine.
+    names : sequence of str
+        The numbers of its geometry that may have one.
+
+    Raises
+    ------
+    ValueError
+        No number, a unit that does not fit, a wildcard over lengths and angles.
+    """
+    sigmas: dict[str, float] = {}
+    for text in given:
+        try:
+            name, sigma = _deviation(text, robot, names)
+            if not name and len(given) > 1:
+                raise ArgumentError("a number without a name stands alone, for all")
+        except ValueError as error:
+            raise ArgumentError(f"{option} {text}: {error}") from None
+        if not name:
+            return sigma
+        sigmas[name] = sigma
+    return sigmas or None
+
+
+def _deviation(text: str, robot: Calibratable, names: Sequence[str]) -> tuple[str, float]:
+    """Name or wildcard, "" for all, and σ in mm, rad or 1."""
+    match = _DEVIATION.fullmatch(text.strip())
+    if match is None:
+        raise ArgumentError("expected NAME=NUMBER, such as base1.x=0.5")
+    name = (match["name"] or "").strip()
+    unit = _unit_of(name, robot, names) if name else "mm"
+    return name, _in_unit(float(match["number"]), match["unit"].strip(), unit, name)
+
+
+def _unit_of(pattern: str, robot: Calibratable, names: Sequence[str]) -> str:
+    """Unit of the numbers that a pattern covers; what is not known is a length."""
+    units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
+    known = {name: str(units[name]) for name in names}
+    known |= {f"frame.{name}": unit for name, unit in _FRAME.items()}
+    covered = {known[name] for name in known if fnmatchcase(name, pattern)}
+    if len(covered) > 1:
+        raise ArgumentError(
+            "covers lengths, angles or ratios together; name them apart, or give one number"
+            " without a name"
+        )
+    return covered.pop() if covered else "mm"
+
+
+def _in_unit(number: float, unit: str, quantity: str, name: str) -> float:
+    """A number in mm, rad or 1."""
+    factors = UNITS.get(quantity, {})
+    if not unit and quantity == "rad":
+        raise ArgumentError(f"{name} is an angle; give it a unit, such as 0.1deg")
+    if not unit:
+        return number
+    if unit not in factors:
+        expected = f"one of {', '.join(u for u in factors if u.isascii())}" if factors else "none"
+        raise ArgumentError(f"unit {unit!r}; expected {expected}")
+    times, over = factors[unit]
+    return number * times / over

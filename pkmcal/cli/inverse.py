@@ -1,0 +1,67 @@
+"""`pkmcal inverse`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pkmcal.cli.options import Json, ParallelRobot, Radians
+from pkmcal.cli.output import contents, folder
+from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
+from pkmcal.files.provenance import comment
+from pkmcal.loading import load_parallel
+from pkmcal.measurements.command_csv import write_commands
+from pkmcal.measurements.pose_csv import read_poses
+from pkmcal.report.as_json import as_json
+
+
+def inverse(
+    robot: ParallelRobot,
+    poses: Annotated[
+        str,
+        typer.Argument(
+            metavar="X,Y,Z,A,B,C|CSV",
+            help="One pose in mm and deg, or a file of poses: 'x \\[mm]' … 'gamma \\[deg]'.",
+        ),
+    ],
+    rad: Radians = False,
+    match: Annotated[
+        bool,
+        typer.Option(
+            "--match", help="Keep the coordinates that the machine determines, complete the others."
+        ),
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write commands.csv, exact.")
+    ] = None,
+    json: Json = False,
+) -> int:
+    """Print the actuator coordinates that lead to poses.
+
+    Exit code 1: a limb cannot reach some of the poses, or breaks a limit there.
+
+    Example: pkmcal inverse hexapod 20,-10,860,5,0,3
+    """
+    machine = load_parallel(robot)
+    row = numbers_on_line("poses", poses, POSE_UNITS, rad)
+    rows = read_poses(poses, machine) if row is None else row
+    if match:
+        rows = machine.complete(rows)
+    q = machine.inverse(rows)
+    allowed = machine.feasible(rows)
+    if out is not None:
+        read = contents(robot, *([Path(poses)] if row is None else []))
+        units = machine.actuator_units
+        write_commands(folder(out) / "commands.csv", units, q, comment=comment(read))
+    if json:
+        typer.echo(as_json({"actuators": q, "units": machine.actuator_units, "ok": allowed.ok}))
+    else:
+        heads = [f"q{i + 1}" for i in range(machine.n_actuators)]
+        typer.echo(table(heads, machine.actuator_units, q))
+        for line in allowed.broken():
+            typer.echo(line)
+        if out is not None:
+            typer.echo(f"\ncommands: {out / 'commands.csv'}")
+    return 0 if allowed.ok.all() else 1

@@ -1,0 +1,64 @@
+"""Arguments and options that several verbs take, each written once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pkmcal.geometry import robot_file
+from pkmcal.loading import machines
+
+_ROBOT = "A built-in machine or a robot file."
+
+
+def _parallel(incomplete: str) -> list[str]:
+    return [name for name in robot_file.builtin_names() if name.startswith(incomplete)]
+
+
+def _all(incomplete: str) -> list[str]:
+    return [name for name in machines() if name.startswith(incomplete)]
+
+
+# Where no name fits what was typed, shells go on with the names of files.
+ParallelRobot = Annotated[
+    str, typer.Argument(metavar="ROBOT", help=_ROBOT, autocompletion=_parallel)
+]
+RobotOrArm = Annotated[str, typer.Argument(metavar="ROBOT", help=_ROBOT, autocompletion=_all)]
+BuiltIn = Annotated[
+    str,
+    typer.Argument(
+        metavar="MACHINE", help="A built-in machine that is like yours.", autocompletion=_all
+    ),
+]
+
+Free = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME",
+        help="Identify this number instead of the robot's default set. Repeat it, separate names"
+        " with commas, or use wildcards: 'rod*,radius'.",
+    ),
+]
+Prior = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="[NAME=]σ",
+        help="Standard deviation of a number before anything is measured: 'base*=0.5',"
+        " 'angle1=0.1deg'. Without a name, in mm, of all.",
+    ),
+]
+Poses = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="CSV",
+        help="Poses, with columns such as 'y \\[mm]' and 'alpha \\[deg]'; by default 30 are"
+        " drawn in the workspace.",
+    ),
+]
+Radians = Annotated[bool, typer.Option("--rad", help="Angles on the line are in radians.")]
+Seed = Annotated[
+    int, typer.Option(metavar="N", min=0, help="Of the random numbers: one seed, one result.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")]

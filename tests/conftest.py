@@ -1,0 +1,39 @@
+"""Fixtures that tests of several rooms share: the command line, run in this process."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from pkmcal.cli.main import app
+
+
+@pytest.fixture(scope="session")
+def run() -> Callable[..., Any]:
+    """Return a function that runs `pkmcal` with these arguments; a traceback goes through."""
+
+    def run_pkmcal(*arguments: object) -> Any:
+        result = CliRunner().invoke(app, [str(each) for each in arguments], prog_name="pkmcal")
+        if result.exception is not None and not isinstance(result.exception, SystemExit):
+            raise result.exception
+        return result
+
+    return run_pkmcal
+
+
+@pytest.fixture(scope="session")
+def refused(run: Callable[..., Any]) -> Callable[..., str]:
+    """Return a function that gives the one line with which `pkmcal` refuses these arguments."""
+
+    def message(*arguments: object) -> str:
+        result = run(*arguments)
+        assert (result.exit_code, result.stdout) == (2, "")
+        match = re.fullmatch(r"pkmcal: ([^\n]+)\n", result.stderr)
+        assert match, result.stderr
+        return match[1]
+
+    return message
