@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+from typing import Any
+
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.calibration.identification import Identification
 from pkmcal.kinematics.robot import Robot
 
 
@@ -47,3 +51,18 @@ def missed(robot: Robot, true: Robot, actuators: FloatArray) -> FloatArray:
     """How far (mm) the robot's idea of where it goes is from where the true one goes."""
     off = robot.forward(actuators).pose - true.forward(actuators).pose
     return np.linalg.norm(off[:, :3], axis=1)
+
+
+def altered(found: Identification, **changes: Any) -> Identification:
+    """The result with other numbers under the flat names that users read."""
+    for name, value in changes.items():
+        if name == "warnings":
+            found = replace(found, warnings=value)
+            continue
+        part, _, inside = name.partition("_") if name.startswith("holdout_") else ("", "", name)
+        part = part or next(
+            field.name for field in fields(found) if hasattr(getattr(found, field.name), inside)
+        )
+        found = replace(found, **{part: replace(getattr(found, part), **{inside: value})})
+        assert getattr(found, name) is value
+    return found

@@ -1,7 +1,7 @@
 """Optimal design by exchange: which rows of a large Jacobian to keep.
 
-Everything is in coordinates in which all candidates have unit information
-about every combination of parameters: that of a choice of them is between 0 and 1, without units.
+SciPy has no design by exchange. Everything is in coordinates in which all candidates have unit
+information about every combination of parameters: that of a choice is between 0 and 1, unitless.
 """
 
 from __future__ import annotations

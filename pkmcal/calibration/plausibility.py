@@ -131,8 +131,8 @@ def beyond_strokes(equations: Equations, start: Evaluation, end: Evaluation) -> 
     more = f" and {len(limbs) - 2} more limbs" if len(limbs) > 2 else ""
     return [
         f"actuators out of stroke in {len(rows)} of {len(poses_of)} rows"
-        f" (rows {first_rows(rows, 10)}): {'; '.join(limbs[:2])}{more};"
-        " check units, signs and columns of the actuators, or the strokes in the robot file"
+        f" (rows {first_rows(rows, 10)}): {'; '.join(limbs[:2])}{more}; check units,"
+        " signs and columns of the actuators, or the strokes in the robot file"
     ]
 
 

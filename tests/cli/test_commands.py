@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 import os
@@ -27,6 +26,8 @@ from pkmcal.cli.demonstration import demonstrate
 from pkmcal.cli.geometry_options import read_deviations
 from pkmcal.files import atomic as whole_file
 from pkmcal.measurements.measurements import Measurements
+
+from ..simulated import altered
 
 ROOT = Path(__file__).resolve().parents[2]
 DELTA = ROOT / "examples" / "linear-delta"
@@ -235,7 +236,7 @@ def test_result_that_did_not_converge_is_not_to_be_trusted(
     run: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def gave_up(*arguments: Any, **settings: Any) -> Identification:
-        return dataclasses.replace(identify(*arguments, **settings), converged=False)
+        return altered(identify(*arguments, **settings), converged=False)
 
     monkeypatch.setattr(pk, "identify", gave_up)
     result = run("calibrate", ROBOT, PROBE)

@@ -21,7 +21,7 @@ from pkmcal.report import report
 from pkmcal.report.contents import verdict
 
 from .. import browser
-from ..simulated import hexapod_poses
+from ..simulated import altered, hexapod_poses
 
 HOSTILE = "<img src=x onerror=alert(1)>&\"'$\\frac{"
 FIGURES = ("points", "residuals", "machine", "correlation", "convergence", "accuracy", "iso0")
@@ -101,7 +101,7 @@ def test_verdict_comes_first_and_names_the_held_out_error(
 def test_verdict_is_no_better_than_the_calibration(
     found: Identification, changes: dict[str, Any], state: str, words: str
 ) -> None:
-    said = verdict(dataclasses.replace(found, **changes))
+    said = verdict(altered(found, **changes))
     assert said[0] == state and words in said[1]
 
 
