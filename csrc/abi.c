@@ -1,8 +1,8 @@
 /* What needs no lanes: names, the best ISA, checks of what calls are given, and small loops. */
 #include "pkmcal.h"
-#include "names.h"
 
 const char *pkm_slot_names(void) { return SLOT_NAMES; }
+const char *pkm_axis_names(void) { return AXIS_NAMES; }
 const char *pkm_driver_names(void) { return DRIVER_NAMES; }
 const char *pkm_row_names(void) { return ROW_NAMES; }
 const char *pkm_map_names(void) { return MAP_NAMES; }
@@ -27,7 +27,7 @@ int pkm_best_isa(void)
 
 static int free_coordinates(const pkm_machine *machine)
 {
-#define CASE(NAME, name, M) if (machine->map == MAP_##NAME) return M;
+#define CASE(NAME, name, M, ...) if (machine->map == MAP_##NAME) return M;
     EACH_MAP(CASE)
 #undef CASE
     return 0;
@@ -41,10 +41,8 @@ int pkm_closure_count(const pkm_machine *machine)
         || machine->actuators < 1 || machine->actuators > machine->limbs)
         return 0;
     for (int i = 0; i < machine->limbs; i++) {
-        if (machine->driver[i] < DRIVER_LENGTH || machine->driver[i] > DRIVER_CRANK
-            || machine->actuator[i] < 0 || machine->actuator[i] >= machine->actuators
-            || machine->rows[i] & ~(ROW_BASE_PLANE | ROW_PLATFORM_PLANE | ROW_COUPLE)
-            || (machine->rows[i] && machine->driver[i] != DRIVER_LENGTH))
+        if (machine->driver[i] < 0 || machine->driver[i] >= DRIVERS || machine->actuator[i] < 0
+            || machine->actuator[i] >= machine->actuators || machine->rows[i] & ~ALL_ROWS)
             return 0;
         rows += 1 + __builtin_popcount((unsigned)machine->rows[i]);
     }

@@ -70,7 +70,9 @@ def declarations() -> str:
     lines = HEADER.read_text(encoding="utf-8").splitlines()
     if lines.count(BEGIN) != 1 or lines.count(END) != 1:
         raise ValueError(f"{HEADER}: expected one line {BEGIN!r} and one line {END!r}")
-    parts = ["\n".join(lines[lines.index(BEGIN) + 1 : lines.index(END)])]
+    names = (GENERATED / "names.h").read_text(encoding="utf-8")
+    parts = re.findall(r"^enum { AXES = \d+ };$", names, re.MULTILINE)  # of the arrays below
+    parts += ["\n".join(lines[lines.index(BEGIN) + 1 : lines.index(END)])]
     calls = "".join(path.read_text(encoding="utf-8") for path in CALLS)
     parts += [re.sub(r"CALL\((\w+)\)", rf"pkm_{isa}_\1", calls) for isa in isas()]
     return re.sub("^ *#.*$", "", "\n".join(parts), flags=re.MULTILINE)

@@ -4,11 +4,11 @@
 
 #include "rows.h"
 
-/* What of a limb depends on its numbers alone: prepared once where rows share the geometry. */
+/* The part of a limb that depends on the geometry only: prepared once where rows share it. */
 typedef struct {
     real g[SLOTS];
-    real first[3], second[3]; /* directions a slider or crank moves the anchor in */
-    real base_axis[3], platform_axis[3];
+    real first[3], second[3]; /* directions the driver moves the anchor in */
+    real axis[AXES][3];
     real per_gain;
 } limb_numbers;
 
@@ -16,7 +16,7 @@ typedef struct {
 INLINE void map_from_pose(int map, const real *pose, real *state)
 {
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_from_pose)(pose, state); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_from_pose)(pose, state); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -27,7 +27,7 @@ INLINE void map_to_pose(int map, const real *state, real pose[6])
     real R[9], sine[3], cosine[3];
     FN(map_frame)(map, state, R, pose);
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_angles)(state, sine, cosine); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_angles)(state, sine, cosine); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -37,7 +37,7 @@ INLINE void map_to_pose(int map, const real *state, real pose[6])
 INLINE void map_rates(int map, const real *state, const real *delta, real *pose)
 {
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_rates)(state, delta, pose); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_rates)(state, delta, pose); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -46,7 +46,7 @@ INLINE void map_rates(int map, const real *state, const real *delta, real *pose)
 INLINE void map_twist(int map, const real *state, const real *delta, real *twist)
 {
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_twist)(state, delta, twist); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_twist)(state, delta, twist); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -55,7 +55,7 @@ INLINE void map_twist(int map, const real *state, const real *delta, real *twist
 INLINE void map_free(int map, const real *state, const real *row, real *out)
 {
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_free)(state, row, out); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_free)(state, row, out); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -66,40 +66,57 @@ INLINE void fill_frame(const double *frame, real F[9])
     for (int k = 0; k < 9; k++) F[k] = fill(frame[k]);
 }
 
+/* The fixed frame of an axis of limb i. */
+INLINE const double *frame_of_axis(const pkm_machine *machine, int i, int axis)
+{
+    return machine->frame + 9 * (AXES * i + axis);
+}
+
 SHARED void prepare_limbs(const pkm_machine *machine, const double *geometry, ptrdiff_t stride,
                           const ptrdiff_t *row, limb_numbers *limb)
 {
     for (int i = 0; i < machine->limbs; i++) {
         limb_numbers *one = &limb[i];
-        real F[9], P[9];
+        real F[9];
         if (stride)
             gather_row(geometry + i * SLOTS, stride, SLOTS, row, one->g);
         else
             for (int s = 0; s < SLOTS; s++) one->g[s] = fill(geometry[i * SLOTS + s]);
         one->per_gain = 1.0 / one->g[GAIN];
-        fill_frame(machine->frame + 9 * i, F);
-        fill_frame(machine->platform_frame + 9 * i, P);
-        if (machine->driver[i] == DRIVER_SLIDER)
-            FN(slider_directions)(one->g, F, one->first, one->second);
-        if (machine->driver[i] == DRIVER_CRANK)
-            FN(crank_directions)(one->g, F, one->first, one->second);
-        if (machine->rows[i] & (ROW_BASE_PLANE | ROW_COUPLE))
-            FN(base_axis)(one->g, F, one->base_axis);
-        if (machine->rows[i] & (ROW_PLATFORM_PLANE | ROW_COUPLE))
-            FN(platform_axis)(one->g, P, one->platform_axis);
+        switch (machine->driver[i]) {
+#define CASE(NAME, name, MOVES, STRETCHES)                                                        \
+        case DRIVER_##NAME:                                                                       \
+            if (!MOVES) break;                                                                    \
+            fill_frame(frame_of_axis(machine, i, 0), F);                                          \
+            FN(name##_directions)(one->g, F, one->first, one->second);                            \
+            break;
+            EACH_DRIVER(CASE)
+#undef CASE
+        }
+#define PREPARE(name, K, ROWS)                                                                    \
+        if (machine->rows[i] & (ROWS)) {                                                          \
+            fill_frame(frame_of_axis(machine, i, K), F);                                          \
+            FN(name##_axis)(one->g, F, one->axis[K]);                                             \
+        }
+        EACH_AXIS(PREPARE)
+#undef PREPARE
     }
 }
 
-/* What of a limb's sphere its numbers alone say, whatever the actuator does. */
+/* The part of a limb's sphere that depends on the geometry only. */
 INLINE void sphere_of_numbers(int driver, const limb_numbers *limb, FN(limb_sphere) *sphere)
 {
+    const real still = fill(0.0);
     memcpy(sphere->b, limb->g + PLATFORM_X, sizeof sphere->b);
-    memcpy(sphere->base_axis, limb->base_axis, sizeof sphere->base_axis);
-    memcpy(sphere->platform_axis, limb->platform_axis, sizeof sphere->platform_axis);
-    if (driver == DRIVER_LENGTH) {
-        memcpy(sphere->c, limb->g + BASE_X, sizeof sphere->c);
-    } else {
-        sphere->rho = limb->g[ROD];
+    memcpy(sphere->axis, limb->axis, sizeof sphere->axis);
+    switch (driver) {
+#define CASE(NAME, name, MOVES, STRETCHES)                                                        \
+    case DRIVER_##NAME:                                                                           \
+        if (!MOVES) FN(name##_anchor)(still, limb->g, limb->first, limb->second, sphere->c);      \
+        if (!STRETCHES) FN(name##_radius)(still, limb->g, &sphere->rho);                          \
+        break;
+        EACH_DRIVER(CASE)
+#undef CASE
     }
 }
 
@@ -110,14 +127,37 @@ INLINE void sphere_at(int driver, const limb_numbers *limb, real q, FN(limb_sphe
 {
     real qt;
     FN(limb_drive)(q, limb->g, &qt);
-    if (driver == DRIVER_LENGTH) {
-        sphere->rho = qt;
-    } else if (driver == DRIVER_SLIDER) {
-        FN(slider_anchor)(qt, limb->g + BASE_X, limb->first, sphere->c);
-    } else {
-        FN(crank_anchor)(qt, limb->g + BASE_X, limb->first, limb->second, sphere->c);
+    switch (driver) {
+#define CASE(NAME, name, MOVES, STRETCHES)                                                        \
+    case DRIVER_##NAME:                                                                           \
+        if (MOVES) FN(name##_anchor)(qt, limb->g, limb->first, limb->second, sphere->c);          \
+        if (STRETCHES) FN(name##_radius)(qt, limb->g, &sphere->rho);                              \
+        break;
+        EACH_DRIVER(CASE)
+#undef CASE
     }
     *reachable &= (sphere->rho > fill(1e-30)) & (sphere->rho < fill(1e30)) & (absolute(qt) < fill(1e30));
+}
+
+/* Does q̃ move the anchor? Does it change the length? */
+INLINE int driver_moves(int driver)
+{
+    switch (driver) {
+#define CASE(NAME, name, MOVES, STRETCHES) case DRIVER_##NAME: return MOVES;
+        EACH_DRIVER(CASE)
+#undef CASE
+    }
+    return 0;
+}
+
+INLINE int driver_stretches(int driver)
+{
+    switch (driver) {
+#define CASE(NAME, name, MOVES, STRETCHES) case DRIVER_##NAME: return STRETCHES;
+        EACH_DRIVER(CASE)
+#undef CASE
+    }
+    return 0;
 }
 
 /* Both, for every limb. */
@@ -133,7 +173,7 @@ INLINE mask spheres_at(const pkm_machine *machine, const limb_numbers *limb, con
 }
 
 /* The scaled system of any map. */
-#define SCALED_ROWS(NAME, name, M)                                                                \
+#define SCALED_ROWS(NAME, name, ...)                                                                \
     SHARED int scaled_##name(const pkm_machine *machine, const FN(limb_sphere) *limb,             \
                              const real *state, real *residual, real *jacobian)                   \
     {                                                                                             \
@@ -146,7 +186,7 @@ INLINE int scaled_rows(int map, const pkm_machine *machine, const FN(limb_sphere
                        const real *state, real *residual, real *jacobian)
 {
     switch (map) {
-#define CASE(NAME, name, M)                                                                       \
+#define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME: return scaled_##name(machine, limb, state, residual, jacobian);
     EACH_MAP(CASE)
 #undef CASE

@@ -4,7 +4,7 @@
 #define ISA base
 #include "core.h"
 
-/* The closure rows' derivatives at home (rows x m, limb by limb): what pkm_order_rows eliminates. */
+/* The closure rows' derivatives at home (rows x m, limb by limb): what pkm_prepare eliminates. */
 static int rows_at_home(const pkm_machine *machine, const double *geometry, const double *home,
                         double *jacobian)
 {
@@ -17,7 +17,7 @@ static int rows_at_home(const pkm_machine *machine, const double *geometry, cons
     prepare_limbs(machine, geometry, 0, zero, limb);
     for (int k = 0; k < 6; k++) pose[k] = fill(home[k]);
     switch (machine->map) {
-#define CASE(NAME, name, M)                                                                       \
+#define CASE(NAME, name, M, ...)                                                                       \
     case MAP_##NAME:                                                                              \
         map_from_pose(MAP_##NAME, pose, state);                                                   \
         FN(map_frame)(MAP_##NAME, state, R, p);                                                   \
@@ -32,12 +32,14 @@ static int rows_at_home(const pkm_machine *machine, const double *geometry, cons
     return rows;
 }
 
-int pkm_order_rows(pkm_machine *machine, const double *geometry, const double *home)
+int pkm_prepare(pkm_machine *machine, const double *geometry, const double *home)
 {
     double A[PKM_MAX_ROWS * 6];
     int row[PKM_MAX_ROWS];
     const int m = map_m(machine->map), rows = pkm_closure_count(machine);
     if (!rows) return PKM_BAD_MACHINE;
+    for (int i = 0; i < machine->limbs; i++) machine->sharing[i] = 0.0;
+    for (int i = 0; i < machine->limbs; i++) machine->sharing[machine->actuator[i]] += 1.0;
     for (int r = 0; r < rows; r++) machine->order[r] = row[r] = r;
     if (rows > m) return 0; /* the normal equations need no order */
     rows_at_home(machine, geometry, home, A);

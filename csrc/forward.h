@@ -76,7 +76,7 @@ INLINE void newton_rows(int map, const forward_call *call, const limb_numbers *s
     store_rows(map, call, state, status, iterations, worst, row, count);
 }
 
-#define NEWTON_ROWS(NAME, name, M)                                                                \
+#define NEWTON_ROWS(NAME, name, ...)                                                                \
     SHARED void newton_##name(const forward_call *call, const limb_numbers *shared,               \
                               const ptrdiff_t *row, int count)                                    \
     {                                                                                             \
@@ -137,7 +137,7 @@ INLINE void forward_map(int map, const forward_call *call)
     start.known = 0;
     if (shared && square && !call->guess_stride)
         switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: predict_##name(machine, shared, call->guess, &start); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: predict_##name(machine, shared, call->guess, &start); break;
             EACH_MAP(CASE)
 #undef CASE
         }
@@ -158,7 +158,7 @@ INLINE void forward_map(int map, const forward_call *call)
             const int count = losses - k < LANES ? losses - k : LANES;
             for (int l = 0; l < LANES; l++) row[l] = lost[k + (l < count ? l : 0)];
             switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: newton_##name(call, shared, row, count); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: newton_##name(call, shared, row, count); break;
                 EACH_MAP(CASE)
 #undef CASE
             }
@@ -177,7 +177,7 @@ int CALL(forward)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
                                pose, status, iterations, residual};
     if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
-#define CASE(NAME, name, M) case MAP_##NAME: forward_map(MAP_##NAME, &call); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: forward_map(MAP_##NAME, &call); break;
         EACH_MAP(CASE)
 #undef CASE
     }

@@ -32,6 +32,9 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
         const int rows = scaled_rows(map, machine, sphere, state, residual, jacobian);
         for (int i = 0, r = 0; i < machine->limbs; i++) {
             const int limb_rows = 1 + __builtin_popcount((unsigned)machine->rows[i]);
+            const real own_q = lane_q[machine->actuator[i]];
+            const int moves = driver_moves(machine->driver[i]);
+            int kinds = machine->rows[i]; /* those that are still to come */
             for (int k = 0; k < limb_rows; k++, r++) {
                 const real *covector = &jacobian[machine->order[r] * m];
                 real step[6], free[6], by_q = fill(0.0), by_g[SLOTS];
@@ -42,10 +45,16 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
                     step[j] = covector[j] * (map_is_angle(map, j) ? machine->length : 1.0);
                 map_free(map, state, step, free);
                 scatter_row(free, m, by_free, rows * m, row, count);
-                if (k == 0)
-                    sphere_derivatives_called(machine, i, &limb[i], R, p,
-                                              lane_q[machine->actuator[i]], &by_q, by_g);
-                by_q *= rough_reciprocal(sphere[i].rho) * machine->weight[r];
+                if (k == 0) {
+                    sphere_derivatives_called(machine, i, &limb[i], R, p, own_q, &by_q, by_g);
+                } else {
+                    if (moves)
+                        constraint_derivatives(machine, i, kinds & -kinds, &limb[i], &sphere[i], R, p,
+                                               own_q, &by_q, by_g);
+                    kinds &= kinds - 1;
+                }
+                if (k && moves) by_q *= machine->weight[r];
+                else by_q *= rough_reciprocal(sphere[i].rho) * machine->weight[r];
                 for (int a = 0; a < actuators; a++)
                     scatter(a == machine->actuator[i] ? by_q : fill(0.0),
                             out->by_q + r * actuators + a, rows * actuators, row, count);
@@ -61,7 +70,7 @@ int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
     const closure_out out = {residual, by_step, by_free, by_q};
     if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
-#define CASE(NAME, name, M)                                                                       \
+#define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME: closure_map(MAP_##NAME, machine, n, geometry, pose, q, &out); break;
         EACH_MAP(CASE)
 #undef CASE
@@ -120,12 +129,9 @@ int CALL(spheres)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
         for (int i = 0; i < machine->limbs; i++) {
             const FN(limb_sphere) *one = &sphere[i];
             real numbers[PKM_SPHERE];
-            for (int k = 0; k < 3; k++) {
-                numbers[k] = one->b[k];
-                numbers[3 + k] = one->c[k];
-                numbers[7 + k] = one->base_axis[k];
-                numbers[10 + k] = one->platform_axis[k];
-            }
+            memcpy(numbers, one->b, sizeof one->b);
+            memcpy(numbers + 3, one->c, sizeof one->c);
+            memcpy(numbers + 7, one->axis, sizeof one->axis);
             numbers[6] = select(reachable, one->rho, fill(NAN));
             scatter_row(numbers, PKM_SPHERE, out + i * PKM_SPHERE, width, row, count);
         }

@@ -8,16 +8,14 @@
  * that squares overflow. */
 INLINE real limb_drive_at(const pkm_machine *machine, int i, const limb_numbers *limb, const real *h)
 {
-    real qt;
-    if (machine->driver[i] == DRIVER_LENGTH) {
-        FN(length_inverse)(limb->g, h, &qt);
-    } else if (machine->driver[i] == DRIVER_SLIDER) {
-        FN(slider_inverse)(limb->g, h, limb->first, fill(machine->branch[i]), &qt);
-    } else {
-        real sine, cosine;
-        FN(crank_inverse)(limb->g, h, limb->first, limb->second, fill(machine->branch[i]), &sine,
-                          &cosine);
-        qt = arctangent2(sine, cosine);
+    real qt = fill(NAN);
+    switch (machine->driver[i]) {
+#define CASE(NAME, name, ...)                                                                     \
+    case DRIVER_##NAME:                                                                           \
+        FN(name##_inverse)(limb->g, h, limb->first, limb->second, fill(machine->branch[i]), &qt); \
+        break;
+        EACH_DRIVER(CASE)
+#undef CASE
     }
     return qt;
 }
@@ -35,16 +33,11 @@ INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *
 INLINE void inverse_at(const pkm_machine *machine, const limb_numbers *limb, const real *R,
                        const real *p, real *q)
 {
-    double sharing[PKM_MAX_LIMBS];
-    for (int a = 0; a < machine->actuators; a++) sharing[a] = 0.0;
-    for (int i = 0; i < machine->limbs; i++) {
-        const int a = machine->actuator[i];
-        const real one = limb_inverse(machine, i, &limb[i], R, p);
-        q[a] = sharing[a] > 0.0 ? q[a] + one : one;
-        sharing[a] += 1.0;
-    }
+    for (int a = 0; a < machine->actuators; a++) q[a] = fill(-0.0); /* -0 + x is x, even for x = -0 */
+    for (int i = 0; i < machine->limbs; i++)
+        q[machine->actuator[i]] += limb_inverse(machine, i, &limb[i], R, p);
     if (machine->actuators < machine->limbs)
-        for (int a = 0; a < machine->actuators; a++) q[a] /= sharing[a];
+        for (int a = 0; a < machine->actuators; a++) q[a] /= machine->sharing[a];
     whole_or_nan(q, machine->actuators);
 }
 

@@ -11,13 +11,13 @@ INLINE void sphere_derivatives(const pkm_machine *machine, int i, const limb_num
                                const real *R, const real *p, real q, real *by_q, real *by_g)
 {
     real F[9];
-    fill_frame(machine->frame + 9 * i, F);
-    if (machine->driver[i] == DRIVER_LENGTH)
-        FN(length_derivatives)(R, p, q, limb->g, by_q, by_g);
-    else if (machine->driver[i] == DRIVER_SLIDER)
-        FN(slider_derivatives)(R, p, q, limb->g, F, by_q, by_g);
-    else
-        FN(crank_derivatives)(R, p, q, limb->g, F, by_q, by_g);
+    fill_frame(frame_of_axis(machine, i, 0), F);
+    switch (machine->driver[i]) {
+#define CASE(NAME, name, ...)                                                                     \
+    case DRIVER_##NAME: FN(name##_derivatives)(R, p, q, limb->g, F, by_q, by_g); break;
+        EACH_DRIVER(CASE)
+#undef CASE
+    }
 }
 
 /* The same out of line, where it is not the innermost loop. */
@@ -27,19 +27,31 @@ SHARED void sphere_derivatives_called(const pkm_machine *machine, int i, const l
     sphere_derivatives(machine, i, limb, R, p, q, by_q, by_g);
 }
 
+/* The same of a row beside the sphere: with the anchor held, and by what moves the anchor. */
 SHARED void constraint_derivatives(const pkm_machine *machine, int i, int kind,
-                                   const limb_numbers *limb, const real *R, const real *p, real *by_g)
+                                   const limb_numbers *limb, const FN(limb_sphere) *sphere,
+                                   const real *R, const real *p, real q, real *by_q, real *by_g)
 {
-    real F[9], P[9];
-    fill_frame(machine->frame + 9 * i, F);
-    fill_frame(machine->platform_frame + 9 * i, P);
-    if (kind == ROW_BASE_PLANE)
-        FN(base_plane_derivatives)(R, p, limb->g, F, by_g);
-    else if (kind == ROW_PLATFORM_PLANE)
-        FN(platform_plane_derivatives)(R, p, limb->g, P, by_g);
-    else
-        FN(couple_derivatives)(R, p, limb->g, F, P,
-                               fill(machine->lever[i]), by_g);
+    real F[9], P[9], v[3], pull[3], of_anchor[SLOTS];
+    switch (kind) {
+#define CASE(NAME, name, N, A)                                                                    \
+    case ROW_##NAME:                                                                              \
+        fill_frame(frame_of_axis(machine, i, N), F);                                              \
+        fill_frame(frame_of_axis(machine, i, A), P);                                              \
+        FN(name##_derivatives)(R, p, sphere->c, limb->g, F, P, fill(machine->lever[i]), v, by_g); \
+        break;
+        EACH_ROW(CASE)
+#undef CASE
+    }
+    for (int k = 0; k < 3; k++) pull[k] = -v[k]; /* Φ depends on d = p + R b - c */
+    fill_frame(frame_of_axis(machine, i, 0), F);
+    switch (machine->driver[i]) {
+#define CASE(NAME, name, ...)                                                                     \
+    case DRIVER_##NAME: FN(name##_carry)(q, limb->g, pull, F, by_q, of_anchor); break;
+        EACH_DRIVER(CASE)
+#undef CASE
+    }
+    for (int s = 0; s < SLOTS; s++) by_g[s] += of_anchor[s];
 }
 
 /* ∂q/∂free of every actuator, -Φ_free / Φ_q limb by limb, averaged where limbs share one. NaN where
@@ -49,10 +61,8 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
 {
     const int m = map_m(map);
     real state[MAX_STATE], R[9], p[3];
-    double sharing[PKM_MAX_LIMBS] = {0};
     map_from_pose(map, pose, state);
     FN(map_frame)(map, state, R, p);
-    for (int i = 0; i < machine->limbs; i++) sharing[machine->actuator[i]] += 1.0;
     for (int k = 0; k < machine->actuators * m; k++) out[k] = fill(0.0);
     for (int i = 0; i < machine->limbs; i++) {
         real phi, omega[3], v[3], row[6], by_free[6], by_q, by_g[SLOTS];
@@ -67,7 +77,7 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
         FN(map_pull)(map, state, omega, v, row);
         map_free(map, state, row, by_free);
         sphere_derivatives(machine, i, &limb[i], R, p, own, &by_q, by_g);
-        for (int j = 0; j < m; j++) out[a * m + j] -= by_free[j] / (by_q * sharing[a]);
+        for (int j = 0; j < m; j++) out[a * m + j] -= by_free[j] / (by_q * machine->sharing[a]);
     }
     whole_or_nan(out, machine->actuators * m);
 }
@@ -127,22 +137,22 @@ INLINE void response_block(int map, const pkm_machine *machine, const limb_numbe
     for (int i = 0; i < machine->limbs; i++) {
         real by_q, by_g[SLOTS], scale = rough_reciprocal(sphere[i].rho) * machine->weight[r];
         sphere_derivatives(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
+        const int a = machine->actuator[i];
         int end = c;
         if (column)
             while (end < columns && column[end] / SLOTS == i) end++;
-        else
-            for (int k = 0; k < 6; k++)
-                out[k * columns + machine->actuator[i]] += response[k * rows + machine->order[r]] * scale * by_q;
-        for (int kind = 0; kind <= ROW_COUPLE; kind = kind ? 2 * kind : 1) {
+        for (int kind = 0; kind <= ALL_ROWS; kind = kind ? 2 * kind : 1) {
             if (kind && !(machine->rows[i] & kind)) continue;
             if (kind) {
-                constraint_derivatives(machine, i, kind, &limb[i], R, p, by_g);
+                constraint_derivatives(machine, i, kind, &limb[i], &sphere[i], R, p, q[a], &by_q, by_g);
                 scale = fill(machine->weight[r]);
             }
+            const real *answer = response + machine->order[r];
+            if (!column && (!kind || driver_moves(machine->driver[i])))
+                for (int k = 0; k < 6; k++) out[k * columns + a] += answer[k * rows] * scale * by_q;
             for (int j = c; j < end; j++)
                 for (int k = 0; k < 6; k++)
-                    out[k * columns + j] += response[k * rows + machine->order[r]]
-                                          * (scale * by_g[column[j] % SLOTS]);
+                    out[k * columns + j] += answer[k * rows] * (scale * by_g[column[j] % SLOTS]);
             r++;
         }
         c = end;
@@ -190,7 +200,7 @@ int CALL(jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geomet
 {
     if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
-#define CASE(NAME, name, M)                                                                       \
+#define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME:                                                                              \
         jacobian_map(MAP_##NAME, machine, n, geometry, geometry_stride, pose, jacobian);          \
         break;
@@ -205,7 +215,7 @@ SHARED void responses(const pkm_machine *machine, ptrdiff_t n, const double *geo
                       const int32_t *column, int columns, int twists, double *jacobian)
 {
     switch (machine->map) {
-#define CASE(NAME, name, M)                                                                       \
+#define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME:                                                                              \
         response_map(MAP_##NAME, machine, n, geometry, geometry_stride, pose, q, column, columns, \
                      twists, jacobian);                                                           \

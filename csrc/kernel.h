@@ -24,14 +24,14 @@ INLINE real FN(absolute)(real x)
  * constraint rows. */
 typedef struct {
     real b[3], c[3], rho;
-    real base_axis[3], platform_axis[3];
+    real axis[AXES][3];
 } FN(limb_sphere);
 
 #ifdef NARROW
 INLINE int map_m(int map)
 {
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: return M;
+#define CASE(NAME, name, M, ...) case MAP_##NAME: return M;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -41,7 +41,12 @@ INLINE int map_m(int map)
 /* Is free coordinate i an angle? Its unit is then 1 rad = `length` mm in scaled systems. */
 INLINE int map_is_angle(int map, int i)
 {
-    return i >= (map == MAP_2TPR2TPS || map == MAP_PLANAR ? 2 : 3);
+    switch (map) {
+#define CASE(NAME, name, M, LENGTHS) case MAP_##NAME: return i >= LENGTHS;
+    EACH_MAP(CASE)
+#undef CASE
+    }
+    return 0;
 }
 #endif
 
@@ -49,7 +54,7 @@ INLINE int map_is_angle(int map, int i)
 INLINE void FN(map_frame)(int map, const real *state, real *R, real *p)
 {
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_frame)(state, R, p); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_frame)(state, R, p); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -58,7 +63,7 @@ INLINE void FN(map_frame)(int map, const real *state, real *R, real *p)
 INLINE void FN(map_retract)(int map, const real *state, const real *delta, real *moved)
 {
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_retract)(state, delta, moved); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_retract)(state, delta, moved); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -68,7 +73,7 @@ INLINE void FN(map_retract)(int map, const real *state, const real *delta, real 
 INLINE void FN(map_tidy)(int map, const real *state, real *tidy)
 {
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_tidy)(state, tidy); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_tidy)(state, tidy); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -77,7 +82,7 @@ INLINE void FN(map_tidy)(int map, const real *state, real *tidy)
 INLINE void FN(map_velocity)(int map, const real *state, const real *delta, real *rate)
 {
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_velocity)(state, delta, rate); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_velocity)(state, delta, rate); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -86,7 +91,7 @@ INLINE void FN(map_velocity)(int map, const real *state, const real *delta, real
 INLINE void FN(map_pull)(int map, const real *state, const real *omega, const real *v, real *row)
 {
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_pull)(state, omega, v, row); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_pull)(state, omega, v, row); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -103,6 +108,20 @@ INLINE void FN(store_row)(int map, int scaled, const real *state, real phi, cons
     FN(map_pull)(map, state, omega, v, covector);
     for (int j = 0; j < map_m(map); j++)
         row[j] = scaled ? covector[j] * (map_is_angle(map, j) ? angular : scale) : covector[j];
+}
+
+/* A row beside the sphere, with its axes on base and platform. */
+INLINE void FN(constraint_row)(int kind, const real *R, const real *p, const real *b, const real *c,
+                               const real (*axis)[3], NUMBER lever, real *phi, real *omega, real *v)
+{
+    switch (kind) {
+#define CASE(NAME, name, N, A)                                                                    \
+    case ROW_##NAME:                                                                              \
+        FN(name##_row)(R, p, b, c, axis[N], axis[A], FN(fill)(lever), phi, omega, v);             \
+        break;
+    EACH_ROW(CASE)
+#undef CASE
+    }
 }
 
 /* All rows at a state in the machine's order of elimination. In a SCALED system Φ is in mm, weighted,
@@ -128,15 +147,10 @@ INLINE int FN(closure_rows)(int map, int scaling, const pkm_machine *machine,
                       jacobian ? &jacobian[machine->order[r] * m] : NULL);
         r++;
         if (!machine->rows[i]) continue;
-        for (int kind = ROW_BASE_PLANE; kind <= ROW_COUPLE; kind *= 2) {
+        for (int kind = 1; kind <= ALL_ROWS; kind *= 2) {
             if (!(machine->rows[i] & kind)) continue;
-            if (kind == ROW_BASE_PLANE)
-                FN(base_plane_row)(R, p, one->b, one->c, one->base_axis, &phi, omega, v);
-            else if (kind == ROW_PLATFORM_PLANE)
-                FN(platform_plane_row)(R, p, one->b, one->c, one->platform_axis, &phi, omega, v);
-            else
-                FN(couple_row)(R, p, one->b, one->c, one->base_axis, one->platform_axis,
-                               FN(fill)((NUMBER)machine->lever[i]), &phi, omega, v);
+            FN(constraint_row)(kind, R, p, one->b, one->c, one->axis, (NUMBER)machine->lever[i],
+                               &phi, omega, v);
             const real factor =
                 FN(fill)((NUMBER)(scaling == SCALED ? machine->weight[r] : machine->size));
             FN(store_row)(map, 1, state, phi, omega, v, factor, factor * inverse_length,

@@ -23,15 +23,17 @@ INLINE void point_path(const real T[3][12], const real *b, const real *origin, r
 INLINE void limb_rates(const pkm_machine *machine, int i, const limb_numbers *limb,
                        const real T[3][12], real *rate, real *bend)
 {
-    real h[3][3], qt1, qt2;
+    real h[3][3], qt1 = fill(NAN), qt2 = qt1;
     point_path(T, limb->g + PLATFORM_X, limb->g + BASE_X, h);
     const real qt = limb_drive_at(machine, i, limb, h[0]);
-    if (machine->driver[i] == DRIVER_LENGTH)
-        FN(length_rates)(qt, h[0], h[1], h[2], &qt1, &qt2);
-    else if (machine->driver[i] == DRIVER_SLIDER)
-        FN(slider_rates)(qt, h[0], h[1], h[2], limb->first, &qt1, &qt2);
-    else
-        FN(crank_rates)(qt, h[0], h[1], h[2], limb->first, limb->second, &qt1, &qt2);
+    switch (machine->driver[i]) {
+#define CASE(NAME, name, ...)                                                                     \
+    case DRIVER_##NAME:                                                                           \
+        FN(name##_rates)(qt, h[0], h[1], h[2], limb->first, limb->second, &qt1, &qt2);            \
+        break;
+        EACH_DRIVER(CASE)
+#undef CASE
+    }
     *rate = qt1 * limb->per_gain;
     *bend = qt2 * limb->per_gain;
 }
@@ -42,9 +44,7 @@ int CALL(rates)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
 {
     if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     const int actuators = machine->actuators;
-    double sharing[PKM_MAX_LIMBS] = {0};
     limb_numbers limb[PKM_MAX_LIMBS];
-    for (int i = 0; i < machine->limbs; i++) sharing[machine->actuator[i]] += 1.0;
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
         real T[3][12], rate[PKM_MAX_LIMBS], bend[PKM_MAX_LIMBS];
@@ -59,8 +59,8 @@ int CALL(rates)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
             bend[machine->actuator[i]] += of_bend;
         }
         for (int a = 0; a < actuators; a++) {
-            rate[a] /= sharing[a];
-            bend[a] /= sharing[a];
+            rate[a] /= machine->sharing[a];
+            bend[a] /= machine->sharing[a];
         }
         whole_or_nan(rate, actuators);
         whole_or_nan(bend, actuators);
@@ -76,35 +76,43 @@ SHARED int limb_bends(const pkm_machine *machine, int i, const limb_numbers *lim
                       const FN(limb_sphere) *sphere, const double *weight, const real T[3][12],
                       real q, real q1, real q2, real *bend)
 {
-    real h[3][3], axis[3][3], turning[3][12], qt;
+    real h[3][3], d[3][3], turning[3][12], qt;
+    const real nowhere[3] = {fill(0.0), fill(0.0), fill(0.0)};
     int r = 0;
     point_path(T, limb->g + PLATFORM_X, limb->g + BASE_X, h);
     FN(limb_drive)(q, limb->g, &qt);
     const real qt1 = q1 * limb->g[GAIN], qt2 = q2 * limb->g[GAIN];
-    if (machine->driver[i] == DRIVER_LENGTH)
-        FN(length_bend)(qt, qt1, qt2, h[0], h[1], h[2], &bend[r]);
-    else if (machine->driver[i] == DRIVER_SLIDER)
-        FN(slider_bend)(qt, qt1, qt2, h[0], h[1], h[2], limb->first, &bend[r]);
-    else
-        FN(crank_bend)(qt, qt1, qt2, h[0], h[1], h[2], limb->first, limb->second, &bend[r]);
+    switch (machine->driver[i]) {
+#define CASE(NAME, name, MOVES, ...)                                                              \
+    case DRIVER_##NAME:                                                                           \
+        FN(name##_bend)(qt, qt1, qt2, h[0], h[1], h[2], limb->first, limb->second, &bend[r]);     \
+        if (MOVES)                                                                                \
+            FN(name##_path)(qt, qt1, qt2, h[0], h[1], h[2], limb->first, limb->second, d[0],      \
+                            d[1], d[2]);                                                          \
+        else                                                                                      \
+            memcpy(d, h, sizeof d);                                                               \
+        break;
+        EACH_DRIVER(CASE)
+#undef CASE
+    }
     bend[r] *= rough_reciprocal(sphere->rho) * weight[r];
     r++;
-    if (machine->rows[i] & (ROW_PLATFORM_PLANE | ROW_COUPLE)) {
-        const real nowhere[3] = {fill(0.0), fill(0.0), fill(0.0)};
-        memcpy(turning, T, sizeof turning);
-        for (int k = 0; k < 3; k++) /* an axis has no place */
-            turning[k][3] = turning[k][7] = turning[k][11] = fill(0.0);
-        point_path(turning, limb->platform_axis, nowhere, axis);
-    }
-    for (int kind = ROW_BASE_PLANE; kind <= ROW_COUPLE; kind *= 2) {
+    memcpy(turning, T, sizeof turning);
+    for (int k = 0; k < 3; k++) /* an axis has no place */
+        turning[k][3] = turning[k][7] = turning[k][11] = fill(0.0);
+    for (int kind = 1; kind <= ALL_ROWS; kind *= 2) {
+        real axis[3][3];
         if (!(machine->rows[i] & kind)) continue;
-        if (kind == ROW_BASE_PLANE)
-            FN(base_plane_bend)(h[0], h[1], h[2], limb->base_axis, &bend[r]);
-        else if (kind == ROW_PLATFORM_PLANE)
-            FN(platform_plane_bend)(h[0], h[1], h[2], axis[0], axis[1], axis[2], &bend[r]);
-        else
-            FN(couple_bend)(limb->base_axis, axis[0], axis[1], axis[2], fill(machine->lever[i]),
-                            &bend[r]);
+        switch (kind) {
+#define CASE(NAME, name, N, A)                                                                    \
+        case ROW_##NAME:                                                                          \
+            point_path(turning, limb->axis[A], nowhere, axis);                                    \
+            FN(name##_bend)(d[0], d[1], d[2], limb->axis[N], axis[0], axis[1], axis[2],           \
+                            fill(machine->lever[i]), &bend[r]);                                   \
+            break;
+            EACH_ROW(CASE)
+#undef CASE
+        }
         bend[r] *= weight[r];
         r++;
     }
@@ -114,7 +122,7 @@ SHARED int limb_bends(const pkm_machine *machine, int i, const limb_numbers *lim
 INLINE void map_bend(int map, const real *state, const real *delta, real *twist_rate)
 {
     switch (map) {
-#define CASE(NAME, name, M) case MAP_##NAME: FN(map_##name##_bend)(state, delta, twist_rate); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_bend)(state, delta, twist_rate); break;
     EACH_MAP(CASE)
 #undef CASE
     }
@@ -139,10 +147,20 @@ INLINE void motion_at(int map, const pkm_machine *machine, const limb_numbers *l
     for (int i = 0, r = 0; i < machine->limbs; i++) {
         real by_q, by_g[SLOTS];
         sphere_derivatives_called(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
-        by_q *= rough_reciprocal(sphere[i].rho) * machine->weight[r];
-        for (int j = 0; j < m; j++)
-            step[j] += response[j * rows + machine->order[r]] * by_q * q1[machine->actuator[i]];
-        r += 1 + __builtin_popcount((unsigned)machine->rows[i]);
+        real scale = rough_reciprocal(sphere[i].rho) * machine->weight[r];
+        for (int kind = 0; kind <= ALL_ROWS; kind = kind ? 2 * kind : 1) {
+            if (kind && !(machine->rows[i] & kind)) continue;
+            if (kind && driver_moves(machine->driver[i])) {
+                constraint_derivatives(machine, i, kind, &limb[i], &sphere[i], R, p,
+                                       q[machine->actuator[i]], &by_q, by_g);
+                scale = fill(machine->weight[r]);
+            }
+            if (!kind || driver_moves(machine->driver[i]))
+                for (int j = 0; j < m; j++)
+                    step[j] += response[j * rows + machine->order[r]] * (by_q * scale)
+                               * q1[machine->actuator[i]];
+            r++;
+        }
     }
     map_twist(map, state, step, twist);
     map_bend(map, state, step, twist_rate);
@@ -195,7 +213,7 @@ int CALL(motion)(const pkm_machine *machine, ptrdiff_t n, const double *geometry
 {
     if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
-#define CASE(NAME, name, M)                                                                       \
+#define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME:                                                                              \
         motion_map(MAP_##NAME, machine, n, geometry, pose, q, q1, q2, motion, pose_rates);        \
         break;

@@ -10,7 +10,6 @@
 #include <string.h>
 
 #include "pkmcal.h"
-#include "names.h"
 
 #define INLINE static inline __attribute__((always_inline, unused))
 
@@ -65,8 +64,7 @@ static void limbs_at(const homotopy *path, double t, FN(limb_sphere) *limb)
         memcpy(limb[i].b, at, sizeof limb[i].b);
         memcpy(limb[i].c, at + 3, sizeof limb[i].c);
         limb[i].rho = at[6];
-        memcpy(limb[i].base_axis, at + 7, sizeof limb[i].base_axis);
-        memcpy(limb[i].platform_axis, at + 10, sizeof limb[i].platform_axis);
+        memcpy(limb[i].axis, at + 7, sizeof limb[i].axis);
     }
 }
 
@@ -84,16 +82,13 @@ INLINE void row_rates(int map, const homotopy *path, const FN(limb_sphere) *limb
             by[k] = path->target[i * PKM_SPHERE + k] - path->start[i * PKM_SPHERE + k];
         FN(sphere_rate)(R, p, one->b, by, one->c, by + 3, one->rho * one->rho,
                         2.0 * one->rho * by[6], &rate[machine->order[r++]]);
-        if (machine->rows[i] & ROW_BASE_PLANE)
-            FN(base_plane_rate)(R, p, one->b, by, one->c, by + 3, one->base_axis, by + 7,
-                                &rate[machine->order[r++]]);
-        if (machine->rows[i] & ROW_PLATFORM_PLANE)
-            FN(platform_plane_rate)(R, p, one->b, by, one->c, by + 3, one->platform_axis, by + 10,
-                                    &rate[machine->order[r++]]);
-        if (machine->rows[i] & ROW_COUPLE)
-            FN(couple_rate)(R, p, one->b, by, one->c, by + 3, one->base_axis, by + 7,
-                            one->platform_axis, by + 10, machine->lever[i],
+#define CASE(NAME, name, N, A)                                                                    \
+        if (machine->rows[i] & ROW_##NAME)                                                        \
+            FN(name##_rate)(R, p, one->b, by, one->c, by + 3, one->axis[N], by + 7 + 3 * N,       \
+                            one->axis[A], by + 7 + 3 * A, machine->lever[i],                      \
                             &rate[machine->order[r++]]);
+        EACH_ROW(CASE)
+#undef CASE
     }
 }
 
@@ -248,7 +243,7 @@ int pkm_paths(const pkm_machine *machine, ptrdiff_t n, const double *start, cons
     for (ptrdiff_t k = 0; k < n; k++) {
         real *x = (real *)state + MAX_STATE * k, *out = (real *)frame + 12 * k;
         switch (machine->map) {
-#define CASE(NAME, name, M)                                                                       \
+#define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME:                                                                              \
         status[k] = follow(MAP_##NAME, &path, accuracy, x, &steps[k], &reached[k]);               \
         FN(map_frame)(MAP_##NAME, x, out, out + 9);                                               \

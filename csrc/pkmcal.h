@@ -9,6 +9,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "names.h"
+
 /* cffi begin */
 enum { PKM_MAX_LIMBS = 12, PKM_MAX_ROWS = 24 };
 enum { PKM_OK, PKM_NOT_CONVERGED, PKM_SINGULAR, PKM_INFEASIBLE, PKM_INVALID };
@@ -25,11 +27,11 @@ typedef struct {
     int rows[12];                   /* set of ROW_... beside the sphere */
     int actuator[12];               /* which actuator drives the limb */
     double branch[12];              /* +1 or -1 for slider and crank */
-    double frame[108];              /* base-side axis frame of each limb, 3 x 3 row by row */
-    double platform_frame[108];     /* platform-side axis frame of each limb */
+    double frame[12 * AXES * 9];    /* of each axis of each limb, 3 x 3 row by row */
     double lever[12];               /* of the couple row [mm] */
     double weight[24];              /* of each row, limb by limb, the sphere first */
-    int order[24];                  /* place of each row in the elimination: see pkm_order_rows */
+    int order[24];                  /* place of each row in the elimination: see pkm_prepare */
+    double sharing[12];             /* how many limbs each actuator drives: see pkm_prepare */
 } pkm_machine;
 
 /* A swarm in `dims` dimensions and the factors of eq. 19. Its state, pkm_swarm_size numbers, begins
@@ -57,6 +59,7 @@ typedef struct {
 enum { PKM_SPACE, PKM_BODY, PKM_TIP }; /* tip: velocity of the tool's origin, in base axes */
 
 const char *pkm_slot_names(void);
+const char *pkm_axis_names(void);
 const char *pkm_driver_names(void);
 const char *pkm_row_names(void);
 const char *pkm_map_names(void);
@@ -69,15 +72,16 @@ int pkm_best_isa(void);
 /* The number of closure rows, or 0 for a machine the core cannot take. */
 int pkm_closure_count(const pkm_machine *machine);
 
-/* Set `order` from an elimination with exchanges at the home pose: later ones run in that order. */
-int pkm_order_rows(pkm_machine *machine, const double *geometry, const double *home);
+/* Count how many limbs `sharing` an actuator, and set `order` from an elimination with exchanges at
+ * the home pose: later ones run in that order. Before every other call of a machine. */
+int pkm_prepare(pkm_machine *machine, const double *geometry, const double *home);
 
 /* How many numbers the state of a swarm has, 0 for a swarm the core cannot take. */
 ptrdiff_t pkm_swarm_size(const pkm_swarm *swarm);
 
-/* What a limb is at given actuators, for homotopies: its joint b, its anchor c, its length and its axes
- * at the base and at the platform, in that order. Zero where it has no axis. */
-enum { PKM_SPHERE = 13 };
+/* What a limb is at given actuators, for homotopies: its joint b, its anchor c, its length and its
+ * axes, in that order. Zero where it has no axis. */
+enum { PKM_SPHERE = 7 + 3 * AXES };
 
 /* What became of a path. */
 enum { PKM_ARRIVED, PKM_LOST, PKM_FAR };

@@ -210,16 +210,20 @@ INLINE void fill_posture(const posture *at, real R[9], real p[3])
     for (int k = 0; k < 3; k++) p[k] = spread(at->p[k]);
 }
 
-/* The anchor of a limb whose `driver` is a constant, and q̃. */
-INLINE void anchor_at(int driver, const limb_numbers *one, double q, real c[3], real *qt)
+/* The anchor of a limb whose `driver` is a constant, and its length. */
+INLINE void anchor_at(int driver, const limb_numbers *one, double q, real c[3], real *rho)
 {
-    FN(limb_drive)(spread(q), one->g, qt);
-    if (driver == DRIVER_LENGTH)
-        memcpy(c, one->g + BASE_X, 3 * sizeof *c);
-    else if (driver == DRIVER_SLIDER)
-        FN(slider_anchor)(*qt, one->g + BASE_X, one->first, c);
-    else
-        FN(crank_anchor)(*qt, one->g + BASE_X, one->first, one->second, c);
+    real qt;
+    FN(limb_drive)(spread(q), one->g, &qt);
+    switch (driver) {
+#define CASE(NAME, name, ...)                                                                     \
+    case DRIVER_##NAME:                                                                           \
+        FN(name##_anchor)(qt, one->g, one->first, one->second, c);                                \
+        FN(name##_radius)(qt, one->g, rho);                                                       \
+        break;
+        EACH_DRIVER(CASE)
+#undef CASE
+    }
 }
 
 /* Squares of a limb's sphere closures over the poses, summed [mm²]. */
@@ -229,56 +233,60 @@ INLINE real squared_spheres(int driver, const limb_numbers *limb, int actuator, 
     const limb_numbers one = *limb;
     real sum = fill(0.0);
     for (ptrdiff_t k = 0; k < n; k++) {
-        real R[9], p[3], c[3], h[3], qt, distance;
+        real R[9], p[3], c[3], h[3], rho;
         fill_posture(&at[k], R, p);
-        anchor_at(driver, &one, at[k].q[actuator], c, &qt);
+        anchor_at(driver, &one, at[k].q[actuator], c, &rho);
         FN(limb_joint)(R, p, one.g + PLATFORM_X, c, h);
-        FN(length_inverse)(one.g, h, &distance);
-        const real off = weight * (distance - (driver == DRIVER_LENGTH ? qt : one.g[ROD]));
+        const real off = weight * (FN(root)(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]) - rho);
         sum += off * off;
     }
     return sum;
 }
 
-/* The same of one of its constraints, which length limbs alone have. */
-INLINE real squared_constraint(int kind, const limb_numbers *one, double lever, double weight,
-                               ptrdiff_t n, const posture *at)
+/* The same of one of its constraints. */
+INLINE real squared_constraint(int driver, int kind, const limb_numbers *one, int actuator,
+                               double lever, double weight, ptrdiff_t n, const posture *at)
 {
     real sum = fill(0.0);
     for (ptrdiff_t k = 0; k < n; k++) {
-        const real *b = one->g + PLATFORM_X, *c = one->g + BASE_X;
-        real R[9], p[3], phi, omega[3], v[3];
+        real R[9], p[3], c[3], rho, phi, omega[3], v[3];
         fill_posture(&at[k], R, p);
-        if (kind == ROW_BASE_PLANE)
-            FN(base_plane_row)(R, p, b, c, one->base_axis, &phi, omega, v);
-        else if (kind == ROW_PLATFORM_PLANE)
-            FN(platform_plane_row)(R, p, b, c, one->platform_axis, &phi, omega, v);
-        else
-            FN(couple_row)(R, p, b, c, one->base_axis, one->platform_axis, fill(lever), &phi,
-                           omega, v);
+        anchor_at(driver, one, at[k].q[actuator], c, &rho);
+        FN(constraint_row)(kind, R, p, one->g + PLATFORM_X, c, one->axis, lever, &phi, omega, v);
         phi *= weight;
         sum += phi * phi;
     }
     return sum;
 }
 
+#define SQUARED(NAME, name, ...)                                                                  \
+    SHARED real add_squared_##name(const pkm_machine *machine, int i, int r,                      \
+                                   const limb_numbers *limb, ptrdiff_t n, const posture *at,      \
+                                   real sum)                                                      \
+    {                                                                                             \
+        const int a = machine->actuator[i];                                                       \
+        sum += squared_spheres(DRIVER_##NAME, limb, a, machine->weight[r++], n, at);              \
+        for (int kind = 1; kind <= ALL_ROWS; kind *= 2)                                           \
+            if (machine->rows[i] & kind)                                                          \
+                sum += squared_constraint(DRIVER_##NAME, kind, limb, a, machine->lever[i],        \
+                                          machine->weight[r++], n, at);                           \
+        return sum;                                                                               \
+    }
+EACH_DRIVER(SQUARED)
+#undef SQUARED
+
 INLINE real squared_closures(const pkm_machine *machine, const limb_numbers *limb, ptrdiff_t n,
                              const posture *at)
 {
     real sum = fill(0.0);
     for (int i = 0, r = 0; i < machine->limbs; i++) {
-        const int a = machine->actuator[i];
-        const double weight = machine->weight[r++];
-        if (machine->driver[i] == DRIVER_LENGTH)
-            sum += squared_spheres(DRIVER_LENGTH, &limb[i], a, weight, n, at);
-        else if (machine->driver[i] == DRIVER_SLIDER)
-            sum += squared_spheres(DRIVER_SLIDER, &limb[i], a, weight, n, at);
-        else
-            sum += squared_spheres(DRIVER_CRANK, &limb[i], a, weight, n, at);
-        for (int kind = ROW_BASE_PLANE; kind <= ROW_COUPLE; kind *= 2)
-            if (machine->rows[i] & kind)
-                sum += squared_constraint(kind, &limb[i], machine->lever[i], machine->weight[r++],
-                                          n, at);
+        switch (machine->driver[i]) {
+#define CASE(NAME, name, ...)                                                                     \
+        case DRIVER_##NAME: sum = add_squared_##name(machine, i, r, &limb[i], n, at, sum); break;
+            EACH_DRIVER(CASE)
+#undef CASE
+        }
+        r += 1 + __builtin_popcount((unsigned)machine->rows[i]);
     }
     return sum;
 }

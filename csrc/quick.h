@@ -72,13 +72,21 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
         real by_q;
         sphere_derivatives_called(machine, i, &limb[i], R, p, start->q[a], &by_q, by_g);
         for (int j = 0; j < m; j++) X[0][j] = fill(0.0);
-        X[0][machine->order[r]] = by_q;
+        X[0][machine->order[r++]] = by_q;
+        for (int kind = 1; kind <= ALL_ROWS; kind *= 2) { /* in the size of PLAIN rows */
+            if (!(machine->rows[i] & kind)) continue;
+            if (driver_moves(machine->driver[i])) {
+                constraint_derivatives(machine, i, kind, &limb[i], &sphere[i], R, p, start->q[a], &by_q,
+                                       by_g);
+                X[0][machine->order[r]] = by_q * machine->size;
+            }
+            r++;
+        }
         FN(substitute)(m, 1, A, X);
         for (int j = 0; j < m; j++) {
             slope[j * actuators + a] -= X[0][j];
             usable &= finite(X[0][j]);
         }
-        r += 1 + __builtin_popcount((unsigned)machine->rows[i]);
     }
     for (int k = 0; k < m * m; k++) factors[k] = join(A[0][k], A[0][k]);
     for (int k = 0; k < m * actuators; k++) start->slope[k] = join(slope[k], slope[k]);
@@ -87,7 +95,7 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
     start->known = usable[0] != 0;
 }
 
-#define PREDICT(NAME, name, M)                                                                    \
+#define PREDICT(NAME, name, ...)                                                                    \
     RARE void predict_##name(const pkm_machine *machine, const limb_numbers *limb,                \
                              const double *guess, prediction *start)                              \
     {                                                                                             \
@@ -126,16 +134,14 @@ INLINE void start_states(int map, const pkm_machine *machine, const rows_in *fir
 INLINE void join_spheres(const pkm_machine *machine, int i, int once, const FN(limb_sphere) *first,
                          const FN(limb_sphere) *last, limb_sphere_narrow *both)
 {
-    if (once || machine->driver[i] != DRIVER_LENGTH)
+    if (once || driver_moves(machine->driver[i]))
         for (int k = 0; k < 3; k++) both->c[k] = join(first->c[k], last->c[k]);
-    if (once || machine->driver[i] == DRIVER_LENGTH) both->rho = join(first->rho, last->rho);
+    if (once || driver_stretches(machine->driver[i])) both->rho = join(first->rho, last->rho);
     if (!once) return;
     for (int k = 0; k < 3; k++) both->b[k] = join(first->b[k], last->b[k]);
     if (!machine->rows[i]) return;
-    for (int k = 0; k < 3; k++) {
-        both->base_axis[k] = join(first->base_axis[k], last->base_axis[k]);
-        both->platform_axis[k] = join(first->platform_axis[k], last->platform_axis[k]);
-    }
+    for (int a = 0; a < AXES; a++)
+        for (int k = 0; k < 3; k++) both->axis[a][k] = join(first->axis[a][k], last->axis[a][k]);
 }
 
 /* Newton in floats; the factors are those at the last state. */

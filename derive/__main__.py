@@ -41,21 +41,15 @@ def _names() -> str:
 
     maps = posemaps.MAPS
     lines = [
-        "/* the numbers of one limb, in the order of the core */",
-        enum("", [*limbs.CONSTANTS, "SLOTS"]),
-        f'#define SLOT_NAMES "{" ".join(limbs.SLOTS)}"',
-        enum("DRIVER_", [driver.name for driver in limbs.DRIVERS]),
-        f'#define DRIVER_NAMES "{" ".join(driver.name for driver in limbs.DRIVERS)}"',
-        "/* constraint rows beside the sphere: bits of a set */",
-        *(f"#define ROW_{row.name.upper()} {1 << i}" for i, row in enumerate(limbs.CONSTRAINTS)),
-        f'#define ROW_NAMES "{" ".join(row.name for row in limbs.CONSTRAINTS)}"',
-        "/* pose maps: m free coordinates, iterated on a state */",
+        *limbs.names(),
+        "/* pose maps: m free coordinates, how many of them are lengths, iterated on a state */",
         enum("MAP_", [pose_map.name for pose_map in maps]),
         f'#define MAP_NAMES "{" ".join(pose_map.name for pose_map in maps)}"',
         f'#define MAP_FREE "{";".join(" ".join(pose_map.free) for pose_map in maps)}"',
         f"#define MAX_STATE {max(pose_map.state_size for pose_map in maps)}",
         "#define EACH_MAP(X) " + " ".join(
-            f"X({pose_map.name.upper()}, {pose_map.name}, {pose_map.m})" for pose_map in maps),
+            f"X({pose_map.name.upper()}, {pose_map.name}, {pose_map.m}, {pose_map.lengths})"
+            for pose_map in maps),
         "",
     ]  # fmt: skip
     return "\n".join(lines)

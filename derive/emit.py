@@ -46,6 +46,16 @@ class _Step:
     doc: str
     sincos: sp.Expr | None = None  # the angle, when the two entries are its sine and cosine
 
+    @property
+    def doubles(self) -> bool:
+        """Whether it calls a function that only doubles have."""
+        return self.sincos is not None or self.is_angle
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether it is the angle of a sine and a cosine."""
+        return len(self.exprs) == 1 and isinstance(self.exprs[0], sp.atan2)
+
 
 @dataclass
 class Function:
@@ -104,6 +114,12 @@ class Function:
         self.known.update({sp.sin(angle): s, sp.cos(angle): c})
         return s, c
 
+    def angle(self, name: str, sine: sp.Expr, cosine: sp.Expr, doc: str = "") -> sp.Symbol:
+        """Name the angle of a sine and a cosine, which are symbols, up to a positive factor."""
+        (symbol,) = self._declare([name])
+        self.steps.append(_Step([symbol], [sp.atan2(sine, cosine)], doc))
+        return symbol
+
     def gradient(self, value: Value, variables: Iterable[sp.Symbol]) -> sp.Matrix:
         """Total derivative of each entry by each variable, through all named intermediates."""
         rows = _entries(value)
@@ -151,7 +167,7 @@ class Function:
         """The C function, with its header comment."""
         statements = _Statements(self)
         lines = [*_comment(self, statements.counts), *statements.lines, "}"]
-        if any(step.sincos is not None for step in self.steps):  # doubles only: see csrc/lanes.h
+        if any(step.doubles for step in self.steps):  # see csrc/lanes.h
             lines = ["#ifndef NARROW", *lines, "#endif"]
         return "\n".join([*lines, ""])
 
@@ -226,6 +242,9 @@ class _Printer:
         if method is None:
             raise NotImplementedError(f"the emitter has no C for {type(expr).__name__}: {expr}")
         return method(expr)
+
+    def _atan2(self, expr: sp.Expr) -> str:
+        return f"arctangent2({', '.join(map(self.print, expr.args))})"
 
     def _Symbol(self, expr: sp.Symbol) -> str:
         return expr.name

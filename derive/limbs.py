@@ -14,10 +14,26 @@ import sympy as sp
 from .emit import Function
 from .rotation import rot_x, rot_y, skew
 
+
+@dataclass(frozen=True)
+class Axis:
+    """An axis of a limb: the third column of a fixed frame, tilted by two of the limb's numbers.
+
+    `tilts` are their slots. A row that has the axis names it; which side it is on the row says.
+    """
+
+    name: str
+    tilts: tuple[str, str]
+
+
+BASE = Axis("base", ("tilt1", "tilt2"))
+PLATFORM = Axis("platform", ("platform_tilt1", "platform_tilt2"))
+AXES = (BASE, PLATFORM)
+
 # The numbers of one limb, in the order of the core. Lengths in mm, tilts in rad.
 SLOTS = (
     "base.x", "base.y", "base.z", "platform.x", "platform.y", "platform.z",
-    "offset", "gain", "rod", "crank", "tilt1", "tilt2", "platform_tilt1", "platform_tilt2",
+    "offset", "gain", "rod", "crank", *(tilt for axis in AXES for tilt in axis.tilts),
 )  # fmt: skip
 
 
@@ -44,15 +60,15 @@ class LimbFunction(Function):
         """q̃ = gain q + offset."""
         return self.g["gain"] * q + self.g["offset"]
 
-    def base_axes(self) -> sp.Matrix:
-        """Frame of slider, crank axis, base-plane normal or universal joint, tilts applied."""
-        F = self.matrix("F", "fixed frame of the axis, in the base, row by row")
-        return self.tilted(F, self.g["tilt1"], self.g["tilt2"], "u")
+    def axes(self, axis: Axis, frame: sp.Matrix, name: str) -> sp.Matrix:
+        """The frame of an axis, its tilts applied."""
+        first, second = axis.tilts
+        return self.tilted(frame, self.g[first], self.g[second], name)
 
-    def platform_axes(self) -> sp.Matrix:
-        """Frame of the platform's revolute joint, tilts applied."""
-        P = self.matrix("P", "fixed frame of the revolute axis, in the platform, row by row")
-        return self.tilted(P, self.g["platform_tilt1"], self.g["platform_tilt2"], "w")
+    def base_axes(self) -> sp.Matrix:
+        """Frame of the slider or of the crank's axis, tilts applied."""
+        F = self.matrix("F", "fixed frame of the axis, in the base, row by row")
+        return self.axes(BASE, F, "u")
 
     def pose(self) -> None:
         """Declare R and p."""
@@ -74,6 +90,23 @@ class Driver:
     name: str
     formula: str
     anchor: Callable[[LimbFunction, sp.Expr], tuple[sp.Matrix, sp.Expr]]
+
+    @property
+    def moves(self) -> bool:
+        """Whether the anchor depends on q̃."""
+        return self._depends(0)
+
+    @property
+    def stretches(self) -> bool:
+        """Whether the length depends on q̃."""
+        return self._depends(1)
+
+    def _depends(self, part: int) -> bool:
+        f = LimbFunction("probe", "", "")
+        f.numbers()
+        qt = f.scalar("qt", "")
+        found = f.written_out(sp.Matrix([self.anchor(f, qt)[part]]))
+        return qt in found.free_symbols
 
 
 def _length(f: LimbFunction, qt: sp.Expr) -> tuple[sp.Matrix, sp.Expr]:
@@ -146,38 +179,73 @@ def _basics() -> list[Function]:
     return [joint, drive, command]
 
 
-def _anchor(driver: Driver) -> Function | None:
-    """Anchor of a slider or crank from its two prepared directions."""
-    if driver is LENGTH:
-        return None
+def _anchor(driver: Driver) -> Function:
+    """The anchor from the driver's two prepared directions."""
     f = LimbFunction(
         f"{driver.name}_anchor", f"{driver.name}: where the anchor stands", driver.formula
     )
     qt = f.scalar("qt", "q̃ [mm or rad]")
-    base = f.vector("base", 3, "base point [mm]")
-    first = f.vector("first", 3, "s, or crank e")
-    if driver is SLIDER:
-        f.output("c", base + qt * first, "anchor [mm]")
-    else:
-        second = f.vector("second", 3, "crank axis × e")
-        sq, cq = f.sincos("q", qt)
-        f.output("c", base + cq * first + sq * second, "anchor [mm]")
+    f.numbers()
+    moved = directed(f, driver, qt)
+    f.output("c", f.base + moved if driver.moves else f.base, "anchor [mm]")
     return f
 
 
-def _prepare(driver: Driver) -> Function | None:
+def directed(f: Function, driver: Driver, qt: sp.Expr) -> sp.Matrix:
+    """From the base point to the anchor, by the prepared directions, which are declared."""
+    first = f.vector("first", 3, "s, or crank e")
+    second = f.vector("second", 3, "0, or crank axis × e")
+    if driver is SLIDER:
+        return qt * first
+    if driver is CRANK:
+        sq, cq = f.sincos("q", qt)
+        return cq * first + sq * second
+    return sp.zeros(3, 1)
+
+
+def _radius(driver: Driver) -> Function:
+    """The length of the limb."""
+    f = LimbFunction(f"{driver.name}_radius", f"{driver.name}: the limb's length", driver.formula)
+    qt = f.scalar("qt", "q̃ [mm or rad]")
+    f.numbers()
+    f.output("rho", qt if driver.stretches else f.g["rod"], "ρ [mm]")
+    return f
+
+
+def _carry(driver: Driver) -> Function:
+    """What a row that pulls at the anchor asks of the actuator and of the limb's numbers."""
+    f = LimbFunction(
+        f"{driver.name}_carry",
+        f"{driver.name}: covector of the anchor to covectors of q and the limb's numbers",
+        f"λ·∂c,  {driver.formula}\nq̃ = gain q + offset",
+    )
+    q = f.scalar("q", "actuator coordinate [mm or rad]")
+    f.numbers()
+    pull = f.vector("pull", 3, "λ, covector of the anchor")
+    if not driver.moves:  # every driver takes the same arguments
+        f.matrix("F", "fixed frame of the axis, in the base, row by row")
+    qt = f.let("qt", f.drive(q), "q̃")
+    c, _ = driver.anchor(f, qt)
+    work = f.let("work", pull.dot(c))
+    f.output("by_q", f.gradient(work, [q])[0], "λ·∂c/∂q")
+    f.output("by_g", f.gradient(work, f.g.values()), "λ·∂c/∂(the limb's numbers)", CONSTANTS)
+    return f
+
+
+def _prepare(driver: Driver) -> Function:
     """The two directions an anchor moves in, of the numbers alone: once per geometry."""
-    if driver is LENGTH:
-        return None
     f = LimbFunction(
         f"{driver.name}_directions",
         f"{driver.name}: the directions the anchor moves in",
         driver.formula,
     )
     f.numbers()
-    axes = f.base_axes()
-    first, second = (axes.col(2), sp.zeros(3, 1)) if driver is SLIDER else (
-        f.g["crank"] * axes.col(0), f.g["crank"] * axes.col(1))  # fmt: skip
+    axes, nothing = f.base_axes(), sp.zeros(3, 1)
+    first, second = {
+        LENGTH: (nothing, nothing),
+        SLIDER: (axes.col(2), nothing),
+        CRANK: (f.g["crank"] * axes.col(0), f.g["crank"] * axes.col(1)),
+    }[driver]
     f.output("first", first, "s, or crank e")
     f.output("second", second, "0, or crank axis × e")
     return f
@@ -198,27 +266,27 @@ def _inverse(driver: Driver) -> Function:
     )
     f.numbers()
     h = f.vector("h", 3, "p + R b - base [mm]")
+    first = f.vector("first", 3, "s, or crank e")
+    second = f.vector("second", 3, "0, or crank axis × e")
+    branch = f.scalar("branch", "sign of d·∂c/∂q̃, where there are two")
     if driver is LENGTH:
         f.output("qt", sp.sqrt(h.dot(h)), "q̃ [mm]")
         return f
-    first = f.vector("first", 3, "s, or crank e")
     if driver is SLIDER:
-        branch = f.scalar("branch", "sign of d·∂c/∂q̃")
         along = f.let("along", h.dot(first))
         across = f.let("across", h - along * first)
         root = f.let("root", sp.sqrt(f.g["rod"] ** 2 - across.dot(across)))
         f.output("qt", along - branch * root, "q̃ [mm]")
         return f
-    second = f.vector("second", 3, "crank axis × e")
-    branch = f.scalar("branch", "sign of d·∂c/∂q̃")
     # both sides times the crank's length, which scales the two atan2 arguments alike
     x, y = f.let("x", h.dot(first)), f.let("y", h.dot(second))
     twice = f.let("twice", h.dot(h) + f.g["crank"] ** 2 - f.g["rod"] ** 2)
     kappa = f.let("kappa", twice / 2)
     root = f.let("root", sp.sqrt(x**2 + y**2 - kappa**2))
     side = f.let("side", branch * root)
-    f.output("sine", sp.Matrix([y * kappa - x * side]), "of q̃, up to a positive factor")
-    f.output("cosine", sp.Matrix([x * kappa + y * side]), "of q̃")
+    sine = f.let("sine", y * kappa - x * side, "of q̃, up to a positive factor")
+    cosine = f.let("cosine", x * kappa + y * side)
+    f.output("qt", f.angle("turn", sine, cosine), "q̃ [rad]")
     return f
 
 
@@ -232,6 +300,8 @@ def _derivatives(driver: Driver) -> Function:
     f.pose()
     q = f.scalar("q", "actuator coordinate [mm or rad]")
     f.numbers()
+    if not driver.moves:  # every driver takes the same arguments
+        f.matrix("F", "fixed frame of the axis, in the base, row by row")
     qt = f.let("qt", f.drive(q), "q̃")
     c, rho = driver.anchor(f, qt)
     d = f.let("d", f.platform_joint(f.b) - c, "from the anchor to the platform joint")
@@ -245,49 +315,51 @@ def _derivatives(driver: Driver) -> Function:
 class Constraint:
     """A closure beside the sphere: a scalar product of d and axes that must vanish.
 
-    `phi` takes the function, d, the base-side axis n and the platform-side axis R a.
+    `phi` takes d, which runs from the anchor to the platform joint, the base-side axis n, the
+    platform-side axis R a and the lever; `on_base` and `on_platform` are these axes, or None.
     """
 
     name: str
     title: str
     formula: str
-    on_base: bool
-    on_platform: bool
+    on_base: Axis | None
+    on_platform: Axis | None
     phi: Callable[[sp.Matrix, sp.Matrix, sp.Matrix, sp.Expr], sp.Expr]
 
 
 CONSTRAINTS = (
     Constraint("base_plane", "the platform joint stays in a plane of the base", "Φ = n·d",
-               True, False, lambda d, n, a, lever: n.dot(d)),
+               BASE, None, lambda d, n, a, lever: n.dot(d)),
     Constraint("platform_plane", "the leg stays square to the platform's revolute axis",
-               "Φ = (R a)·d", False, True, lambda d, n, a, lever: a.dot(d)),
+               "Φ = (R a)·d", None, PLATFORM, lambda d, n, a, lever: a.dot(d)),
     Constraint("couple", "revolute and universal axis stay square, at the lever λ",
-               "Φ = λ (R a)·n", True, True, lambda d, n, a, lever: lever * a.dot(n)),
+               "Φ = λ (R a)·n", BASE, PLATFORM, lambda d, n, a, lever: lever * a.dot(n)),
 )  # fmt: skip
 
 
 def _constraint(row: Constraint, known_axes: bool) -> Function:
-    """A constraint of a length-driven limb; with known axes it is what Newton iterates on."""
+    """A constraint at a known anchor; with known axes it is what Newton iterates on."""
     f = LimbFunction(f"{row.name}_{'row' if known_axes else 'derivatives'}",
-                     f"{row.name}: {row.title}", f"{row.formula},  d = p + R b - base")  # fmt: skip
+                     f"{row.name}: {row.title}", f"{row.formula},  d = p + R b - c")  # fmt: skip
     f.pose()
     n, a = sp.zeros(3, 1), sp.zeros(3, 1)
     if known_axes:
         b = f.vector("b", 3, "platform joint, platform frame [mm]")
-        base = f.vector("c", 3, "base joint [mm]")
-        if row.on_base:
-            n = f.vector("n", 3, "base-side axis, base frame")
-        if row.on_platform:
-            a = f.vector("a", 3, "platform-side axis, platform frame")
+    c = f.vector("c", 3, "anchor [mm]")
+    if known_axes:
+        n = f.vector("n", 3, "base-side axis, base frame")
+        a = f.vector("a", 3, "platform-side axis, platform frame")
     else:
         f.numbers()
-        b, base = f.b, f.base
+        b = f.b
+        F = f.matrix("F", "fixed frame of the base-side axis, in the base, row by row")
+        P = f.matrix("P", "fixed frame of the platform-side axis, in the platform, row by row")
         if row.on_base:
-            n = f.let("n", f.base_axes().col(2), "base-side axis")
+            n = f.let("n", f.axes(row.on_base, F, "u").col(2), "base-side axis")
         if row.on_platform:
-            a = f.let("a", f.platform_axes().col(2), "platform-side axis")
-    lever = f.scalar("lever", "λ [mm]") if row.name == "couple" else sp.S.One
-    d = f.let("d", f.platform_joint(b) - base, "from the base joint to the platform joint")
+            a = f.let("a", f.axes(row.on_platform, P, "w").col(2), "platform-side axis")
+    lever = f.scalar("lever", "λ [mm]")
+    d = f.let("d", f.platform_joint(b) - c, "from the anchor to the platform joint")
     if row.on_platform:
         a = f.let("Ra", f.R * a)
         a = f.let("turned", a + skew(f.omega) * a)
@@ -297,7 +369,9 @@ def _constraint(row: Constraint, known_axes: bool) -> Function:
         f.output("omega", f.gradient(phi, f.omega), "∂Φ/∂ω")
         f.output("v", f.gradient(phi, f.v), "∂Φ/∂v")
     else:
-        f.output("by_g", f.gradient(phi, f.g.values()), "∂Φ/∂(the limb's numbers)", CONSTANTS)
+        f.output("v", f.gradient(phi, f.v), "∂Φ/∂v = -∂Φ/∂c")
+        by_g = f.gradient(phi, f.g.values())
+        f.output("by_g", by_g, "∂Φ/∂(the limb's numbers), c held", CONSTANTS)
     return f
 
 
@@ -316,29 +390,61 @@ def _moving(row: Constraint | None) -> Function:
         rho2 = f.scalar("rho2", "ρ²") + s * f.scalar("rho2_rate", "its rate")
         phi = _half_square(f, f.let("d", d), rho2)
     else:
-        n = moving("n", "base-side axis") if row.on_base else sp.zeros(3, 1)
-        a = f.R * moving("a", "platform-side axis") if row.on_platform else sp.zeros(3, 1)
-        lever = f.scalar("lever", "λ") if row.name == "couple" else sp.S.One
+        n, a = moving("n", "base-side axis"), f.R * moving("a", "platform-side axis")
+        lever = f.scalar("lever", "λ")
         phi = row.phi(f.let("d", d), n, a, lever)
     f.output("rate", f.gradient(phi, [s])[0], "Φ's rate")
     return f
 
 
-def _axis(name: str, where: str) -> Function:
+def _axis(axis: Axis) -> Function:
     """The third axis of a tilted frame: once per geometry."""
-    f = LimbFunction(f"{name}_axis", f"{name}-side axis of a limb", "frame Rx(tilt1) Ry(tilt2) ez")
+    f = LimbFunction(f"{axis.name}_axis", f"{axis.name} axis of a limb",
+                     "frame Rx(tilt1) Ry(tilt2) ez")  # fmt: skip
     f.numbers()
-    axes = f.base_axes() if name == "base" else f.platform_axes()
-    f.output("axis", axes.col(2), where)
+    frame = f.matrix("F", "fixed frame of the axis, row by row")
+    f.output("axis", f.axes(axis, frame, "u").col(2), "as its frame")
     return f
 
 
 def functions() -> list[Function]:
     """The emitted functions of every driver and row."""
-    made: list[Function | None] = [*_basics(), _sphere()]
-    made += [_axis("base", "in the base"), _axis("platform", "in the platform")]
-    for step in (_prepare, _anchor, _inverse, _derivatives):
+    made = [*_basics(), _sphere(), *map(_axis, AXES)]
+    for step in (_prepare, _anchor, _radius, _inverse, _derivatives, _carry):
         made += [step(driver) for driver in DRIVERS]
     made += [_constraint(row, known) for row in CONSTRAINTS for known in (True, False)]
-    made += [_moving(row) for row in (None, *CONSTRAINTS)]
-    return [f for f in made if f is not None]
+    return made + [_moving(row) for row in (None, *CONSTRAINTS)]
+
+
+def names() -> list[str]:
+    """What C calls the numbers, axes, drivers and rows of limbs, and lists of each for macros."""
+    drivers = [
+        f"X({driver.name.upper()}, {driver.name}, {int(driver.moves)}, {int(driver.stretches)})"
+        for driver in DRIVERS
+    ]
+    rows, axes = [], []
+    for row in CONSTRAINTS:
+        sides = [AXES.index(axis) if axis else 0 for axis in (row.on_base, row.on_platform)]
+        rows.append(f"X({row.name.upper()}, {row.name}, {sides[0]}, {sides[1]})")
+    for axis in AXES:
+        having = (row for row in CONSTRAINTS if axis in (row.on_base, row.on_platform))
+        used = " | ".join(f"ROW_{row.name.upper()}" for row in having)
+        axes.append(f"X({axis.name}, {AXES.index(axis)}, {used or 0})")
+    return [
+        "/* the numbers of one limb, in the order of the core */",
+        "enum { " + ", ".join([*CONSTANTS, "SLOTS"]) + " };",
+        f'#define SLOT_NAMES "{" ".join(SLOTS)}"',
+        "/* axes: name, place, and the rows that have it */",
+        f"enum {{ AXES = {len(AXES)} }};",
+        f'#define AXIS_NAMES "{";".join(" ".join((axis.name, *axis.tilts)) for axis in AXES)}"',
+        "#define EACH_AXIS(X) " + " ".join(axes),
+        "/* drivers: does q̃ move the anchor, does it change the length? */",
+        "enum { " + "".join(f"DRIVER_{driver.name.upper()}, " for driver in DRIVERS) + "DRIVERS };",
+        f'#define DRIVER_NAMES "{" ".join(driver.name for driver in DRIVERS)}"',
+        "#define EACH_DRIVER(X) " + " ".join(drivers),
+        "/* constraint rows beside the sphere, bits of a set: the axes on base and platform */",
+        *(f"#define ROW_{row.name.upper()} {1 << i}" for i, row in enumerate(CONSTRAINTS)),
+        f"#define ALL_ROWS {(1 << len(CONSTRAINTS)) - 1}",
+        f'#define ROW_NAMES "{" ".join(row.name for row in CONSTRAINTS)}"',
+        "#define EACH_ROW(X) " + " ".join(rows),
+    ]

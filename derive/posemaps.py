@@ -47,6 +47,11 @@ class PoseMap:
         """Number of free coordinates."""
         return len(self.free)
 
+    @property
+    def lengths(self) -> int:
+        """How many of them are lengths: they come before the angles."""
+        return sum(each in POSE[:3] for each in self.free)
+
 
 def rpy_angles(R: sp.Matrix, state: sp.Matrix) -> list[tuple[sp.Expr, sp.Expr]]:
     """(sine, cosine) of α, β, γ up to a common positive factor, from R (eq. 1)."""

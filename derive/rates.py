@@ -36,14 +36,33 @@ def _limb_path(
 ) -> tuple[sp.Matrix, sp.Expr]:
     """d(t) and ρ(t), up to a constant, of a limb whose joint and actuator move."""
     h = _path(f, "h", "p + R b - base [mm]")
+    first = f.vector("first", 3, "s, or crank e")
+    second = f.vector("second", 3, "0, or crank axis × e")
     if driver is LENGTH:
         return h, drive
-    first = f.vector("first", 3, "s, or crank e")
     if driver is not CRANK:
         return h - drive * first, sp.S.Zero  # a rod's length stays
-    second = f.vector("second", 3, "crank axis × e")
     f.sincos("q", qt)
     return h - sp.cos(drive) * first - sp.sin(drive) * second, sp.S.Zero
+
+
+def _joint_path(driver: Driver) -> Function:
+    """From the anchor to the joint, and its derivatives by time, for the rows beside the sphere."""
+    f = Function(
+        f"{driver.name}_path",
+        f"{driver.name}: from the anchor to the joint as joint and actuator move",
+        f"d, ḋ, d̈ of d = p + R b - c,  {driver.formula}",
+    )
+    qt, qt1, qt2 = _moved_drive(f)
+    path, _ = _limb_path(f, driver, qt, qt + qt1 * T + qt2 * T**2 / 2)
+    for k, name in enumerate(("d", "d1", "d2")):
+        f.output(name, path.applyfunc(lambda e, k=k: _at_start(f, e, k)), "[mm, /s, /s²]")
+    return f
+
+
+def _moved_drive(f: Function) -> list[sp.Symbol]:
+    docs = (("qt", "q̃ [mm or rad]"), ("qt1", "dq̃/dt [/s]"), ("qt2", "d²q̃/dt² [/s²]"))
+    return [f.scalar(name, doc) for name, doc in docs]
 
 
 def _rates(driver: Driver) -> Function:
@@ -79,9 +98,7 @@ def _sphere_bend(driver: Driver) -> Function:
         f"{driver.name}: how the sphere row bends as joint and actuator move",
         f"d²Φ/dt²,  Φ = (d·d - ρ²)/2,  {driver.formula}",
     )
-    qt, qt1, qt2 = (f.scalar(name, doc) for name, doc in (
-        ("qt", "q̃ [mm or rad]"), ("qt1", "dq̃/dt [/s]"), ("qt2", "d²q̃/dt² [/s²]"),
-    ))  # fmt: skip
+    qt, qt1, qt2 = _moved_drive(f)
     path, rho = _limb_path(f, driver, qt, qt + qt1 * T + qt2 * T**2 / 2)
     d, d1, d2 = (
         f.let(name, path.applyfunc(lambda e, k=k: _at_start(f, e, k)))
@@ -99,14 +116,10 @@ def _constraint_bend(row: Constraint) -> Function:
         f"{row.name}: how the row bends along a path",
         f"d²Φ/dt²,  {row.formula}",
     )
-    d = n = a = sp.zeros(3, 1)
-    if row.name != "couple":
-        d = _path(f, "h", "p + R b - base [mm]")
-    if row.on_base:
-        n = f.vector("n", 3, "base-side axis, base frame")
-    if row.on_platform:
-        a = _path(f, "a", "platform-side axis, base frame")
-    lever = f.scalar("lever", "λ [mm]") if row.name == "couple" else sp.S.One
+    d = _path(f, "h", "p + R b - c [mm]")
+    n = f.vector("n", 3, "base-side axis, base frame")
+    a = _path(f, "a", "platform-side axis, base frame")
+    lever = f.scalar("lever", "λ [mm]")
     f.output("phi2", _at_start(f, row.phi(d, n, a, lever), 2), "d²Φ/dt² [mm/s²]")
     return f
 
@@ -172,6 +185,6 @@ def _pose_rates() -> Function:
 
 def functions() -> list[Function]:
     """The emitted functions of paths."""
-    made = [step(driver) for step in (_rates, _sphere_bend) for driver in DRIVERS]
+    made = [step(driver) for step in (_rates, _sphere_bend, _joint_path) for driver in DRIVERS]
     made += [_constraint_bend(row) for row in CONSTRAINTS]
     return [*made, *(_map_bend(pose_map) for pose_map in MAPS), _frame_motion(), _pose_rates()]

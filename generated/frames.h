@@ -1,5 +1,5 @@
 /* Generated from derive/frames.py by `python -m derive`; never edited by hand.
- * derivation 70020fa3e67a27b6
+ * derivation dfc15f40517de458
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation fb7930544e8ece11
+ * derivation b2b716889767197b
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*
@@ -88,11 +88,11 @@ INLINE void FN(sphere_row)(const real R[9], const real p[3], const real b[3], co
 
 #ifndef NARROW
 /*
- * base-side axis of a limb
+ * base axis of a limb
  *     frame Rx(tilt1) Ry(tilt2) ez
  * in  g[14]          the limb's numbers
- * in  F[9]           fixed frame of the axis, in the base, row by row
- * out axis[3]        in the base
+ * in  F[9]           fixed frame of the axis, row by row
+ * out axis[3]        as its frame
  * operations: 6 +, 12 *, 0 /, 0 sqrt
  */
 INLINE void FN(base_axis)(const real g[14], const real F[9], real axis[3])
@@ -109,22 +109,43 @@ INLINE void FN(base_axis)(const real g[14], const real F[9], real axis[3])
 
 #ifndef NARROW
 /*
- * platform-side axis of a limb
+ * platform axis of a limb
  *     frame Rx(tilt1) Ry(tilt2) ez
  * in  g[14]          the limb's numbers
- * in  P[9]           fixed frame of the revolute axis, in the platform, row by row
- * out axis[3]        in the platform
+ * in  F[9]           fixed frame of the axis, row by row
+ * out axis[3]        as its frame
  * operations: 6 +, 12 *, 0 /, 0 sqrt
  */
-INLINE void FN(platform_axis)(const real g[14], const real P[9], real axis[3])
+INLINE void FN(platform_axis)(const real g[14], const real F[9], real axis[3])
 {
-    real sw1, cw1;
-    FN(sincos)(g[PLATFORM_TILT1], &sw1, &cw1);
-    real sw2, cw2;
-    FN(sincos)(g[PLATFORM_TILT2], &sw2, &cw2);
-    axis[0] = P[0]*sw2 + (P[2]*cw1 - P[1]*sw1)*cw2;
-    axis[1] = P[3]*sw2 + (P[5]*cw1 - P[4]*sw1)*cw2;
-    axis[2] = P[6]*sw2 + (P[8]*cw1 - P[7]*sw1)*cw2;
+    real su1, cu1;
+    FN(sincos)(g[PLATFORM_TILT1], &su1, &cu1);
+    real su2, cu2;
+    FN(sincos)(g[PLATFORM_TILT2], &su2, &cu2);
+    axis[0] = F[0]*su2 + (F[2]*cu1 - F[1]*su1)*cu2;
+    axis[1] = F[3]*su2 + (F[5]*cu1 - F[4]*su1)*cu2;
+    axis[2] = F[6]*su2 + (F[8]*cu1 - F[7]*su1)*cu2;
+}
+#endif
+
+#ifndef NARROW
+/*
+ * length: the directions the anchor moves in
+ *     c = base, ρ = q̃
+ * in  g[14]          the limb's numbers
+ * in  F[9]           fixed frame of the axis, in the base, row by row
+ * out first[3]       s, or crank e
+ * out second[3]      0, or crank axis × e
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(length_directions)(const real g[14], const real F[9], real first[3], real second[3])
+{
+    first[0] = FN(fill)(0.0f);
+    first[1] = FN(fill)(0.0f);
+    first[2] = FN(fill)(0.0f);
+    second[0] = FN(fill)(0.0f);
+    second[1] = FN(fill)(0.0f);
+    second[2] = FN(fill)(0.0f);
 }
 #endif
 
@@ -179,19 +200,39 @@ INLINE void FN(crank_directions)(const real g[14], const real F[9], real first[3
 #endif
 
 /*
+ * length: where the anchor stands
+ *     c = base, ρ = q̃
+ * in  qt             q̃ [mm or rad]
+ * in  g[14]          the limb's numbers
+ * in  first[3]       s, or crank e
+ * in  second[3]      0, or crank axis × e
+ * out c[3]           anchor [mm]
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(length_anchor)(real qt, const real g[14], const real first[3], const real second[3],
+        real c[3])
+{
+    c[0] = g[BASE_X];
+    c[1] = g[BASE_Y];
+    c[2] = g[BASE_Z];
+}
+
+/*
  * slider: where the anchor stands
  *     c = base + q̃ s, ρ = rod
  * in  qt             q̃ [mm or rad]
- * in  base[3]        base point [mm]
+ * in  g[14]          the limb's numbers
  * in  first[3]       s, or crank e
+ * in  second[3]      0, or crank axis × e
  * out c[3]           anchor [mm]
  * operations: 3 +, 3 *, 0 /, 0 sqrt
  */
-INLINE void FN(slider_anchor)(real qt, const real base[3], const real first[3], real c[3])
+INLINE void FN(slider_anchor)(real qt, const real g[14], const real first[3], const real second[3],
+        real c[3])
 {
-    c[0] = qt*first[0] + base[0];
-    c[1] = qt*first[1] + base[1];
-    c[2] = qt*first[2] + base[2];
+    c[0] = qt*first[0] + g[BASE_X];
+    c[1] = qt*first[1] + g[BASE_Y];
+    c[2] = qt*first[2] + g[BASE_Z];
 }
 
 #ifndef NARROW
@@ -199,32 +240,75 @@ INLINE void FN(slider_anchor)(real qt, const real base[3], const real first[3], 
  * crank: where the anchor stands
  *     c = base + crank Rot(axis, q̃) e, ρ = rod
  * in  qt             q̃ [mm or rad]
- * in  base[3]        base point [mm]
+ * in  g[14]          the limb's numbers
  * in  first[3]       s, or crank e
- * in  second[3]      crank axis × e
+ * in  second[3]      0, or crank axis × e
  * out c[3]           anchor [mm]
  * operations: 6 +, 6 *, 0 /, 0 sqrt
  */
-INLINE void FN(crank_anchor)(real qt, const real base[3], const real first[3],
-        const real second[3], real c[3])
+INLINE void FN(crank_anchor)(real qt, const real g[14], const real first[3], const real second[3],
+        real c[3])
 {
     real sq, cq;
     FN(sincos)(qt, &sq, &cq);
-    c[0] = base[0] + first[0]*cq + second[0]*sq;
-    c[1] = base[1] + first[1]*cq + second[1]*sq;
-    c[2] = base[2] + first[2]*cq + second[2]*sq;
+    c[0] = g[BASE_X] + first[0]*cq + second[0]*sq;
+    c[1] = g[BASE_Y] + first[1]*cq + second[1]*sq;
+    c[2] = g[BASE_Z] + first[2]*cq + second[2]*sq;
 }
 #endif
+
+/*
+ * length: the limb's length
+ *     c = base, ρ = q̃
+ * in  qt             q̃ [mm or rad]
+ * in  g[14]          the limb's numbers
+ * out rho            ρ [mm]
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(length_radius)(real qt, const real g[14], real *rho)
+{
+    *rho = qt;
+}
+
+/*
+ * slider: the limb's length
+ *     c = base + q̃ s, ρ = rod
+ * in  qt             q̃ [mm or rad]
+ * in  g[14]          the limb's numbers
+ * out rho            ρ [mm]
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(slider_radius)(real qt, const real g[14], real *rho)
+{
+    *rho = g[ROD];
+}
+
+/*
+ * crank: the limb's length
+ *     c = base + crank Rot(axis, q̃) e, ρ = rod
+ * in  qt             q̃ [mm or rad]
+ * in  g[14]          the limb's numbers
+ * out rho            ρ [mm]
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(crank_radius)(real qt, const real g[14], real *rho)
+{
+    *rho = g[ROD];
+}
 
 /*
  * length: actuator coordinate at a joint position
  *     q̃ = ‖h‖
  * in  g[14]          the limb's numbers
  * in  h[3]           p + R b - base [mm]
+ * in  first[3]       s, or crank e
+ * in  second[3]      0, or crank axis × e
+ * in  branch         sign of d·∂c/∂q̃, where there are two
  * out qt             q̃ [mm]
  * operations: 2 +, 3 *, 0 /, 1 sqrt
  */
-INLINE void FN(length_inverse)(const real g[14], const real h[3], real *qt)
+INLINE void FN(length_inverse)(const real g[14], const real h[3], const real first[3],
+        const real second[3], real branch, real *qt)
 {
     *qt = FN(root)(h[0]*h[0] + h[1]*h[1] + h[2]*h[2]);
 }
@@ -235,12 +319,13 @@ INLINE void FN(length_inverse)(const real g[14], const real h[3], real *qt)
  * in  g[14]          the limb's numbers
  * in  h[3]           p + R b - base [mm]
  * in  first[3]       s, or crank e
- * in  branch         sign of d·∂c/∂q̃
+ * in  second[3]      0, or crank axis × e
+ * in  branch         sign of d·∂c/∂q̃, where there are two
  * out qt             q̃ [mm]
  * operations: 9 +, 11 *, 0 /, 1 sqrt
  */
-INLINE void FN(slider_inverse)(const real g[14], const real h[3], const real first[3], real branch,
-        real *qt)
+INLINE void FN(slider_inverse)(const real g[14], const real h[3], const real first[3],
+        const real second[3], real branch, real *qt)
 {
     const real along = h[0]*first[0] + h[1]*first[1] + h[2]*first[2];
     const real across0 = h[0] - first[0]*along;
@@ -250,6 +335,7 @@ INLINE void FN(slider_inverse)(const real g[14], const real h[3], const real fir
     *qt = along - branch*root;
 }
 
+#ifndef NARROW
 /*
  * crank: actuator coordinate at a joint position
  *     h·(cos q̃ e + sin q̃ n) = κ = (h·h + crank² - rod²)/(2 crank)
@@ -257,14 +343,13 @@ INLINE void FN(slider_inverse)(const real g[14], const real h[3], const real fir
  * in  g[14]          the limb's numbers
  * in  h[3]           p + R b - base [mm]
  * in  first[3]       s, or crank e
- * in  second[3]      crank axis × e
- * in  branch         sign of d·∂c/∂q̃
- * out sine[1]        of q̃, up to a positive factor
- * out cosine[1]      of q̃
+ * in  second[3]      0, or crank axis × e
+ * in  branch         sign of d·∂c/∂q̃, where there are two
+ * out qt             q̃ [rad]
  * operations: 12 +, 20 *, 0 /, 1 sqrt
  */
 INLINE void FN(crank_inverse)(const real g[14], const real h[3], const real first[3],
-        const real second[3], real branch, real sine[1], real cosine[1])
+        const real second[3], real branch, real *qt)
 {
     const real x = h[0]*first[0] + h[1]*first[1] + h[2]*first[2];
     const real y = h[0]*second[0] + h[1]*second[1] + h[2]*second[2];
@@ -272,9 +357,13 @@ INLINE void FN(crank_inverse)(const real g[14], const real h[3], const real firs
     const real kappa = 0.5f*twice;
     const real root = FN(root)(x*x + y*y - kappa*kappa);
     const real side = branch*root;
-    sine[0] = y*kappa - x*side;
-    cosine[0] = x*kappa + y*side;
+    /* of q̃, up to a positive factor */
+    const real sine = y*kappa - x*side;
+    const real cosine = x*kappa + y*side;
+    const real turn = arctangent2(sine, cosine);
+    *qt = turn;
 }
+#endif
 
 /*
  * length: the sphere row by q and numbers
@@ -284,12 +373,13 @@ INLINE void FN(crank_inverse)(const real g[14], const real h[3], const real firs
  * in  p[3]           platform origin [mm]
  * in  q              actuator coordinate [mm or rad]
  * in  g[14]          the limb's numbers
+ * in  F[9]           fixed frame of the axis, in the base, row by row
  * out by_q           ∂Φ/∂q
  * out by_g[14]       ∂Φ/∂(the limb's numbers)
  * operations: 19 +, 21 *, 0 /, 0 sqrt
  */
 INLINE void FN(length_derivatives)(const real R[9], const real p[3], real q, const real g[14],
-        real *by_q, real by_g[14])
+        const real F[9], real *by_q, real by_g[14])
 {
     /* q̃ */
     const real qt = q*g[GAIN] + g[OFFSET];
@@ -467,26 +557,184 @@ INLINE void FN(crank_derivatives)(const real R[9], const real p[3], real q, cons
 #endif
 
 /*
+ * length: covector of the anchor to covectors of q and the limb's numbers
+ *     λ·∂c,  c = base, ρ = q̃
+ *     q̃ = gain q + offset
+ * in  q              actuator coordinate [mm or rad]
+ * in  g[14]          the limb's numbers
+ * in  pull[3]        λ, covector of the anchor
+ * in  F[9]           fixed frame of the axis, in the base, row by row
+ * out by_q           λ·∂c/∂q
+ * out by_g[14]       λ·∂c/∂(the limb's numbers)
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(length_carry)(real q, const real g[14], const real pull[3], const real F[9],
+        real *by_q, real by_g[14])
+{
+    *by_q = FN(fill)(0.0f);
+    by_g[BASE_X] = pull[0];
+    by_g[BASE_Y] = pull[1];
+    by_g[BASE_Z] = pull[2];
+    by_g[PLATFORM_X] = FN(fill)(0.0f);
+    by_g[PLATFORM_Y] = FN(fill)(0.0f);
+    by_g[PLATFORM_Z] = FN(fill)(0.0f);
+    by_g[OFFSET] = FN(fill)(0.0f);
+    by_g[GAIN] = FN(fill)(0.0f);
+    by_g[ROD] = FN(fill)(0.0f);
+    by_g[CRANK] = FN(fill)(0.0f);
+    by_g[TILT1] = FN(fill)(0.0f);
+    by_g[TILT2] = FN(fill)(0.0f);
+    by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
+    by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
+}
+
+#ifndef NARROW
+/*
+ * slider: covector of the anchor to covectors of q and the limb's numbers
+ *     λ·∂c,  c = base + q̃ s, ρ = rod
+ *     q̃ = gain q + offset
+ * in  q              actuator coordinate [mm or rad]
+ * in  g[14]          the limb's numbers
+ * in  pull[3]        λ, covector of the anchor
+ * in  F[9]           fixed frame of the axis, in the base, row by row
+ * out by_q           λ·∂c/∂q
+ * out by_g[14]       λ·∂c/∂(the limb's numbers)
+ * operations: 19 +, 41 *, 0 /, 0 sqrt
+ */
+INLINE void FN(slider_carry)(real q, const real g[14], const real pull[3], const real F[9],
+        real *by_q, real by_g[14])
+{
+    /* q̃ */
+    const real qt = q*g[GAIN] + g[OFFSET];
+    real su1, cu1;
+    FN(sincos)(g[TILT1], &su1, &cu1);
+    real su2, cu2;
+    FN(sincos)(g[TILT2], &su2, &cu2);
+    /* slider direction */
+    const real t0 = F[2]*cu1 - F[1]*su1;
+    const real s0 = F[0]*su2 + cu2*t0;
+    const real t1 = F[5]*cu1 - F[4]*su1;
+    const real s1 = F[3]*su2 + cu2*t1;
+    const real t2 = F[8]*cu1 - F[7]*su1;
+    const real s2 = F[6]*su2 + cu2*t2;
+    const real t3 = pull[0]*s0 + pull[1]*s1 + pull[2]*s2;
+    *by_q = g[GAIN]*t3;
+    by_g[BASE_X] = pull[0];
+    by_g[BASE_Y] = pull[1];
+    by_g[BASE_Z] = pull[2];
+    by_g[PLATFORM_X] = FN(fill)(0.0f);
+    by_g[PLATFORM_Y] = FN(fill)(0.0f);
+    by_g[PLATFORM_Z] = FN(fill)(0.0f);
+    by_g[OFFSET] = t3;
+    by_g[GAIN] = q*t3;
+    by_g[ROD] = FN(fill)(0.0f);
+    by_g[CRANK] = FN(fill)(0.0f);
+    const real t4 = cu1*cu2;
+    const real t5 = su1*cu2;
+    const real t6 = pull[0]*qt;
+    const real t7 = pull[1]*qt;
+    const real t8 = pull[2]*qt;
+    by_g[TILT1] = (-F[1]*t4 - F[2]*t5)*t6 + (-F[4]*t4 - F[5]*t5)*t7 + (-F[7]*t4 - F[8]*t5)*t8;
+    by_g[TILT2] = (F[0]*cu2 - su2*t0)*t6 + (F[3]*cu2 - su2*t1)*t7 + (F[6]*cu2 - su2*t2)*t8;
+    by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
+    by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
+}
+#endif
+
+#ifndef NARROW
+/*
+ * crank: covector of the anchor to covectors of q and the limb's numbers
+ *     λ·∂c,  c = base + crank Rot(axis, q̃) e, ρ = rod
+ *     q̃ = gain q + offset
+ * in  q              actuator coordinate [mm or rad]
+ * in  g[14]          the limb's numbers
+ * in  pull[3]        λ, covector of the anchor
+ * in  F[9]           fixed frame of the axis, in the base, row by row
+ * out by_q           λ·∂c/∂q
+ * out by_g[14]       λ·∂c/∂(the limb's numbers)
+ * operations: 35 +, 70 *, 0 /, 0 sqrt
+ */
+INLINE void FN(crank_carry)(real q, const real g[14], const real pull[3], const real F[9],
+        real *by_q, real by_g[14])
+{
+    /* q̃ */
+    const real qt = q*g[GAIN] + g[OFFSET];
+    real su1, cu1;
+    FN(sincos)(g[TILT1], &su1, &cu1);
+    real su2, cu2;
+    FN(sincos)(g[TILT2], &su2, &cu2);
+    /* crank at q̃ = 0 */
+    const real t0 = F[1]*su1 - F[2]*cu1;
+    const real t1 = -t0;
+    const real e0 = F[0]*cu2 - su2*t1;
+    const real t2 = F[4]*su1 - F[5]*cu1;
+    const real t3 = -t2;
+    const real e1 = F[3]*cu2 - su2*t3;
+    const real t4 = F[7]*su1 - F[8]*cu1;
+    const real t5 = -t4;
+    const real e2 = F[6]*cu2 - su2*t5;
+    /* and at q̃ = 90° */
+    const real t6 = F[1]*cu1;
+    const real t7 = F[2]*su1;
+    const real n0 = t6 + t7;
+    const real t8 = F[4]*cu1;
+    const real t9 = F[5]*su1;
+    const real n1 = t8 + t9;
+    const real t10 = F[7]*cu1;
+    const real t11 = F[8]*su1;
+    const real n2 = t10 + t11;
+    real sq, cq;
+    FN(sincos)(qt, &sq, &cq);
+    const real t12 = g[CRANK]*pull[0];
+    const real t13 = g[CRANK]*pull[1];
+    const real t14 = g[CRANK]*pull[2];
+    const real t15 = (n0*t12 + n1*t13 + n2*t14)*cq;
+    const real t16 = (e0*t12 + e1*t13 + e2*t14)*sq;
+    *by_q = g[GAIN]*t15 - g[GAIN]*t16;
+    by_g[BASE_X] = pull[0];
+    by_g[BASE_Y] = pull[1];
+    by_g[BASE_Z] = pull[2];
+    by_g[PLATFORM_X] = FN(fill)(0.0f);
+    by_g[PLATFORM_Y] = FN(fill)(0.0f);
+    by_g[PLATFORM_Z] = FN(fill)(0.0f);
+    by_g[OFFSET] = t15 - t16;
+    by_g[GAIN] = q*t15 - q*t16;
+    by_g[ROD] = FN(fill)(0.0f);
+    by_g[CRANK] = pull[0]*(e0*cq + n0*sq) + pull[1]*(e1*cq + n1*sq) + pull[2]*(e2*cq + n2*sq);
+    const real t17 = cq*t12;
+    const real t18 = cq*t13;
+    const real t19 = cq*t14;
+    by_g[TILT1] = (su2*t6 + su2*t7)*t17 + (su2*t8 + su2*t9)*t18 + (su2*t10 + su2*t11)*t19 +
+        sq*t1*t12 + sq*t3*t13 + sq*t5*t14;
+    by_g[TILT2] = (cu2*t0 - F[0]*su2)*t17 + (cu2*t2 - F[3]*su2)*t18 + (cu2*t4 - F[6]*su2)*t19;
+    by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
+    by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
+}
+#endif
+
+/*
  * base_plane: the platform joint stays in a plane of the base
- *     Φ = n·d,  d = p + R b - base
+ *     Φ = n·d,  d = p + R b - c
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
  * in  b[3]           platform joint, platform frame [mm]
- * in  c[3]           base joint [mm]
+ * in  c[3]           anchor [mm]
  * in  n[3]           base-side axis, base frame
+ * in  a[3]           platform-side axis, platform frame
+ * in  lever          λ [mm]
  * out phi            Φ [mm]
  * out omega[3]       ∂Φ/∂ω
  * out v[3]           ∂Φ/∂v
  * operations: 17 +, 18 *, 0 /, 0 sqrt
  */
 INLINE void FN(base_plane_row)(const real R[9], const real p[3], const real b[3], const real c[3],
-        const real n[3], real *phi, real omega[3], real v[3])
+        const real n[3], const real a[3], real lever, real *phi, real omega[3], real v[3])
 {
     /* R b */
     const real r0 = R[0]*b[0] + R[1]*b[1] + R[2]*b[2];
     const real r1 = R[3]*b[0] + R[4]*b[1] + R[5]*b[2];
     const real r2 = R[6]*b[0] + R[7]*b[1] + R[8]*b[2];
-    /* from the base joint to the platform joint */
+    /* from the anchor to the platform joint */
     const real d0 = p[0] + r0 - c[0];
     const real d1 = p[1] + r1 - c[1];
     const real d2 = p[2] + r2 - c[2];
@@ -502,16 +750,20 @@ INLINE void FN(base_plane_row)(const real R[9], const real p[3], const real b[3]
 #ifndef NARROW
 /*
  * base_plane: the platform joint stays in a plane of the base
- *     Φ = n·d,  d = p + R b - base
+ *     Φ = n·d,  d = p + R b - c
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
+ * in  c[3]           anchor [mm]
  * in  g[14]          the limb's numbers
- * in  F[9]           fixed frame of the axis, in the base, row by row
- * out by_g[14]       ∂Φ/∂(the limb's numbers)
+ * in  F[9]           fixed frame of the base-side axis, in the base, row by row
+ * in  P[9]           fixed frame of the platform-side axis, in the platform, row by row
+ * in  lever          λ [mm]
+ * out v[3]           ∂Φ/∂v = -∂Φ/∂c
+ * out by_g[14]       ∂Φ/∂(the limb's numbers), c held
  * operations: 34 +, 50 *, 0 /, 0 sqrt
  */
-INLINE void FN(base_plane_derivatives)(const real R[9], const real p[3], const real g[14],
-        const real F[9], real by_g[14])
+INLINE void FN(base_plane_derivatives)(const real R[9], const real p[3], const real c[3],
+        const real g[14], const real F[9], const real P[9], real lever, real v[3], real by_g[14])
 {
     real su1, cu1;
     FN(sincos)(g[TILT1], &su1, &cu1);
@@ -528,13 +780,16 @@ INLINE void FN(base_plane_derivatives)(const real R[9], const real p[3], const r
     const real r0 = R[0]*g[PLATFORM_X] + R[1]*g[PLATFORM_Y] + R[2]*g[PLATFORM_Z];
     const real r1 = R[3]*g[PLATFORM_X] + R[4]*g[PLATFORM_Y] + R[5]*g[PLATFORM_Z];
     const real r2 = R[6]*g[PLATFORM_X] + R[7]*g[PLATFORM_Y] + R[8]*g[PLATFORM_Z];
-    /* from the base joint to the platform joint */
-    const real d0 = p[0] + r0 - g[BASE_X];
-    const real d1 = p[1] + r1 - g[BASE_Y];
-    const real d2 = p[2] + r2 - g[BASE_Z];
-    by_g[BASE_X] = -n0;
-    by_g[BASE_Y] = -n1;
-    by_g[BASE_Z] = -n2;
+    /* from the anchor to the platform joint */
+    const real d0 = p[0] + r0 - c[0];
+    const real d1 = p[1] + r1 - c[1];
+    const real d2 = p[2] + r2 - c[2];
+    v[0] = n0;
+    v[1] = n1;
+    v[2] = n2;
+    by_g[BASE_X] = FN(fill)(0.0f);
+    by_g[BASE_Y] = FN(fill)(0.0f);
+    by_g[BASE_Z] = FN(fill)(0.0f);
     by_g[PLATFORM_X] = R[0]*n0 + R[3]*n1 + R[6]*n2;
     by_g[PLATFORM_Y] = R[1]*n0 + R[4]*n1 + R[7]*n2;
     by_g[PLATFORM_Z] = R[2]*n0 + R[5]*n1 + R[8]*n2;
@@ -553,25 +808,28 @@ INLINE void FN(base_plane_derivatives)(const real R[9], const real p[3], const r
 
 /*
  * platform_plane: the leg stays square to the platform's revolute axis
- *     Φ = (R a)·d,  d = p + R b - base
+ *     Φ = (R a)·d,  d = p + R b - c
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
  * in  b[3]           platform joint, platform frame [mm]
- * in  c[3]           base joint [mm]
+ * in  c[3]           anchor [mm]
+ * in  n[3]           base-side axis, base frame
  * in  a[3]           platform-side axis, platform frame
+ * in  lever          λ [mm]
  * out phi            Φ [mm]
  * out omega[3]       ∂Φ/∂ω
  * out v[3]           ∂Φ/∂v
  * operations: 29 +, 33 *, 0 /, 0 sqrt
  */
 INLINE void FN(platform_plane_row)(const real R[9], const real p[3], const real b[3],
-        const real c[3], const real a[3], real *phi, real omega[3], real v[3])
+        const real c[3], const real n[3], const real a[3], real lever, real *phi, real omega[3],
+        real v[3])
 {
     /* R b */
     const real r0 = R[0]*b[0] + R[1]*b[1] + R[2]*b[2];
     const real r1 = R[3]*b[0] + R[4]*b[1] + R[5]*b[2];
     const real r2 = R[6]*b[0] + R[7]*b[1] + R[8]*b[2];
-    /* from the base joint to the platform joint */
+    /* from the anchor to the platform joint */
     const real d0 = p[0] + r0 - c[0];
     const real d1 = p[1] + r1 - c[1];
     const real d2 = p[2] + r2 - c[2];
@@ -590,16 +848,20 @@ INLINE void FN(platform_plane_row)(const real R[9], const real p[3], const real 
 #ifndef NARROW
 /*
  * platform_plane: the leg stays square to the platform's revolute axis
- *     Φ = (R a)·d,  d = p + R b - base
+ *     Φ = (R a)·d,  d = p + R b - c
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
+ * in  c[3]           anchor [mm]
  * in  g[14]          the limb's numbers
- * in  P[9]           fixed frame of the revolute axis, in the platform, row by row
- * out by_g[14]       ∂Φ/∂(the limb's numbers)
+ * in  F[9]           fixed frame of the base-side axis, in the base, row by row
+ * in  P[9]           fixed frame of the platform-side axis, in the platform, row by row
+ * in  lever          λ [mm]
+ * out v[3]           ∂Φ/∂v = -∂Φ/∂c
+ * out by_g[14]       ∂Φ/∂(the limb's numbers), c held
  * operations: 52 +, 77 *, 0 /, 0 sqrt
  */
-INLINE void FN(platform_plane_derivatives)(const real R[9], const real p[3], const real g[14],
-        const real P[9], real by_g[14])
+INLINE void FN(platform_plane_derivatives)(const real R[9], const real p[3], const real c[3],
+        const real g[14], const real F[9], const real P[9], real lever, real v[3], real by_g[14])
 {
     real sw1, cw1;
     FN(sincos)(g[PLATFORM_TILT1], &sw1, &cw1);
@@ -616,16 +878,19 @@ INLINE void FN(platform_plane_derivatives)(const real R[9], const real p[3], con
     const real r0 = R[0]*g[PLATFORM_X] + R[1]*g[PLATFORM_Y] + R[2]*g[PLATFORM_Z];
     const real r1 = R[3]*g[PLATFORM_X] + R[4]*g[PLATFORM_Y] + R[5]*g[PLATFORM_Z];
     const real r2 = R[6]*g[PLATFORM_X] + R[7]*g[PLATFORM_Y] + R[8]*g[PLATFORM_Z];
-    /* from the base joint to the platform joint */
-    const real d0 = p[0] + r0 - g[BASE_X];
-    const real d1 = p[1] + r1 - g[BASE_Y];
-    const real d2 = p[2] + r2 - g[BASE_Z];
+    /* from the anchor to the platform joint */
+    const real d0 = p[0] + r0 - c[0];
+    const real d1 = p[1] + r1 - c[1];
+    const real d2 = p[2] + r2 - c[2];
     const real Ra0 = R[0]*a0 + R[1]*a1 + R[2]*a2;
     const real Ra1 = R[3]*a0 + R[4]*a1 + R[5]*a2;
     const real Ra2 = R[6]*a0 + R[7]*a1 + R[8]*a2;
-    by_g[BASE_X] = -Ra0;
-    by_g[BASE_Y] = -Ra1;
-    by_g[BASE_Z] = -Ra2;
+    v[0] = Ra0;
+    v[1] = Ra1;
+    v[2] = Ra2;
+    by_g[BASE_X] = FN(fill)(0.0f);
+    by_g[BASE_Y] = FN(fill)(0.0f);
+    by_g[BASE_Z] = FN(fill)(0.0f);
     by_g[PLATFORM_X] = R[0]*Ra0 + R[3]*Ra1 + R[6]*Ra2;
     by_g[PLATFORM_Y] = R[1]*Ra0 + R[4]*Ra1 + R[7]*Ra2;
     by_g[PLATFORM_Z] = R[2]*Ra0 + R[5]*Ra1 + R[8]*Ra2;
@@ -652,11 +917,11 @@ INLINE void FN(platform_plane_derivatives)(const real R[9], const real p[3], con
 
 /*
  * couple: revolute and universal axis stay square, at the lever λ
- *     Φ = λ (R a)·n,  d = p + R b - base
+ *     Φ = λ (R a)·n,  d = p + R b - c
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
  * in  b[3]           platform joint, platform frame [mm]
- * in  c[3]           base joint [mm]
+ * in  c[3]           anchor [mm]
  * in  n[3]           base-side axis, base frame
  * in  a[3]           platform-side axis, platform frame
  * in  lever          λ [mm]
@@ -684,18 +949,20 @@ INLINE void FN(couple_row)(const real R[9], const real p[3], const real b[3], co
 #ifndef NARROW
 /*
  * couple: revolute and universal axis stay square, at the lever λ
- *     Φ = λ (R a)·n,  d = p + R b - base
+ *     Φ = λ (R a)·n,  d = p + R b - c
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
+ * in  c[3]           anchor [mm]
  * in  g[14]          the limb's numbers
- * in  F[9]           fixed frame of the axis, in the base, row by row
- * in  P[9]           fixed frame of the revolute axis, in the platform, row by row
+ * in  F[9]           fixed frame of the base-side axis, in the base, row by row
+ * in  P[9]           fixed frame of the platform-side axis, in the platform, row by row
  * in  lever          λ [mm]
- * out by_g[14]       ∂Φ/∂(the limb's numbers)
+ * out v[3]           ∂Φ/∂v = -∂Φ/∂c
+ * out by_g[14]       ∂Φ/∂(the limb's numbers), c held
  * operations: 50 +, 97 *, 0 /, 0 sqrt
  */
-INLINE void FN(couple_derivatives)(const real R[9], const real p[3], const real g[14],
-        const real F[9], const real P[9], real lever, real by_g[14])
+INLINE void FN(couple_derivatives)(const real R[9], const real p[3], const real c[3],
+        const real g[14], const real F[9], const real P[9], real lever, real v[3], real by_g[14])
 {
     real su1, cu1;
     FN(sincos)(g[TILT1], &su1, &cu1);
@@ -722,6 +989,9 @@ INLINE void FN(couple_derivatives)(const real R[9], const real p[3], const real 
     const real Ra0 = R[0]*a0 + R[1]*a1 + R[2]*a2;
     const real Ra1 = R[3]*a0 + R[4]*a1 + R[5]*a2;
     const real Ra2 = R[6]*a0 + R[7]*a1 + R[8]*a2;
+    v[0] = FN(fill)(0.0f);
+    v[1] = FN(fill)(0.0f);
+    v[2] = FN(fill)(0.0f);
     by_g[BASE_X] = FN(fill)(0.0f);
     by_g[BASE_Y] = FN(fill)(0.0f);
     by_g[BASE_Z] = FN(fill)(0.0f);
@@ -794,12 +1064,15 @@ INLINE void FN(sphere_rate)(const real R[9], const real p[3], const real b[3],
  * in  c_rate[3]      its rate
  * in  n[3]           base-side axis
  * in  n_rate[3]      its rate
+ * in  a[3]           platform-side axis
+ * in  a_rate[3]      its rate
+ * in  lever          λ
  * out rate           Φ's rate
  * operations: 26 +, 24 *, 0 /, 0 sqrt
  */
 INLINE void FN(base_plane_rate)(const real R[9], const real p[3], const real b[3],
         const real b_rate[3], const real c[3], const real c_rate[3], const real n[3],
-        const real n_rate[3], real *rate)
+        const real n_rate[3], const real a[3], const real a_rate[3], real lever, real *rate)
 {
     const real d0 = R[0]*b[0] + R[1]*b[1] + R[2]*b[2] + p[0] - c[0];
     const real d1 = R[3]*b[0] + R[4]*b[1] + R[5]*b[2] + p[1] - c[1];
@@ -818,14 +1091,17 @@ INLINE void FN(base_plane_rate)(const real R[9], const real p[3], const real b[3
  * in  b_rate[3]      its rate
  * in  c[3]           anchor
  * in  c_rate[3]      its rate
+ * in  n[3]           base-side axis
+ * in  n_rate[3]      its rate
  * in  a[3]           platform-side axis
  * in  a_rate[3]      its rate
+ * in  lever          λ
  * out rate           Φ's rate
  * operations: 38 +, 42 *, 0 /, 0 sqrt
  */
 INLINE void FN(platform_plane_rate)(const real R[9], const real p[3], const real b[3],
-        const real b_rate[3], const real c[3], const real c_rate[3], const real a[3],
-        const real a_rate[3], real *rate)
+        const real b_rate[3], const real c[3], const real c_rate[3], const real n[3],
+        const real n_rate[3], const real a[3], const real a_rate[3], real lever, real *rate)
 {
     const real d0 = R[0]*b[0] + R[1]*b[1] + R[2]*b[2] + p[0] - c[0];
     const real d1 = R[3]*b[0] + R[4]*b[1] + R[5]*b[2] + p[1] - c[1];

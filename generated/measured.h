@@ -1,5 +1,5 @@
 /* Generated from derive/measured.py by `python -m derive`; never edited by hand.
- * derivation ffa6579e1882555c
+ * derivation f1c6514312bc8ad8
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

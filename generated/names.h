@@ -1,23 +1,31 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation fb7930544e8ece11
+ * derivation b2b716889767197b
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* the numbers of one limb, in the order of the core */
 enum { BASE_X, BASE_Y, BASE_Z, PLATFORM_X, PLATFORM_Y, PLATFORM_Z, OFFSET, GAIN, ROD, CRANK, TILT1, TILT2, PLATFORM_TILT1, PLATFORM_TILT2, SLOTS };
 #define SLOT_NAMES "base.x base.y base.z platform.x platform.y platform.z offset gain rod crank tilt1 tilt2 platform_tilt1 platform_tilt2"
-enum { DRIVER_LENGTH, DRIVER_SLIDER, DRIVER_CRANK };
+/* axes: name, place, and the rows that have it */
+enum { AXES = 2 };
+#define AXIS_NAMES "base tilt1 tilt2;platform platform_tilt1 platform_tilt2"
+#define EACH_AXIS(X) X(base, 0, ROW_BASE_PLANE | ROW_COUPLE) X(platform, 1, ROW_PLATFORM_PLANE | ROW_COUPLE)
+/* drivers: does q̃ move the anchor, does it change the length? */
+enum { DRIVER_LENGTH, DRIVER_SLIDER, DRIVER_CRANK, DRIVERS };
 #define DRIVER_NAMES "length slider crank"
-/* constraint rows beside the sphere: bits of a set */
+#define EACH_DRIVER(X) X(LENGTH, length, 0, 1) X(SLIDER, slider, 1, 0) X(CRANK, crank, 1, 0)
+/* constraint rows beside the sphere, bits of a set: the axes on base and platform */
 #define ROW_BASE_PLANE 1
 #define ROW_PLATFORM_PLANE 2
 #define ROW_COUPLE 4
+#define ALL_ROWS 7
 #define ROW_NAMES "base_plane platform_plane couple"
-/* pose maps: m free coordinates, iterated on a state */
+#define EACH_ROW(X) X(BASE_PLANE, base_plane, 0, 0) X(PLATFORM_PLANE, platform_plane, 0, 1) X(COUPLE, couple, 0, 1)
+/* pose maps: m free coordinates, how many of them are lengths, iterated on a state */
 enum { MAP_SPATIAL, MAP_TRANSLATION, MAP_PLANAR, MAP_2TPR2TPS };
 #define MAP_NAMES "spatial translation planar 2tpr2tps"
 #define MAP_FREE "x y z alpha beta gamma;x y z;x y gamma;y z alpha beta"
 #define MAX_STATE 7
-#define EACH_MAP(X) X(SPATIAL, spatial, 6) X(TRANSLATION, translation, 3) X(PLANAR, planar, 3) X(2TPR2TPS, 2tpr2tps, 4)
+#define EACH_MAP(X) X(SPATIAL, spatial, 6, 3) X(TRANSLATION, translation, 3, 3) X(PLANAR, planar, 3, 2) X(2TPR2TPS, 2tpr2tps, 4, 2)
 #define ROW_CALLS \
     "compose a:6* b:6* -> out:6\n" \
     "invert a:6 -> out:6\n" \

@@ -1,5 +1,5 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation b0b2e0d4feca6ec4
+ * derivation becd94bbe7937f1b
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

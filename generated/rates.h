@@ -1,5 +1,5 @@
 /* Generated from derive/rates.py by `python -m derive`; never edited by hand.
- * derivation 1132c5aebcde6934
+ * derivation ba2bd0ae9b342736
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*
@@ -9,12 +9,14 @@
  * in  h[3]           p + R b - base [mm]
  * in  h1[3]          its velocity [/s]
  * in  h2[3]          its acceleration [/s²]
+ * in  first[3]       s, or crank e
+ * in  second[3]      0, or crank axis × e
  * out qt1            dq̃/dt [mm/s or rad/s]
  * out qt2            d²q̃/dt² [mm/s² or rad/s²]
  * operations: 8 +, 12 *, 1 /, 0 sqrt
  */
 INLINE void FN(length_rates)(real qt, const real h[3], const real h1[3], const real h2[3],
-        real *qt1, real *qt2)
+        const real first[3], const real second[3], real *qt1, real *qt2)
 {
     /* dq̃/dt */
     const real t0 = 1.0f/qt;
@@ -32,12 +34,13 @@ INLINE void FN(length_rates)(real qt, const real h[3], const real h1[3], const r
  * in  h1[3]          its velocity [/s]
  * in  h2[3]          its acceleration [/s²]
  * in  first[3]       s, or crank e
+ * in  second[3]      0, or crank axis × e
  * out qt1            dq̃/dt [mm/s or rad/s]
  * out qt2            d²q̃/dt² [mm/s² or rad/s²]
  * operations: 15 +, 20 *, 1 /, 0 sqrt
  */
 INLINE void FN(slider_rates)(real qt, const real h[3], const real h1[3], const real h2[3],
-        const real first[3], real *qt1, real *qt2)
+        const real first[3], const real second[3], real *qt1, real *qt2)
 {
     /* from the anchor to the joint */
     const real d0 = h[0] - qt*first[0];
@@ -66,7 +69,7 @@ INLINE void FN(slider_rates)(real qt, const real h[3], const real h1[3], const r
  * in  h1[3]          its velocity [/s]
  * in  h2[3]          its acceleration [/s²]
  * in  first[3]       s, or crank e
- * in  second[3]      crank axis × e
+ * in  second[3]      0, or crank axis × e
  * out qt1            dq̃/dt [mm/s or rad/s]
  * out qt2            d²q̃/dt² [mm/s² or rad/s²]
  * operations: 30 +, 42 *, 1 /, 0 sqrt
@@ -118,11 +121,13 @@ INLINE void FN(crank_rates)(real qt, const real h[3], const real h1[3], const re
  * in  h[3]           p + R b - base [mm]
  * in  h1[3]          its velocity [/s]
  * in  h2[3]          its acceleration [/s²]
+ * in  first[3]       s, or crank e
+ * in  second[3]      0, or crank axis × e
  * out phi2           d²Φ/dt² [mm²/s²]
  * operations: 7 +, 8 *, 0 /, 0 sqrt
  */
 INLINE void FN(length_bend)(real qt, real qt1, real qt2, const real h[3], const real h1[3],
-        const real h2[3], real *phi2)
+        const real h2[3], const real first[3], const real second[3], real *phi2)
 {
     *phi2 = h[0]*h2[0] + h[1]*h2[1] + h[2]*h2[2] + h1[0]*h1[0] + h1[1]*h1[1] + h1[2]*h1[2] - qt*qt2
         - qt1*qt1;
@@ -138,11 +143,12 @@ INLINE void FN(length_bend)(real qt, real qt1, real qt2, const real h[3], const 
  * in  h1[3]          its velocity [/s]
  * in  h2[3]          its acceleration [/s²]
  * in  first[3]       s, or crank e
+ * in  second[3]      0, or crank axis × e
  * out phi2           d²Φ/dt² [mm²/s²]
  * operations: 14 +, 15 *, 0 /, 0 sqrt
  */
 INLINE void FN(slider_bend)(real qt, real qt1, real qt2, const real h[3], const real h1[3],
-        const real h2[3], const real first[3], real *phi2)
+        const real h2[3], const real first[3], const real second[3], real *phi2)
 {
     const real d0 = h[0] - qt*first[0];
     const real d1 = h[1] - qt*first[1];
@@ -168,7 +174,7 @@ INLINE void FN(slider_bend)(real qt, real qt1, real qt2, const real h[3], const 
  * in  h1[3]          its velocity [/s]
  * in  h2[3]          its acceleration [/s²]
  * in  first[3]       s, or crank e
- * in  second[3]      crank axis × e
+ * in  second[3]      0, or crank axis × e
  * out phi2           d²Φ/dt² [mm²/s²]
  * operations: 29 +, 35 *, 0 /, 0 sqrt
  */
@@ -203,17 +209,130 @@ INLINE void FN(crank_bend)(real qt, real qt1, real qt2, const real h[3], const r
 #endif
 
 /*
- * base_plane: how the row bends along a path
- *     d²Φ/dt²,  Φ = n·d
+ * length: from the anchor to the joint as joint and actuator move
+ *     d, ḋ, d̈ of d = p + R b - c,  c = base, ρ = q̃
+ * in  qt             q̃ [mm or rad]
+ * in  qt1            dq̃/dt [/s]
+ * in  qt2            d²q̃/dt² [/s²]
  * in  h[3]           p + R b - base [mm]
  * in  h1[3]          its velocity [/s]
  * in  h2[3]          its acceleration [/s²]
+ * in  first[3]       s, or crank e
+ * in  second[3]      0, or crank axis × e
+ * out d[3]           [mm, /s, /s²]
+ * out d1[3]          [mm, /s, /s²]
+ * out d2[3]          [mm, /s, /s²]
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(length_path)(real qt, real qt1, real qt2, const real h[3], const real h1[3],
+        const real h2[3], const real first[3], const real second[3], real d[3], real d1[3],
+        real d2[3])
+{
+    d[0] = h[0];
+    d[1] = h[1];
+    d[2] = h[2];
+    d1[0] = h1[0];
+    d1[1] = h1[1];
+    d1[2] = h1[2];
+    d2[0] = h2[0];
+    d2[1] = h2[1];
+    d2[2] = h2[2];
+}
+
+/*
+ * slider: from the anchor to the joint as joint and actuator move
+ *     d, ḋ, d̈ of d = p + R b - c,  c = base + q̃ s, ρ = rod
+ * in  qt             q̃ [mm or rad]
+ * in  qt1            dq̃/dt [/s]
+ * in  qt2            d²q̃/dt² [/s²]
+ * in  h[3]           p + R b - base [mm]
+ * in  h1[3]          its velocity [/s]
+ * in  h2[3]          its acceleration [/s²]
+ * in  first[3]       s, or crank e
+ * in  second[3]      0, or crank axis × e
+ * out d[3]           [mm, /s, /s²]
+ * out d1[3]          [mm, /s, /s²]
+ * out d2[3]          [mm, /s, /s²]
+ * operations: 9 +, 9 *, 0 /, 0 sqrt
+ */
+INLINE void FN(slider_path)(real qt, real qt1, real qt2, const real h[3], const real h1[3],
+        const real h2[3], const real first[3], const real second[3], real d[3], real d1[3],
+        real d2[3])
+{
+    d[0] = h[0] - qt*first[0];
+    d[1] = h[1] - qt*first[1];
+    d[2] = h[2] - qt*first[2];
+    d1[0] = h1[0] - qt1*first[0];
+    d1[1] = h1[1] - qt1*first[1];
+    d1[2] = h1[2] - qt1*first[2];
+    d2[0] = h2[0] - qt2*first[0];
+    d2[1] = h2[1] - qt2*first[1];
+    d2[2] = h2[2] - qt2*first[2];
+}
+
+#ifndef NARROW
+/*
+ * crank: from the anchor to the joint as joint and actuator move
+ *     d, ḋ, d̈ of d = p + R b - c,  c = base + crank Rot(axis, q̃) e, ρ = rod
+ * in  qt             q̃ [mm or rad]
+ * in  qt1            dq̃/dt [/s]
+ * in  qt2            d²q̃/dt² [/s²]
+ * in  h[3]           p + R b - base [mm]
+ * in  h1[3]          its velocity [/s]
+ * in  h2[3]          its acceleration [/s²]
+ * in  first[3]       s, or crank e
+ * in  second[3]      0, or crank axis × e
+ * out d[3]           [mm, /s, /s²]
+ * out d1[3]          [mm, /s, /s²]
+ * out d2[3]          [mm, /s, /s²]
+ * operations: 24 +, 29 *, 0 /, 0 sqrt
+ */
+INLINE void FN(crank_path)(real qt, real qt1, real qt2, const real h[3], const real h1[3],
+        const real h2[3], const real first[3], const real second[3], real d[3], real d1[3],
+        real d2[3])
+{
+    real sq, cq;
+    FN(sincos)(qt, &sq, &cq);
+    const real t0 = first[0]*cq;
+    const real t1 = second[0]*sq;
+    d[0] = h[0] - t0 - t1;
+    const real t2 = first[1]*cq;
+    const real t3 = second[1]*sq;
+    d[1] = h[1] - t2 - t3;
+    const real t4 = first[2]*cq;
+    const real t5 = second[2]*sq;
+    d[2] = h[2] - t4 - t5;
+    const real t6 = qt1*sq;
+    const real t7 = qt1*cq;
+    d1[0] = h1[0] + first[0]*t6 - second[0]*t7;
+    d1[1] = h1[1] + first[1]*t6 - second[1]*t7;
+    d1[2] = h1[2] + first[2]*t6 - second[2]*t7;
+    const real t8 = qt2*sq;
+    const real t9 = qt2*cq;
+    const real t10 = qt1*qt1;
+    d2[0] = h2[0] + first[0]*t8 + t0*t10 + t1*t10 - second[0]*t9;
+    d2[1] = h2[1] + first[1]*t8 + t2*t10 + t3*t10 - second[1]*t9;
+    d2[2] = h2[2] + first[2]*t8 + t4*t10 + t5*t10 - second[2]*t9;
+}
+#endif
+
+/*
+ * base_plane: how the row bends along a path
+ *     d²Φ/dt²,  Φ = n·d
+ * in  h[3]           p + R b - c [mm]
+ * in  h1[3]          its velocity [/s]
+ * in  h2[3]          its acceleration [/s²]
  * in  n[3]           base-side axis, base frame
+ * in  a[3]           platform-side axis, base frame
+ * in  a1[3]          its velocity [/s]
+ * in  a2[3]          its acceleration [/s²]
+ * in  lever          λ [mm]
  * out phi2           d²Φ/dt² [mm/s²]
  * operations: 2 +, 3 *, 0 /, 0 sqrt
  */
 INLINE void FN(base_plane_bend)(const real h[3], const real h1[3], const real h2[3],
-        const real n[3], real *phi2)
+        const real n[3], const real a[3], const real a1[3], const real a2[3], real lever,
+        real *phi2)
 {
     *phi2 = h2[0]*n[0] + h2[1]*n[1] + h2[2]*n[2];
 }
@@ -221,17 +340,20 @@ INLINE void FN(base_plane_bend)(const real h[3], const real h1[3], const real h2
 /*
  * platform_plane: how the row bends along a path
  *     d²Φ/dt²,  Φ = (R a)·d
- * in  h[3]           p + R b - base [mm]
+ * in  h[3]           p + R b - c [mm]
  * in  h1[3]          its velocity [/s]
  * in  h2[3]          its acceleration [/s²]
+ * in  n[3]           base-side axis, base frame
  * in  a[3]           platform-side axis, base frame
  * in  a1[3]          its velocity [/s]
  * in  a2[3]          its acceleration [/s²]
+ * in  lever          λ [mm]
  * out phi2           d²Φ/dt² [mm/s²]
  * operations: 8 +, 12 *, 0 /, 0 sqrt
  */
 INLINE void FN(platform_plane_bend)(const real h[3], const real h1[3], const real h2[3],
-        const real a[3], const real a1[3], const real a2[3], real *phi2)
+        const real n[3], const real a[3], const real a1[3], const real a2[3], real lever,
+        real *phi2)
 {
     *phi2 = h[0]*a2[0] + h[1]*a2[1] + h[2]*a2[2] + 2.0f*h1[0]*a1[0] + 2.0f*h1[1]*a1[1] +
         2.0f*h1[2]*a1[2] + h2[0]*a[0] + h2[1]*a[1] + h2[2]*a[2];
@@ -240,6 +362,9 @@ INLINE void FN(platform_plane_bend)(const real h[3], const real h1[3], const rea
 /*
  * couple: how the row bends along a path
  *     d²Φ/dt²,  Φ = λ (R a)·n
+ * in  h[3]           p + R b - c [mm]
+ * in  h1[3]          its velocity [/s]
+ * in  h2[3]          its acceleration [/s²]
  * in  n[3]           base-side axis, base frame
  * in  a[3]           platform-side axis, base frame
  * in  a1[3]          its velocity [/s]
@@ -248,8 +373,8 @@ INLINE void FN(platform_plane_bend)(const real h[3], const real h1[3], const rea
  * out phi2           d²Φ/dt² [mm/s²]
  * operations: 2 +, 4 *, 0 /, 0 sqrt
  */
-INLINE void FN(couple_bend)(const real n[3], const real a[3], const real a1[3], const real a2[3],
-        real lever, real *phi2)
+INLINE void FN(couple_bend)(const real h[3], const real h1[3], const real h2[3], const real n[3],
+        const real a[3], const real a1[3], const real a2[3], real lever, real *phi2)
 {
     *phi2 = (n[0]*a2[0] + n[1]*a2[1] + n[2]*a2[2])*lever;
 }

@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 7adae37a7e002da7
+ * derivation 4993a2086d9f56cc
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,

@@ -1,5 +1,5 @@
 /* Generated from derive/screws.py by `python -m derive`; never edited by hand.
- * derivation 531774715477e6ee
+ * derivation 6ece6d74e53e8878
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #define SERIES_END 10.0

@@ -1,5 +1,5 @@
 /* Generated from derive/tpr2tps.py by `python -m derive`; never edited by hand.
- * derivation cac31466936f3c27
+ * derivation 323d794969503d6b
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

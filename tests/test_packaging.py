@@ -44,9 +44,18 @@ def test_a_compiler_is_not_given_flags_that_it_does_not_know(
     strange.write_text(f'#!/bin/sh\ncase "$*" in *{faster[0]}*) exit 1;; esac\n')
     strange.chmod(0o755)
     monkeypatch.setenv("CC", f"{strange} -m64")
-    assert build["flags"]() == required + faster[1:]
+    monkeypatch.delenv("CFLAGS", raising=False)
+    assert build["flags"]() == [*required, *faster[1:], "-g0"]
     monkeypatch.setenv("CC", str(tmp_path / "nothing here"))
-    assert build["flags"]() == required
+    assert build["flags"]() == [*required, "-g0"]
+
+
+def test_line_numbers_stay_where_the_flags_of_the_environment_ask_for_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    build = runpy.run_path(str(ROOT / "csrc" / "build.py"))
+    monkeypatch.setenv("CFLAGS", "-O1 -g -fsanitize=address")
+    assert "-g0" not in build["flags"]()
 
 
 def lacking(*, python: str | Path = sys.executable, **environment: str) -> str:

@@ -54,6 +54,8 @@ def closures(model: Any, poses: Array, q: Array, slots: Array | None = None) -> 
             anchor, radius = base, moved
         elif limb.kind == "PUS":
             anchor, radius = base + moved[:, None] * axis, n["rod"]
+        elif limb.kind != "RUS":
+            raise ValueError(f"unknown limb kind {limb.kind!r}")
         else:
             direction = np.stack([np.cos(moved), np.sin(moved), 0.0 * moved], axis=-1)
             crank = turned(limb.frame, n["tilt1"], n["tilt2"], direction)

@@ -23,6 +23,9 @@ def _text(pointer: Any) -> str:
 
 # One source for these: the derivation, by way of the core.
 SLOTS: tuple[str, ...] = tuple(_text(lib.pkm_slot_names()).split())
+AXES: dict[str, tuple[str, ...]] = {  # and the slots of their tilts
+    name: tuple(tilts) for name, *tilts in map(str.split, _text(lib.pkm_axis_names()).split(";"))
+}
 DRIVERS: tuple[str, ...] = tuple(_text(lib.pkm_driver_names()).split())
 ROWS: tuple[str, ...] = tuple(_text(lib.pkm_row_names()).split())
 MAPS: dict[str, tuple[str, ...]] = {

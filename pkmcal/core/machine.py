@@ -8,7 +8,18 @@ import numpy as np
 
 from pkmcal._core import ffi, lib
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.core.library import DRIVERS, ISA, MAPS, ROWS, call, ensure, in_threads, part, pointer
+from pkmcal.core.library import (
+    AXES,
+    DRIVERS,
+    ISA,
+    MAPS,
+    ROWS,
+    call,
+    ensure,
+    in_threads,
+    part,
+    pointer,
+)
 
 
 class Closure(NamedTuple):
@@ -40,7 +51,7 @@ class Machine:
     map : str
         A key of `MAPS`.
     limbs : list of dict
-        Of each limb: driver, rows (names), actuator, branch, frame, platform_frame (3, 3), lever,
+        Of each limb: driver, rows (names), actuator, branch, frames (3, 3) by axis, lever,
         weights of the sphere row and the other rows.
     length : float
         Characteristic length, mm.
@@ -72,13 +83,13 @@ class Machine:
             struct.actuator[i] = limb["actuator"]
             struct.branch[i] = limb["branch"]
             struct.lever[i] = limb["lever"]
-            for k in range(9):
-                struct.frame[9 * i + k] = limb["frame"].flat[k]
-                struct.platform_frame[9 * i + k] = limb["platform_frame"].flat[k]
+            for axis, frame in limb["frames"].items():
+                place = 9 * (len(AXES) * i + list(AXES).index(axis))
+                struct.frame[place : place + 9] = frame.ravel().tolist()
             weights += limb["weights"]
         for r, weight in enumerate(weights):
             struct.weight[r] = weight
-        ensure(lib.pkm_order_rows(struct, pointer(slots), pointer(home)))
+        ensure(lib.pkm_prepare(struct, pointer(slots), pointer(home)))
         self.struct = struct
         self.isa = isa
         self.actuators: int = struct.actuators
@@ -191,10 +202,10 @@ class Machine:
         return out
 
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
-        """What the limbs are at coordinates (N, n): (N, limbs, 13).
+        """What the limbs are at coordinates (N, n): (N, limbs, 7 + 3 AXES).
 
-        Platform joint (3), anchor (3), length, axis at the base (3), axis at the platform (3), in
-        mm; lengths are NaN in rows where a limb has no positive one.
+        Platform joint (3), anchor (3), length in mm, and the axes (3 each), 0 where it has none;
+        lengths are NaN in rows where a limb has no positive one.
         """
         out = np.empty((len(q), self.struct.limbs, lib.PKM_SPHERE))
         call("spheres", self.struct, len(q), slots, q, out, isa=self.isa)

@@ -45,7 +45,7 @@ def follow(
     states: ComplexArray,
     accuracy: float,
 ) -> Paths:
-    """Solutions of the closures of limbs `start` followed to limbs `target`, (limbs, 13).
+    """Solutions of the closures of limbs `start` followed to limbs `target`, (limbs, 7 + 3 axes).
 
     `states` (N, k) are those of the pose map; `accuracy` is how far a prediction may be off.
     """
@@ -55,7 +55,9 @@ def follow(
     frame = np.empty((n, 12), dtype=np.complex128)
     status, steps = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
     reached = np.empty(n)
-    limbs = [np.ascontiguousarray(each, dtype=np.complex128) for each in (start, target)]
+    limbs = np.zeros((2, len(start), lib.PKM_SPHERE), dtype=np.complex128)
+    for each, given in zip(limbs, (start, target), strict=True):
+        each[:, : given.shape[1]] = given  # axes that a start system does not know are 0
     arrays = [pointer(each) for each in (*limbs, x, frame, status, steps, reached)]
     ensure(lib.pkm_paths(machine.struct, n, *arrays[:3], accuracy, *arrays[3:]))
     return Paths(x, frame, status, steps, reached)

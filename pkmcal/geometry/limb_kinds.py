@@ -6,17 +6,16 @@ length; every limb has the sphere row, and some kinds add rows of their own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 from pkmcal.arrays import Unit
-from pkmcal.core.library import SLOTS
+from pkmcal.core.library import AXES, DRIVERS, ROWS, SLOTS
 
 Driver = Literal["length", "slider", "crank"]
 
 POINT_SLOTS = SLOTS[:6]
-TILT_SLOTS = ("tilt1", "tilt2")
-PLATFORM_TILT_SLOTS = ("platform_tilt1", "platform_tilt2")
 
 
 @dataclass(frozen=True)
@@ -29,23 +28,26 @@ class LimbKind:
         The name of the kind.
     driver : {"length", "slider", "crank"}
         How the actuator moves the limb; a crank's coordinate is an angle.
-    base_axis : str or None
-        Key of its axis in base axes; its tilts are the slots ``tilt1`` and ``tilt2``.
-    platform_axis : str or None
-        Key of its axis in platform axes; tilts in ``platform_tilt1`` and ``platform_tilt2``.
+    axes : mapping of str to str
+        Key of each axis of the core (`pkmcal.core.AXES`) that the limb has; its tilts have the key
+        with ``_tilt`` behind it.
     rows : tuple of str
         The closures beside the sphere row.
     couple : bool
-        Whether a stated length `couple` adds a row and makes `base_axis` part of the limb.
-        Otherwise every limb of the kind has its `base_axis`.
+        Whether a stated length `couple` adds a row and makes the base axis part of the limb.
+        Otherwise every limb of the kind has all its axes.
     """
 
     name: str
     driver: Driver
-    base_axis: str | None = None
-    platform_axis: str | None = None
+    axes: Mapping[str, str] = field(default_factory=dict)
     rows: tuple[str, ...] = ()
     couple: bool = False
+
+    def __post_init__(self) -> None:
+        unknown = {self.driver, *self.axes, *self.rows} - {*DRIVERS, *AXES, *ROWS}
+        if unknown:
+            raise ValueError(f"{self.name}: the core has no {', '.join(sorted(unknown))}")
 
     @property
     def actuator_unit(self) -> Unit:
@@ -62,9 +64,10 @@ class LimbKind:
         """Whether the inverse has two branches to choose from."""
         return self.driver != "length"
 
-    def has_base_axis(self, couple: bool) -> bool:
-        """Whether a limb with or without a couple length has the base axis."""
-        return self.base_axis is not None and (couple or not self.couple)
+    def axes_of(self, couple: bool) -> dict[str, str]:
+        """The axes of a limb with or without a couple length, in the order of the core."""
+        missing = "base" if self.couple and not couple else None
+        return {axis: self.axes[axis] for axis in AXES if axis in self.axes and axis != missing}
 
     def all_rows(self, couple: bool) -> tuple[str, ...]:
         """The rows beside the sphere row of a limb with or without a couple length."""
@@ -72,7 +75,7 @@ class LimbKind:
 
     def keys(self) -> tuple[str, ...]:
         """Every key a ``[[limb]]`` table of this kind may have."""
-        axes = [axis for axis in (self.base_axis, self.platform_axis) if axis is not None]
+        axes = self.axes.values()
         return (
             ("kind", "base", "platform", "offset", "gain", "actuator")
             + self.lengths
@@ -97,12 +100,9 @@ class LimbKind:
         found["gain"] = (f"gain{limb}", "1")
         for slot in self.lengths:
             found[slot] = (f"{slot}{limb}", "mm")
-        if self.has_base_axis(couple):
-            for i, slot in enumerate(TILT_SLOTS, 1):
-                found[slot] = (f"{self.base_axis}{limb}.tilt{i}", "rad")
-        if self.platform_axis is not None:
-            for i, slot in enumerate(PLATFORM_TILT_SLOTS, 1):
-                found[slot] = (f"{self.platform_axis}{limb}.tilt{i}", "rad")
+        for axis, key in self.axes_of(couple).items():
+            for i, slot in enumerate(AXES[axis], 1):
+                found[slot] = (f"{key}{limb}.tilt{i}", "rad")
         return tuple((slot, *found[slot]) for slot in SLOTS if slot in found)
 
 
@@ -113,14 +113,13 @@ KINDS: dict[str, LimbKind] = {
         LimbKind(
             "UPR",
             "length",
-            base_axis="universal",
-            platform_axis="revolute",
+            axes={"base": "universal", "platform": "revolute"},
             rows=("platform_plane",),
             couple=True,
         ),
-        LimbKind("RPS", "length", base_axis="normal", rows=("base_plane",)),
-        LimbKind("PUS", "slider", base_axis="slider"),
-        LimbKind("RUS", "crank", base_axis="axis"),
+        LimbKind("RPS", "length", {"base": "normal"}, rows=("base_plane",)),
+        LimbKind("PUS", "slider", {"base": "slider"}),
+        LimbKind("RUS", "crank", {"base": "axis"}),
     )
 }
 

@@ -42,12 +42,11 @@ class Limb:
     branch : int
         +1 or -1, the sign of u·∂c/∂q̃ with u from carriage to platform joint; 0 where the kind
         has no branches.
-    frame : ndarray (3, 3)
-        Orthonormal and right-handed, columns e1 e2 e3 in base axes: e3 is the stated reference of
-        the slider, the crank's axis, the normal or the universal joint's axis; e1 is the crank's
-        direction at q̃ = 0 and otherwise chosen from e3. The identity where unused.
-    platform_frame : ndarray (3, 3)
-        The same for the revolute joint's axis, in platform axes.
+    frames : mapping of str to ndarray (3, 3)
+        Of each axis of the core (`pkmcal.core.AXES`) that the kind has: orthonormal and
+        right-handed, columns e1 e2 e3. e3 is the stated reference of the slider, the crank's axis,
+        the normal, the universal or the revolute joint's axis; e1 is the crank's direction at
+        q̃ = 0 and otherwise chosen from e3.
     couple : float
         Length λ of the couple row in mm; 0 without that row.
     weights : tuple of float
@@ -61,13 +60,22 @@ class Limb:
     kind: str
     actuator: int
     branch: int
-    frame: FloatArray
-    platform_frame: FloatArray
+    frames: Mapping[str, FloatArray]
     couple: float = 0.0
     weights: tuple[float, ...] = ()
     stroke: tuple[float, float] | None = None
     base_cone: Cone | None = None
     platform_cone: Cone | None = None
+
+    @property
+    def frame(self) -> FloatArray:
+        """Frame of the base axis; the identity where unused."""
+        return self.frames.get("base", np.eye(3))
+
+    @property
+    def platform_frame(self) -> FloatArray:
+        """Frame of the platform axis; the identity where unused."""
+        return self.frames.get("platform", np.eye(3))
 
 
 @dataclass(frozen=True, eq=False)

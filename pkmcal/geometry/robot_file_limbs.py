@@ -11,8 +11,9 @@ import numpy as np
 
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, Unit
+from pkmcal.core.library import AXES
 from pkmcal.files.toml_table import Table, shown, unit_vector
-from pkmcal.geometry.limb_kinds import ALIASES, KINDS, PLATFORM_TILT_SLOTS, TILT_SLOTS, LimbKind
+from pkmcal.geometry.limb_kinds import ALIASES, KINDS, LimbKind
 from pkmcal.geometry.model import Cone, Limb
 from pkmcal.geometry.ties import LimbNumber, Term, Tie
 
@@ -117,16 +118,15 @@ def _read_limb(table: Table, i: int, parameters: Parameters) -> tuple[Limb, dict
     couple = _positive(table, "couple", table.number("couple", "mm")) if "couple" in table else 0.0
     entries = _read_numbers(table, kind, couple > 0.0, parameters)
 
-    frame = platform_frame = np.eye(3)
-    if kind.base_axis is not None:
-        if kind.has_base_axis(couple > 0.0):
-            frame = _frame(table, kind.base_axis, "zero" if kind.driver == "crank" else None)
-        else:
-            for key in (kind.base_axis, f"{kind.base_axis}_tilt"):
-                if key in table:
-                    table.fail(key, "only a limb with a couple length has this")
-    if kind.platform_axis is not None:
-        platform_frame = _frame(table, kind.platform_axis)
+    axes = kind.axes_of(couple > 0.0)
+    for axis in kind.axes.keys() - axes.keys():
+        for key in (kind.axes[axis], f"{kind.axes[axis]}_tilt"):
+            if key in table:
+                table.fail(key, "only a limb with a couple length has this")
+    zero = "zero" if kind.driver == "crank" else None
+    frames = {
+        axis: _frame(table, key, zero if axis == "base" else None) for axis, key in axes.items()
+    }
 
     branch = table.integer("branch") if kind.has_branch else 0
     if kind.has_branch and branch not in (1, -1):
@@ -138,15 +138,14 @@ def _read_limb(table: Table, i: int, parameters: Parameters) -> tuple[Limb, dict
         kind=kind.name,
         actuator=actuator - 1,
         branch=branch,
-        frame=frame,
-        platform_frame=platform_frame,
+        frames=frames,
         couple=couple,
         weights=_weights(table, kind.all_rows(couple > 0.0)),
         stroke=_stroke(table, kind.actuator_unit),
         base_cone=_cone(table, "base_cone"),
         platform_cone=_cone(table, "platform_cone"),
     )
-    for array in (frame, platform_frame):
+    for array in frames.values():
         array.flags.writeable = False
     return limb, entries
 
@@ -168,15 +167,11 @@ def _read_numbers(
     for key in kind.lengths:
         entries[key] = entry(key, table[key], "mm")
         _positive(table, key, entries[key].value)
-    axes: list[tuple[str | None, tuple[str, ...]]] = [(kind.platform_axis, PLATFORM_TILT_SLOTS)]
-    if kind.has_base_axis(couple):
-        axes.append((kind.base_axis, TILT_SLOTS))
-    for axis, slots in axes:
-        if axis is not None:
-            key = f"{axis}_tilt"
-            tilts = table.list_of(key, 2, "two angles") if key in table else (0.0, 0.0)
-            for slot, tilt in zip(slots, tilts, strict=True):
-                entries[slot] = entry(key, tilt, "rad")
+    for axis, name in kind.axes_of(couple).items():
+        key = f"{name}_tilt"
+        tilts = table.list_of(key, 2, "two angles") if key in table else (0.0, 0.0)
+        for slot, tilt in zip(AXES[axis], tilts, strict=True):
+            entries[slot] = entry(key, tilt, "rad")
     return entries
 
 

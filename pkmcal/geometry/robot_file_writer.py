@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from pkmcal.arrays import FloatArray
-from pkmcal.core.library import MAPS, POSE
+from pkmcal.core.library import AXES, MAPS, POSE
 from pkmcal.geometry.geometry import Geometry
-from pkmcal.geometry.limb_kinds import KINDS, PLATFORM_TILT_SLOTS, TILT_SLOTS
+from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Cone, Limb, Model
 from pkmcal.geometry.ties import LimbNumber, Term
 
@@ -84,12 +84,9 @@ def _limb(limb: Limb, i: int, geometry: Geometry) -> dict[str, Any]:
         "base": _point("base", numbers, geometry),
         "platform": _point("platform", numbers, geometry),
     }
-    if kind.platform_axis is not None:
-        data[kind.platform_axis] = limb.platform_frame[:, 2].tolist()
-        data[f"{kind.platform_axis}_tilt"] = [entry(slot) for slot in PLATFORM_TILT_SLOTS]
-    if kind.base_axis is not None and kind.has_base_axis(couple):
-        data[kind.base_axis] = limb.frame[:, 2].tolist()
-        data[f"{kind.base_axis}_tilt"] = [entry(slot) for slot in TILT_SLOTS]
+    for axis, key in kind.axes_of(couple).items():
+        data[key] = limb.frames[axis][:, 2].tolist()
+        data[f"{key}_tilt"] = [entry(slot) for slot in AXES[axis]]
     if kind.driver == "crank":
         data["zero"] = limb.frame[:, 0].tolist()
     data.update({key: entry(key) for key in (*kind.lengths, "offset", "gain")})

@@ -291,8 +291,7 @@ def _limb(limb: Limb) -> dict[str, Any]:
         "rows": rows,
         "actuator": limb.actuator,
         "branch": limb.branch,
-        "frame": limb.frame,
-        "platform_frame": limb.platform_frame,
+        "frames": limb.frames,
         "lever": limb.couple,
         "weights": [1.0, *(limb.weights or [1.0] * len(rows))],
     }

@@ -196,6 +196,7 @@ def run(f: Function, values: dict[str, mp.mpf | list[mp.mpf]]) -> dict[str, list
     outputs = {a.name: [mp.nan] * (a.size or 1) for a, _ in f.outputs}
     known = {**dict(zip(limbs.CONSTANTS, range(99), strict=False)), **values, **outputs}
     known |= {"SIXTH": mp.mpf(1) / 6, "mpf": mp.mpf, "sqrt": mp.sqrt, "sin": mp.sin, "cos": mp.cos}
+    known["arctangent2"] = mp.atan2
     for statement in body(f).split(";")[:-1]:
         line = " ".join(statement.split())
         line = re.sub(r"(\d+\.\d+(?:e[+-]?\d+)?)f\b", r"mpf('\1')", line)

@@ -14,6 +14,8 @@ import pytest
 import sympy as sp
 from pkmcal.derive import limbs, rates
 
+DRIVERS = [driver.name for driver in limbs.DRIVERS]
+ROWS = [row.name for row in limbs.CONSTRAINTS]
 FUNCTIONS = {f.name: f for module in (limbs, rates) for f in module.functions()}
 
 
@@ -56,11 +58,12 @@ def closures() -> dict[str, sp.Expr]:
         return (d.dot(d) - square) / 2
 
     made = {"sphere_row": sphere(b, c, rho2)}
-    for driver in ("length", "slider", "crank"):
+    for driver in DRIVERS:
         centre, rho = anchor(driver, g["gain"] * q + g["offset"])
         made[f"{driver}_derivatives"] = sphere(platform, centre, rho**2)
+        made[f"{driver}_carry"] = symbols("pull", 3).dot(centre)
     known = (b, c, symbols("n", 3), symbols("a", 3))
-    tilts = (platform, base, tilted(F, "tilt").col(2), tilted(P, "platform_tilt").col(2))
+    tilts = (platform, c, tilted(F, "tilt").col(2), tilted(P, "platform_tilt").col(2))
     for suffix, (joint, foot, n, a) in {"row": known, "derivatives": tilts}.items():
         d, axis = p + v + small * R * joint - foot, small * R * a
         made[f"base_plane_{suffix}"] = n.dot(d)
@@ -120,18 +123,43 @@ def test_limb_derivatives_are_those_of_the_closure(name: str) -> None:
         assert_equal(FUNCTIONS[name].result(argument.name), expected)
 
 
-@pytest.mark.parametrize("driver", ["slider", "crank"])
+@pytest.mark.parametrize("driver", DRIVERS)
 def test_the_anchor_moves_in_the_prepared_directions(driver: str) -> None:
     directions, made = FUNCTIONS[f"{driver}_directions"], FUNCTIONS[f"{driver}_anchor"]
-    prepared = dict(zip(symbols("base", 3), base, strict=True))
+    prepared: dict[sp.Expr, sp.Expr] = {}
     for name in ("first", "second"):
         prepared.update(zip(symbols(name, 3), directions.result(name), strict=True))
-    assert_equal(made.result("c").xreplace(prepared), anchor(driver, qt)[0])
+    centre, rho = anchor(driver, qt)
+    assert_equal(made.result("c").xreplace(prepared), centre)
+    assert_equal(FUNCTIONS[f"{driver}_radius"].result("rho"), column([rho]))
+
+
+@pytest.mark.parametrize("driver", limbs.DRIVERS)
+def test_what_is_said_to_depend_on_the_actuator_does(driver: limbs.Driver) -> None:
+    centre, rho = anchor(driver.name, qt)
+    assert driver.moves == (qt in centre.free_symbols)
+    assert driver.stretches == (qt in rho.free_symbols)
+
+
+@pytest.mark.parametrize("driver", DRIVERS)
+def test_the_path_of_the_joint_from_the_anchor_is_differentiated_by_time(driver: str) -> None:
+    t, qt1, qt2 = sp.symbols("t qt1 qt2", real=True)
+    first, second, h1, h2 = (symbols(name, 3) for name in ("first", "second", "h1", "h2"))
+    drive = qt + qt1 * t + qt2 * t**2 / 2
+    carried = {
+        "length": sp.zeros(3, 1),
+        "slider": drive * first,
+        "crank": sp.cos(drive) * first + sp.sin(drive) * second,
+    }[driver]
+    path = h + h1 * t + h2 * t**2 / 2 - carried
+    for order, name in enumerate(("d", "d1", "d2")):
+        expected = path.applyfunc(lambda e, order=order: sp.diff(e, t, order).subs(t, 0))
+        assert_equal(FUNCTIONS[f"{driver}_path"].result(name), expected)
 
 
 def test_axes_are_the_third_columns_of_the_tilted_frames() -> None:
     assert_equal(FUNCTIONS["base_axis"].result("axis"), tilted(F, "tilt").col(2))
-    assert_equal(FUNCTIONS["platform_axis"].result("axis"), tilted(P, "platform_tilt").col(2))
+    assert_equal(FUNCTIONS["platform_axis"].result("axis"), tilted(F, "platform_tilt").col(2))
 
 
 def test_command_undoes_drive() -> None:
@@ -143,7 +171,7 @@ def test_command_undoes_drive() -> None:
 
 
 @pytest.mark.parametrize("branch", [1, -1])
-@pytest.mark.parametrize("driver", ["length", "slider", "crank"])
+@pytest.mark.parametrize("driver", DRIVERS)
 def test_inverse_puts_the_limb_at_its_length_on_its_branch(driver: str, branch: int) -> None:
     made = FUNCTIONS[f"{driver}_inverse"]
     numbers = rational_point(column([*anchor(driver, qt)[0], g["rod"], *h]), seed=1)
@@ -156,11 +184,7 @@ def test_inverse_puts_the_limb_at_its_length_on_its_branch(driver: str, branch: 
                 zip(symbols(name, 3), directions.result(name).subs(values).n(40), strict=True)
             )
     values[sp.Symbol("branch", real=True)] = branch
-    if driver == "crank":
-        sine, cosine = (made.result(name).subs(values)[0] for name in ("sine", "cosine"))
-        solution = sp.N(sp.atan2(sine, cosine), 40)
-    else:
-        solution = sp.N(made.result("qt").subs(values)[0], 40)
+    solution = sp.N(made.result("qt").subs(values)[0], 40)
     centre, rho = anchor(driver, qt)
     d = base + h - centre
     at = {**values, qt: solution}
@@ -169,7 +193,7 @@ def test_inverse_puts_the_limb_at_its_length_on_its_branch(driver: str, branch: 
         assert sp.sign(d.dot(centre.diff(qt)).xreplace(at).n(30)) == branch
 
 
-@pytest.mark.parametrize("driver", ["length", "slider", "crank"])
+@pytest.mark.parametrize("driver", DRIVERS)
 def test_rates_keep_the_closure_to_second_order(driver: str) -> None:
     """With q̃ + qt1 t + qt2 t²/2 the closure along h + h1 t + h2 t²/2 has no t and no t²."""
     made = FUNCTIONS[f"{driver}_rates"]
@@ -190,7 +214,7 @@ def test_rates_keep_the_closure_to_second_order(driver: str) -> None:
         assert abs(sp.diff(phi, t, order).subs(t, 0).subs(numbers).n(30)) < 1e-20
 
 
-@pytest.mark.parametrize("row", ["sphere", "base_plane", "platform_plane", "couple"])
+@pytest.mark.parametrize("row", ["sphere", *ROWS])
 def test_rate_of_a_row_is_its_derivative_while_the_limb_changes(row: str) -> None:
     still = dict.fromkeys([*omega, *v], 0)
     phi = closures()[f"{row}_row"].subs(still)
@@ -201,7 +225,7 @@ def test_rate_of_a_row_is_its_derivative_while_the_limb_changes(row: str) -> Non
     assert_equal(FUNCTIONS[f"{row}_rate"].result("rate"), column([expected]))
 
 
-@pytest.mark.parametrize("driver", ["length", "slider", "crank"])
+@pytest.mark.parametrize("driver", DRIVERS)
 def test_a_closure_does_not_bend_where_the_actuator_follows_the_joint(driver: str) -> None:
     """`*_bend`, which takes any path, vanishes on the one that `*_rates` gives, and only there."""
     first, second, h1, h2 = (symbols(name, 3) for name in ("first", "second", "h1", "h2"))
