@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from cffi import FFI
 
 from csrc.build import CSRC, GENERATED, declarations
@@ -122,6 +123,8 @@ class OneLane:
         return int(getattr(self._here.lib, name)(*map(self._own, arguments)))
 
     def _own(self, argument: Any) -> Any:
+        if isinstance(argument, np.ndarray):
+            argument = library.pointer(argument)
         if isinstance(argument, library.ffi.CData):
             return self._here.ffi.cast("void *", int(library.ffi.cast("intptr_t", argument)))
         return argument

@@ -84,7 +84,7 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
 
 /* How the map's step answers a residual in each row, -Φ⁻¹ (m x rows), per unit of the scaled rows;
  * NaN where they are singular. */
-SHARED int step_response(int map, const pkm_machine *machine, const FN(limb_sphere) *sphere,
+INLINE int response_rows(int map, const pkm_machine *machine, const FN(limb_sphere) *sphere,
                          const real *state, real *response)
 {
     const int m = map_m(map);
@@ -99,6 +99,27 @@ SHARED int step_response(int map, const pkm_machine *machine, const FN(limb_sphe
             response[j * rows + r] = select(known, response[j * rows + r] * scale, fill(NAN));
     }
     return rows;
+}
+
+#define STEP_RESPONSE(NAME, name, ...)                                                            \
+    SHARED int response_##name(const pkm_machine *machine, const FN(limb_sphere) *sphere,         \
+                               const real *state, real *response)                                 \
+    {                                                                                             \
+        return response_rows(MAP_##NAME, machine, sphere, state, response);                       \
+    }
+EACH_MAP(STEP_RESPONSE)
+#undef STEP_RESPONSE
+
+INLINE int step_response(int map, const pkm_machine *machine, const FN(limb_sphere) *sphere,
+                         const real *state, real *response)
+{
+    switch (map) {
+#define CASE(NAME, name, ...)                                                                     \
+    case MAP_##NAME: return response_##name(machine, sphere, state, response);
+    EACH_MAP(CASE)
+#undef CASE
+    }
+    return 0;
 }
 
 /* The same of the pose, or where `twists` of the platform: -M Φ⁻¹ (6 x rows). */

@@ -59,10 +59,29 @@ def _default_isa() -> int:
     return ISAS.index(wanted)
 
 
-def _functions(isa: str) -> dict[str, Any]:
+def _of_arrays(function: Any) -> Callable[..., int]:
+    """A function of the core that takes arrays where C takes pointers to numbers.
+
+    Written out for its arguments: for a call of one row, looking at each costs as much as the call.
+    """
+    numbers = {ffi.typeof(f"{name} *") for name in ("double", "int32_t", "int64_t", "uint64_t")}
+    kinds = [argument if argument in numbers else None for argument in ffi.typeof(function).args]
+    names = [f"a{k}" for k in range(len(kinds))]
+    types = dict(zip(names, kinds, strict=True))
+    passed = [f"buffer(t{name}, {name})" if types[name] else name for name in names]
+    known = {"function": function, "buffer": ffi.from_buffer}
+    known |= {f"t{name}": kind for name, kind in types.items()}
+    made: Callable[..., int] = eval(
+        f"lambda {', '.join(names)}: function({', '.join(passed)})", known
+    )
+    return made
+
+
+def _functions(isa: str) -> dict[str, Callable[..., int]]:
     """The functions compiled for an ISA, by their names in ``csrc/calls.h``."""
-    prefix = f"pkm_{isa}_"
-    return {name[len(prefix) :]: getattr(lib, name) for name in dir(lib) if name.startswith(prefix)}
+    start = f"pkm_{isa}_"
+    names = [name for name in dir(lib) if name.startswith(start)]
+    return {name[len(start) :]: _of_arrays(getattr(lib, name)) for name in names}
 
 
 def _row_call(line: str) -> tuple[str, tuple[list[tuple[int, str]], list[tuple[int, ...]]]]:
@@ -102,7 +121,7 @@ def ensure(code: int) -> None:
 
 
 def call(function: str, *arguments: Any, isa: int | None = None) -> None:
-    """Call a function of the core, with arrays as pointers to their numbers.
+    """Call a function of the core; it takes arrays where C takes pointers to numbers.
 
     Parameters
     ----------
@@ -122,7 +141,7 @@ def call(function: str, *arguments: Any, isa: int | None = None) -> None:
         chosen = FUNCTIONS[ISA if isa is None else isa][function]
     except IndexError:
         raise ArgumentError(f"this processor has no ISA {isa}") from None
-    code = chosen(*[pointer(a) if isinstance(a, np.ndarray) else a for a in arguments])
+    code = chosen(*arguments)
     if code < 0:
         ensure(code)
 

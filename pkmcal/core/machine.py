@@ -122,6 +122,9 @@ class Machine:
         guess_stride = 6 if guess.ndim == 2 else 0
 
         def run(start: int, stop: int) -> None:
+            if stop - start == n:  # one row as often as not: no slices
+                whole = (n, slots, stride, q, guess, guess_stride, pose, status, iterations)
+                return call("forward", self.struct, *whole, residual, isa=self.isa)
             geometry = part(slots, start, stop) if stride else slots
             begin = part(guess, start, stop) if guess_stride else guess
             found = [part(each, start, stop) for each in (pose, status, iterations, residual)]
@@ -129,6 +132,8 @@ class Machine:
             call("forward", self.struct, stop - start, *given, *found, isa=self.isa)
 
         in_threads(run, n, threads)
+        if len(shape) == 1:
+            return pose, status, iterations, residual
         return (
             pose.reshape(*shape, 6),
             status.reshape(shape),

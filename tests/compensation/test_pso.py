@@ -290,7 +290,7 @@ def test_the_core_refuses_what_it_cannot_take() -> None:
     assert library.lib.pkm_swarm_size(struct) == 0
     assert library.lib.pkm_base_swarm_judge(struct, null) == library.lib.PKM_BAD_SWARM
     with pytest.raises(ValueError, match="the core refused the call"):
-        library.call("swarm_judge", struct, null)
+        library.call("swarm_judge", struct, np.empty(1))
 
 
 # --- order-2 stability -------------------------------------------------------------------------
