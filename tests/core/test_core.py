@@ -189,7 +189,7 @@ def test_the_core_refuses_an_isa_a_machine_and_columns_it_does_not_have() -> Non
         with pytest.raises(ValueError, match="refused"):
             machine.error_jacobian(robot.slots, pose, q, np.array(columns, dtype=np.int32))
     machine.isa = 3
-    with pytest.raises(ValueError, match="refused"):
+    with pytest.raises(ValueError, match="has no ISA"):
         machine.forward(robot.slots, q, robot.home, None)
 
 
