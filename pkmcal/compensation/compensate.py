@@ -213,7 +213,10 @@ def compensate(
         reached = measured(ideal + correction) if callable(measured) else measured
         at = _pose_of(reached, poses, orientation)
         gross |= np.linalg.norm((at - poses)[:, :3], axis=1) > robot.length
-        off = ideal - robot.inverse(at, match)
+        there = robot.inverse(at, match)
+        off = robot.nearest_turns(ideal, near=there) - there
+        if common:
+            off = about_their_mean(robot.turns, off)
         if method == "pso":
             step, of_pass = _by_swarm(off, common, half_width, seed, swarm)
         else:
@@ -231,6 +234,16 @@ def compensate(
         orientation=orientation,
         units=robot.actuator_units,
     )
+
+
+def about_their_mean(turns: FloatArray, off: FloatArray) -> FloatArray:
+    """Differences (N, n) of angles at the turn nearest to their mean on the circle."""
+    off, known = off.copy(), np.isfinite(off).all(axis=1)
+    for i in np.flatnonzero(np.isfinite(turns)) if known.any() else ():
+        to_angle = 2 * np.pi / turns[i]
+        about = np.angle(np.exp(1j * to_angle * off[known, i]).mean()) / to_angle
+        off[:, i] -= turns[i] * np.rint((off[:, i] - about) / turns[i])
+    return off
 
 
 def _mean(off: FloatArray) -> FloatArray:

@@ -20,8 +20,8 @@ from pkmcal.result import RowResult
 class Solved(Protocol):
     """What a result asks of the machine it comes from; `Kinematics` describes each."""
 
-    def closure_by_twist(self, own: FloatArray, q: FloatArray) -> FloatArray:
-        """Closure rows by a scaled twist, (N, rows, m)."""
+    def closure_by_twist(self, own: FloatArray, q: FloatArray | None = None) -> FloatArray:
+        """Closure rows by a scaled twist, (N, rows, m); q by default the inverse of the poses."""
 
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (N, n)."""
@@ -74,16 +74,19 @@ class Forward(RowResult):
     def same_side(self) -> BoolArray:
         """Whether the determinant has the sign it has at the guess (...), computed when asked for.
 
-        False means that the pose is another assembly mode than the guess's, with a singularity
-        between. True where it is unknown: with more closures than free coordinates.
+        At the guess with the actuators that lead there. False means that the pose is another
+        assembly mode than the guess's, with a singularity between. True where it is unknown: with
+        more closures than free coordinates, and where a limb does not reach the guess.
         """
         steps = self._closure_by_twist(self._own)
         if steps.shape[-2] != steps.shape[-1]:
             return np.asarray(self.ok)
-        same = np.array(self.ok)
-        there, at_guess = steps[same], self._closure_by_twist(self._guess)[same]
-        same[same] = np.sign(np.linalg.det(there)) == np.sign(np.linalg.det(at_guess))
-        return same
+        same = np.asarray(self.ok)
+        at_guess = self._machine.closure_by_twist(np.atleast_2d(self._guess))
+        with np.errstate(invalid="ignore"):  # rows that failed, guesses out of reach
+            there, sign = (np.sign(np.linalg.det(each)) for each in (steps, at_guess))
+        sign = sign[0] if self._guess.ndim == 1 else sign.reshape(same.shape)
+        return np.asarray(same & ((there == sign) | np.isnan(sign)))
 
     @cached_property
     def certificate(self) -> Certificate:

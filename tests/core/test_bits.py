@@ -44,7 +44,7 @@ ARM = pk.SerialArm(
     rng.normal(size=(7, 3)),
     rng.normal(0, 500, (7, 3)),
     screw.from_pose([800, 100, 500, 1, 2, 3]),
-    ["revolute", "revolute", "prismatic", "revolute", "prismatic", "revolute", "revolute"],
+    kinds=["revolute", "revolute", "prismatic", "revolute", "prismatic", "revolute", "revolute"],
 )
 THETA = rng.uniform(-2, 2, (ROWS, 7))
 ERRORS = rng.normal(0, 1, (ROWS, 7, 6)) * [1, 1, 1, 0.01, 0.01, 0.01]
