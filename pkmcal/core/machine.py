@@ -23,8 +23,8 @@ from pkmcal.core.library import (
     pointer,
 )
 
-
 CLOSURE_TOLERANCE = 2e-3  # of a machine's size
+FAR_HOME = 10.0  # times the limbs' numbers: a home beyond is that of another geometry
 _OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 
 
@@ -86,7 +86,8 @@ class Machine:
         struct.limbs = len(limbs)
         struct.actuators = 1 + max(limb["actuator"] for limb in limbs)
         struct.length = length
-        struct.size = float(np.abs(slots).sum(axis=1).max() + np.abs(home[:3]).sum())
+        joints = float(np.abs(slots).sum(axis=1).max())
+        struct.size = joints + min(float(np.abs(home[:3]).sum()), FAR_HOME * joints)
         if closure_tolerance is None:
             closure_tolerance = CLOSURE_TOLERANCE * struct.size
         struct.closure_tolerance = closure_tolerance

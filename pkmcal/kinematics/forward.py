@@ -36,12 +36,13 @@ class Forward(RowResult):
     pose : ndarray (..., 6)
         x y z in mm, α β γ in rad; NaN where `status` is not 0.
     status : ndarray of int (...)
-        0 ok, 1 not converged, 2 singular, 3 infeasible, 4 invalid input; `ok` and `failed` are
-        masks of it, `failures` says it in words.
+        0 ok, 1 not converged, 2 singular, 3 infeasible, 4 invalid input, 5 does not close: of more
+        closures than free coordinates one misses by more than ``robot.closure_tolerance``. `ok`
+        and `failed` are masks of it, `failures` says it in words.
     iterations : ndarray of int (...)
         Newton steps taken.
     residual : ndarray (...)
-        Largest closure error, mm; NaN where `status` is not 0.
+        Largest closure error, mm; NaN where `status` is not 0 or 5.
     """
 
     STATUS = STATUS
@@ -98,6 +99,14 @@ class Forward(RowResult):
         """
         problem = self._machine.assembly_problem(self._q)
         return certify_rows(problem, self._own.reshape(-1, 6)).reshape(self.status.shape)
+
+    def failures(self) -> str:
+        """What failed and where, in one line; empty where nothing did."""
+        said = super().failures()
+        if said and self._guess.ndim == 1 and np.isfinite(self._guess).all():
+            if not np.isfinite(self._machine.closure_by_twist(self._guess[None])).all():
+                said += "; a limb does not reach the guess, by default the home pose"
+        return said
 
     def _closure_by_twist(self, own: FloatArray) -> FloatArray:
         """Closure rows by a scaled twist (..., rows, m), at a pose for each row or one for all."""
