@@ -37,7 +37,8 @@ def determinant_sides(robot: pk.Robot, own: np.ndarray, q: np.ndarray) -> np.nda
         change = twin_rows.closures(robot.model, own + step, q)
         change -= twin_rows.closures(robot.model, own - step, q)
         columns.append(change / step[i] / (1.0 if i < 3 else robot.length))
-    return np.linalg.det(np.stack(columns, axis=-1))
+    with np.errstate(invalid="ignore"):  # out of reach
+        return np.linalg.det(np.stack(columns, axis=-1))
 
 
 def kind_of(robot: pk.Robot) -> str:
@@ -76,7 +77,9 @@ def judged(kind: str, seed: int, rows: int) -> Counter[str]:
     turns = np.where(np.isfinite(robot.turns), robot.turns, 0.0)
     sent = q + turns * rng.integers(-2, 3, q.shape)
     somewhere = own + generated.ROOM * rng.uniform(-3, 3, own.shape)
-    guess = (np.tile(robot.own_home, (len(own), 1)), own, somewhere)[rng.integers(3)]
+    guess: np.ndarray = (np.tile(robot.own_home, (len(own), 1)), own.copy(), somewhere)[
+        rng.integers(3)
+    ]
     solved = robot.forward(sent, out(guess))
     ok = solved.ok
     found.update(STATUS[code] for code in solved.status.tolist())
@@ -89,8 +92,13 @@ def judged(kind: str, seed: int, rows: int) -> Counter[str]:
     found["wrong: open"] += int((~(solved.residual[open_ones] > bound)).sum())
     found["wrong: half known"] += int(np.isfinite(solved.pose[~ok]).any(axis=1).sum())
     if kind in generated.SQUARE:
+        fixed = np.setdiff1d(range(6), generated.FREE[kind])
+        guess[:, fixed] = robot.own_home[fixed]  # what the map does not move is not looked at
         at_guess = robot.inverse(out(guess))
-        sides = [determinant_sides(robot, *pair) for pair in ((guess[ok], at_guess[ok]), (there, sent[ok]))]
+        sides = [
+            determinant_sides(robot, *pair)
+            for pair in ((guess[ok], at_guess[ok]), (there, sent[ok]))
+        ]
         clear = np.isfinite(sides[0]) & (np.abs(sides).min(axis=0) > 1e-6)
         same = np.sign(sides[0]) == np.sign(sides[1])
         found["wrong: side"] += int((same != solved.same_side[ok])[clear].sum())
