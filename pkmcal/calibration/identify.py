@@ -252,8 +252,11 @@ def _unknown(argument: str, given: str | Sequence[str], count: int) -> list[bool
 def _result(estimator: Estimator, estimate: Estimate, held: HeldOut) -> Identification:
     chosen, search = estimator.equations.parameters, estimator.search
     covariance = reported_covariance(estimator, estimate)
+    robot = as_given(chosen.robot.replace(chosen.values_at(estimate.evaluation.theta)))
+    if isinstance(robot, Robot):
+        robot = robot.closing(estimator.equations.actuators, estimate.evaluation.pose)
     return Identification(
-        robot=as_given(chosen.robot.replace(chosen.values_at(estimate.evaluation.theta))),
+        robot=robot,
         table=parameter_table(estimator, estimate, covariance),
         identifiability=identifiability(estimator, estimate),
         misfit=misfit(estimator, estimate),

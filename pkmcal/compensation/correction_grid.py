@@ -214,7 +214,8 @@ def correction_grid(
 
     def wanted(places: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
         aims = ideal(robot, _poses(names, places, base[0]))
-        return aims.poses, aims.actuators, calibrated.inverse(aims.poses, match) - aims.actuators
+        to_command = calibrated.inverse(aims.poses, match, near=aims.actuators)
+        return aims.poses, aims.actuators, to_command - aims.actuators
 
     corrections = wanted(nodes)[2].reshape(*(len(axis) for axis in nodes), -1)
     between = tuple(np.sort(np.r_[axis, 0.5 * (axis[1:] + axis[:-1])]) for axis in nodes)

@@ -27,7 +27,10 @@ from pkmcal.geometry.robot_file_writer import text_of
 # What a data sheet states beside single numbers: of the circles of the joints, and of the legs at
 # home, which a machine with length limbs has.
 STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_diameter", "length")
-TOP = ("name", "units", "frames", "pose", "parameters", "calibration", "stated", "limb")
+TOP = (
+    "name", "units", "closure_tolerance", "frames", "pose", "parameters", "calibration", "stated",
+    "limb",
+)  # fmt: skip
 
 
 _BUILTIN = resources.files("pkmcal") / "builtin"
@@ -150,8 +153,18 @@ def parse(source: Source, file: str | None) -> Model:
         stated=_read_stated(_section(top, "stated"), geometry, limbs.limbs),
         base_frame=_read_pose(frames, "base", POSE) if "base" in frames else None,
         tool_frame=_read_pose(frames, "tool", POSE) if "tool" in frames else None,
+        closure_tolerance=_read_tolerance(top),
         file=file,
     )
+
+
+def _read_tolerance(top: Table) -> float | None:
+    if "closure_tolerance" not in top:
+        return None
+    found = top.number("closure_tolerance", "mm")
+    if not found > 0.0:
+        top.fail("closure_tolerance", f"must be positive, found {top['closure_tolerance']!r}")
+    return found
 
 
 def _section(top: Table, key: str) -> Table:

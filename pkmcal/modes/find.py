@@ -57,8 +57,13 @@ class AssemblyProblem(NamedTuple):
         return spheres if self.q.ndim > 1 else spheres[0]
 
     def closures(self) -> Closures:
-        """The closures as quadratic equations."""
-        size = self.machine.struct.size
+        """The closures as quadratic equations.
+
+        Anchors and lengths are as exact as the numbers they are computed from: those of the limbs,
+        and the actuators', which are the limb's length or the anchor's way less the offset. Home
+        has no part in it: it may be that of another geometry.
+        """
+        size = 2.0 * float(np.abs(self.slots).sum(axis=1).max())
         return Closures(self.map, self.rows, self.spheres(), self.length, size, self.levers)
 
 

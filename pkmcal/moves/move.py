@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -147,7 +148,8 @@ class Move(Result):
         position, velocity, acceleration = self.law.sample(times)
         motion = derivatives.straight(self.start, self.end, (position, velocity, acceleration))
         pose = to_pose(motion[:, 0])
-        return motion, (self.robot.inverse(pose), *self.robot.rates(motion))
+        q = self.robot.inverse(pose, near=self._turns_at(position))
+        return motion, (q, *self.robot.rates(motion))
 
     def _in_joint(self, times: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
         robot, frames, slots = self.robot, self.robot.frames, self.robot.slots
@@ -167,14 +169,54 @@ class Move(Result):
         first, last = frames.inward(np.stack([self.start, self.end]))
         matched = [POSE.index(name) for name in moved_coordinates(robot)]
         way = (last - first)[matched]
-        own, q = complete(
-            robot.machine, robot.model.map, slots, first + share * (last - first), matched
-        )
+        own, q = self._completed(share)
+        near = self._turns_at(share[:, 0])
+        q = q if near is None else robot.nearest_turns(q, near=near)
         velocity, acceleration = completed_rates(
             robot.machine, robot.model.map, slots, own, q, matched, (speed * way, bend * way)
         )
         motion = robot.machine.motion(slots, own, q, velocity, acceleration)[0]
         return frames.motion_outward(motion), (q, velocity, acceleration)
+
+    def _completed(self, share: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Own poses and actuators at shares (N, 1) of a way that is straight in coordinates."""
+        robot = self.robot
+        first, last = robot.frames.inward(np.stack([self.start, self.end]))
+        matched = [POSE.index(name) for name in moved_coordinates(robot)]
+        way = first + share * (last - first)
+        return complete(robot.machine, robot.model.map, robot.slots, way, matched)
+
+    def _turns_at(self, share: FloatArray) -> FloatArray | None:
+        """Coordinates (N, n) near those at shares (N,) of the way, whose angles do not jump."""
+        if self._continuous is None:
+            return None
+        shares = np.linspace(0.0, 1.0, len(self._continuous))
+        return np.stack([np.interp(share, shares, q) for q in self._continuous.T], axis=1)
+
+    @cached_property
+    def _continuous(self) -> FloatArray | None:
+        """Coordinates (k, n) evenly along the way, each angle near the one before.
+
+        None where no actuator turns.
+        """
+        turns = self.robot.turns
+        if np.isinf(turns).all():
+            return None
+        share = np.linspace(0.0, 1.0, _STEPS + 1)
+        if self.space == "coordinates":
+            q = self._completed(share[:, None])[1]
+        else:
+            still = np.zeros_like(share)
+            motion = derivatives.straight(self.start, self.end, (share, still, still))
+            q = self.robot.inverse(to_pose(motion[:, 0]))
+        known = np.isfinite(q).all(axis=1)
+        if not known.any():
+            return np.zeros_like(q)
+        for i in np.flatnonzero(np.isfinite(turns)).tolist():
+            q[known, i] = np.unwrap(q[known, i], period=turns[i])
+        for i in range(q.shape[1]):  # what is out of reach has no angle
+            q[:, i] = np.interp(share, share[known], q[known, i])
+        return q
 
     @property
     def _straight(self) -> str:
@@ -211,7 +253,8 @@ def move(
         "pose": the platform's origin goes straight and the platform turns about one axis (SLERP);
         "coordinates": those that the robot file declares to match, or else its free coordinates,
         go straight, and the machine determines the others, as by `Robot.complete`;
-        "joint": the actuators go straight.
+        "joint": the actuators go straight, those that turn the short way round unless a stroke
+        forbids it.
     velocity, acceleration, jerk : array_like () or (n,), optional
         Limits of the actuators, mm or rad, and s; without `duration` at least one is needed.
 
@@ -247,6 +290,7 @@ def move(
         if value is not None
     }
     q = robot.inverse(np.stack(ends))
+    q[1] = robot.short_way(q[0], q[1])
     if law == "jerk-limited":
         if space != "joint" or duration is not None or len(limits) < 3:
             raise ArgumentError(
