@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, first_largest
 from pkmcal.core import screws
 
 _ROUNDS = 60  # of turning and shifting in turn
+_ALIKE = 1e-12  # share of squares by which turnings differ that are not equally good
 _FLAT = 0.05  # share of the largest spread of points below which they lie in a plane, or a line
 
 
@@ -66,9 +67,12 @@ def of_points(seen: PointPairs) -> tuple[FloatArray, FloatArray]:
     turns = Rotation.create_group("O").as_matrix()
     for _ in range(_ROUNDS if count else 1):
         shifts = turns.reshape(-1, 9) @ gain.T - still
-        turns = _nearest(straight + np.einsum("ijk,sk->sij", by_shift, shifts))
+        common = straight + np.einsum("ijk,sk->sij", by_shift, shifts)
+        # a turning that points in a plane or a line do not determine stays as it is
+        turns = _nearest(common + _ALIKE * np.linalg.norm(straight) * turns)
     off = (turns.reshape(-1, 9) @ seen_by.T) - point.reshape(-1)
-    best = int(np.argmin(((off - off @ inverse.T @ lever.T) ** 2).sum(axis=1)))
+    misfit = ((off - off @ inverse.T @ lever.T) ** 2).sum(axis=1)
+    best = first_largest(-misfit, _ALIKE * float((point**2).sum()))
     shift = inverse @ off[best]
     point = seen.point + (shifted.reshape(lever.shape) @ shift).reshape(-1, 3)
     place = seen.values.mean(axis=0) - turns[best] @ point.mean(axis=0)

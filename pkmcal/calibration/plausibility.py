@@ -21,6 +21,7 @@ FAR = 0.25  # share of the machine's size by which errors of manufacture do not 
 _BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
 _LEAST_FREEDOM = 0.5  # degrees of freedom from which residuals show how good a fit is
 MISFIT_RATIO = 0.2  # of the misfit that another reading may leave to be named as what was meant
+_ALIKE = 1e-6  # share by which misfits differ that are not equal
 _FACTORS = {
     "mm": (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)),
     "rad": (
@@ -49,7 +50,9 @@ def likely_unit_errors(
             words: _misfit(_alone(replace(data, measured=other), parameters), other.units, size)
             for words, other in _readings(data.measured, parameters.robot.actuator_units)
         }
-        words = min(trials, key=lambda text: trials[text])
+        # exchanges that a symmetric machine cannot tell apart misfit alike
+        least = min(trials.values())
+        words = next(text for text in trials if trials[text] <= least * (1.0 + _ALIKE))
         if trials[words] < MISFIT_RATIO * present:
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
             off = (
