@@ -15,9 +15,16 @@ from pkmcal.calibration.parameters import POINTS, FitData, Parameters
 from pkmcal.core import instruments
 from pkmcal.core.library import STATUS
 from pkmcal.display import first_rows
+from pkmcal.measurements import orientation
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import Predicted, difference, distance_per_point, predict
+from pkmcal.measurements.observation import (
+    Predicted,
+    by_difference,
+    difference,
+    distance_per_point,
+    predict,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +101,9 @@ class Equations:
         self._guess = np.tile(parameters.robot.home, (len(self.actuators), 1))
         for measured, framed, place in zip(self.sets, self._framed, self.pose_of, strict=True):
             if measured.kind in ("pose", "position") and not framed:
-                self._guess[place, : len(measured.components)] = measured.values
+                self._guess[place, :3] = measured.values[:, :3]
+                if measured.kind == "pose":
+                    self._guess[place, 3:] = orientation.shortest(measured.values[:, 3:])
         self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
         self.components = np.concatenate([np.full(len(m), len(m.components)) for m in self.sets])
         self.first = np.cumsum(self.components) - self.components  # equation of each row
@@ -196,7 +205,10 @@ class Equations:
         self._guess = np.where(evaluation.status[:, None] == 0, evaluation.pose, self._guess)
 
     def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
-        """Derivative of the predicted values of each set to the parameters, (N, k, n)."""
+        """Derivative of the predicted values of each set to the parameters, (N, k, n).
+
+        With the opposite sign that of the residuals.
+        """
         p = self.parameters
         by_geometry = evaluation.robot.error_twists(evaluation.pose, self.actuators)[:, :, p.places]
         parts = []
@@ -210,7 +222,7 @@ class Equations:
                 by_point = seen.by_target if name == "target" else seen.by_anchor
                 assert by_point is not None
                 np.put_along_axis(part, np.repeat(columns[:, None, :], k, axis=1), by_point, axis=2)
-            parts.append(part)
+            parts.append(by_difference(self.sets[i].kind, part, evaluation.residuals[i]))
         return parts
 
     def whitened(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
@@ -274,6 +286,13 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     sigma = measured.sigma
     if sigma is None:
         return np.tile(mm_per_unit(measured.units, length), (len(measured), 1))
+    if measured.kind == "pose" and not _same_turnings(sigma):
+        sigma = orientation.covariance(sigma, measured.values[:, 3:])
     if sigma.ndim == 2:
         return 1.0 / sigma
     return np.linalg.inv(np.linalg.cholesky(sigma))
+
+
+def _same_turnings(sigma: FloatArray) -> bool:
+    """Whether standard deviations (N, 6) are the same about every axis."""
+    return sigma.ndim == 2 and bool((sigma[:, 4:] == sigma[:, 3:4]).all())

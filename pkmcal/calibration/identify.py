@@ -27,6 +27,7 @@ from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.parameters import KNOWN, Bounds, FitData, Known, Prior, parameters
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
+    distant_points,
     implausible_changes,
     insufficient_data,
     likely_unit_errors,
@@ -165,6 +166,7 @@ def _warnings(
             f"residuals are {np.sqrt(result.chi2_per_dof):.3g} times what sigma says:"
             f" {_remedy(result, estimator, estimate)}"
         )
+    notes += distant_points(estimate.evaluation, equations.parameters)
     notes += beyond_strokes(equations, estimator.start, estimate.evaluation)
     kept = estimate.state.determined.rank - estimate.state.fitted.rank
     if kept:

@@ -23,7 +23,7 @@ from pkmcal.kinematics import overconstrained
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
-from pkmcal.modes.find import assemblies, continue_path, find_modes, pose_distance
+from pkmcal.modes.find import assemblies, continue_path, find_modes, nearest_first, pose_distance
 
 
 class Robot(Kinematics):
@@ -181,8 +181,7 @@ class Robot(Kinematics):
             whole("starts", starts, 0, note=" or None")
         problem = self.assembly_problem(rows[0])
         found = find_modes(problem, starts)
-        apart = pose_distance(found.poses, self.own_home[None], self.length)
-        order = np.argsort(apart)
+        order = nearest_first(found.poses, self.own_home[None], self.length)
         own = np.ascontiguousarray(found.poses[order])
         poses = self.frames.outward(own)
 

@@ -22,6 +22,9 @@ BLURRED = 1e-4  # rad, or lengths: near a singularity poses without a proof are 
 AT_ONCE = 2000  # certificates: 12 x 12 matrices in memory
 STARTS = 2000  # random ones, where the paths prove nothing
 
+_EQUAL = 1e-7  # share of the machine's size by which distances of poses differ that are not equal
+_DECIMALS = 6  # of R, and of p in the machine's size, that are more than rounding
+
 
 class AssemblyProblem(NamedTuple):
     """A machine at given actuator coordinates.
@@ -229,6 +232,21 @@ def pose_distance(poses: FloatArray, pose: FloatArray, length: float) -> FloatAr
     """Distance of poses (N, 6) from one (1, 6), mm: of p, and largest entry of R times length."""
     difference = _scaled(frames_of(poses) - frames_of(pose), length)
     return np.asarray(np.abs(difference).max(axis=1, initial=0.0) * length)
+
+
+def nearest_first(poses: FloatArray, pose: FloatArray, length: float) -> IntArray:
+    """Order of poses (N, 6) by `pose_distance` from one (1, 6).
+
+    Poses equally far, as symmetric machines have them, come in the order of R and p, so that
+    rounding does not decide.
+    """
+    apart = pose_distance(poses, pose, length)
+    order = np.argsort(apart)
+    step = np.diff(apart[order], prepend=apart[order[:1]]) > _EQUAL * length
+    shell = np.empty(len(poses), dtype=np.intp)
+    shell[order] = np.cumsum(step)
+    entries = np.round(_scaled(frames_of(poses), length), _DECIMALS)
+    return np.lexsort((*entries.T[::-1], shell))
 
 
 def signs(problem: AssemblyProblem, poses: FloatArray) -> Signs:
