@@ -18,7 +18,8 @@ from pkmcal.kinematics.robot import Robot
 _FULL_TURN = 2 * np.pi
 _STEEP = 0.5  # rad: no axis is tilted so far from its reference by error
 _APART = 60.0  # times: two lengths of one machine do not differ by more
-_SMALLEST, _LARGEST = 10.0, 1e5  # mm: a machine is larger, or smaller
+_SMALLEST, _LARGEST = 0.01, 1e6  # mm: any machine is larger, or smaller
+USUAL = (10.0, 1e5)  # mm: most are; micromachines and machines of cables are not
 _FACTORS = ((1e3, "metres"), (25.4, "inches"), (1e-3, "micrometres"))
 _STEPS = 40  # of a move to the end of a stroke
 _POSES, _SPREAD = 200, 0.2  # drawn around home to look for a pose that is not singular
@@ -49,7 +50,7 @@ def wrong_unit(robot: Robot) -> Iterator[Finding]:
     sizes = _sizes(robot)
     if not sizes:  # all joints in one point, which `doubled` says
         return
-    yield from whole_size(max(sizes.values()))
+    yield from whole_size(max(sizes.values()), (_SMALLEST, _LARGEST))
     middle = float(np.exp(np.median(np.log(list(sizes.values())))))
     found = False
     for name, value in sizes.items():
@@ -66,10 +67,22 @@ def wrong_unit(robot: Robot) -> Iterator[Finding]:
         yield from _mended(robot)
 
 
-def whole_size(largest: float) -> Iterator[Finding]:
+def unusual_size(robot: Robot) -> str:
+    """A remark on a machine whose size is rare, for the unit may be another; else empty."""
+    largest = max(_sizes(robot).values(), default=USUAL[0])
+    if USUAL[0] <= largest <= USUAL[1]:
+        return ""
+    likely = "metres" if largest < USUAL[0] else "micrometres"
+    return (
+        f"its largest length is {largest:.4g} mm, as few machines have: see length under [units] if"
+        f" that is in {likely}"
+    )
+
+
+def whole_size(largest: float, within: tuple[float, float]) -> Iterator[Finding]:
     """A machine whose largest length, mm, is that of none."""
-    if not _SMALLEST <= largest <= _LARGEST:
-        likely = "metres" if largest < _SMALLEST else "micrometres"
+    if not within[0] <= largest <= within[1]:
+        likely = "metres" if largest < within[0] else "micrometres"
         yield Finding(
             "unit",
             (),

@@ -8,12 +8,15 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal import screw
 from pkmcal.arrays import FloatArray, wrapped
 from pkmcal.core.library import DRIVERS, SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 
 _SAME_ANGLE = 1e-6  # rad
+_TILTED = 0.5  # rad: a plane is so far from another by intention
+_FLAT = 0.2  # of the longer side: points no wider than this are rather on a line
 ALIKE = 0.03  # of the base's radius: by less, errors of manufacture make limbs differ
 
 
@@ -87,6 +90,48 @@ def joints(robot: Robot) -> tuple[Joints, Joints]:
     return Joints("base", slots[:, 0:3]), Joints("platform", slots[:, 3:6])
 
 
+def along_axis(robot: Robot) -> tuple[Joints, Joints]:
+    """Base and platform joints of a machine at home, seen along the axis they lie around.
+
+    That is z, unless the base joints lie on a circle in a plane that is clearly tilted against it,
+    as those of a machine do whose frame follows something else.
+    """
+    base, platform = joints(robot)
+    middle = base.points.mean(axis=0)
+    spread, plane = np.linalg.svd(base.points - middle)[1:]  # the last row is across the plane
+    upright = abs(plane[2, 2]) >= np.cos(_TILTED)
+    if upright or len(base.points) < 3 or spread[1] < _FLAT * spread[0]:
+        return base, platform
+    turn = plane * np.array([[1.0], [1.0], [np.linalg.det(plane)]])
+    turned = Joints("base", (base.points - middle) @ turn.T)
+    room = ALIKE * size(robot)
+    if np.ptp(turned.radii) > 2 * room or np.abs(turned.points[:, 2]).max() > room:
+        return base, platform
+    at_home = platform.points @ screw.from_pose(robot.model.home)[:3, :3].T
+    return turned, Joints("platform", at_home @ turn.T)
+
+
+def slider_ways(robot: Robot) -> FloatArray:
+    """Direction of each slider as stated (limbs, 3), unit; 0 for other limbs."""
+    return np.array([
+        limb.frames["base"][:, 2] if KINDS[limb.kind].driver == "slider" else np.zeros(3)
+        for limb in robot.model.limbs
+    ])  # fmt: skip
+
+
+def on_rails(robot: Robot) -> bool:
+    """Whether the carriages of all limbs run on parallel rails side by side.
+
+    Such a machine has no axis that its limbs lie around (Triaglide, Hexaglide).
+    """
+    ways, points = slider_ways(robot), joints(robot)[0].points
+    if not ways.any(axis=1).all() or np.abs(np.cross(ways, ways[0])).max() > ALIKE:
+        return False
+    across = points - np.outer(points @ ways[0], ways[0])
+    spread = np.linalg.svd(across - across.mean(axis=0))[1]
+    return bool(spread[1] <= ALIKE * spread[0])
+
+
 def size(robot: Robot) -> float:
     """Root mean square distance of the base joints from their middle, mm; or `Robot.length`."""
     base = joints(robot)[0].points
@@ -140,14 +185,15 @@ class Trait:
 
 def traits(robot: Robot) -> list[Trait]:
     """What alike limbs have in common."""
-    base, platform = joints(robot)
+    base, platform = along_axis(robot)
     mm = size(robot)
     degree = mm * np.pi / 180
     limbs = robot.model.limbs
+    rails = on_rails(robot)
     between = np.degrees(np.abs(wrapped(base.angles - platform.angles)))
     off_axis = (base.radii > 1e-6 * mm) & (platform.radii > 1e-6 * mm)
     found = [
-        Trait("base radius", "mm", base.radii, 1.0),
+        Trait("base radius", "mm", np.full(len(limbs), np.nan) if rails else base.radii, 1.0),
         Trait("platform radius", "mm", platform.radii, 1.0),
         Trait("angle between base and platform joint", "deg",
               np.where(off_axis, between, np.nan), degree),
@@ -165,9 +211,11 @@ def traits(robot: Robot) -> list[Trait]:
         if driver == "crank":
             rods.append(Trait("crank", "mm", slot["crank"], 1.0))
         unit, shown, scale = ("deg", 180 / np.pi, degree) if driver == "crank" else ("mm", 1.0, 1.0)
+        # from one side or the other a rail's carriage drives, and stands elsewhere
+        at_home = np.full(len(limbs), np.nan) if rails else drive * shown
         own = (
             *rods,
-            Trait(f"{driver} at home", unit, drive * shown, scale),
+            Trait(f"{driver} at home", unit, at_home, scale),
             Trait("offset", unit, slot["offset"] * shown, scale),
             Trait("gain", "1", slot["gain"], mm),
             Trait("lower end of the stroke", unit, ends[:, 0] * shown, scale),
