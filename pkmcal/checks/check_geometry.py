@@ -117,7 +117,8 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
     remarks on its size, since all of its lengths may be in another unit.
 
     Of a serial arm fewer things can be checked: lengths, joint errors and Denavit–Hartenberg twists
-    in another unit (unit, angle), and neighbouring joints on one axis (double), where ``Finding.limbs`` counts joints.
+    in another unit (unit, angle), and neighbouring joints on one axis (double), where
+    ``Finding.limbs`` counts joints.
 
     Examples
     --------

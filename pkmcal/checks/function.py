@@ -21,6 +21,7 @@ _APART = 60.0  # times: two lengths of one machine do not differ by more
 _SMALLEST, _LARGEST = 0.01, 1e6  # mm: any machine is larger, or smaller
 USUAL = (10.0, 1e5)  # mm: most are; micromachines and machines of cables are not
 _FACTORS = ((1e3, "metres"), (25.4, "inches"), (1e-3, "micrometres"))
+_NOISE, _SAME = 0.005, 1e-4  # of the largest length: errors of joints that are meant to be at 0
 _STEPS = 40  # of a move to the end of a stroke
 _POSES, _SPREAD = 200, 0.2  # drawn around home to look for a pose that is not singular
 _SINGULAR = 1e-7  # conditioning: numerically none
@@ -120,7 +121,19 @@ def _sizes(robot: Robot) -> dict[str, float]:
         "cranks": float(slots[:, SLOTS.index("crank")].max()),
         "strokes": max(ends, default=0.0),
     }
-    return {name: value for name, value in sizes.items() if value > 1e-9}
+    least = _NOISE * max(sizes.values())
+    meant = {"base joints": _alike(base.points), "platform joints": _alike(platform.points)}
+    return {
+        name: value
+        for name, value in sizes.items()
+        if value > 1e-9 and (value > least or meant.get(name, True))
+    }
+
+
+def _alike(points: FloatArray) -> bool:
+    """Whether some joints are equally far from the origin, as in tables and not by error."""
+    far = np.sort(np.linalg.norm(points, axis=1))
+    return bool((np.diff(far) <= _SAME * far[1:]).any())
 
 
 def _mended(robot: Robot) -> Iterator[Finding]:

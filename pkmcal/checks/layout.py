@@ -167,7 +167,7 @@ def swapped(robot: Robot) -> Iterator[Finding]:
     if robot.model.map == "planar" and not all(_has_circle(side, room) for side in sides):
         return  # arms reach in to platforms of any width
     base, platform = (float(np.median(side.radii)) for side in sides)
-    if platform > _WIDER * base > 0:
+    if platform > _WIDER * base > room:
         yield Finding(
             "swapped",
             (),
@@ -180,26 +180,27 @@ def swapped(robot: Robot) -> Iterator[Finding]:
 def opposite_order(robot: Robot) -> Iterator[Finding]:
     """Base joints counted one way round and platform joints another."""
     base, platform = along_axis(robot)
-    if platform.radii.min() <= ALIKE * float(base.radii.max()):
+    room = ALIKE * size(robot)
+    if min(base.radii.min(), platform.radii.min()) <= room:
         return
-    if base.senses == platform.senses or base.senses & platform.senses:
+    below, above = base.senses(room), platform.senses(room)
+    if below == above or below & above:
         return
-    mirrored = bool(base.senses and platform.senses)
+    mirrored = bool(below and above)
     yield Finding(
         "order",
         (),
-        f"seen from above, the base joints run {_way(base)} and the platform joints"
-        f" {_way(platform)}",
+        f"seen from above, the base joints run {_way(below)} and the platform joints {_way(above)}",
         "one of the tables has a left-handed frame: turn the sign of its x or of its y"
         if mirrored
         else "were two joints exchanged? Joint 1 of the base and of the platform belong to limb 1",
     )
 
 
-def _way(side: Joints) -> str:
-    if not side.senses:
+def _way(senses: frozenset[int]) -> str:
+    if not senses:
         return "neither way round"
-    return "counter-clockwise" if 1 in side.senses else "clockwise"
+    return "counter-clockwise" if 1 in senses else "clockwise"
 
 
 def off_circle(robot: Robot) -> Iterator[Finding]:
@@ -242,6 +243,8 @@ def unlike(robot: Robot) -> Iterator[Finding]:
             f"{usual:.6g} {trait.unit} with the others"
             if np.isfinite(usual)
             else "unlike each other, where the others come in alike pairs"
+            if len(limbs) > 1
+            else "like no other, where the others come in alike groups"
         )
         same = " of the same kind" if len(kinds) == 1 else ""
         yield Finding(

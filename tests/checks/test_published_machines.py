@@ -110,10 +110,10 @@ def two_heights() -> pk.Robot:
 
 def on_a_wall() -> pk.Robot:
     """A hexapod whose frame has x, not z, across its base."""
-    turn = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]]).T
+    turn = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
     plain = six_six()
     slots = plain.geometry.slots
-    return legs(slots[:, :3] @ turn.T, slots[:, 3:6] @ turn.T, **dict(zip("xyz", turn[:, 2] * 700)))
+    return legs(slots[:, :3] @ turn.T, slots[:, 3:6] @ turn.T, x=700.0)
 
 
 def innocenti() -> pk.Robot:
@@ -209,7 +209,7 @@ def test_one_joint_elsewhere_is_found(name: str) -> None:
     robot = PUBLISHED[name]()
     base = robot.geometry.slots[:, :3]
     size = float(np.linalg.norm(base - base.mean(axis=0), axis=1).max())
-    assert 0.2 > 3 * VISIBLE
+    assert 3 * VISIBLE < 0.2
     for limb in range(len(base)):
         for axis in range(3):
             if name.startswith("orthoglide") and axis == limb:
@@ -236,14 +236,16 @@ def test_a_rare_size_is_remarked_on_where_nothing_is_found() -> None:
 # --- serial arms ---------------------------------------------------------------------------------
 
 PUMA = {"a": [0, 431.8, 20.3, 0, 0, 0], "d": [0, 0, 150.05, 431.8, 0, 0], "theta": 0.0}
-TWISTS = np.array([90.0, 0, -90, 90, -90, 0])
 
 
-@pytest.mark.parametrize("convention", ["standard", "modified"])
-def test_twists_typed_in_degrees_are_found(convention: Any) -> None:
-    good = pk.SerialArm.from_dh(**PUMA, alpha=np.radians(TWISTS), convention=convention)
+@pytest.mark.parametrize(
+    ("convention", "twists"),
+    [("standard", [90.0, 0, -90, 90, -90, 0]), ("modified", [0.0, -90, 0, 90, -90, 90])],
+)
+def test_twists_typed_in_degrees_are_found(convention: Any, twists: list[float]) -> None:
+    good = pk.SerialArm.from_dh(**PUMA, alpha=np.radians(twists), convention=convention)
     assert pk.check_geometry(good).ok
-    wrong = pk.SerialArm.from_dh(**PUMA, alpha=TWISTS, convention=convention)
+    wrong = pk.SerialArm.from_dh(**PUMA, alpha=twists, convention=convention)
     check = pk.check_geometry(wrong)
     assert check.kinds == ("angle",) and len(check.findings) == 4
     assert "was 90 deg meant?" in check.findings[0].suggestion
