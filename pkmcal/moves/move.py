@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -22,6 +22,7 @@ from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.kinematics.workspace import moved_coordinates
 from pkmcal.moves import derivatives
 from pkmcal.moves.events import Event, events
+from pkmcal.moves.peaks import STEPS, largest, peaks
 from pkmcal.moves.time_laws import (
     CUBIC,
     QUINTIC,
@@ -35,7 +36,6 @@ from pkmcal.result import Result
 from pkmcal.screw import from_pose, to_pose
 
 _LAWS = {"cubic": CUBIC, "quintic": QUINTIC}
-_STEPS = 2000  # along a move, in search of peaks
 
 Space = Literal["pose", "coordinates", "joint"]
 
@@ -130,16 +130,20 @@ class Move(Result):
 
     def _parts(self) -> Iterator[str | Table]:
         yield f"{self.robot.name}: straight in {self._straight}, {self.duration:.4g} s"
-        at = self.sample(np.linspace(0.0, self.duration, _STEPS + 1))
+        ends = self.sample(np.array([0.0, self.duration]))
+        speeds, accelerations = peaks(self.sample, self.duration)
         rows = []
         for i, unit in enumerate(self.robot.actuator_units):
             factor, unit = displayed(1.0, unit)
-            numbers = (at.actuators[0, i], at.actuators[-1, i], np.abs(at.velocities[:, i]).max(),
-                       np.abs(at.accelerations[:, i]).max())  # fmt: skip
+            numbers = (*ends.actuators[:, i], speeds[i], accelerations[i])
             rows.append([f"q{i + 1} [{unit}]", *(f"{number * factor:.4g}" for number in numbers)])
         head = ["actuator", "from", "to", "top speed [/s]", "top acceleration [/s²]"]
         yield Table(head, rows, left=1)
-        yield f"conditioning {np.min(self.conditioning(at.time)):.3g} at least"
+        times = np.linspace(0.0, self.duration, STEPS + 1)
+        worse = largest(
+            lambda t: -self.conditioning(t)[:, None], times, -self.conditioning(times)[:, None]
+        )
+        yield f"conditioning {-worse[0]:.3g} at least"
         yield from map(str, self.events())
 
     # --------------------------------------------------------------------------------------------
@@ -256,7 +260,8 @@ def move(
         "joint": the actuators go straight, those that turn the short way round unless a stroke
         forbids it.
     velocity, acceleration, jerk : array_like () or (n,), optional
-        Limits of the actuators, mm or rad, and s; without `duration` at least one is needed.
+        Limits of the actuators, mm or rad, and s; without `duration` at least one is needed. They
+        hold between samples too: see Notes.
 
     Returns
     -------
@@ -268,6 +273,14 @@ def move(
     ValueError
         An end that the machine cannot take, a straight path that it cannot follow, no duration and
         no limits, limits that are not positive.
+
+    Notes
+    -----
+    The largest velocity and acceleration are sought along the path at 2001 places, and wherever the
+    position or the velocity changes by more from one to the next than these can explain, in ever
+    smaller steps; each maximum is then closed in on to rounding. What can be missed is shorter than
+    a step, 1/2000 of the duration, and changes the position (a velocity) or the velocity (an
+    acceleration) there by less than the largest of them does in a step.
 
     Examples
     --------
@@ -359,30 +372,15 @@ def _fastest(unit: Move, limits: dict[str, FloatArray]) -> float:
     """The shortest duration within limits: speeds go with 1/T and accelerations with 1/T²."""
     if not limits:
         raise ArgumentError("give a duration, or limits of velocity or acceleration")
-    parts: dict[str, Callable[[MoveSample], FloatArray]] = {
-        "velocity": lambda at: at.velocities,
-        "acceleration": lambda at: at.accelerations,
-    }
+    largest = dict(zip(("velocity", "acceleration"), peaks(unit.sample, 1.0), strict=True))
     shortest = 0.0
     for name, most in limits.items():
         order = 1 if name == "velocity" else 2
-        peaks = _peaks(unit, parts[name])
-        if not np.isfinite(peaks).all():
+        if not np.isfinite(largest[name]).all():
             raise ArgumentError(
                 "the path leaves the machine's reach or is singular: no fastest move"
             )
-        shortest = max(shortest, float(((peaks / most) ** (1 / order)).max()))
+        shortest = max(shortest, float(((largest[name] / most) ** (1 / order)).max()))
     if shortest == 0.0:
         raise ArgumentError("start and end are the same pose: give a duration")
     return shortest
-
-
-def _peaks(unit: Move, part: Callable[[MoveSample], FloatArray]) -> FloatArray:
-    """The largest size of each actuator's velocity or acceleration, looked at again closely."""
-    coarse = np.linspace(0.0, 1.0, _STEPS + 1)
-    sizes = np.abs(part(unit.sample(coarse)))
-    peaks = sizes.max(axis=0)
-    for i, k in enumerate(sizes.argmax(axis=0).tolist()):
-        near = np.linspace(coarse[max(k - 1, 0)], coarse[min(k + 1, _STEPS)], _STEPS + 1)
-        peaks[i] = max(peaks[i], np.abs(part(unit.sample(near)))[:, i].max())
-    return np.asarray(peaks)
