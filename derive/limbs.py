@@ -28,7 +28,8 @@ class Axis:
 
 BASE = Axis("base", ("tilt1", "tilt2"))
 PLATFORM = Axis("platform", ("platform_tilt1", "platform_tilt2"))
-AXES = (BASE, PLATFORM)
+HINGE = Axis("hinge", ("hinge_tilt1", "hinge_tilt2"))
+AXES = (BASE, PLATFORM, HINGE)
 
 # The numbers of one limb, in the order of the core. Lengths in mm, tilts in rad.
 SLOTS = (
@@ -334,6 +335,8 @@ CONSTRAINTS = (
                "Φ = (R a)·d", None, PLATFORM, lambda d, n, a, lever: a.dot(d)),
     Constraint("couple", "revolute and universal axis stay square, at the lever λ",
                "Φ = λ (R a)·n", BASE, PLATFORM, lambda d, n, a, lever: lever * a.dot(n)),
+    Constraint("hinge_plane", "the rod stays square to the axis it swings about on the carriage",
+               "Φ = n·d", HINGE, None, lambda d, n, a, lever: n.dot(d)),
 )  # fmt: skip
 
 
@@ -422,8 +425,10 @@ def names() -> list[str]:
         f"X({driver.name.upper()}, {driver.name}, {int(driver.moves)}, {int(driver.stretches)})"
         for driver in DRIVERS
     ]
-    rows, axes = [], []
+    rows, axes, rows_with_axes = [], [], []
     for row in CONSTRAINTS:
+        has = [axis.name for axis in (row.on_base, row.on_platform) if axis]
+        rows_with_axes.append(" ".join((row.name, *has)))
         sides = [AXES.index(axis) if axis else 0 for axis in (row.on_base, row.on_platform)]
         rows.append(f"X({row.name.upper()}, {row.name}, {sides[0]}, {sides[1]})")
     for axis in AXES:
@@ -445,6 +450,6 @@ def names() -> list[str]:
         "/* constraint rows beside the sphere, bits of a set: the axes on base and platform */",
         *(f"#define ROW_{row.name.upper()} {1 << i}" for i, row in enumerate(CONSTRAINTS)),
         f"#define ALL_ROWS {(1 << len(CONSTRAINTS)) - 1}",
-        f'#define ROW_NAMES "{" ".join(row.name for row in CONSTRAINTS)}"',
+        f'#define ROW_NAMES "{";".join(rows_with_axes)}"',
         "#define EACH_ROW(X) " + " ".join(rows),
     ]

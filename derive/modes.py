@@ -1,4 +1,4 @@
-"""Start systems for following every assembly mode: ``python -m derive.modes`` writes them.
+"""Start systems for following every assembly mode: ``python -m derive.modes [NAME ...]`` writes them.
 
 The closures of a machine are polynomial equations in the state of its pose map, with the numbers of
 its limbs as coefficients. For complex numbers chosen at random they have as many solutions as any
@@ -13,6 +13,7 @@ them by other means.
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +27,8 @@ from . import limbs, posemaps
 ROOT = Path(__file__).parent.parent
 FILE = (ROOT / "pkmcal" if (ROOT / "pkmcal").is_dir() else ROOT) / "modes" / "modes.json"
 Array = Any  # of complex numbers
-SPHERE = 13  # numbers of a limb: joint b, anchor c, length, axis at base, axis at platform
+AXIS = {axis: slice(7 + 3 * k, 10 + 3 * k) for k, axis in enumerate(limbs.AXES)}
+ROW = {row.name: row for row in limbs.CONSTRAINTS}
 UNIT = {"spatial": ([3, 4, 5, 6],), "planar": ([2, 3],), "2tpr2tps": ([2, 3], [4, 5])}
 QUIET = 12  # loops without a new solution that end the search
 
@@ -43,11 +45,27 @@ class Family:
     rows: tuple[tuple[str, ...], ...]
     zero: tuple[tuple[int, int], ...] = ()
 
+    @property
+    def width(self) -> int:
+        """Numbers of a limb: joint b, anchor c, length, and axes up to the last that a row has.
+
+        Those of base and platform in any case. So start systems stay when an axis is declared.
+        """
+        used = {axis for kinds in self.rows for axis in axes_of(kinds)}
+        return max(AXIS[axis].stop for axis in {limbs.BASE, limbs.PLATFORM} | used)
+
+
+def axes_of(kinds: tuple[str, ...]) -> set[limbs.Axis]:
+    """The axes that these rows have."""
+    sides = ((ROW[kind].on_base, ROW[kind].on_platform) for kind in kinds)
+    return {axis for both in sides for axis in both if axis}
+
 
 IN_PLANE = tuple((limb, place) for limb in (2, 3) for place in (0, 2, 3, 5))  # on the y axes
 FAMILIES = (
     Family("hexapod", "spatial", ((),) * 6),
     Family("3rps", "spatial", (("base_plane",),) * 3),
+    Family("3prs", "spatial", (("hinge_plane",),) * 3),
     Family("2tpr2tps-spatial", "spatial", ((),) * 2 + (("platform_plane",),) * 2),
     Family("delta", "translation", ((),) * 3),
     Family("planar", "planar", ((),) * 3),
@@ -63,17 +81,20 @@ class System:
         pose_map = next(each for each in posemaps.MAPS if each.name == family.map)
         self.state_size = pose_map.state_size
         state = sp.Matrix(sp.symbols(f"x0:{pose_map.state_size}"))
-        numbers = sp.Matrix(len(family.rows), SPHERE, sp.symbols(f"g0:{SPHERE * len(family.rows)}"))
+        shape = (len(family.rows), family.width)
+        numbers = sp.Matrix(*shape, sp.symbols(f"g0:{shape[0] * shape[1]}"))
         R, p = pose_map.frame(state)
         rows = []
         for i, kinds in enumerate(family.rows):
             b, c = numbers[i, 0:3].T, numbers[i, 3:6].T
-            n, a = numbers[i, 7:10].T, numbers[i, 10:13].T
             d = p + R * b - c
             rows.append(d.dot(d) - numbers[i, 6] ** 2)
-            for constraint in limbs.CONSTRAINTS:
-                if constraint.name in kinds:
-                    rows.append(constraint.phi(d, n, R * a, sp.S.One))
+            for kind in kinds:
+                n, a = (
+                    numbers[i, AXIS[axis]].T if axis else sp.zeros(3, 1)
+                    for axis in (ROW[kind].on_base, ROW[kind].on_platform)
+                )
+                rows.append(ROW[kind].phi(d, n, R * a, sp.S.One))
         rows += kept(pose_map.name, state)
         system = sp.Matrix(rows)
         given = (list(state), list(numbers))
@@ -143,7 +164,7 @@ def distinct(system: System, x: Array, near: float = 1e-6) -> Array:
 
 
 def start_system(family: Family, seed: int = 1) -> tuple[Array, Array]:
-    """Numbers (limbs, SPHERE) and all the solutions (N, state) there."""
+    """Numbers (limbs, width) and all the solutions (N, state) there."""
     rng = np.random.default_rng(seed)
     system = System(family)
     g, x = solved_at_random(family, system, rng)
@@ -160,15 +181,15 @@ def start_system(family: Family, seed: int = 1) -> tuple[Array, Array]:
     found, _, off = newton(system, found, np.broadcast_to(g, (len(found), len(g))), 4)
     if off.max() > 1e-10:
         raise ValueError(f"{family.name}: a solution is known to {off.max():.0e} only")
-    return g.reshape(-1, SPHERE), found
+    return g.reshape(-1, family.width), found
 
 
 def random_numbers(family: Family, rng: np.random.Generator) -> Array:
     """Complex numbers of every limb, those that vanish in the family zero."""
-    g = rng.normal(size=(len(family.rows), SPHERE, 2)) @ [1, 1j] / np.sqrt(2)
+    g = rng.normal(size=(len(family.rows), family.width, 2)) @ [1, 1j] / np.sqrt(2)
     for i, kinds in enumerate(family.rows):
-        g[i, 7:10] *= "base_plane" in kinds
-        g[i, 10:13] *= "platform_plane" in kinds
+        for axis, place in AXIS.items():
+            g[i, place] *= axis in axes_of(kinds)
     for i, place in family.zero:
         g[i, place] = 0
     return g
@@ -187,10 +208,10 @@ def solved_at_random(
     for i, kinds in enumerate(family.rows):
         d = p + R @ g[i, 0:3] - g[i, 3:6]
         g[i, 6] = np.sqrt(d @ d)
-        for kind, axis, along in (("base_plane", slice(7, 10), d),
-                                  ("platform_plane", slice(10, 13), R.T @ d)):  # fmt: skip
-            if kind in kinds:
-                g[i, axis] -= along * (g[i, axis] @ along) / (along @ along)
+        for kind in kinds:  # a plane row: its one axis becomes square to d
+            axis = ROW[kind].on_base or ROW[kind].on_platform
+            along = d if ROW[kind].on_base else R.T @ d
+            g[i, AXIS[axis]] -= along * (g[i, AXIS[axis]] @ along) / (along @ along)
     return g.ravel(), x
 
 
@@ -201,9 +222,13 @@ def pairs(z: Array) -> list[Any]:
 
 
 def main() -> None:
-    """Find and write every start system."""
-    content = {}
-    for family in FAMILIES:
+    """Find and write the start systems of the families named, or of all; the others stay."""
+    known = {family.name: family for family in FAMILIES}
+    named = sys.argv[1:] or list(known)
+    if unknown := set(named) - set(known):
+        raise SystemExit(f"no family {', '.join(sorted(unknown))}; there are {', '.join(known)}")
+    content = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
+    for family in map(known.__getitem__, named):
         numbers, states = start_system(family)
         content[family.name] = {
             "map": family.map,
@@ -212,7 +237,7 @@ def main() -> None:
             "limbs": pairs(numbers),
             "states": pairs(states),
         }
-    lines = [f"{json.dumps(name)}: {json.dumps(each)}" for name, each in content.items()]
+    lines = [f"{json.dumps(name)}: {json.dumps(content[name])}" for name in known if name in content]
     FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
 

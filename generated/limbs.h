@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation b2b716889767197b
+ * derivation af6972725e77e58e
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*
@@ -28,11 +28,11 @@ INLINE void FN(limb_joint)(const real R[9], const real p[3], const real b[3], co
  * an actuator's command as the limb sees it
  *     q̃ = gain q + offset
  * in  q              actuator coordinate [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * out qt             q̃ [mm or rad]
  * operations: 1 +, 1 *, 0 /, 0 sqrt
  */
-INLINE void FN(limb_drive)(real q, const real g[14], real *qt)
+INLINE void FN(limb_drive)(real q, const real g[16], real *qt)
 {
     *qt = q*g[GAIN] + g[OFFSET];
 }
@@ -42,11 +42,11 @@ INLINE void FN(limb_drive)(real q, const real g[14], real *qt)
  *     q = (q̃ - offset)/gain
  * in  qt             q̃ [mm or rad]
  * in  per_gain       1/gain, once per geometry: divisions are slow
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * out q              actuator coordinate [mm or rad]
  * operations: 1 +, 1 *, 0 /, 0 sqrt
  */
-INLINE void FN(limb_command)(real qt, real per_gain, const real g[14], real *q)
+INLINE void FN(limb_command)(real qt, real per_gain, const real g[16], real *q)
 {
     *q = (qt - g[OFFSET])*per_gain;
 }
@@ -90,12 +90,12 @@ INLINE void FN(sphere_row)(const real R[9], const real p[3], const real b[3], co
 /*
  * base axis of a limb
  *     frame Rx(tilt1) Ry(tilt2) ez
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  F[9]           fixed frame of the axis, row by row
  * out axis[3]        as its frame
  * operations: 6 +, 12 *, 0 /, 0 sqrt
  */
-INLINE void FN(base_axis)(const real g[14], const real F[9], real axis[3])
+INLINE void FN(base_axis)(const real g[16], const real F[9], real axis[3])
 {
     real su1, cu1;
     FN(sincos)(g[TILT1], &su1, &cu1);
@@ -111,12 +111,12 @@ INLINE void FN(base_axis)(const real g[14], const real F[9], real axis[3])
 /*
  * platform axis of a limb
  *     frame Rx(tilt1) Ry(tilt2) ez
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  F[9]           fixed frame of the axis, row by row
  * out axis[3]        as its frame
  * operations: 6 +, 12 *, 0 /, 0 sqrt
  */
-INLINE void FN(platform_axis)(const real g[14], const real F[9], real axis[3])
+INLINE void FN(platform_axis)(const real g[16], const real F[9], real axis[3])
 {
     real su1, cu1;
     FN(sincos)(g[PLATFORM_TILT1], &su1, &cu1);
@@ -130,15 +130,36 @@ INLINE void FN(platform_axis)(const real g[14], const real F[9], real axis[3])
 
 #ifndef NARROW
 /*
+ * hinge axis of a limb
+ *     frame Rx(tilt1) Ry(tilt2) ez
+ * in  g[16]          the limb's numbers
+ * in  F[9]           fixed frame of the axis, row by row
+ * out axis[3]        as its frame
+ * operations: 6 +, 12 *, 0 /, 0 sqrt
+ */
+INLINE void FN(hinge_axis)(const real g[16], const real F[9], real axis[3])
+{
+    real su1, cu1;
+    FN(sincos)(g[HINGE_TILT1], &su1, &cu1);
+    real su2, cu2;
+    FN(sincos)(g[HINGE_TILT2], &su2, &cu2);
+    axis[0] = F[0]*su2 + (F[2]*cu1 - F[1]*su1)*cu2;
+    axis[1] = F[3]*su2 + (F[5]*cu1 - F[4]*su1)*cu2;
+    axis[2] = F[6]*su2 + (F[8]*cu1 - F[7]*su1)*cu2;
+}
+#endif
+
+#ifndef NARROW
+/*
  * length: the directions the anchor moves in
  *     c = base, ρ = q̃
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  F[9]           fixed frame of the axis, in the base, row by row
  * out first[3]       s, or crank e
  * out second[3]      0, or crank axis × e
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(length_directions)(const real g[14], const real F[9], real first[3], real second[3])
+INLINE void FN(length_directions)(const real g[16], const real F[9], real first[3], real second[3])
 {
     first[0] = FN(fill)(0.0f);
     first[1] = FN(fill)(0.0f);
@@ -153,13 +174,13 @@ INLINE void FN(length_directions)(const real g[14], const real F[9], real first[
 /*
  * slider: the directions the anchor moves in
  *     c = base + q̃ s, ρ = rod
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  F[9]           fixed frame of the axis, in the base, row by row
  * out first[3]       s, or crank e
  * out second[3]      0, or crank axis × e
  * operations: 6 +, 12 *, 0 /, 0 sqrt
  */
-INLINE void FN(slider_directions)(const real g[14], const real F[9], real first[3], real second[3])
+INLINE void FN(slider_directions)(const real g[16], const real F[9], real first[3], real second[3])
 {
     real su1, cu1;
     FN(sincos)(g[TILT1], &su1, &cu1);
@@ -178,13 +199,13 @@ INLINE void FN(slider_directions)(const real g[14], const real F[9], real first[
 /*
  * crank: the directions the anchor moves in
  *     c = base + crank Rot(axis, q̃) e, ρ = rod
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  F[9]           fixed frame of the axis, in the base, row by row
  * out first[3]       s, or crank e
  * out second[3]      0, or crank axis × e
  * operations: 9 +, 24 *, 0 /, 0 sqrt
  */
-INLINE void FN(crank_directions)(const real g[14], const real F[9], real first[3], real second[3])
+INLINE void FN(crank_directions)(const real g[16], const real F[9], real first[3], real second[3])
 {
     real su1, cu1;
     FN(sincos)(g[TILT1], &su1, &cu1);
@@ -203,13 +224,13 @@ INLINE void FN(crank_directions)(const real g[14], const real F[9], real first[3
  * length: where the anchor stands
  *     c = base, ρ = q̃
  * in  qt             q̃ [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  first[3]       s, or crank e
  * in  second[3]      0, or crank axis × e
  * out c[3]           anchor [mm]
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(length_anchor)(real qt, const real g[14], const real first[3], const real second[3],
+INLINE void FN(length_anchor)(real qt, const real g[16], const real first[3], const real second[3],
         real c[3])
 {
     c[0] = g[BASE_X];
@@ -221,13 +242,13 @@ INLINE void FN(length_anchor)(real qt, const real g[14], const real first[3], co
  * slider: where the anchor stands
  *     c = base + q̃ s, ρ = rod
  * in  qt             q̃ [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  first[3]       s, or crank e
  * in  second[3]      0, or crank axis × e
  * out c[3]           anchor [mm]
  * operations: 3 +, 3 *, 0 /, 0 sqrt
  */
-INLINE void FN(slider_anchor)(real qt, const real g[14], const real first[3], const real second[3],
+INLINE void FN(slider_anchor)(real qt, const real g[16], const real first[3], const real second[3],
         real c[3])
 {
     c[0] = qt*first[0] + g[BASE_X];
@@ -240,13 +261,13 @@ INLINE void FN(slider_anchor)(real qt, const real g[14], const real first[3], co
  * crank: where the anchor stands
  *     c = base + crank Rot(axis, q̃) e, ρ = rod
  * in  qt             q̃ [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  first[3]       s, or crank e
  * in  second[3]      0, or crank axis × e
  * out c[3]           anchor [mm]
  * operations: 6 +, 6 *, 0 /, 0 sqrt
  */
-INLINE void FN(crank_anchor)(real qt, const real g[14], const real first[3], const real second[3],
+INLINE void FN(crank_anchor)(real qt, const real g[16], const real first[3], const real second[3],
         real c[3])
 {
     real sq, cq;
@@ -261,11 +282,11 @@ INLINE void FN(crank_anchor)(real qt, const real g[14], const real first[3], con
  * length: the limb's length
  *     c = base, ρ = q̃
  * in  qt             q̃ [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * out rho            ρ [mm]
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(length_radius)(real qt, const real g[14], real *rho)
+INLINE void FN(length_radius)(real qt, const real g[16], real *rho)
 {
     *rho = qt;
 }
@@ -274,11 +295,11 @@ INLINE void FN(length_radius)(real qt, const real g[14], real *rho)
  * slider: the limb's length
  *     c = base + q̃ s, ρ = rod
  * in  qt             q̃ [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * out rho            ρ [mm]
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(slider_radius)(real qt, const real g[14], real *rho)
+INLINE void FN(slider_radius)(real qt, const real g[16], real *rho)
 {
     *rho = g[ROD];
 }
@@ -287,11 +308,11 @@ INLINE void FN(slider_radius)(real qt, const real g[14], real *rho)
  * crank: the limb's length
  *     c = base + crank Rot(axis, q̃) e, ρ = rod
  * in  qt             q̃ [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * out rho            ρ [mm]
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(crank_radius)(real qt, const real g[14], real *rho)
+INLINE void FN(crank_radius)(real qt, const real g[16], real *rho)
 {
     *rho = g[ROD];
 }
@@ -299,7 +320,7 @@ INLINE void FN(crank_radius)(real qt, const real g[14], real *rho)
 /*
  * length: actuator coordinate at a joint position
  *     q̃ = ‖h‖
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  h[3]           p + R b - base [mm]
  * in  first[3]       s, or crank e
  * in  second[3]      0, or crank axis × e
@@ -307,7 +328,7 @@ INLINE void FN(crank_radius)(real qt, const real g[14], real *rho)
  * out qt             q̃ [mm]
  * operations: 2 +, 3 *, 0 /, 1 sqrt
  */
-INLINE void FN(length_inverse)(const real g[14], const real h[3], const real first[3],
+INLINE void FN(length_inverse)(const real g[16], const real h[3], const real first[3],
         const real second[3], real branch, real *qt)
 {
     *qt = FN(root)(h[0]*h[0] + h[1]*h[1] + h[2]*h[2]);
@@ -316,7 +337,7 @@ INLINE void FN(length_inverse)(const real g[14], const real h[3], const real fir
 /*
  * slider: actuator coordinate at a joint position
  *     q̃ = h·s - branch √(rod² - ‖h - (h·s) s‖²)
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  h[3]           p + R b - base [mm]
  * in  first[3]       s, or crank e
  * in  second[3]      0, or crank axis × e
@@ -324,7 +345,7 @@ INLINE void FN(length_inverse)(const real g[14], const real h[3], const real fir
  * out qt             q̃ [mm]
  * operations: 9 +, 11 *, 0 /, 1 sqrt
  */
-INLINE void FN(slider_inverse)(const real g[14], const real h[3], const real first[3],
+INLINE void FN(slider_inverse)(const real g[16], const real h[3], const real first[3],
         const real second[3], real branch, real *qt)
 {
     const real along = h[0]*first[0] + h[1]*first[1] + h[2]*first[2];
@@ -340,7 +361,7 @@ INLINE void FN(slider_inverse)(const real g[14], const real h[3], const real fir
  * crank: actuator coordinate at a joint position
  *     h·(cos q̃ e + sin q̃ n) = κ = (h·h + crank² - rod²)/(2 crank)
  *     q̃ = atan2(h·n, h·e) - branch atan2(√((h·e)² + (h·n)² - κ²), κ)
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  h[3]           p + R b - base [mm]
  * in  first[3]       s, or crank e
  * in  second[3]      0, or crank axis × e
@@ -348,7 +369,7 @@ INLINE void FN(slider_inverse)(const real g[14], const real h[3], const real fir
  * out qt             q̃ [rad]
  * operations: 12 +, 20 *, 0 /, 1 sqrt
  */
-INLINE void FN(crank_inverse)(const real g[14], const real h[3], const real first[3],
+INLINE void FN(crank_inverse)(const real g[16], const real h[3], const real first[3],
         const real second[3], real branch, real *qt)
 {
     const real x = h[0]*first[0] + h[1]*first[1] + h[2]*first[2];
@@ -372,14 +393,14 @@ INLINE void FN(crank_inverse)(const real g[14], const real h[3], const real firs
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
  * in  q              actuator coordinate [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  F[9]           fixed frame of the axis, in the base, row by row
  * out by_q           ∂Φ/∂q
- * out by_g[14]       ∂Φ/∂(the limb's numbers)
+ * out by_g[16]       ∂Φ/∂(the limb's numbers)
  * operations: 19 +, 21 *, 0 /, 0 sqrt
  */
-INLINE void FN(length_derivatives)(const real R[9], const real p[3], real q, const real g[14],
-        const real F[9], real *by_q, real by_g[14])
+INLINE void FN(length_derivatives)(const real R[9], const real p[3], real q, const real g[16],
+        const real F[9], real *by_q, real by_g[16])
 {
     /* q̃ */
     const real qt = q*g[GAIN] + g[OFFSET];
@@ -406,6 +427,8 @@ INLINE void FN(length_derivatives)(const real R[9], const real p[3], real q, con
     by_g[TILT2] = FN(fill)(0.0f);
     by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
     by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
+    by_g[HINGE_TILT1] = FN(fill)(0.0f);
+    by_g[HINGE_TILT2] = FN(fill)(0.0f);
 }
 
 #ifndef NARROW
@@ -416,14 +439,14 @@ INLINE void FN(length_derivatives)(const real R[9], const real p[3], real q, con
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
  * in  q              actuator coordinate [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  F[9]           fixed frame of the axis, in the base, row by row
  * out by_q           ∂Φ/∂q
- * out by_g[14]       ∂Φ/∂(the limb's numbers)
+ * out by_g[16]       ∂Φ/∂(the limb's numbers)
  * operations: 44 +, 66 *, 0 /, 0 sqrt
  */
-INLINE void FN(slider_derivatives)(const real R[9], const real p[3], real q, const real g[14],
-        const real F[9], real *by_q, real by_g[14])
+INLINE void FN(slider_derivatives)(const real R[9], const real p[3], real q, const real g[16],
+        const real F[9], real *by_q, real by_g[16])
 {
     /* q̃ */
     const real qt = q*g[GAIN] + g[OFFSET];
@@ -469,6 +492,8 @@ INLINE void FN(slider_derivatives)(const real R[9], const real p[3], real q, con
     by_g[TILT2] = -(F[0]*cu2 - su2*t0)*t8 - (F[3]*cu2 - su2*t1)*t9 - (F[6]*cu2 - su2*t2)*t10;
     by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
     by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
+    by_g[HINGE_TILT1] = FN(fill)(0.0f);
+    by_g[HINGE_TILT2] = FN(fill)(0.0f);
 }
 #endif
 
@@ -480,14 +505,14 @@ INLINE void FN(slider_derivatives)(const real R[9], const real p[3], real q, con
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
  * in  q              actuator coordinate [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  F[9]           fixed frame of the axis, in the base, row by row
  * out by_q           ∂Φ/∂q
- * out by_g[14]       ∂Φ/∂(the limb's numbers)
+ * out by_g[16]       ∂Φ/∂(the limb's numbers)
  * operations: 64 +, 120 *, 0 /, 0 sqrt
  */
-INLINE void FN(crank_derivatives)(const real R[9], const real p[3], real q, const real g[14],
-        const real F[9], real *by_q, real by_g[14])
+INLINE void FN(crank_derivatives)(const real R[9], const real p[3], real q, const real g[16],
+        const real F[9], real *by_q, real by_g[16])
 {
     /* q̃ */
     const real qt = q*g[GAIN] + g[OFFSET];
@@ -553,6 +578,8 @@ INLINE void FN(crank_derivatives)(const real R[9], const real p[3], real q, cons
         F[6]*su2)*d2*t15;
     by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
     by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
+    by_g[HINGE_TILT1] = FN(fill)(0.0f);
+    by_g[HINGE_TILT2] = FN(fill)(0.0f);
 }
 #endif
 
@@ -561,15 +588,15 @@ INLINE void FN(crank_derivatives)(const real R[9], const real p[3], real q, cons
  *     λ·∂c,  c = base, ρ = q̃
  *     q̃ = gain q + offset
  * in  q              actuator coordinate [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  pull[3]        λ, covector of the anchor
  * in  F[9]           fixed frame of the axis, in the base, row by row
  * out by_q           λ·∂c/∂q
- * out by_g[14]       λ·∂c/∂(the limb's numbers)
+ * out by_g[16]       λ·∂c/∂(the limb's numbers)
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(length_carry)(real q, const real g[14], const real pull[3], const real F[9],
-        real *by_q, real by_g[14])
+INLINE void FN(length_carry)(real q, const real g[16], const real pull[3], const real F[9],
+        real *by_q, real by_g[16])
 {
     *by_q = FN(fill)(0.0f);
     by_g[BASE_X] = pull[0];
@@ -586,6 +613,8 @@ INLINE void FN(length_carry)(real q, const real g[14], const real pull[3], const
     by_g[TILT2] = FN(fill)(0.0f);
     by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
     by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
+    by_g[HINGE_TILT1] = FN(fill)(0.0f);
+    by_g[HINGE_TILT2] = FN(fill)(0.0f);
 }
 
 #ifndef NARROW
@@ -594,15 +623,15 @@ INLINE void FN(length_carry)(real q, const real g[14], const real pull[3], const
  *     λ·∂c,  c = base + q̃ s, ρ = rod
  *     q̃ = gain q + offset
  * in  q              actuator coordinate [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  pull[3]        λ, covector of the anchor
  * in  F[9]           fixed frame of the axis, in the base, row by row
  * out by_q           λ·∂c/∂q
- * out by_g[14]       λ·∂c/∂(the limb's numbers)
+ * out by_g[16]       λ·∂c/∂(the limb's numbers)
  * operations: 19 +, 41 *, 0 /, 0 sqrt
  */
-INLINE void FN(slider_carry)(real q, const real g[14], const real pull[3], const real F[9],
-        real *by_q, real by_g[14])
+INLINE void FN(slider_carry)(real q, const real g[16], const real pull[3], const real F[9],
+        real *by_q, real by_g[16])
 {
     /* q̃ */
     const real qt = q*g[GAIN] + g[OFFSET];
@@ -638,6 +667,8 @@ INLINE void FN(slider_carry)(real q, const real g[14], const real pull[3], const
     by_g[TILT2] = (F[0]*cu2 - su2*t0)*t6 + (F[3]*cu2 - su2*t1)*t7 + (F[6]*cu2 - su2*t2)*t8;
     by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
     by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
+    by_g[HINGE_TILT1] = FN(fill)(0.0f);
+    by_g[HINGE_TILT2] = FN(fill)(0.0f);
 }
 #endif
 
@@ -647,15 +678,15 @@ INLINE void FN(slider_carry)(real q, const real g[14], const real pull[3], const
  *     λ·∂c,  c = base + crank Rot(axis, q̃) e, ρ = rod
  *     q̃ = gain q + offset
  * in  q              actuator coordinate [mm or rad]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  pull[3]        λ, covector of the anchor
  * in  F[9]           fixed frame of the axis, in the base, row by row
  * out by_q           λ·∂c/∂q
- * out by_g[14]       λ·∂c/∂(the limb's numbers)
+ * out by_g[16]       λ·∂c/∂(the limb's numbers)
  * operations: 35 +, 70 *, 0 /, 0 sqrt
  */
-INLINE void FN(crank_carry)(real q, const real g[14], const real pull[3], const real F[9],
-        real *by_q, real by_g[14])
+INLINE void FN(crank_carry)(real q, const real g[16], const real pull[3], const real F[9],
+        real *by_q, real by_g[16])
 {
     /* q̃ */
     const real qt = q*g[GAIN] + g[OFFSET];
@@ -709,6 +740,8 @@ INLINE void FN(crank_carry)(real q, const real g[14], const real pull[3], const 
     by_g[TILT2] = (cu2*t0 - F[0]*su2)*t17 + (cu2*t2 - F[3]*su2)*t18 + (cu2*t4 - F[6]*su2)*t19;
     by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
     by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
+    by_g[HINGE_TILT1] = FN(fill)(0.0f);
+    by_g[HINGE_TILT2] = FN(fill)(0.0f);
 }
 #endif
 
@@ -754,16 +787,16 @@ INLINE void FN(base_plane_row)(const real R[9], const real p[3], const real b[3]
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
  * in  c[3]           anchor [mm]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  F[9]           fixed frame of the base-side axis, in the base, row by row
  * in  P[9]           fixed frame of the platform-side axis, in the platform, row by row
  * in  lever          λ [mm]
  * out v[3]           ∂Φ/∂v = -∂Φ/∂c
- * out by_g[14]       ∂Φ/∂(the limb's numbers), c held
+ * out by_g[16]       ∂Φ/∂(the limb's numbers), c held
  * operations: 34 +, 50 *, 0 /, 0 sqrt
  */
 INLINE void FN(base_plane_derivatives)(const real R[9], const real p[3], const real c[3],
-        const real g[14], const real F[9], const real P[9], real lever, real v[3], real by_g[14])
+        const real g[16], const real F[9], const real P[9], real lever, real v[3], real by_g[16])
 {
     real su1, cu1;
     FN(sincos)(g[TILT1], &su1, &cu1);
@@ -803,6 +836,8 @@ INLINE void FN(base_plane_derivatives)(const real R[9], const real p[3], const r
     by_g[TILT2] = (F[0]*cu2 - su2*t0)*d0 + (F[3]*cu2 - su2*t1)*d1 + (F[6]*cu2 - su2*t2)*d2;
     by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
     by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
+    by_g[HINGE_TILT1] = FN(fill)(0.0f);
+    by_g[HINGE_TILT2] = FN(fill)(0.0f);
 }
 #endif
 
@@ -852,16 +887,16 @@ INLINE void FN(platform_plane_row)(const real R[9], const real p[3], const real 
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
  * in  c[3]           anchor [mm]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  F[9]           fixed frame of the base-side axis, in the base, row by row
  * in  P[9]           fixed frame of the platform-side axis, in the platform, row by row
  * in  lever          λ [mm]
  * out v[3]           ∂Φ/∂v = -∂Φ/∂c
- * out by_g[14]       ∂Φ/∂(the limb's numbers), c held
+ * out by_g[16]       ∂Φ/∂(the limb's numbers), c held
  * operations: 52 +, 77 *, 0 /, 0 sqrt
  */
 INLINE void FN(platform_plane_derivatives)(const real R[9], const real p[3], const real c[3],
-        const real g[14], const real F[9], const real P[9], real lever, real v[3], real by_g[14])
+        const real g[16], const real F[9], const real P[9], real lever, real v[3], real by_g[16])
 {
     real sw1, cw1;
     FN(sincos)(g[PLATFORM_TILT1], &sw1, &cw1);
@@ -912,6 +947,8 @@ INLINE void FN(platform_plane_derivatives)(const real R[9], const real p[3], con
     const real t10 = P[6]*cw2 - sw2*t2;
     by_g[PLATFORM_TILT2] = (R[0]*t8 + R[1]*t9 + R[2]*t10)*d0 + (R[3]*t8 + R[4]*t9 + R[5]*t10)*d1 +
         (R[6]*t8 + R[7]*t9 + R[8]*t10)*d2;
+    by_g[HINGE_TILT1] = FN(fill)(0.0f);
+    by_g[HINGE_TILT2] = FN(fill)(0.0f);
 }
 #endif
 
@@ -953,16 +990,16 @@ INLINE void FN(couple_row)(const real R[9], const real p[3], const real b[3], co
  * in  R[9]           platform to base, row by row
  * in  p[3]           platform origin [mm]
  * in  c[3]           anchor [mm]
- * in  g[14]          the limb's numbers
+ * in  g[16]          the limb's numbers
  * in  F[9]           fixed frame of the base-side axis, in the base, row by row
  * in  P[9]           fixed frame of the platform-side axis, in the platform, row by row
  * in  lever          λ [mm]
  * out v[3]           ∂Φ/∂v = -∂Φ/∂c
- * out by_g[14]       ∂Φ/∂(the limb's numbers), c held
+ * out by_g[16]       ∂Φ/∂(the limb's numbers), c held
  * operations: 50 +, 97 *, 0 /, 0 sqrt
  */
 INLINE void FN(couple_derivatives)(const real R[9], const real p[3], const real c[3],
-        const real g[14], const real F[9], const real P[9], real lever, real v[3], real by_g[14])
+        const real g[16], const real F[9], const real P[9], real lever, real v[3], real by_g[16])
 {
     real su1, cu1;
     FN(sincos)(g[TILT1], &su1, &cu1);
@@ -1024,6 +1061,104 @@ INLINE void FN(couple_derivatives)(const real R[9], const real p[3], const real 
     const real t21 = P[6]*cw2 - sw2*t5;
     by_g[PLATFORM_TILT2] = (R[0]*t19 + R[1]*t20 + R[2]*t21)*t16 + (R[3]*t19 + R[4]*t20 +
         R[5]*t21)*t17 + (R[6]*t19 + R[7]*t20 + R[8]*t21)*t18;
+    by_g[HINGE_TILT1] = FN(fill)(0.0f);
+    by_g[HINGE_TILT2] = FN(fill)(0.0f);
+}
+#endif
+
+/*
+ * hinge_plane: the rod stays square to the axis it swings about on the carriage
+ *     Φ = n·d,  d = p + R b - c
+ * in  R[9]           platform to base, row by row
+ * in  p[3]           platform origin [mm]
+ * in  b[3]           platform joint, platform frame [mm]
+ * in  c[3]           anchor [mm]
+ * in  n[3]           base-side axis, base frame
+ * in  a[3]           platform-side axis, platform frame
+ * in  lever          λ [mm]
+ * out phi            Φ [mm]
+ * out omega[3]       ∂Φ/∂ω
+ * out v[3]           ∂Φ/∂v
+ * operations: 17 +, 18 *, 0 /, 0 sqrt
+ */
+INLINE void FN(hinge_plane_row)(const real R[9], const real p[3], const real b[3], const real c[3],
+        const real n[3], const real a[3], real lever, real *phi, real omega[3], real v[3])
+{
+    /* R b */
+    const real r0 = R[0]*b[0] + R[1]*b[1] + R[2]*b[2];
+    const real r1 = R[3]*b[0] + R[4]*b[1] + R[5]*b[2];
+    const real r2 = R[6]*b[0] + R[7]*b[1] + R[8]*b[2];
+    /* from the anchor to the platform joint */
+    const real d0 = p[0] + r0 - c[0];
+    const real d1 = p[1] + r1 - c[1];
+    const real d2 = p[2] + r2 - c[2];
+    *phi = n[0]*d0 + n[1]*d1 + n[2]*d2;
+    omega[0] = n[2]*r1 - n[1]*r2;
+    omega[1] = n[0]*r2 - n[2]*r0;
+    omega[2] = n[1]*r0 - n[0]*r1;
+    v[0] = n[0];
+    v[1] = n[1];
+    v[2] = n[2];
+}
+
+#ifndef NARROW
+/*
+ * hinge_plane: the rod stays square to the axis it swings about on the carriage
+ *     Φ = n·d,  d = p + R b - c
+ * in  R[9]           platform to base, row by row
+ * in  p[3]           platform origin [mm]
+ * in  c[3]           anchor [mm]
+ * in  g[16]          the limb's numbers
+ * in  F[9]           fixed frame of the base-side axis, in the base, row by row
+ * in  P[9]           fixed frame of the platform-side axis, in the platform, row by row
+ * in  lever          λ [mm]
+ * out v[3]           ∂Φ/∂v = -∂Φ/∂c
+ * out by_g[16]       ∂Φ/∂(the limb's numbers), c held
+ * operations: 34 +, 50 *, 0 /, 0 sqrt
+ */
+INLINE void FN(hinge_plane_derivatives)(const real R[9], const real p[3], const real c[3],
+        const real g[16], const real F[9], const real P[9], real lever, real v[3], real by_g[16])
+{
+    real su1, cu1;
+    FN(sincos)(g[HINGE_TILT1], &su1, &cu1);
+    real su2, cu2;
+    FN(sincos)(g[HINGE_TILT2], &su2, &cu2);
+    /* base-side axis */
+    const real t0 = F[2]*cu1 - F[1]*su1;
+    const real n0 = F[0]*su2 + cu2*t0;
+    const real t1 = F[5]*cu1 - F[4]*su1;
+    const real n1 = F[3]*su2 + cu2*t1;
+    const real t2 = F[8]*cu1 - F[7]*su1;
+    const real n2 = F[6]*su2 + cu2*t2;
+    /* R b */
+    const real r0 = R[0]*g[PLATFORM_X] + R[1]*g[PLATFORM_Y] + R[2]*g[PLATFORM_Z];
+    const real r1 = R[3]*g[PLATFORM_X] + R[4]*g[PLATFORM_Y] + R[5]*g[PLATFORM_Z];
+    const real r2 = R[6]*g[PLATFORM_X] + R[7]*g[PLATFORM_Y] + R[8]*g[PLATFORM_Z];
+    /* from the anchor to the platform joint */
+    const real d0 = p[0] + r0 - c[0];
+    const real d1 = p[1] + r1 - c[1];
+    const real d2 = p[2] + r2 - c[2];
+    v[0] = n0;
+    v[1] = n1;
+    v[2] = n2;
+    by_g[BASE_X] = FN(fill)(0.0f);
+    by_g[BASE_Y] = FN(fill)(0.0f);
+    by_g[BASE_Z] = FN(fill)(0.0f);
+    by_g[PLATFORM_X] = R[0]*n0 + R[3]*n1 + R[6]*n2;
+    by_g[PLATFORM_Y] = R[1]*n0 + R[4]*n1 + R[7]*n2;
+    by_g[PLATFORM_Z] = R[2]*n0 + R[5]*n1 + R[8]*n2;
+    by_g[OFFSET] = FN(fill)(0.0f);
+    by_g[GAIN] = FN(fill)(0.0f);
+    by_g[ROD] = FN(fill)(0.0f);
+    by_g[CRANK] = FN(fill)(0.0f);
+    by_g[TILT1] = FN(fill)(0.0f);
+    by_g[TILT2] = FN(fill)(0.0f);
+    by_g[PLATFORM_TILT1] = FN(fill)(0.0f);
+    by_g[PLATFORM_TILT2] = FN(fill)(0.0f);
+    const real t3 = cu1*cu2;
+    const real t4 = su1*cu2;
+    by_g[HINGE_TILT1] = (-F[1]*t3 - F[2]*t4)*d0 + (-F[4]*t3 - F[5]*t4)*d1 + (-F[7]*t3 - F[8]*t4)*d2;
+    by_g[HINGE_TILT2] = (F[0]*cu2 - su2*t0)*d0 + (F[3]*cu2 - su2*t1)*d1 + (F[6]*cu2 - su2*t2)*d2;
 }
 #endif
 
@@ -1139,4 +1274,33 @@ INLINE void FN(couple_rate)(const real R[9], const real p[3], const real b[3],
         R[2]*a[2])*n_rate[0] + (R[3]*a_rate[0] + R[4]*a_rate[1] + R[5]*a_rate[2])*n[1] + (R[3]*a[0]
         + R[4]*a[1] + R[5]*a[2])*n_rate[1] + (R[6]*a_rate[0] + R[7]*a_rate[1] +
         R[8]*a_rate[2])*n[2] + (R[6]*a[0] + R[7]*a[1] + R[8]*a[2])*n_rate[2])*lever;
+}
+
+/*
+ * rate of the row as the limb changes
+ *     Φ = n·d,  d = p + R b - c
+ * in  R[9]           platform to base, row by row
+ * in  p[3]           platform origin [mm]
+ * in  b[3]           platform joint
+ * in  b_rate[3]      its rate
+ * in  c[3]           anchor
+ * in  c_rate[3]      its rate
+ * in  n[3]           base-side axis
+ * in  n_rate[3]      its rate
+ * in  a[3]           platform-side axis
+ * in  a_rate[3]      its rate
+ * in  lever          λ
+ * out rate           Φ's rate
+ * operations: 26 +, 24 *, 0 /, 0 sqrt
+ */
+INLINE void FN(hinge_plane_rate)(const real R[9], const real p[3], const real b[3],
+        const real b_rate[3], const real c[3], const real c_rate[3], const real n[3],
+        const real n_rate[3], const real a[3], const real a_rate[3], real lever, real *rate)
+{
+    const real d0 = R[0]*b[0] + R[1]*b[1] + R[2]*b[2] + p[0] - c[0];
+    const real d1 = R[3]*b[0] + R[4]*b[1] + R[5]*b[2] + p[1] - c[1];
+    const real d2 = R[6]*b[0] + R[7]*b[1] + R[8]*b[2] + p[2] - c[2];
+    *rate = (R[0]*b_rate[0] + R[1]*b_rate[1] + R[2]*b_rate[2] - c_rate[0])*n[0] + (R[3]*b_rate[0] +
+        R[4]*b_rate[1] + R[5]*b_rate[2] - c_rate[1])*n[1] + (R[6]*b_rate[0] + R[7]*b_rate[1] +
+        R[8]*b_rate[2] - c_rate[2])*n[2] + n_rate[0]*d0 + n_rate[1]*d1 + n_rate[2]*d2;
 }

@@ -1,14 +1,14 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation b2b716889767197b
+ * derivation af6972725e77e58e
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* the numbers of one limb, in the order of the core */
-enum { BASE_X, BASE_Y, BASE_Z, PLATFORM_X, PLATFORM_Y, PLATFORM_Z, OFFSET, GAIN, ROD, CRANK, TILT1, TILT2, PLATFORM_TILT1, PLATFORM_TILT2, SLOTS };
-#define SLOT_NAMES "base.x base.y base.z platform.x platform.y platform.z offset gain rod crank tilt1 tilt2 platform_tilt1 platform_tilt2"
+enum { BASE_X, BASE_Y, BASE_Z, PLATFORM_X, PLATFORM_Y, PLATFORM_Z, OFFSET, GAIN, ROD, CRANK, TILT1, TILT2, PLATFORM_TILT1, PLATFORM_TILT2, HINGE_TILT1, HINGE_TILT2, SLOTS };
+#define SLOT_NAMES "base.x base.y base.z platform.x platform.y platform.z offset gain rod crank tilt1 tilt2 platform_tilt1 platform_tilt2 hinge_tilt1 hinge_tilt2"
 /* axes: name, place, and the rows that have it */
-enum { AXES = 2 };
-#define AXIS_NAMES "base tilt1 tilt2;platform platform_tilt1 platform_tilt2"
-#define EACH_AXIS(X) X(base, 0, ROW_BASE_PLANE | ROW_COUPLE) X(platform, 1, ROW_PLATFORM_PLANE | ROW_COUPLE)
+enum { AXES = 3 };
+#define AXIS_NAMES "base tilt1 tilt2;platform platform_tilt1 platform_tilt2;hinge hinge_tilt1 hinge_tilt2"
+#define EACH_AXIS(X) X(base, 0, ROW_BASE_PLANE | ROW_COUPLE) X(platform, 1, ROW_PLATFORM_PLANE | ROW_COUPLE) X(hinge, 2, ROW_HINGE_PLANE)
 /* drivers: does q̃ move the anchor, does it change the length? */
 enum { DRIVER_LENGTH, DRIVER_SLIDER, DRIVER_CRANK, DRIVERS };
 #define DRIVER_NAMES "length slider crank"
@@ -17,9 +17,10 @@ enum { DRIVER_LENGTH, DRIVER_SLIDER, DRIVER_CRANK, DRIVERS };
 #define ROW_BASE_PLANE 1
 #define ROW_PLATFORM_PLANE 2
 #define ROW_COUPLE 4
-#define ALL_ROWS 7
-#define ROW_NAMES "base_plane platform_plane couple"
-#define EACH_ROW(X) X(BASE_PLANE, base_plane, 0, 0) X(PLATFORM_PLANE, platform_plane, 0, 1) X(COUPLE, couple, 0, 1)
+#define ROW_HINGE_PLANE 8
+#define ALL_ROWS 15
+#define ROW_NAMES "base_plane base;platform_plane platform;couple base platform;hinge_plane hinge"
+#define EACH_ROW(X) X(BASE_PLANE, base_plane, 0, 0) X(PLATFORM_PLANE, platform_plane, 0, 1) X(COUPLE, couple, 0, 1) X(HINGE_PLANE, hinge_plane, 2, 0)
 /* pose maps: m free coordinates, how many of them are lengths, iterated on a state */
 enum { MAP_SPATIAL, MAP_TRANSLATION, MAP_PLANAR, MAP_2TPR2TPS };
 #define MAP_NAMES "spatial translation planar 2tpr2tps"

@@ -380,6 +380,27 @@ INLINE void FN(couple_bend)(const real h[3], const real h1[3], const real h2[3],
 }
 
 /*
+ * hinge_plane: how the row bends along a path
+ *     d²Φ/dt²,  Φ = n·d
+ * in  h[3]           p + R b - c [mm]
+ * in  h1[3]          its velocity [/s]
+ * in  h2[3]          its acceleration [/s²]
+ * in  n[3]           base-side axis, base frame
+ * in  a[3]           platform-side axis, base frame
+ * in  a1[3]          its velocity [/s]
+ * in  a2[3]          its acceleration [/s²]
+ * in  lever          λ [mm]
+ * out phi2           d²Φ/dt² [mm/s²]
+ * operations: 2 +, 3 *, 0 /, 0 sqrt
+ */
+INLINE void FN(hinge_plane_bend)(const real h[3], const real h1[3], const real h2[3],
+        const real n[3], const real a[3], const real a1[3], const real a2[3], real lever,
+        real *phi2)
+{
+    *phi2 = h2[0]*n[0] + h2[1]*n[1] + h2[2]*n[2];
+}
+
+/*
  * spatial: rate of the twist on the path state ⊕ δ t
  *     (ω̇, v̇) at t = 0
  * in  state[7]       of the map

@@ -24,7 +24,8 @@ RETURNED = 1e-8  # mm; of an angle its arc at the characteristic length
 OTHER = 1e-3  # mm, from which a pose is another one and not the same one badly solved
 CLOSED = 1e-8  # mm, to which an other mode meets the closures
 ON_THE_MANIFOLD = 1e-9  # mm, to which the wanted poses do
-CONSTRAINED = ("2tpr2tps-spatial", "3rps", "linear-delta-6")  # limbs that leave no six numbers free
+# limbs that leave no six numbers free
+CONSTRAINED = ("2tpr2tps-spatial", "3rps", "3prs", "linear-delta-6")
 OWN_GEOMETRY = 4  # every fourth chunk has a geometry of its own in each row
 
 

@@ -19,8 +19,10 @@ import numpy as np
 SLOTS = (
     *("base.x", "base.y", "base.z", "platform.x", "platform.y", "platform.z"),
     *("offset", "gain", "rod", "crank", "tilt1", "tilt2", "platform_tilt1", "platform_tilt2"),
+    *("hinge_tilt1", "hinge_tilt2"),
 )
 LENGTH_KINDS = ("UPS", "UPR", "RPS")
+SLIDER_KINDS = ("PUS", "PRS")
 EX, EY, EZ = np.eye(3)
 
 Array = np.ndarray
@@ -96,12 +98,17 @@ def platform_axis(limb: Any, n: dict[str, float]) -> Array:
     return np.asarray(limb.platform_frame) @ rx(n["platform_tilt1"]) @ ry(n["platform_tilt2"]) @ EZ
 
 
+def hinge(limb: Any, n: dict[str, float]) -> Array:
+    """The axis that a PRS limb's rod swings about, fixed in the carriage: in base axes."""
+    return np.asarray(limb.frames["hinge"]) @ rx(n["hinge_tilt1"]) @ ry(n["hinge_tilt2"]) @ EZ
+
+
 def driver(limb: Any, n: dict[str, float], q: complex) -> tuple[Array, complex]:
     """Anchor point c and length rho at the actuator coordinate q."""
     moved = n["gain"] * q + n["offset"]
     if limb.kind in LENGTH_KINDS:
         return base_point(n), moved
-    if limb.kind == "PUS":
+    if limb.kind in SLIDER_KINDS:
         return base_point(n) + moved * (tilted(limb, n) @ EZ), n["rod"]
     if limb.kind == "RUS":
         return base_point(n) + n["crank"] * (tilted(limb, n) @ rz(moved) @ EX), n["rod"]
@@ -116,6 +123,8 @@ def limb_rows(limb: Any, n: dict[str, float], pose: Array, q: complex) -> list[c
     rows = [np.sqrt(d @ d) - rho]
     if limb.kind == "RPS":
         rows.append((tilted(limb, n) @ EZ) @ d)
+    if limb.kind == "PRS":
+        rows.append(hinge(limb, n) @ d)
     if limb.kind == "UPR":
         r = R @ platform_axis(limb, n)
         rows.append(r @ d)
@@ -142,7 +151,7 @@ def limb_inverse(limb: Any, n: dict[str, float], pose: Array) -> float:
     w = pose[:3] + rotation(pose) @ platform_point(n) - base_point(n)
     if limb.kind in LENGTH_KINDS:
         moved = np.sqrt(w @ w)
-    elif limb.kind == "PUS":  # |w - moved s| = rod; the branch is the sign of (w - moved s).s
+    elif limb.kind in SLIDER_KINDS:  # |w - moved s| = rod; the branch is the sign of (w - moved s).s
         along = w @ (tilted(limb, n) @ EZ)
         under = n["rod"] ** 2 - (w @ w - along**2)
         moved = along - limb.branch * np.sqrt(under) if under >= 0 else np.nan
@@ -254,6 +263,7 @@ def error_jacobian(
     flat = np.ravel(model.geometry.slots if slots is None else slots).astype(float)
     size = {"gain": 1e-4, "tilt1": 1e-4, "tilt2": 1e-4}
     size |= {"platform_tilt1": 1e-4, "platform_tilt2": 1e-4}
+    size |= {"hinge_tilt1": 1e-4, "hinge_tilt2": 1e-4}
     steps = np.tile([size.get(name, 1e-2) for name in SLOTS], len(model.limbs))
     start = forward(model, q, flat, guess)
     return central_difference(lambda at: forward(model, q, at, start), flat, steps)

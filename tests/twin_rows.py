@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from .twin import EZ, LENGTH_KINDS, SLOTS
+from .twin import EZ, LENGTH_KINDS, SLIDER_KINDS, SLOTS
 
 Array = np.ndarray
 
@@ -52,7 +52,7 @@ def closures(model: Any, poses: Array, q: Array, slots: Array | None = None) -> 
         axis = turned(limb.frame, n["tilt1"], n["tilt2"], EZ)
         if limb.kind in LENGTH_KINDS:
             anchor, radius = base, moved
-        elif limb.kind == "PUS":
+        elif limb.kind in SLIDER_KINDS:
             anchor, radius = base + moved[:, None] * axis, n["rod"]
         elif limb.kind != "RUS":
             raise ValueError(f"unknown limb kind {limb.kind!r}")
@@ -64,6 +64,9 @@ def closures(model: Any, poses: Array, q: Array, slots: Array | None = None) -> 
         result.append(np.linalg.norm(d, axis=1) - radius)
         if limb.kind == "RPS":
             result.append(np.einsum("ni,ni->n", axis, d))
+        if limb.kind == "PRS":
+            hinge = turned(limb.frames["hinge"], n["hinge_tilt1"], n["hinge_tilt2"], EZ)
+            result.append(np.einsum("ni,ni->n", hinge, d))
         if limb.kind == "UPR":
             r = turned(limb.platform_frame, n["platform_tilt1"], n["platform_tilt2"], EZ)
             r = np.einsum("nij,nj->ni", R, r)

@@ -17,6 +17,7 @@ WORKSPACE: dict[str, tuple[float, float, float, float, float, float]] = {
     "2tpr2tps": (0.0, 20.0, 20.0, 0.12, 0.12, 0.0),
     "2tpr2tps-spatial": (0.0, 20.0, 20.0, 0.12, 0.12, 0.0),
     "3rps": (0.0, 0.0, 250.0, 0.5, 0.5, 0.0),
+    "3prs": (0.0, 0.0, 60.0, 0.35, 0.35, 0.0),
     "3rrr-planar": (20.0, 20.0, 0.0, 0.0, 0.0, 0.2),
     "6-rus": (20.0, 20.0, 20.0, 0.15, 0.15, 0.15),
     "hexapod": (100.0, 100.0, 100.0, 0.3, 0.3, 0.3),
@@ -33,22 +34,21 @@ def poses(name: str, count: int, seed: int = 0) -> np.ndarray:
     found = robot_file.read(name).home + spread * WORKSPACE[name]
     if name in ("2tpr2tps", "2tpr2tps-spatial"):
         found[:, 0] = found[:, 2] * np.tan(found[:, 4])
-    if name == "3rps":
-        follow_3rps(found)
+    if name in ("3rps", "3prs"):
+        follow_planes(found, robot_file.read(name).geometry["platform1.x"])
     return found
 
 
-def follow_3rps(poses: np.ndarray) -> None:
-    """Set x, y and gamma of a 3-RPS's poses (N, 6) to what z, alpha and beta lead to.
+def follow_planes(poses: np.ndarray, radius: float) -> None:
+    """Set x, y and gamma of a 3-RPS's or 3-PRS's poses (N, 6) to what z, alpha and beta lead to.
 
-    The platform joints, at radius r and 0, 120 and 240 degrees, stay in their legs' planes. With
+    The platform joints, at radius r and 0, 120 and 240 degrees, stay in their limbs' planes. With
     the platform's axes n and o (columns of R): n_y = o_x, x = r (n_x - o_y) / 2, y = -r n_y.
     """
     alpha, beta = poses[:, 3], poses[:, 4]
     gamma = np.arctan2(np.sin(alpha) * np.sin(beta), np.cos(alpha) + np.cos(beta))
     n_x, n_y = np.cos(gamma) * np.cos(beta), np.sin(gamma) * np.cos(beta)
     o_y = np.sin(gamma) * np.sin(beta) * np.sin(alpha) + np.cos(gamma) * np.cos(alpha)
-    radius = robot_file.read("3rps").geometry["platform1.x"]
     poses[:, 0] = radius * (n_x - o_y) / 2.0
     poses[:, 1] = -radius * n_y
     poses[:, 5] = gamma

@@ -53,13 +53,6 @@ _KEYS = {
     "base_cone": "{{ axis = …, angle = … }}: how far its joint on the base swings",
     "platform_cone": "the same of its joint on the platform",
 }
-_KINDS = {
-    "UPS": "a leg of variable length",
-    "UPR": "a leg of variable length that keeps to a plane of the platform",
-    "RPS": "a leg of variable length that keeps to a plane of the base",
-    "PUS": "a carriage and a rod",
-    "RUS": "a crank and a rod",
-}
 _ARM = """\
 # units      of every number below; mm, m or in; deg or rad
 # [tool]     home: pose of the tool with all joints at zero
@@ -125,7 +118,9 @@ def _limb_keys(limbs: Iterable[dict[str, object]]) -> Iterable[str]:
     named = dict.fromkeys(str(limb["kind"]) for limb in limbs)
     kinds = {kind: ALIASES.get(kind, kind) for kind in named}
     used = {key for kind in kinds.values() for key in KINDS[kind].keys()}  # noqa: SIM118
-    explained = ("\n#" + 18 * " ").join(f"{name}: {_KINDS[kind]}" for name, kind in kinds.items())
+    explained = ("\n#" + 18 * " ").join(
+        f"{name}: {KINDS[kind].what}" for name, kind in kinds.items()
+    )
     for names, words in _KEYS.items():
         if names.split(",")[0] in used:
             yield f"#   {names:13}  {words.format(kinds=explained)}\n"

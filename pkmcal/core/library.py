@@ -27,7 +27,9 @@ AXES: dict[str, tuple[str, ...]] = {  # and the slots of their tilts
     name: tuple(tilts) for name, *tilts in map(str.split, _text(lib.pkm_axis_names()).split(";"))
 }
 DRIVERS: tuple[str, ...] = tuple(_text(lib.pkm_driver_names()).split())
-ROWS: tuple[str, ...] = tuple(_text(lib.pkm_row_names()).split())
+ROWS: dict[str, tuple[str, ...]] = {  # beside the sphere, and the axes that they have
+    name: tuple(axes) for name, *axes in map(str.split, _text(lib.pkm_row_names()).split(";"))
+}
 MAPS: dict[str, tuple[str, ...]] = {
     name: tuple(free.split())
     for name, free in zip(

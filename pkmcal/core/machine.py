@@ -94,7 +94,7 @@ class Machine:
         weights: list[float] = []
         for i, limb in enumerate(limbs):
             struct.driver[i] = DRIVERS.index(limb["driver"])
-            struct.rows[i] = sum(1 << ROWS.index(row) for row in limb["rows"])
+            struct.rows[i] = sum(1 << list(ROWS).index(row) for row in limb["rows"])
             struct.actuator[i] = limb["actuator"]
             struct.branch[i] = limb["branch"]
             struct.lever[i] = limb["lever"]

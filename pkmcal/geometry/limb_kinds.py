@@ -28,6 +28,8 @@ class LimbKind:
         The name of the kind.
     driver : {"length", "slider", "crank"}
         How the actuator moves the limb; a crank's coordinate is an angle.
+    what : str
+        What the limb is, in a few words.
     axes : mapping of str to str
         Key of each axis of the core (`pkmcal.core.AXES`) that the limb has; its tilts have the key
         with ``_tilt`` behind it.
@@ -40,6 +42,7 @@ class LimbKind:
 
     name: str
     driver: Driver
+    what: str
     axes: Mapping[str, str] = field(default_factory=dict)
     rows: tuple[str, ...] = ()
     couple: bool = False
@@ -48,6 +51,14 @@ class LimbKind:
         unknown = {self.driver, *self.axes, *self.rows} - {*DRIVERS, *AXES, *ROWS}
         if unknown:
             raise ValueError(f"{self.name}: the core has no {', '.join(sorted(unknown))}")
+        for couple in {False, self.couple}:
+            used = {axis for row in self.all_rows(couple) for axis in ROWS[row]}
+            used |= set() if self.driver == "length" else {"base"}
+            if used != set(self.axes_of(couple)):
+                raise ValueError(
+                    f"{self.name}: its driver and rows have the axes {sorted(used)}, "
+                    f"but {sorted(self.axes_of(couple))} have keys"
+                )
 
     @property
     def actuator_unit(self) -> Unit:
@@ -109,17 +120,31 @@ class LimbKind:
 KINDS: dict[str, LimbKind] = {
     kind.name: kind
     for kind in (
-        LimbKind("UPS", "length"),
+        LimbKind("UPS", "length", "a leg of variable length"),
         LimbKind(
             "UPR",
             "length",
+            "a leg of variable length that keeps to a plane of the platform",
             axes={"base": "universal", "platform": "revolute"},
             rows=("platform_plane",),
             couple=True,
         ),
-        LimbKind("RPS", "length", {"base": "normal"}, rows=("base_plane",)),
-        LimbKind("PUS", "slider", {"base": "slider"}),
-        LimbKind("RUS", "crank", {"base": "axis"}),
+        LimbKind(
+            "RPS",
+            "length",
+            "a leg of variable length that keeps to a plane of the base",
+            axes={"base": "normal"},
+            rows=("base_plane",),
+        ),
+        LimbKind("PUS", "slider", "a carriage and a rod", axes={"base": "slider"}),
+        LimbKind(
+            "PRS",
+            "slider",
+            "a carriage and a rod that keeps to a plane of the carriage",
+            axes={"base": "slider", "hinge": "normal"},
+            rows=("hinge_plane",),
+        ),
+        LimbKind("RUS", "crank", "a crank and a rod", axes={"base": "axis"}),
     )
 }
 

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.core.library import AXES
 from pkmcal.result import Result
 
 Array = Any  # of real or complex numbers
@@ -28,6 +29,7 @@ ROUNDING = 64 * np.finfo(float).eps
 UP = 1.0 + 1e-9  # what the rounding of a sum of bounds is far below
 DOWN = 1.0 - 1e-13
 R, P = slice(0, 9), slice(9, 12)
+PLANES = {"base_plane": "base", "hinge_plane": "hinge"}  # fixed in the base, each with its normal
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,7 +71,7 @@ class Closures:
         Pose map.
     rows : sequence of sequences of str
         Of each limb, its rows beside the sphere.
-    spheres : ndarray (limbs, 13) or (N, limbs, 13)
+    spheres : ndarray (limbs, 7 + 3 axes) or (N, limbs, 7 + 3 axes)
         The limbs, as `Machine.spheres` gives them, for all rows or for each.
     length : float
         Characteristic length, mm: p is measured in it.
@@ -90,7 +92,8 @@ class Closures:
     ) -> None:
         self.map, self.rows, self.length, self.size = map, rows, length, size
         one = spheres.reshape(-1, *spheres.shape[-2:])[0]  # actuators change anchors and lengths
-        self.b, self.n, self.a, self.levers = one[:, 0:3], one[:, 7:10], one[:, 10:13], levers
+        self.b, self.levers = one[:, 0:3], levers
+        self.axis = {axis: one[:, 7 + 3 * k : 10 + 3 * k] for k, axis in enumerate(AXES)}
         self.c, self.rho = spheres[..., 3:6], spheres[..., 6]
 
     def __call__(self, u: Array) -> tuple[Array, Array, FloatArray, FloatArray, FloatArray]:
@@ -112,28 +115,34 @@ class Closures:
             df.append(self._row(d, b))
             df_abs.append(self._row(far, np.abs(b)))
             change.append(3.0 * reach**2)
-            if "base_plane" in kinds:
-                n = np.broadcast_to(self.n[i], d.shape)
-                f.append(np.sum(n * d, axis=1))
-                f_abs.append(np.sum(far, axis=1))
-                df.append(self._row(n, b))
-                df_abs.append(self._row(np.ones(d.shape), np.abs(b)))
-                change.append(0.0)
-            if "platform_plane" in kinds:
-                a, Ra = self.a[i], turn @ self.a[i]
-                Ra_abs = spread.sum(axis=2)
-                f.append(np.sum(Ra * d, axis=1))
-                f_abs.append(np.sum(Ra_abs * far, axis=1))
-                df.append(self._row(Ra, b) + self._row(d, a, by_p=False))
-                df_abs.append(self._row(Ra_abs, np.abs(b)) + self._row(far, np.ones(3), by_p=False))
-                change.append(6.0 * np.abs(a).sum() * reach)
-            if "couple" in kinds:
-                n, a = np.broadcast_to(self.n[i], d.shape), self.levers[i] * self.a[i]
-                f.append(np.sum(n * (turn @ a), axis=1))
-                f_abs.append(np.sum(spread, axis=(1, 2)) * self.levers[i])
-                df.append(self._row(n, a, by_p=False))
-                df_abs.append(self._row(np.ones(d.shape), np.full(3, self.levers[i]), by_p=False))
-                change.append(0.0)
+            for kind in kinds:
+                if kind in PLANES:
+                    n = np.broadcast_to(self.axis[PLANES[kind]][i], d.shape)
+                    f.append(np.sum(n * d, axis=1))
+                    f_abs.append(np.sum(far, axis=1))
+                    df.append(self._row(n, b))
+                    df_abs.append(self._row(np.ones(d.shape), np.abs(b)))
+                    change.append(0.0)
+                elif kind == "platform_plane":
+                    a, Ra = self.axis["platform"][i], turn @ self.axis["platform"][i]
+                    Ra_abs = spread.sum(axis=2)
+                    f.append(np.sum(Ra * d, axis=1))
+                    f_abs.append(np.sum(Ra_abs * far, axis=1))
+                    df.append(self._row(Ra, b) + self._row(d, a, by_p=False))
+                    by_turn = self._row(far, np.ones(3), by_p=False)
+                    df_abs.append(self._row(Ra_abs, np.abs(b)) + by_turn)
+                    change.append(6.0 * np.abs(a).sum() * reach)
+                elif kind == "couple":
+                    n = np.broadcast_to(self.axis["base"][i], d.shape)
+                    lever = self.levers[i]
+                    a = lever * self.axis["platform"][i]
+                    f.append(np.sum(n * (turn @ a), axis=1))
+                    f_abs.append(np.sum(spread, axis=(1, 2)) * lever)
+                    df.append(self._row(n, a, by_p=False))
+                    df_abs.append(self._row(np.ones(d.shape), np.full(3, lever), by_p=False))
+                    change.append(0.0)
+                else:
+                    raise ValueError(f"no certificate has the row {kind!r}")
         for row in self._pose_rows(u):
             for into, entry in zip((f, df, f_abs, df_abs, change), row, strict=True):
                 into.append(entry)

@@ -54,7 +54,7 @@ class AssemblyProblem(NamedTuple):
     q: FloatArray
 
     def spheres(self) -> FloatArray:
-        """The limbs (limbs, 13), or of each row."""
+        """The limbs (limbs, 7 + 3 axes), or of each row."""
         rows = np.ascontiguousarray(self.q.reshape(-1, self.q.shape[-1]))
         spheres: FloatArray = self.machine.spheres(self.slots, rows)
         return spheres if self.q.ndim > 1 else spheres[0]

@@ -37,8 +37,8 @@ class StartSystem:
     ----------
     name : str
         Of the kind of machine.
-    limbs : ndarray of complex (limbs, 13)
-        As `Machine.spheres` gives them.
+    limbs : ndarray of complex (limbs, width)
+        As `Machine.spheres` gives them, up to the last axis that a row has.
     states : ndarray of complex (N, k)
         Every solution, as a state of the pose map.
     """
@@ -105,7 +105,7 @@ def start_system(map: str, rows: list[tuple[str, ...]], spheres: FloatArray) -> 
         Pose map.
     rows : list of tuple of str
         Of each limb, its rows beside the sphere.
-    spheres : ndarray (limbs, 13)
+    spheres : ndarray (limbs, 7 + 3 axes)
         The limbs; what is zero in a family has to be zero here.
     """
     for family in _families():
@@ -123,7 +123,7 @@ def start_system(map: str, rows: list[tuple[str, ...]], spheres: FloatArray) -> 
 
 
 def endpoints(machine: Machine, start: StartSystem, map: str, spheres: FloatArray) -> Endpoints:
-    """Follow every path to the limbs `spheres` (limbs, 13); where some are lost, again."""
+    """Follow every path to the limbs `spheres`; where some are lost, again."""
     target, scale, middle_b, middle_c = _normalized(map, spheres)
     n, every, before = len(start.states), np.empty((0, 12), dtype=np.complex128), None
     for accuracy, way in ATTEMPTS:

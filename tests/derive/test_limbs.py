@@ -64,11 +64,13 @@ def closures() -> dict[str, sp.Expr]:
         made[f"{driver}_carry"] = symbols("pull", 3).dot(centre)
     known = (b, c, symbols("n", 3), symbols("a", 3))
     tilts = (platform, c, tilted(F, "tilt").col(2), tilted(P, "platform_tilt").col(2))
+    hinges = {"row": known[2], "derivatives": tilted(F, "hinge_tilt").col(2)}
     for suffix, (joint, foot, n, a) in {"row": known, "derivatives": tilts}.items():
         d, axis = p + v + small * R * joint - foot, small * R * a
         made[f"base_plane_{suffix}"] = n.dot(d)
         made[f"platform_plane_{suffix}"] = axis.dot(d)
         made[f"couple_{suffix}"] = lever * axis.dot(n)
+        made[f"hinge_plane_{suffix}"] = hinges[suffix].dot(d)
     return made
 
 
@@ -160,6 +162,7 @@ def test_the_path_of_the_joint_from_the_anchor_is_differentiated_by_time(driver:
 def test_axes_are_the_third_columns_of_the_tilted_frames() -> None:
     assert_equal(FUNCTIONS["base_axis"].result("axis"), tilted(F, "tilt").col(2))
     assert_equal(FUNCTIONS["platform_axis"].result("axis"), tilted(F, "platform_tilt").col(2))
+    assert_equal(FUNCTIONS["hinge_axis"].result("axis"), tilted(F, "hinge_tilt").col(2))
 
 
 def test_command_undoes_drive() -> None:

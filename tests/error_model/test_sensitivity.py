@@ -17,7 +17,7 @@ from ..workspaces import WORKSPACE, poses
 
 ROOT = Path(__file__).resolve().parents[2]
 DELTA = ROOT / "examples" / "linear-delta" / "robot.toml"
-CONSTRAINED = ("2tpr2tps-spatial", "3rps", "linear-delta-6")
+CONSTRAINED = ("2tpr2tps-spatial", "3rps", "3prs", "linear-delta-6")
 MACHINES = sorted(WORKSPACE)
 
 

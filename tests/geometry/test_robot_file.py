@@ -100,10 +100,10 @@ TILT = st.lists(NAMED_ANGLE, min_size=2, max_size=2)
 @st.composite
 def limbs(draw: st.DrawFn) -> dict[str, Any]:
     """A limb of any kind with any of its keys."""
-    kind = draw(st.sampled_from(["UPS", "TPR", "UPR", "RPS", "PUS", "RUS"]))
+    kind = draw(st.sampled_from(["UPS", "TPR", "UPR", "RPS", "PUS", "PRS", "RUS"]))
     limb = {"kind": kind, "base": draw(POINT), "platform": draw(POINT)}
     axes = {"TPR": ["revolute"], "UPR": ["revolute"], "RPS": ["normal"]}
-    axes |= {"PUS": ["slider"], "RUS": ["axis"]}
+    axes |= {"PUS": ["slider"], "PRS": ["slider", "normal"], "RUS": ["axis"]}
     named = list(axes.get(kind, []))
     if kind == "UPR":
         limb["couple"] = draw(LENGTH)
@@ -112,7 +112,7 @@ def limbs(draw: st.DrawFn) -> dict[str, Any]:
         limb[key] = list(draw(DIRECTION))
         if draw(st.booleans()):
             limb[f"{key}_tilt"] = draw(TILT)
-    if kind in ("PUS", "RUS"):
+    if kind in ("PUS", "PRS", "RUS"):
         limb |= {"rod": draw(LENGTH), "branch": draw(st.sampled_from([1, -1]))}
     if kind == "RUS":
         x, y, z = limb["axis"]
@@ -121,7 +121,7 @@ def limbs(draw: st.DrawFn) -> dict[str, Any]:
         limb["crank"] = draw(LENGTH | st.just("arm"))
     elif draw(st.booleans()):
         limb["offset"] = draw(NAMED_LENGTH)
-    rows = {"TPR": 1, "UPR": 2, "RPS": 1}.get(kind, 0)
+    rows = {"TPR": 1, "UPR": 2, "RPS": 1, "PRS": 1}.get(kind, 0)
     if rows and draw(st.booleans()):
         limb["weights"] = draw(st.lists(LENGTH, min_size=rows, max_size=rows))
     if draw(st.booleans()):
@@ -235,10 +235,11 @@ def test_each_kind_has_its_numbers() -> None:
         {"kind": "RPS", "normal": [0, 1, 0]},
         {"kind": "PUS", "slider": [0, 0, 1], **slide},
         {"kind": "RUS", "axis": [0, 0, 1], "zero": [1, 0, 0], "crank": 1.0, **slide},
+        {"kind": "PRS", "slider": [0, 0, 1], "normal": [0, 1, 0], **slide},
     ]
     model = parse(document([base | limb for limb in limbs]))
     extra = [
-        [number.name for number in model.geometry.numbers if number.limb == i][8:] for i in range(6)
+        [number.name for number in model.geometry.numbers if number.limb == i][8:] for i in range(7)
     ]
     assert extra == [
         [],
@@ -247,6 +248,7 @@ def test_each_kind_has_its_numbers() -> None:
         ["normal4.tilt1", "normal4.tilt2"],
         ["rod5", "slider5.tilt1", "slider5.tilt2"],
         ["rod6", "crank6", "axis6.tilt1", "axis6.tilt2"],
+        ["rod7", "slider7.tilt1", "slider7.tilt2", "normal7.tilt1", "normal7.tilt2"],
     ]
     assert [limb.weights for limb in model.limbs[:5]] == [(), (1.0,), (1.0, 1.0), (1.0,), ()]
     assert [limb.branch for limb in model.limbs[:6]] == [0, 0, 0, 0, 1, 1]

@@ -13,9 +13,9 @@ from pkmcal.core.library import POSE
 
 from .. import twin, twin_rows
 from ..round_trips import errors
-from ..workspaces import WORKSPACE, follow_3rps, poses
+from ..workspaces import WORKSPACE, follow_planes, poses
 
-CONSTRAINED = ("2tpr2tps-spatial", "3rps")
+CONSTRAINED = ("2tpr2tps-spatial", "3rps", "3prs")
 EIGHT_ROWS = Path(__file__).parents[2] / "examples" / "2tpr2tps-eight-rows.toml"
 every = pytest.mark.parametrize("name", WORKSPACE)
 constrained = pytest.mark.parametrize("name", CONSTRAINED)
@@ -67,12 +67,13 @@ def test_2tpr2tps_completes_to_eq_7() -> None:
         np.testing.assert_allclose(found[:, 5], 0.0, atol=1e-12)
 
 
-def test_3rps_completes_to_the_drift_of_its_planes() -> None:
-    at = poses("3rps", 40, seed=33)
-    wanted = at.copy()
+@pytest.mark.parametrize("name", ["3rps", "3prs"])
+def test_limbs_in_planes_complete_to_the_drift_of_their_planes(name: str) -> None:
+    at = poses(name, 40, seed=33)
+    robot, wanted = pk.load(name), at.copy()
     wanted[:, [0, 1, 5]] = 0.0
-    found = pk.load("3rps").complete(wanted)
-    follow_3rps(wanted)
+    found = robot.complete(wanted)
+    follow_planes(wanted, robot.geometry["platform1.x"])
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-9)
     assert np.abs(found[:, :2]).max() > 5.0  # mm: not next to nothing
 

@@ -114,7 +114,7 @@ def test_jacobians_are_of_the_free_coordinates_in_the_machines_own_frame(
     np.testing.assert_allclose(robot.forward_jacobian(wanted), by_q, rtol=1e-8, atol=1e-8)
 
 
-@pytest.mark.parametrize("name", ["3rps", "2tpr2tps-spatial", "linear-delta-6"])
+@pytest.mark.parametrize("name", ["3rps", "3prs", "2tpr2tps-spatial", "linear-delta-6"])
 @framed
 def test_completed_poses_keep_what_is_matched_in_the_machines_own_frame(
     name: str, frames: tuple[Frame, Frame]

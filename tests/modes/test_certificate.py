@@ -14,7 +14,7 @@ from .. import dietmaier
 
 NAMES = [
     *("2tpr2tps", "2tpr2tps-spatial", "rbt-6t03p", "hexapod", "linear-delta", "rotary-delta"),
-    *("6-rus", "3rps", "3rrr-planar"),
+    *("6-rus", "3rps", "3prs", "3rrr-planar"),
 ]
 
 

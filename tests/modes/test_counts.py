@@ -57,14 +57,15 @@ POSES = {
 
 
 def count(map: str, rows: Sequence[Sequence[str]], spheres: Sequence[Sequence[int]]) -> int:
-    """Solutions modulo the prime of limbs (13 numbers each), with their multiplicity."""
+    """Solutions modulo the prime of limbs (joint, anchor, length, axes), with multiplicity."""
     equations = rotation() + POSES[map]
     for kinds, g in zip(rows, spheres, strict=True):
         turned = ["+".join(f"{g[j]}*{R[k][j]}" for j in range(3)) for k in range(3)]
         d = [f"({P[k]}+{turned[k]}-{g[3 + k]})" for k in range(3)]
         equations.append("+".join(f"{each}*{each}" for each in d) + f"-{g[6]}*{g[6]}")
-        if "base_plane" in kinds:
-            equations.append("+".join(f"{g[7 + k]}*{d[k]}" for k in range(3)))
+        for kind, normal in (("base_plane", 7), ("hinge_plane", 13)):
+            if kind in kinds:
+                equations.append("+".join(f"{g[normal + k]}*{d[k]}" for k in range(3)))
         if "platform_plane" in kinds:
             axis = ["+".join(f"{g[10 + j]}*{R[k][j]}" for j in range(3)) for k in range(3)]
             equations.append("+".join(f"({axis[k]})*{d[k]}" for k in range(3)))
@@ -82,7 +83,7 @@ def count(map: str, rows: Sequence[Sequence[str]], spheres: Sequence[Sequence[in
 @pytest.mark.parametrize("family", homotopy._families(), ids=lambda family: family.start.name)
 def test_start_systems_hold_as_many_solutions_as_the_gröbner_basis_says(family):
     draw = random.Random(7)
-    spheres = [[draw.randrange(1, PRIME) for _ in range(13)] for _ in family.rows]
+    spheres = [[draw.randrange(1, PRIME) for _ in range(16)] for _ in family.rows]
     for limb, place in family.zero:
         spheres[limb][place] = 0
     assert count(family.map, family.rows, spheres) == len(family.start.states)
@@ -98,7 +99,7 @@ def modulo(value: float) -> int:
     [
         *(("2tpr2tps", 24), ("2tpr2tps-spatial", 24), ("rbt-6t03p", 40), ("hexapod", 36)),
         *(("linear-delta", 2), ("linear-delta-6", 40), ("rotary-delta", 2), ("6-rus", 40)),
-        *(("3rps", 16), ("3rrr-planar", 6), ("rbt-6t03p-printed", 0)),
+        *(("3rps", 16), ("3prs", 16), ("3rrr-planar", 6), ("rbt-6t03p-printed", 0)),
     ],
 )
 def test_complex_modes_of_builtin_machines_are_as_documented(name, solutions):

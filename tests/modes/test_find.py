@@ -15,7 +15,7 @@ from .. import dietmaier, robots, twin_rows
 
 SQUARE = [
     *("2tpr2tps", "2tpr2tps-spatial", "rbt-6t03p", "hexapod", "linear-delta", "rotary-delta"),
-    *("6-rus", "3rps", "3rrr-planar"),
+    *("6-rus", "3rps", "3prs", "3rrr-planar"),
 ]
 
 
@@ -350,7 +350,7 @@ def test_homotopy_and_exhaustive_starts_agree_on_a_thousand_random_hexapods():
 
 def test_start_systems_are_read_once_and_their_counts_are_the_known_ones():
     known = {"hexapod": 40, "3rps": 16, "2tpr2tps-spatial": 32, "delta": 2, "planar": 6}
-    known |= {"2tpr2tps": 32, "2tpr2tps-published": 24}
+    known |= {"3prs": 16, "2tpr2tps": 32, "2tpr2tps-published": 24}
     families = homotopy._families()
     assert {f.start.name: len(f.start.states) for f in families} == known
     assert homotopy._families() is families

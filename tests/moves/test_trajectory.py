@@ -20,7 +20,7 @@ from .. import twin
 from ..robots import made, ring
 
 STRAIGHT = ("rbt-6t03p", "hexapod", "6-rus", "linear-delta", "rotary-delta", "3rrr-planar")
-CONSTRAINED = ("2tpr2tps", "2tpr2tps-spatial", "3rps")
+CONSTRAINED = ("2tpr2tps", "2tpr2tps-spatial", "3rps", "3prs")
 SHARED = ("linear-delta-6",)  # keeps its orientation, so that a straight path can be followed
 EIGHT_ROWS = Path(__file__).parents[2] / "examples" / "2tpr2tps-eight-rows.toml"
 EVERY = (*STRAIGHT, *CONSTRAINED, *SHARED)
@@ -154,11 +154,13 @@ def closures_in_50_digits(robot: pk.Robot, u: Any, q: Any) -> list[Any]:
         d = mp.matrix(u[:3]) + R * mp.matrix(twin.platform_point(n).tolist()) - mp.matrix(base)
         axis = mp.matrix(limb.frame[:, 2].tolist())
         turned = R * mp.matrix(limb.platform_frame[:, 2].tolist())
-        if limb.kind == "PUS":
+        if limb.kind in twin.SLIDER_KINDS:
             d, drive = d - drive * axis, mp.mpf(n["rod"])
         rows.append((mp.fdot(d, d) - drive**2) / (2 * drive))
         if limb.kind == "RPS":
             rows.append(mp.fdot(axis, d))
+        if limb.kind == "PRS":
+            rows.append(mp.fdot(mp.matrix(limb.frames["hinge"][:, 2].tolist()), d))
         if limb.kind == "UPR":
             rows.append(mp.fdot(turned, d))
             rows += [limb.couple * mp.fdot(turned, axis)] if limb.couple else []
