@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -102,11 +102,10 @@ class Compensation(Result):
         yield _ASSUMED[self.orientation]
         heads = ["row"]
         heads += [f"{q}{i} [{u}]" for q in ("q", "dq") for i, u in enumerate(self.units, 1)]
+        columns = (each.reshape(count, -1) for each in (self.actuators, self.correction))
         rows = [
             [str(row), *(fixed(float(value), 4) for value in (*q, *dq))]
-            for row, (q, dq) in enumerate(
-                zip(*(each.reshape(count, -1) for each in (self.actuators, self.correction)), strict=True)
-            )
+            for row, (q, dq) in enumerate(zip(*columns, strict=True))
         ]
         if len(rows) > _LISTED:
             rows[_LISTED - 4 : -3] = [["⋮"] * len(heads)]
@@ -213,9 +212,8 @@ def compensate(
     gross = np.zeros(len(poses), dtype=bool)
     history = []
     for _ in range(passes):
-        reached = measured
-        if callable(measured):
-            reached = measured((ideal + correction).reshape(*shape, -1))
+        sent = (ideal + correction).reshape(*shape, -1)
+        reached: Any = measured(sent) if callable(measured) else measured
         at = _pose_of(reached, poses, shape, orientation)
         gross |= np.linalg.norm((at - poses)[:, :3], axis=1) > robot.length
         there = robot.inverse(at, match)

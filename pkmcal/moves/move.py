@@ -206,7 +206,7 @@ class Move(Result):
         turns = self.robot.turns
         if np.isinf(turns).all():
             return None
-        share = np.linspace(0.0, 1.0, _STEPS + 1)
+        share = np.linspace(0.0, 1.0, STEPS + 1)
         if self.space == "coordinates":
             q = self._completed(share[:, None])[1]
         else:
