@@ -357,7 +357,8 @@ def test_limits_hold_between_samples_where_a_rod_grazes_its_reach(
             if name in limits:
                 used = np.abs(values).max() / limits[name]
                 assert used == pytest.approx(1.0, abs=1e-3)
-                assert used <= 1.0 + 1e-6
+                # the peak goes with 1/√eps, and lengths are rounded: 2^-52 of them is some of eps
+                assert used <= 1.0 + 1e-6 + 4 * 2**-52 / eps
 
 
 @pytest.mark.parametrize(("name", "space"), MOVED)
