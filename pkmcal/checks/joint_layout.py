@@ -122,7 +122,7 @@ def slider_ways(robot: Robot) -> FloatArray:
 
 
 def on_rails(robot: Robot) -> bool:
-    """Whether the carriages of all limbs run on parallel rails side by side.
+    """Whether the carriages of all limbs run on parallel rails side by side, three at least.
 
     Such a machine has no axis that its limbs lie around (Triaglide, Hexaglide).
     """
@@ -130,8 +130,10 @@ def on_rails(robot: Robot) -> bool:
     if not ways.any(axis=1).all() or np.abs(np.cross(ways, ways[0])).max() > ALIKE:
         return False
     across = points - np.outer(points @ ways[0], ways[0])
-    spread = np.linalg.svd(across - across.mean(axis=0))[1]
-    return bool(spread[1] <= ALIKE * spread[0])
+    spread, along = np.linalg.svd(across - across.mean(axis=0))[1:]
+    places = np.sort(across @ along[0])
+    rails = 1 + int((np.diff(places) > ALIKE * size(robot)).sum())
+    return bool(spread[1] <= ALIKE * spread[0] and rails >= 3)
 
 
 def size(robot: Robot) -> float:

@@ -44,7 +44,7 @@ def tolerance(
         typer.Option(
             metavar="MM",
             help="The inverse question: which sigma may each joint have, so that 99.7 % of the"
-            " machines are within this distance?",
+            " machines are within this distance at all poses?",
         ),
     ] = None,
     poses: Poses = None,
