@@ -140,7 +140,10 @@ class Equations:
         )
 
     def misfit(self, pose: FloatArray, theta: FloatArray) -> FloatArray:
-        """How far off the worst reading at each pose (K, 6) is, mm, angles as their arc; (K,), inf without a pose."""
+        """How far off the worst reading at each pose (K, 6) is, mm (K,); inf without a pose.
+
+        Angles count as their arc.
+        """
         worst = np.zeros(len(pose))
         residuals = self._residuals(self._predicted(pose, theta))
         for measured, place, residual in zip(self.sets, self.pose_of, residuals, strict=True):
