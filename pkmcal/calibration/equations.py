@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Int32Array, mm_per_unit, rms
+from pkmcal.arrays import FloatArray, Int32Array, IntArray, mm_per_unit, rms
 from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_poses
 from pkmcal.calibration.parameters import POINTS, FitData, Parameters
 from pkmcal.core import instruments
@@ -113,22 +113,49 @@ class Equations:
         """Evaluate at `theta` (n,)."""
         robot = self.parameters.robot._with_values(self.parameters.values_at(theta))
         solved = robot.forward(self.actuators, self._guess)
+        predicted = self._predicted(solved.pose, theta)
+        residuals = self._residuals(predicted)
+        return Evaluation(theta, robot, solved.pose, solved.status, predicted, residuals)
+
+    def _predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
+        """Readings of each set at poses (K, 6)."""
         frame = self.parameters.frame_at(theta)
-        predicted, residuals = [], []
-        for i, measured in enumerate(self.sets):
-            seen = predict(
+        return tuple(
+            predict(
                 measured.kind,
-                solved.pose[self.pose_of[i]],
+                pose[self.pose_of[i]],
                 frame=frame if self._framed[i] else None,
                 origin=self.parameters.origin,
                 **self._known[i],
                 **{name: theta[columns] for name, columns in self._columns[i].items()},
             )
-            predicted.append(seen)
-            residuals.append(difference(measured.kind, measured.values, seen.values))
-        return Evaluation(
-            theta, robot, solved.pose, solved.status, tuple(predicted), tuple(residuals)
+            for i, measured in enumerate(self.sets)
         )
+
+    def _residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
+        """Measured less predicted of each set."""
+        return tuple(
+            difference(measured.kind, measured.values, seen.values)
+            for measured, seen in zip(self.sets, predicted, strict=True)
+        )
+
+    def misfit(self, pose: FloatArray, theta: FloatArray) -> FloatArray:
+        """How far off the worst reading at each pose (K, 6) is, mm (K,); inf without a pose.
+
+        Angles count as their arc.
+        """
+        worst = np.zeros(len(pose))
+        residuals = self._residuals(self._predicted(pose, theta))
+        for measured, place, residual in zip(self.sets, self.pose_of, residuals, strict=True):
+            arcs = mm_per_unit(measured.units, self.parameters.robot.length)
+            off = np.linalg.norm(residual * arcs, axis=1)
+            np.maximum.at(worst, place, np.where(np.isfinite(off), off, np.inf))
+        return worst
+
+    def start_from(self, rows: IntArray, poses: FloatArray) -> None:
+        """Start the forward kinematics of some distinct rows of actuators from poses (s, 6)."""
+        self._guess = self._guess.copy()
+        self._guess[rows] = poses
 
     def with_values(self, values: Sequence[FloatArray], prior_centre: FloatArray) -> Equations:
         """The same with other measured values (N, k) of each set, and another centre (n,)."""
@@ -143,7 +170,8 @@ class Equations:
     def start(self) -> Evaluation:
         """Evaluate at the present parameters, an unknown frame aligned with the readings.
 
-        Rows that fail from a measured pose are tried from home.
+        Rows that fail from a measured pose are tried from home, those that then miss grossly in
+        every assembly mode.
         """
         theta = self.parameters.start.copy()
         evaluation = self.at(theta)
