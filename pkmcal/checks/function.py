@@ -161,7 +161,7 @@ def not_closed(robot: Robot) -> Iterator[Finding]:
         yield Finding(
             "home",
             tuple(int(i) + 1 for i in open_limbs),
-            f"at home {named(open_limbs)} cannot close: {worst[open_limbs].max():.4g} mm are missing",
+            f"at home {named(open_limbs)} cannot close: {worst[open_limbs].max():.4g} mm missing",
             "check the axes of the limbs, their joints and the home pose",
         )
 

@@ -1,7 +1,7 @@
 """Complete poses from some of their coordinates, and the rates of the actuators there.
 
-Where limbs constrain the pose (3-RPS, 3-PRS, spatial 2TPR&2TPS) or share an actuator, six numbers are
-too many: the closures, with the matched coordinates held, determine the rest.
+Where limbs constrain the pose (3-RPS, 3-PRS, spatial 2TPR&2TPS) or share an actuator, six numbers
+are too many: the closures, with the matched coordinates held, determine the rest.
 """
 
 from __future__ import annotations
