@@ -1,4 +1,4 @@
-"""Start systems for every assembly mode: ``python -m derive.modes [NAME ...]`` writes them.
+"""Start systems for following every assembly mode; ``python -m derive.modes [NAME ...]`` writes.
 
 The closures of a machine are polynomial equations in the state of its pose map, with the numbers of
 its limbs as coefficients. For complex numbers chosen at random they have as many solutions as any
@@ -237,8 +237,9 @@ def main() -> None:
             "limbs": pairs(numbers),
             "states": pairs(states),
         }
-    kept = [name for name in known if name in content]
-    lines = [f"{json.dumps(name)}: {json.dumps(content[name])}" for name in kept]
+    lines = [
+        f"{json.dumps(name)}: {json.dumps(content[name])}" for name in known if name in content
+    ]
     FILE.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
 

@@ -151,8 +151,7 @@ def limb_inverse(limb: Any, n: dict[str, float], pose: Array) -> float:
     w = pose[:3] + rotation(pose) @ platform_point(n) - base_point(n)
     if limb.kind in LENGTH_KINDS:
         moved = np.sqrt(w @ w)
-    elif limb.kind in SLIDER_KINDS:
-        # the rod is |w - moved s|; the branch is the sign of (w - moved s).s
+    elif limb.kind in SLIDER_KINDS:  # |w - moved s| = rod; the branch: sign of (w - moved s).s
         along = w @ (tilted(limb, n) @ EZ)
         under = n["rod"] ** 2 - (w @ w - along**2)
         moved = along - limb.branch * np.sqrt(under) if under >= 0 else np.nan

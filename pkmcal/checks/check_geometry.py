@@ -9,7 +9,13 @@ from pkmcal.arguments import instance
 from pkmcal.arms.arm import SerialArm
 from pkmcal.checks.arm import ARM_CHECKS
 from pkmcal.checks.finding import Finding
-from pkmcal.checks.function import singular, unreachable, unusual_size, wrong_unit
+from pkmcal.checks.function import (
+    not_closed,
+    singular,
+    unreachable,
+    unusual_size,
+    wrong_unit,
+)
 from pkmcal.checks.layout import (
     angles_as_coordinates,
     contradicted,
@@ -31,6 +37,7 @@ CHECKS = (
     opposite_order,
     off_circle,
     unlike,
+    not_closed,
     unreachable,
     singular,
     contradicted,
@@ -99,6 +106,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
         order     base and platform joints counted in opposite senses: a mirrored frame
         circle    joints off the circle that the others lie on
         alike     limbs that are unlike the others
+        home      a home that the constraints of limbs do not allow
         stroke    home, or a stroke's ends, that the inverse kinematics cannot use
         singular  home, or every pose, is singular; affinely similar base and platform
         stated    numbers that contradict what the robot file states

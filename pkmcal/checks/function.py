@@ -8,7 +8,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.checks.finding import Finding, named
-from pkmcal.checks.joint_layout import joints, size
+from pkmcal.checks.joint_layout import ALIKE, joints, size
 from pkmcal.core.library import POSE, SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.dexterity import dexterity
@@ -172,6 +172,24 @@ def _in_strokes(robot: Robot, drive: FloatArray, factor: float) -> bool:
             if not factor * limb.stroke[0] <= value <= factor * limb.stroke[1]:
                 return False
     return bool(np.isfinite(drive).all()) and (stated or factor == 1.0)
+
+
+def not_closed(robot: Robot) -> Iterator[Finding]:
+    """Limbs whose constraints do not allow home: a normal or an axis that is another limb's."""
+    own, _ = robot.own_rows(robot.home)
+    actuators = robot.machine.inverse(robot.slots, own)
+    missed = np.abs(robot.machine.closure(robot.slots, own, actuators).residual[0])
+    limbs = robot.model.limbs
+    rows = [1 + len(KINDS[limb.kind].all_rows(limb.couple > 0.0)) for limb in limbs]
+    worst = np.maximum.reduceat(missed, np.cumsum([0, *rows[:-1]]))
+    open_limbs = np.flatnonzero(worst > ALIKE * size(robot))  # NaN is `unreachable`
+    if open_limbs.size:
+        yield Finding(
+            "home",
+            tuple(int(i) + 1 for i in open_limbs),
+            f"at home {named(open_limbs)} cannot close: {worst[open_limbs].max():.4g} mm missing",
+            "check the axes of the limbs, their joints and the home pose",
+        )
 
 
 def unreachable(robot: Robot) -> Iterator[Finding]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import re
 from pathlib import Path
@@ -11,8 +12,9 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.cli.new import template
 
-from ..mutations import MUTATIONS, manufactured, similar, with_model, with_slots
+from ..mutations import BASE, MUTATIONS, PLATFORM, manufactured, similar, with_model, with_slots
 
 MACHINES = tuple(name for name in pk.machines() if name != "3r")
 GOOD = tuple(name for name in MACHINES if name != "rbt-6t03p-printed")
@@ -141,6 +143,24 @@ def test_errors_of_manufacture_raise_no_alarm(share: float, most: float) -> None
 
 
 # --- single checks -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("machine", ["3rps", "3prs"])
+@pytest.mark.parametrize("normal", ["[1.0, 0.0, 0.0]", "[0.0, 1.0, 0.2]", "[-0.866, -0.5, 0.0]"])
+def test_a_limb_that_its_plane_keeps_from_home_is_named(
+    machine: str, normal: str, tmp_path: Path
+) -> None:
+    """A plane that is radial, oblique or another limb's, where limb 1 has the one of y = 0."""
+    text = template(machine).replace("normal = [0.0, 1.0, 0.0]", f"normal = {normal}", 1)
+    (tmp_path / "robot.toml").write_text(text, encoding="utf-8")
+    robot = pk.load(tmp_path / "robot.toml")
+    n = np.array(ast.literal_eval(normal)) / np.linalg.norm(ast.literal_eval(normal))
+    drive = robot.inverse(robot.home)[0] if machine == "3prs" else 0.0
+    joint = robot.home[:3] + robot.geometry.slots[0, PLATFORM] - robot.geometry.slots[0, BASE]
+    missed = abs(n @ (joint - [0.0, 0.0, drive]))
+    homes = [each for each in pk.check_geometry(robot).findings if each.kind == "home"]
+    assert [each.limbs for each in homes] == [(1,)]
+    assert f"limb 1 cannot close: {missed:.4g} mm" in homes[0].what
 
 
 def test_a_joint_off_its_circle_is_named_with_its_distance() -> None:
