@@ -16,7 +16,7 @@ from pkmcal.core.library import POSE, STATUS
 from . import generated, twin_rows
 
 CLOSED = 1e-8  # mm
-MATCHES = {  # of as many coordinates as the machine has degrees of freedom, and more than one choice
+MATCHES = {  # of as many coordinates as the machine has degrees of freedom
     "tripod": [("z", "alpha", "beta"), ("x", "y", "gamma"), ("alpha", "beta", "gamma")],
     "pairs": [("x", "y", "z"), ("x", "y", "gamma"), ("z", "alpha", "beta")],
 }

@@ -105,7 +105,10 @@ class Compensation(Result):
         rows = [
             [str(row), *(fixed(float(value), 4) for value in (*q, *dq))]
             for row, (q, dq) in enumerate(
-                zip(*(each.reshape(count, -1) for each in (self.actuators, self.correction)), strict=True)
+                zip(
+                    *(each.reshape(count, -1) for each in (self.actuators, self.correction)),
+                    strict=True,
+                )
             )
         ]
         if len(rows) > _LISTED:
