@@ -216,9 +216,8 @@ def compensate(
     gross = np.zeros(len(poses), dtype=bool)
     history = []
     for _ in range(passes):
-        reached = measured
-        if callable(measured):
-            reached = measured((ideal + correction).reshape(*shape, -1))
+        commands = (ideal + correction).reshape(*shape, -1)
+        reached = measured(commands) if callable(measured) else measured
         at = _pose_of(reached, poses, shape, orientation)
         gross |= np.linalg.norm((at - poses)[:, :3], axis=1) > robot.length
         there = robot.inverse(at, match)

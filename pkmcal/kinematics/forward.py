@@ -103,9 +103,10 @@ class Forward(RowResult):
     def failures(self) -> str:
         """What failed and where, in one line; empty where nothing did."""
         said = super().failures()
-        if said and self._guess.ndim == 1 and np.isfinite(self._guess).all():
-            if not np.isfinite(self._machine.closure_by_twist(self._guess[None])).all():
-                said += "; a limb does not reach the guess, by default the home pose"
+        if not said or self._guess.ndim > 1 or not np.isfinite(self._guess).all():
+            return said
+        if not np.isfinite(self._machine.closure_by_twist(self._guess[None])).all():
+            said += "; a limb does not reach the guess, by default the home pose"
         return said
 
     def _closure_by_twist(self, own: FloatArray) -> FloatArray:

@@ -66,7 +66,7 @@ class LimbResidual:
         q, q_shape = as_rows("actuators", actuators, robot.n_actuators)
         if shape != q_shape or not len(rows):
             raise ArgumentError(
-                f"poses must have shape (..., 6) and actuators (..., {robot.n_actuators}), not empty;"
+                f"poses must have shape (..., 6) and actuators (..., {robot.n_actuators}), some rows;"
                 f" found {(*shape, 6)} and {(*q_shape, robot.n_actuators)}"
             )
         geometry = robot.geometry
