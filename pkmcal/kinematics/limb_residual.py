@@ -66,8 +66,8 @@ class LimbResidual:
         q, q_shape = as_rows("actuators", actuators, robot.n_actuators)
         if shape != q_shape or not len(rows):
             raise ArgumentError(
-                f"poses must have shape (..., 6) and actuators (..., {robot.n_actuators}), some rows;"
-                f" found {(*shape, 6)} and {(*q_shape, robot.n_actuators)}"
+                f"poses must have shape (..., 6), not empty, and actuators (..., {q.shape[1]});"
+                f" found {(*shape, 6)} and {(*q_shape, q.shape[1])}"
             )
         geometry = robot.geometry
         self.free = tuple(geometry.match(robot.model.free if free is None else free, "free"))
