@@ -190,8 +190,8 @@ def random_numbers(family: Family, rng: np.random.Generator) -> Array:
     for i, kinds in enumerate(family.rows):
         for axis, place in AXIS.items():
             g[i, place] *= axis in axes_of(kinds)
-    for i, place in family.zero:
-        g[i, place] = 0
+    for i, number in family.zero:
+        g[i, number] = 0
     return g
 
 
@@ -210,8 +210,10 @@ def solved_at_random(
         g[i, 6] = np.sqrt(d @ d)
         for kind in kinds:  # a plane row: its one axis becomes square to d
             axis = ROW[kind].on_base or ROW[kind].on_platform
+            assert axis is not None  # every plane row has one
             along = d if ROW[kind].on_base else R.T @ d
-            g[i, AXIS[axis]] -= along * (g[i, AXIS[axis]] @ along) / (along @ along)
+            own = AXIS[axis]
+            g[i, own] -= along * (g[i, own] @ along) / (along @ along)
     return g.ravel(), x
 
 

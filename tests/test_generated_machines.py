@@ -16,8 +16,8 @@ from pkmcal.core.library import POSE, STATUS
 from . import generated, twin_rows
 
 CLOSED = 1e-8  # mm
-# Sets of as many coordinates as the machine has degrees of freedom, more than one for each.
-MATCHES = {
+SHORTEST = 30.0  # mm, which no limb is shorter than
+MATCHES = {  # of as many coordinates as the machine has degrees of freedom
     "tripod": [("z", "alpha", "beta"), ("x", "y", "gamma"), ("alpha", "beta", "gamma")],
     "pairs": [("x", "y", "z"), ("x", "y", "gamma"), ("z", "alpha", "beta")],
 }
@@ -88,7 +88,12 @@ def judged(kind: str, seed: int, rows: int) -> Counter[str]:
     more = robot.machine.rows > robot.machine.m
     bound = robot.closure_tolerance if more else CLOSED
     closes = missed(robot, there, sent[ok])
-    found["wrong: forward"] += int((~(closes <= bound + CLOSED)).sum())
+    # the core's residual is (d·d - ρ²)/(2ρ), the twin's e = ‖d‖ - ρ: they differ by e²/(2ρ)
+    within = bound + (bound**2 / SHORTEST if more else 0.0) + CLOSED
+    found["wrong: forward"] += int((~(closes <= within)).sum())
+    if more:
+        apart = np.abs(closes - solved.residual[ok])
+        found["wrong: residual"] += int((apart > closes**2 / SHORTEST + CLOSED).sum())
     open_ones = solved.status == 5
     found["wrong: open"] += int((~(solved.residual[open_ones] > bound)).sum())
     found["wrong: half known"] += int(np.isfinite(solved.pose[~ok]).any(axis=1).sum())

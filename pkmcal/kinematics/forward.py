@@ -103,13 +103,11 @@ class Forward(RowResult):
     def failures(self) -> str:
         """What failed and where, in one line; empty where nothing did."""
         said = super().failures()
-        one_guess = self._guess.ndim == 1 and np.isfinite(self._guess).all()
-        if said and one_guess and not self._reaches(self._guess):
+        if not said or self._guess.ndim > 1 or not np.isfinite(self._guess).all():
+            return said
+        if not np.isfinite(self._machine.closure_by_twist(self._guess[None])).all():
             said += "; a limb does not reach the guess, by default the home pose"
         return said
-
-    def _reaches(self, pose: FloatArray) -> bool:
-        return bool(np.isfinite(self._machine.closure_by_twist(pose[None])).all())
 
     def _closure_by_twist(self, own: FloatArray) -> FloatArray:
         """Closure rows by a scaled twist (..., rows, m), at a pose for each row or one for all."""

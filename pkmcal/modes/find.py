@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core import screws
+from pkmcal.core.library import SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.modes.assemblies import Assemblies, Signs
 from pkmcal.modes.certificate import Certificate, Closures, certify, newton
@@ -20,6 +21,7 @@ FLAT = 1e-9  # points this near a plane, beside their spread, are in it
 CLOSED = 1e-10  # of the terms of a closure: what Newton's method did not bring there is no mode
 BLURRED = 1e-4  # rad, or lengths: near a singularity poses without a proof are not known better
 AT_ONCE = 2000  # certificates: 12 x 12 matrices in memory
+_LENGTHS = (*SLOTS[:6], "offset", "rod", "crank")  # of a crank, the offset is a few radians
 STARTS = 2000  # random ones, where the paths prove nothing
 
 _EQUAL = 1e-7  # share of the machine's size by which distances of poses differ that are not equal
@@ -64,9 +66,10 @@ class AssemblyProblem(NamedTuple):
 
         Anchors and lengths are as exact as the numbers they are computed from: those of the limbs,
         and the actuators', which are the limb's length or the anchor's way less the offset. Home
-        has no part in it: it may be that of another geometry.
+        has no part in it: it may be that of another geometry. Nor have gains and angles.
         """
-        size = 2.0 * float(np.abs(self.slots).sum(axis=1).max())
+        lengths = np.isin(SLOTS, _LENGTHS)
+        size = 2.0 * float(np.abs(self.slots[:, lengths]).sum(axis=1).max())
         return Closures(self.map, self.rows, self.spheres(), self.length, size, self.levers)
 
 
