@@ -6,9 +6,11 @@ What is public is imported when it is first asked for: `import pkmcal` alone tak
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # as of typing, which takes longer to import than all else here
 if TYPE_CHECKING:  # the same names for type checkers and editors; a test compares both
+    from typing import Any
+
     from pkmcal import screw as screw
     from pkmcal import trajectory as trajectory
     from pkmcal.arms.arm import SerialArm as SerialArm

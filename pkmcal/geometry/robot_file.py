@@ -13,8 +13,9 @@ import numpy as np
 from pkmcal import arguments
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, Unit
-from pkmcal.core.library import MAPS, POSE
+from pkmcal.core.library import MAPS, MAX_LIMBS, POSE
 from pkmcal.exceptions import ArgumentTypeError, FileError
+from pkmcal.files import reading
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import ANGLE_UNITS, LENGTH_UNITS, Table, Units, shown
@@ -41,6 +42,11 @@ def builtin_names(folder: str = "machines") -> tuple[str, ...]:
     found = (_BUILTIN / folder).iterdir()
     names = (entry.name for entry in found)
     return tuple(sorted(name[: -len(".toml")] for name in names if name.endswith(".toml")))
+
+
+def is_built_in(robot: str) -> bool:
+    """Whether this is the name of a built-in machine."""
+    return robot in _builtin()
 
 
 def _builtin() -> dict[str, Any]:
@@ -94,10 +100,10 @@ def located(robot: str | os.PathLike[str]) -> tuple[bytes, str, str | None]:
     if isinstance(robot, str) and robot in known:
         return known[robot].read_bytes(), f"built-in machine {robot}", None
     path = Path(robot)
-    if path.is_file():
-        return path.read_bytes(), str(path), str(path)
     if path.is_dir():
         raise FileError(f"{path}: this is a folder, not a robot file")
+    if path.exists():  # also a pipe
+        return reading.content(robot, reading.MOST_ROBOT), str(path), str(path)
     if isinstance(robot, str) and path.name == robot and not path.suffix:
         raise FileError(f"unknown machine {robot!r}{did_you_mean(robot, known)}")
     near = (each.name for each in path.parent.glob("*.toml"))
@@ -132,7 +138,10 @@ def parse(source: Source, file: str | None) -> Model:
     top.only(TOP)
     top.units = read_units(top)
     parameters = Parameters(_section(top, "parameters"))
-    limbs = read_limbs(top.tables("limb", "a robot"), parameters)
+    described = top.tables("limb", "a robot")
+    if len(described) > MAX_LIMBS:
+        described[MAX_LIMBS].fail("", f"a robot has at most {MAX_LIMBS} limbs")
+    limbs = read_limbs(described, parameters)
     values = parameters.finish([number.name for number in limbs.numbers])
     geometry = Geometry(limbs.numbers, parameters.ordered_units(), limbs.values | values)
 

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal.cli import main as cli
+from pkmcal.cli import verbs
 from pkmcal.cli.calibrate import read_tracker
 from pkmcal.measurements.command_csv import read_commands
 from pkmcal.measurements.pose_csv import read_poses
@@ -25,7 +25,7 @@ def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def run(*arguments: str | Path) -> Any:
-    return CliRunner().invoke(cli.app, [str(a) for a in arguments], prog_name="pkmcal")
+    return CliRunner().invoke(verbs.app, [str(a) for a in arguments], prog_name="pkmcal")
 
 
 def test_plan_prints_and_writes_what_plan_poses_finds(tmp_path: Path) -> None:
