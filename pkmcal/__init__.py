@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # the same names for type checkers and editors; a test compares both
+    from pkmcal import export as export
     from pkmcal import screw as screw
     from pkmcal import trajectory as trajectory
     from pkmcal.arms.arm import SerialArm as SerialArm
@@ -105,7 +106,7 @@ _HOMES = {
     "moves.move": ("Move", "MoveSample"),
 }
 _HOME_OF = {name: f"pkmcal.{home}" for home, names in _HOMES.items() for name in names}
-_MODULES = ("screw", "trajectory")
+_MODULES = ("export", "screw", "trajectory")
 
 __all__ = sorted((*_HOME_OF, *_MODULES))
 

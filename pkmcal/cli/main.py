@@ -16,6 +16,7 @@ from pkmcal.cli.calibrate import calibrate
 from pkmcal.cli.check import check
 from pkmcal.cli.compensate import compensate
 from pkmcal.cli.demonstration import demo
+from pkmcal.cli.export import export
 from pkmcal.cli.forward import forward
 from pkmcal.cli.inverse import inverse
 from pkmcal.cli.machines import machines
@@ -46,7 +47,18 @@ class _Verbs(TyperGroup):
 
 
 app = typer.Typer(cls=_Verbs, pretty_exceptions_enable=False)
-for verb in (demo, machines, new, check, sensitivity, tolerance, plan, calibrate, compensate):
+for verb in (
+    demo,
+    machines,
+    new,
+    check,
+    sensitivity,
+    tolerance,
+    plan,
+    calibrate,
+    compensate,
+    export,
+):
     app.command()(verb)
 _SIGNED = {"ignore_unknown_options": True}  # an argument may be -330,-330,-330
 app.command(context_settings=_SIGNED)(inverse)
