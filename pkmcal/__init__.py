@@ -43,6 +43,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.exceptions import CalibrationWarning as CalibrationWarning
     from pkmcal.exceptions import Error as Error
     from pkmcal.exceptions import FileError as FileError
+    from pkmcal.export.import_printer import import_printer as import_printer
     from pkmcal.geometry.geometry import Geometry as Geometry
     from pkmcal.kinematics.dexterity import Dexterity as Dexterity
     from pkmcal.kinematics.dexterity import dexterity as dexterity
@@ -88,6 +89,7 @@ _HOMES = {
         "Error",
         "FileError",
     ),
+    "export.import_printer": ("import_printer",),
     "geometry.geometry": ("Geometry",),
     "kinematics.dexterity": ("Dexterity", "dexterity"),
     "kinematics.forward": ("Forward",),

@@ -14,7 +14,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-TARGETS = ("c",)
+TARGETS = ("c", "klipper")
 
 
 def export(
@@ -27,11 +27,26 @@ def export(
         str | None,
         typer.Option(metavar="TYPE", help="Of a C header: double, the default, or float."),
     ] = None,
+    config: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Of Klipper: your printer.cfg, which is written with the changed numbers and"
+            " otherwise as it is; by default the lines alone.",
+        ),
+    ] = None,
+    project: Annotated[
+        bool,
+        typer.Option(
+            "--project", help="Where a firmware cannot hold the robot: the nearest that it can."
+        ),
+    ] = False,
     json: Json = False,
 ) -> int:
     """Write a robot for a controller.
 
-    c: a C99 header with its inverse and forward kinematics and Jacobian.
+    c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
+    linear delta for Klipper or Kalico.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -39,12 +54,25 @@ def export(
     """
     word("--as", target, TARGETS)
     machine = load_parallel(robot)
-    pk.export.c_header(machine, out, _number(number))
-    if json:
-        typer.echo(as_json({"robot": machine.name, "as": target, "file": str(out)}))
+    loss = None
+    if target == "c":
+        _only(target, config=config, project=project or None)
+        pk.export.c_header(machine, out, _number(number))
     else:
-        typer.echo(f"{out}: {machine.name}")
+        _only(target, number=number)
+        loss = pk.export.klipper(machine, out, config, project)
+    if json:
+        typer.echo(as_json({"robot": machine.name, "as": target, "file": str(out), "loss": loss}))
+    else:
+        typer.echo(f"{out}: {machine.name}" + (f"; {loss}" if loss and not loss.exact else ""))
     return 0
+
+
+def _only(target: str, **options: object) -> None:
+    """Refuse options of another target."""
+    for name, value in options.items():
+        if value is not None:
+            raise ArgumentError(f"--{name} says nothing of --as {target}")
 
 
 def _number(given: str | None) -> Literal["double", "float"]:

@@ -18,6 +18,7 @@ from pkmcal.cli.compensate import compensate
 from pkmcal.cli.demonstration import demo
 from pkmcal.cli.export import export
 from pkmcal.cli.forward import forward
+from pkmcal.cli.import_file import import_file
 from pkmcal.cli.inverse import inverse
 from pkmcal.cli.machines import machines
 from pkmcal.cli.new import new
@@ -60,6 +61,7 @@ for verb in (
     export,
 ):
     app.command()(verb)
+app.command("import")(import_file)
 _SIGNED = {"ignore_unknown_options": True}  # an argument may be -330,-330,-330
 app.command(context_settings=_SIGNED)(inverse)
 app.command(context_settings=_SIGNED)(forward)

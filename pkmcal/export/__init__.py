@@ -1,5 +1,8 @@
 """Robots for controllers, and back: `pk.export`."""
 
 from pkmcal.export.c_header import c_header as c_header
+from pkmcal.export.import_printer import Printer as Printer
+from pkmcal.export.klipper import klipper as klipper
+from pkmcal.export.linear_delta import Loss as Loss
 
-__all__ = ["c_header"]
+__all__ = ["Loss", "Printer", "c_header", "klipper"]

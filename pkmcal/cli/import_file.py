@@ -1,0 +1,50 @@
+"""`pkmcal import`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import pkmcal as pk
+from pkmcal.cli.options import Json
+from pkmcal.cli.output import folder
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.atomic import write_whole
+from pkmcal.report.as_json import as_json
+
+
+def import_file(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="A printer.cfg.")],
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Where to write; made if it is not there.")
+    ] = Path("."),
+    json: Json = False,
+) -> int:
+    """Make a robot file and measurements out of a printer's configuration.
+
+    Of Klipper or Kalico with the kinematics of a linear delta. robot.toml has the firmware's
+    numbers; probe.csv the heights that a DELTA_CALIBRATE stored, if there are any. Existing files
+    are never overwritten.
+
+    Example: pkmcal import examples/linear-delta/printer.cfg
+    """
+    printer = pk.import_printer(file)
+    robot, probe = out / "robot.toml", out / "probe.csv"
+    written = [robot] if printer.measurements is None else [robot, probe]
+    for path in written:
+        if path.exists():
+            raise ArgumentError(f"{path} exists already; name another folder with --out")
+    folder(out)
+    write_whole(robot, printer.text)
+    if printer.measurements is not None:
+        printer.measurements.write(probe)
+    if json:
+        heights = 0 if printer.measurements is None else len(printer.measurements)
+        parts = {"files": [str(path) for path in written], "heights": heights}
+        typer.echo(as_json({"robot": printer.robot.name, **parts, "distances": printer.distances}))
+    else:
+        typer.echo(printer)
+        typer.echo("written: " + ", ".join(map(str, written)))
+    return 0
