@@ -14,7 +14,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-TARGETS = ("c", "klipper")
+TARGETS = ("c", "klipper", "reprap", "marlin")
 
 
 def export(
@@ -46,7 +46,7 @@ def export(
     """Write a robot for a controller.
 
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
-    linear delta for Klipper or Kalico.
+    linear delta for Klipper or Kalico; reprap, marlin: its M665 and M666.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -58,9 +58,13 @@ def export(
     if target == "c":
         _only(target, config=config, project=project or None)
         pk.export.c_header(machine, out, _number(number))
-    else:
+    elif target == "klipper":
         _only(target, number=number)
         loss = pk.export.klipper(machine, out, config, project)
+    else:
+        _only(target, number=number, config=config)
+        write = pk.export.reprap if target == "reprap" else pk.export.marlin
+        loss = write(machine, out, project)
     if json:
         typer.echo(as_json({"robot": machine.name, "as": target, "file": str(out), "loss": loss}))
     else:

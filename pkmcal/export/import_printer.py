@@ -1,4 +1,4 @@
-"""Klipper and Kalico: a robot and its stored measurements out of a printer.cfg."""
+"""A robot, and stored measurements, out of the configuration of a printer's firmware."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Literal, get_args
 
 import numpy as np
 
+from pkmcal.arguments import path as as_path
+from pkmcal.arguments import word
+from pkmcal.export.delta_gcode import of_marlin, of_reprap
 from pkmcal.export.linear_delta import FirmwareDelta, as_robot, text_of
 from pkmcal.export.printer_config import (
     DELTA_ANGLES,
@@ -18,6 +22,7 @@ from pkmcal.export.printer_config import (
     read,
     require_delta,
     step_of,
+    text_in,
 )
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -28,6 +33,12 @@ _HEAD = """\
 # An actuator coordinate is the motor's steps down from its end stop; `offset` is the height of the
 # carriage there, position_endstop + sqrt(arm_length^2 - delta_radius^2).
 """
+_GCODE_HEAD = """\
+# Imported from {file} by pkmcal: M665 and M666 of a linear delta.
+# An actuator coordinate is the carriage's way down from its end stop, in mm; `offset` is the height
+# of the carriage there.
+"""
+Firmware = Literal["klipper", "reprap", "marlin"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,13 +74,17 @@ class Printer(Result):
             )
 
 
-def import_printer(path: str | PathLike[str]) -> Printer:
-    r"""Read a linear delta from a printer.cfg of Klipper or Kalico, with its probe results.
+def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") -> Printer:
+    r"""Read a linear delta from its firmware's configuration, with stored probe results.
 
     Parameters
     ----------
     path : str or path
-        The file; the block of SAVE_CONFIG at its end is read too, included files are not.
+        A printer.cfg of Klipper or Kalico: the block of SAVE_CONFIG at its end is read too,
+        included files are not. Or a file with the M665 and M666 of the other firmwares; actuator
+        coordinates are then mm down from the end stops.
+    firmware : {"klipper", "reprap", "marlin"}
+        Whose file it is.
 
     Raises
     ------
@@ -91,6 +106,12 @@ def import_printer(path: str | PathLike[str]) -> Printer:
     ...     pk.import_printer(f"{folder}/printer.cfg")
     <Printer: printer: a linear delta, no stored heights>
     """
+    word("firmware", firmware, get_args(Firmware))
+    if firmware != "klipper":
+        where = as_path("path", path)
+        parse = of_reprap if firmware == "reprap" else of_marlin
+        found = parse(text_in(where), str(where))
+        return _printer(where, found, [-1.0] * 3, _GCODE_HEAD, None, 0)
     printer = read(path)
     require_delta(printer)
     radius = positive(printer, "printer", "delta_radius")
@@ -104,11 +125,22 @@ def import_printer(path: str | PathLike[str]) -> Printer:
         height = float(np.sqrt(arm**2 - radius**2))
         carriages.append(_first(printer, section, "position_endstop") + height)
         steps.append(step_of(printer, section))
-    firmware = FirmwareDelta(radius, tuple(angles), tuple(arms), tuple(carriages))
-    name = Path(printer.place).stem
-    text = text_of(firmware, [-step for step in steps], name, _HEAD.format(file=name + ".cfg"))
-    robot = as_robot(firmware, [-step for step in steps], name)
-    return Printer(robot, _heights(printer), _count(printer, "distance"), text)
+    delta = FirmwareDelta(radius, tuple(angles), tuple(arms), tuple(carriages))
+    distances = _count(printer, "distance")
+    gains = [-step for step in steps]
+    return _printer(Path(printer.place), delta, gains, _HEAD, _heights(printer), distances)
+
+
+def _printer(
+    file: Path,
+    delta: FirmwareDelta,
+    gains: list[float],
+    head: str,
+    measurements: Measurements | None,
+    distances: int,
+) -> Printer:
+    text = text_of(delta, gains, file.stem, head.format(file=file.name))
+    return Printer(as_robot(delta, gains, file.stem), measurements, distances, text)
 
 
 def _first(printer: PrinterConfig, section: str, option: str) -> float:

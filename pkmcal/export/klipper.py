@@ -61,10 +61,8 @@ def klipper(
     >>> import pathlib, tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     loss = pk.export.klipper(robot, f"{folder}/lines.cfg")
-    ...     print(pathlib.Path(folder, "lines.cfg").read_text()[:41])
-    [printer]
-    delta_radius: 105.600000
-    [step
+    ...     print(pathlib.Path(folder, "lines.cfg").read_text().split()[:3])
+    ['[printer]', 'delta_radius:', '105.600000']
     """
     path, project = as_path("path", path), flag("project", project)
     firmware, loss = of_robot(robot, project)

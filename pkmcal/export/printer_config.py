@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 
 from pkmcal.arguments import path as as_path
 from pkmcal.exceptions import FileError
@@ -149,8 +150,13 @@ class PrinterConfig:
 def read(path: str | PathLike[str]) -> PrinterConfig:
     """Read a printer.cfg."""
     where = as_path("path", path)
+    return PrinterConfig(text_in(where), str(where))
+
+
+def text_in(where: Path) -> str:
+    """What a text file says, line ends as they are."""
     try:
-        return PrinterConfig(where.read_bytes().decode("utf-8-sig"), str(where))
+        return where.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError:
         raise FileError(f"{where}: this is no text in UTF-8") from None
 
