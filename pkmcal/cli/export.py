@@ -14,7 +14,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-TARGETS = ("c", "klipper", "reprap", "marlin")
+TARGETS = ("c", "klipper", "reprap", "marlin", "mjcf")
 
 
 def export(
@@ -47,6 +47,7 @@ def export(
 
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
     linear delta for Klipper or Kalico; reprap, marlin: its M665 and M666.
+    mjcf: a model for MuJoCo.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -58,6 +59,9 @@ def export(
     if target == "c":
         _only(target, config=config, project=project or None)
         pk.export.c_header(machine, out, _number(number))
+    elif target == "mjcf":
+        _only(target, number=number, config=config, project=project or None)
+        pk.export.mjcf(machine, out)
     elif target == "klipper":
         _only(target, number=number)
         loss = pk.export.klipper(machine, out, config, project)

@@ -113,7 +113,7 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
     def whole(values: Any) -> str:
         return ", ".join(str(int(value)) for value in values)
 
-    first, second, frame, axis = _prepared(robot)
+    first, second, frame, axis = prepared(robot)
     wide = number == "double"
     size = machine.struct.size
     return {
@@ -214,7 +214,7 @@ def _rows(robot: Robot) -> list[dict[str, Any]]:
     ]
 
 
-def _prepared(robot: Robot) -> tuple[list[FloatArray], ...]:
+def prepared(robot: Robot) -> tuple[list[FloatArray], ...]:
     """Of each limb what follows from its numbers alone, as the core computes it.
 
     First and second direction of its anchor, the fixed frame of its base axis, and its axes.
