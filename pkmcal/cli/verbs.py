@@ -13,7 +13,9 @@ from pkmcal.cli.calibrate import calibrate
 from pkmcal.cli.check import check
 from pkmcal.cli.compensate import compensate
 from pkmcal.cli.demonstration import demo
+from pkmcal.cli.export import export
 from pkmcal.cli.forward import forward
+from pkmcal.cli.import_file import import_file
 from pkmcal.cli.inverse import inverse
 from pkmcal.cli.machines import machines
 from pkmcal.cli.new import new
@@ -44,8 +46,20 @@ class _Verbs(TyperGroup):
 
 
 app = typer.Typer(cls=_Verbs, pretty_exceptions_enable=False)
-for verb in (demo, machines, new, check, sensitivity, tolerance, plan, calibrate, compensate):
+for verb in (
+    demo,
+    machines,
+    new,
+    check,
+    sensitivity,
+    tolerance,
+    plan,
+    calibrate,
+    compensate,
+    export,
+):
     app.command()(verb)
+app.command("import")(import_file)
 _SIGNED = {"ignore_unknown_options": True}  # an argument may be -330,-330,-330
 app.command(context_settings=_SIGNED)(inverse)
 app.command(context_settings=_SIGNED)(forward)

@@ -12,7 +12,7 @@ import pkmcal as pk
 
 from .pages import DOCS, PAGES, ROOT, MissingLog, Session, blocks, name_of, prose
 
-LANGUAGES = {"python", "console", "text", "toml", "sh", "{eval-rst}", "{toctree}"}
+LANGUAGES = {"c", "python", "console", "text", "toml", "sh", "{eval-rst}", "{toctree}"}
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 every_page = pytest.mark.parametrize("page", PAGES, ids=name_of)
 every_page_of_today = pytest.mark.parametrize(  # the list of changes names what is gone
