@@ -273,13 +273,14 @@ def _step_calls(robot: Robot, rows: list[dict[str, Any]]) -> list[str]:
 
 
 def _counted(functions: list[c_source.CFunction], calls: list[str], elimination: int = 0) -> str:
-    """Operations of calls, of the elimination of so many unknowns, and of sine and cosine."""
+    """Operations of calls, with those of their sines and arctangents, and of an elimination."""
     by_name = {function.name: function for function in functions}
     count = np.zeros(4, dtype=int)
     for name in calls:
         count += by_name[name].operations
-        angles = by_name[name].body.count("FN(sincos)(")
-        count += angles * np.array([14, 22, 0, 0])
+        body = by_name[name].body
+        count += body.count("FN(sincos)(") * np.array([18, 20, 0, 0])
+        count += body.count("arctangent2(") * np.array([16, 19, 1, 0])
     m = elimination
     products = sum((m - k - 1) * (m - k) for k in range(m)) + m * (m - 1) // 2
     count += (products, products, m * (m - 1) // 2 + m, 0)
