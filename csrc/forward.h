@@ -51,7 +51,8 @@ INLINE void store_rows(int map, const forward_call *call, const real *state, mas
     map_to_pose(map, state, pose);
     for (int k = 0; k < 6; k++) pose[k] = select(good, pose[k], fill(NAN));
     scatter_row(pose, 6, call->pose, 6, row, count);
-    scatter(select(good, residual, fill(NAN)), call->residual, 1, row, count);
+    const mask closest = good | (status == fill_mask(PKM_NOT_CLOSED));
+    scatter(select(closest, residual, fill(NAN)), call->residual, 1, row, count);
     for (int l = 0; l < count; l++) {
         call->status[row[l]] = (int32_t)status[l];
         call->iterations[row[l]] = (int32_t)iterations[l];

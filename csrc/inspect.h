@@ -95,7 +95,7 @@ int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
         FN(pose_frame)(lane_pose, R, p);
         for (int i = 0; i < limbs; i++) {
             real qt, by_q, by_g[SLOTS], square = fill(0.0);
-            const real q = limb_inverse(machine, i, &limb[i], R, p);
+            const real q = limb_inverse(machine, i, &limb[i], R, p, fill(machine->near[i]));
             FN(limb_drive)(q, limb[i].g, &qt);
             sphere_derivatives_called(machine, i, &limb[i], R, p, q, &by_q, by_g);
             for (int k = 0; k < 3; k++) square += by_g[BASE_X + k] * by_g[BASE_X + k];

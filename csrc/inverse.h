@@ -20,22 +20,44 @@ INLINE real limb_drive_at(const pkm_machine *machine, int i, const limb_numbers 
     return qt;
 }
 
+/* The angle that is `x` up to whole turns and nearest to `near`. */
+INLINE real nearest_turn(real x, real near, real turn)
+{
+    /* the nearest whole number, as in sincos */
+    const real shift = fill(6755399441055744.0), turns = (x - near) / turn;
+    return x - turn * ((turns + shift) - shift);
+}
+
+/* The limb's command; where its drive is an angle, the turn of it that is nearest to `near`. */
 INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *limb, const real *R,
-                         const real *p)
+                         const real *p, real near)
 {
     real h[3], q;
     FN(limb_joint)(R, p, limb->g + PLATFORM_X, limb->g + BASE_X, h);
-    FN(limb_command)(limb_drive_at(machine, i, limb, h), limb->per_gain, limb->g, &q);
+    real qt = limb_drive_at(machine, i, limb, h);
+    if (machine->angle[i]) qt = nearest_turn(qt, near, fill(TWO_PI));
+    FN(limb_command)(qt, limb->per_gain, limb->g, &q);
     return q;
 }
 
-/* Limbs that share an actuator are averaged; one limb out of reach makes the whole row NaN. */
+/* Limbs that share an actuator are averaged, angles at the turn nearest to the first limb's; one limb
+ * out of reach makes the whole row NaN. `near` (NULL: the machine's own) says which turn that is. */
 INLINE void inverse_at(const pkm_machine *machine, const limb_numbers *limb, const real *R,
-                       const real *p, real *q)
+                       const real *p, const real *near, real *q)
 {
+    real first[PKM_MAX_LIMBS];
+    int seen = 0;
     for (int a = 0; a < machine->actuators; a++) q[a] = fill(-0.0); /* -0 + x is x, even for x = -0 */
-    for (int i = 0; i < machine->limbs; i++)
-        q[machine->actuator[i]] += limb_inverse(machine, i, &limb[i], R, p);
+    for (int i = 0; i < machine->limbs; i++) {
+        const int a = machine->actuator[i], others = seen >> a & 1;
+        real about = fill(machine->near[i]);
+        if (machine->angle[i] && (others || near))
+            FN(limb_drive)(others ? first[a] : near[a], limb[i].g, &about);
+        const real own = limb_inverse(machine, i, &limb[i], R, p, about);
+        if (!others) first[a] = own;
+        seen |= 1 << a;
+        q[a] += own;
+    }
     if (machine->actuators < machine->limbs)
         for (int a = 0; a < machine->actuators; a++) q[a] /= machine->sharing[a];
     whole_or_nan(q, machine->actuators);
@@ -45,11 +67,12 @@ INLINE void inverse_at(const pkm_machine *machine, const limb_numbers *limb, con
 RARE void inverse_once(const pkm_machine *machine, const limb_numbers *limb, const real *R,
                        const real *p, real *q)
 {
-    inverse_at(machine, limb, R, p, q);
+    inverse_at(machine, limb, R, p, NULL, q);
 }
 
 int CALL(inverse)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                  ptrdiff_t geometry_stride, const double *pose, double *q)
+                  ptrdiff_t geometry_stride, const double *pose, const double *near,
+                  ptrdiff_t near_stride, double *q)
 {
     if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
     enum { BLOCKS_INVERSE = 2 }; /* side by side: the processor overlaps them */
@@ -57,7 +80,7 @@ int CALL(inverse)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
     for (ptrdiff_t first = 0; first < n; first += BLOCKS_INVERSE * LANES) {
         ptrdiff_t row[BLOCKS_INVERSE][LANES];
         real lane_pose[BLOCKS_INVERSE][6], R[BLOCKS_INVERSE][9], p[BLOCKS_INVERSE][3];
-        real lane_q[BLOCKS_INVERSE][PKM_MAX_LIMBS];
+        real lane_q[BLOCKS_INVERSE][PKM_MAX_LIMBS], about[PKM_MAX_LIMBS];
         int count[BLOCKS_INVERSE];
         for (int t = 0; t < BLOCKS_INVERSE; t++) {
             count[t] = block_rows(first + t * LANES, n, row[t]);
@@ -67,7 +90,8 @@ int CALL(inverse)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
         for (int t = 0; t < BLOCKS_INVERSE; t++) {
             if (first + t == 0 || geometry_stride)
                 prepare_limbs(machine, geometry, geometry_stride, row[t], limb);
-            inverse_at(machine, limb, R[t], p[t], lane_q[t]);
+            if (near) gather_row(near, near_stride, machine->actuators, row[t], about);
+            inverse_at(machine, limb, R[t], p[t], near ? about : NULL, lane_q[t]);
         }
         for (int t = 0; t < BLOCKS_INVERSE; t++)
             scatter_row(lane_q[t], machine->actuators, q, machine->actuators, row[t], count[t]);

@@ -69,7 +69,7 @@ INLINE void jacobian_block(int map, const pkm_machine *machine, const limb_numbe
         FN(limb_sphere) sphere;
         mask reachable = fill_mask(-1);
         const int a = machine->actuator[i];
-        real own = limb_inverse(machine, i, &limb[i], R, p);
+        real own = limb_inverse(machine, i, &limb[i], R, p, fill(machine->near[i]));
         own = select(finite(own), own, fill(NAN));
         sphere_of_numbers(machine->driver[i], &limb[i], &sphere);
         sphere_at(machine->driver[i], &limb[i], own, &sphere, &reachable);

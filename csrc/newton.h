@@ -82,11 +82,15 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
     const mask lost = *status == fill_mask(PKM_NOT_CONVERGED);
     const mask flat = ~(pivot > fill(LEAST_PIVOT));
     *status = select_mask(lost & ((worst <= closed) | flat), fill_mask(PKM_SINGULAR), *status);
-    /* of the pose itself, and without the weights */
+    /* of the pose itself, and without the weights; more rows than m meet each other or they do not */
     const int rows = scaled_rows(map, machine, limb, state, phi, NULL);
     *residual = zero;
     for (int r = 0; r < rows; r++)
         *residual = larger(*residual, absolute(phi[machine->order[r]]) * (1.0 / machine->weight[r]));
+    if (rows > m) {
+        const mask open = (*status == fill_mask(PKM_OK)) & ~(*residual <= fill(machine->closure_tolerance));
+        *status = select_mask(open, fill_mask(PKM_NOT_CLOSED), *status);
+    }
 }
 
 #endif

@@ -13,7 +13,8 @@
 
 /* cffi begin */
 enum { PKM_MAX_LIMBS = 12, PKM_MAX_ROWS = 24 };
-enum { PKM_OK, PKM_NOT_CONVERGED, PKM_SINGULAR, PKM_INFEASIBLE, PKM_INVALID };
+enum { PKM_OK, PKM_NOT_CONVERGED, PKM_SINGULAR, PKM_INFEASIBLE, PKM_INVALID,
+       PKM_NOT_CLOSED };
 enum { PKM_BAD_MACHINE = -1, PKM_BAD_COLUMN = -2, PKM_BAD_SWARM = -3 };
 
 /* A machine: its pose map and its limbs, without the numbers that calibration changes. */
@@ -23,10 +24,13 @@ typedef struct {
     int actuators;
     double size;                    /* [mm] what rounding is measured against */
     double length;                  /* characteristic length [mm]: rotations times it are mm */
+    double closure_tolerance;       /* [mm]: what more rows than coordinates may miss */
     int driver[12];                 /* DRIVER_... of each limb */
     int rows[12];                   /* set of ROW_... beside the sphere */
     int actuator[12];               /* which actuator drives the limb */
     double branch[12];              /* +1 or -1 for slider and crank */
+    int angle[12];                  /* is q̃ an angle, the same after a whole turn? */
+    double near[12];                /* q̃ an angle is given nearest to: see pkm_prepare */
     double frame[12 * AXES * 9];    /* of each axis of each limb, 3 x 3 row by row */
     double lever[12];               /* of the couple row [mm] */
     double weight[24];              /* of each row, limb by limb, the sphere first */
@@ -72,8 +76,10 @@ int pkm_best_isa(void);
 /* The number of closure rows, or 0 for a machine the core cannot take. */
 int pkm_closure_count(const pkm_machine *machine);
 
-/* Count how many limbs `sharing` an actuator, and set `order` from an elimination with exchanges at
- * the home pose: later ones run in that order. Before every other call of a machine. */
+/* Before every other call of a machine: count how many limbs are `sharing` an actuator, and set
+ * `order` from an elimination with exchanges at the home pose: later ones run in that order.
+ * `near` holds the middle of each limb's stroke, or NaN where it states none; what is NaN becomes the
+ * drive where the actuator's first stroke has its middle, or else where the actuator is at home. */
 int pkm_prepare(pkm_machine *machine, const double *geometry, const double *home);
 
 /* How many numbers the state of a swarm has, 0 for a swarm the core cannot take. */

@@ -20,7 +20,7 @@ enum { STEPS_PREDICTED = 2, STEPS_GUESSED = 3 }; /* Newton steps in floats */
 /* Where all rows start from: the step per actuator coordinate, and the sign of the determinant. */
 typedef struct {
     int known;
-    real q[PKM_MAX_LIMBS];
+    real q[PKM_MAX_LIMBS], turn[PKM_MAX_LIMBS]; /* a turn of the actuator; 0: it is no angle */
     narrow slope[6 * PKM_MAX_LIMBS], state[MAX_STATE];
     narrow_mask sign;
 } prediction;
@@ -70,6 +70,7 @@ INLINE void predict(int map, const pkm_machine *machine, const limb_numbers *lim
     for (int i = 0, r = 0; i < machine->limbs; i++) {
         const int a = machine->actuator[i];
         real by_q;
+        start->turn[a] = machine->angle[i] ? TWO_PI * limb[i].per_gain : fill(0.0);
         sphere_derivatives_called(machine, i, &limb[i], R, p, start->q[a], &by_q, by_g);
         for (int j = 0; j < m; j++) X[0][j] = fill(0.0);
         X[0][machine->order[r++]] = by_q;
@@ -117,8 +118,14 @@ INLINE void start_states(int map, const pkm_machine *machine, const rows_in *fir
         for (int s = 0; s < MAX_STATE; s++) state[s] = join(low[s], high[s]);
         return;
     }
-    for (int a = 0; a < actuators; a++)
-        change[a] = join(first->q[a] - start->q[a], last->q[a] - start->q[a]);
+    for (int a = 0; a < actuators; a++) {
+        real low = first->q[a], high = last->q[a];
+        if (start->turn[a][0] != 0.0) {
+            low = nearest_turn(low, start->q[a], start->turn[a]);
+            high = nearest_turn(high, start->q[a], start->turn[a]);
+        }
+        change[a] = join(low - start->q[a], high - start->q[a]);
+    }
     for (int j = 0; j < m; j++) {
         step[j] = start->slope[j * actuators] * change[0];
         for (int a = 1; a < actuators; a++) step[j] += start->slope[j * actuators + a] * change[a];

@@ -6,9 +6,12 @@ What is public is imported when it is first asked for: `import pkmcal` alone tak
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
+TYPE_CHECKING = False  # as of typing, which takes longer to import than all else here
 if TYPE_CHECKING:  # the same names for type checkers and editors; a test compares both
+    from typing import Any
+
+    from pkmcal import export as export
     from pkmcal import screw as screw
     from pkmcal import trajectory as trajectory
     from pkmcal.arms.arm import SerialArm as SerialArm
@@ -42,6 +45,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.exceptions import CalibrationWarning as CalibrationWarning
     from pkmcal.exceptions import Error as Error
     from pkmcal.exceptions import FileError as FileError
+    from pkmcal.export.import_printer import import_printer as import_printer
     from pkmcal.geometry.geometry import Geometry as Geometry
     from pkmcal.kinematics.dexterity import Dexterity as Dexterity
     from pkmcal.kinematics.dexterity import dexterity as dexterity
@@ -87,6 +91,7 @@ _HOMES = {
         "Error",
         "FileError",
     ),
+    "export.import_printer": ("import_printer",),
     "geometry.geometry": ("Geometry",),
     "kinematics.dexterity": ("Dexterity", "dexterity"),
     "kinematics.forward": ("Forward",),
@@ -105,7 +110,7 @@ _HOMES = {
     "moves.move": ("Move", "MoveSample"),
 }
 _HOME_OF = {name: f"pkmcal.{home}" for home, names in _HOMES.items() for name in names}
-_MODULES = ("screw", "trajectory")
+_MODULES = ("export", "screw", "trajectory")
 
 __all__ = sorted((*_HOME_OF, *_MODULES))
 

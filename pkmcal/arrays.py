@@ -86,6 +86,20 @@ def wrapped(angles: FloatArray) -> FloatArray:
     return np.asarray(angles - 2 * np.pi * np.rint(angles / (2 * np.pi)))
 
 
+def first_largest(values: FloatArray, alike: float) -> int:
+    """Index of the largest value; of those within `alike` of it, the first.
+
+    Rounding then decides nothing: values that differ by less count as equal, whatever the
+    processor or the linear algebra library made of their last digits.
+
+    Examples
+    --------
+    >>> first_largest(np.array([0.0, 1.0, 1.0 + 1e-15]), 1e-9)
+    1
+    """
+    return int(np.argmax(values >= values.max() - alike))
+
+
 def rms(values: FloatArray) -> float:
     """Root mean square; NaN without values."""
     return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float("nan")

@@ -9,6 +9,7 @@ from html import escape
 from itertools import islice, zip_longest
 
 _MOST_ROWS = 20  # of a table with a row for each pose
+_LONGEST_NAME = 120  # letters that are shown of one
 _MOST_DECIMALS = 15  # a double has no digits beyond; also what an exact number is given
 
 
@@ -90,6 +91,31 @@ def first_rows(rows: Iterable[int], most: int = 5) -> str:
     """
     shown = [str(row) for row in islice(rows, most + 1)]
     return ", ".join(shown[:most]) + (", …" if len(shown) > most else "")
+
+
+def visible(text: str) -> str:
+    r"""A text whose control characters are replaced: it is shown, and steers no terminal.
+
+    Examples
+    --------
+    >>> visible("rod\x1b[31m\nleg")
+    'rod�[31m\nleg'
+    """
+    if all(map(str.isprintable, text.split("\n"))):
+        return text
+    return "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def printable(text: str, longest: int = _LONGEST_NAME) -> str:
+    r"""A name on one line: control characters replaced, a long one cut.
+
+    Examples
+    --------
+    >>> printable("rod\n1")
+    'rod�1'
+    """
+    shown = visible(text[: longest + 1]).replace("\n", "\N{REPLACEMENT CHARACTER}")
+    return shown if len(shown) <= longest else shown[: longest - 1] + "…"
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pkmcal.display import Table, first_rows
+from pkmcal.display import Table, first_rows, visible
 
 
 class Result:
@@ -26,10 +26,10 @@ class Result:
 
     def __repr__(self) -> str:
         title = str(next(self._parts())).partition("\n")[0]
-        return f"<{type(self).__name__}: {title}>"
+        return visible(f"<{type(self).__name__}: {title}>")
 
     def __str__(self) -> str:
-        return "\n".join(str(part) for part in self._parts())
+        return visible("\n".join(str(part) for part in self._parts()))
 
     def _repr_html_(self) -> str:
         return "\n".join(

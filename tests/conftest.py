@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from pkmcal.cli.main import app
+from pkmcal.cli.verbs import app
 
 
 @pytest.fixture(scope="session")

@@ -165,10 +165,18 @@ def limb_inverse(limb: Any, n: dict[str, float], pose: Array) -> float:
 
 
 def inverse(model: Any, pose: Array, slots: Array | None = None) -> Array:
-    """Actuators (n,) of a pose taken as given; a shared actuator gets the mean of its limbs."""
+    """Actuators (n,) of a pose taken as given; a shared actuator gets the mean of its limbs.
+
+    A crank's angle is the one from -180 to 180 degrees, those of others on it are near the first.
+    """
     shares: dict[int, list[float]] = {}
     for limb, n in zip(model.limbs, numbers(model, slots), strict=True):
-        shares.setdefault(limb.actuator, []).append(limb_inverse(limb, n, np.asarray(pose, float)))
+        mine = shares.setdefault(limb.actuator, [])
+        q = limb_inverse(limb, n, np.asarray(pose, float))
+        if mine and limb.kind == "RUS":
+            half = np.pi / abs(n["gain"])
+            q = mine[0] + (q - mine[0] + half) % (2 * half) - half
+        mine.append(q)
     return np.array([np.mean(shares[i]) for i in sorted(shares)])
 
 

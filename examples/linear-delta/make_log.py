@@ -1,7 +1,8 @@
-"""Makes probe.csv: what a bed probe reads on a simulated linear delta with stated errors.
+"""Makes probe.csv and printer.cfg: what a bed probe reads on a simulated linear delta.
 
 The printer goes where robot.toml, its geometry before any calibration, puts the bed (z = 0). Its
 true geometry is another, so the nozzle ends up a little above or below: that height is the log.
+printer.cfg is the same printer and log as Klipper keeps them.
 
     python examples/linear-delta/make_log.py
 """
@@ -48,5 +49,29 @@ def log() -> pk.Measurements:
     )
 
 
+def printer_config(measured: pk.Measurements) -> str:
+    """The printer before its calibration as a printer.cfg, the log where SAVE_CONFIG puts it."""
+    endstop = 625.0 - math.sqrt(340.0**2 - 170.0**2)
+    text = "# A simulated linear delta, before its calibration.\n"
+    for i, axis in enumerate("abc"):
+        text += f"[stepper_{axis}]\nstep_pin: gpio{3 * i}\ndir_pin: gpio{3 * i + 1}\n"
+        text += f"enable_pin: gpio{3 * i + 2}\nendstop_pin: gpio{9 + i}\n"
+        text += "rotation_distance: 60\nmicrosteps: 32\n"
+        text += f"position_endstop: {endstop:.6f}\narm_length: 340\n\n"
+    text += "[printer]\nkinematics: delta\nmax_velocity: 300\nmax_accel: 3000\n"
+    text += (
+        "delta_radius: 170 # towers less the joint offsets\n\n[delta_calibrate]\nradius: 120\n\n"
+    )
+    text += "#*# <---------------------- SAVE_CONFIG ---------------------->\n"
+    text += "#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.\n#*#\n"
+    text += "#*# [delta_calibrate]\n"
+    for i, (travels, height) in enumerate(zip(measured.actuators, measured.values, strict=True)):
+        steps = ",".join(f"{-travel / STEP:.3f}" for travel in travels)
+        text += f"#*# height{i} = {height}\n#*# height{i}_pos = {steps}\n"
+    return text
+
+
 if __name__ == "__main__":
     log().write(sys.argv[1] if len(sys.argv) > 1 else HERE / "probe.csv")
+    if len(sys.argv) == 1:
+        (HERE / "printer.cfg").write_text(printer_config(log()))

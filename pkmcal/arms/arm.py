@@ -16,6 +16,7 @@ from pkmcal.arms.denavit_hartenberg import Convention, screws_of
 from pkmcal.arms.inputs import motion
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import FileError
+from pkmcal.files.reading import Input
 
 _SAME = 1e-9  # mm, and mm per rad: by so much the arm of a source may differ
 
@@ -110,7 +111,7 @@ class SerialArm(Chain):
     ) -> SerialArm:
         """An arm from a URDF file: the chain of moving joints between two links.
 
-        Needs the extra ``pkmcal[urdf]``. Metres become mm.
+        Metres become mm.
 
         Parameters
         ----------
@@ -124,10 +125,11 @@ class SerialArm(Chain):
         Raises
         ------
         ValueError
-            No such links, no moving joint between them, or one that an arm has not (floating,
-            planar, mimic).
+            No URDF file: cut short, with a document type or xacro, a joint without its links, an
+            origin that is not three numbers. No such links, no moving joint between them, or one
+            that an arm has not (floating, planar, mimic).
         """
-        from pkmcal.arms import urdf  # the parser takes a while to import
+        from pkmcal.arms import urdf  # brings a parser of XML
 
         return cls(**urdf.read(path, tip, base))
 
@@ -220,9 +222,10 @@ class SerialArm(Chain):
         """
         from pkmcal.arms import urdf
 
-        if not self._is_alike(SerialArm.from_urdf(source, tip, base)):
+        read = Input(source)
+        if not self._is_alike(SerialArm.from_urdf(read, tip, base)):
             raise FileError(f"source: {source} holds another arm than this one")
-        urdf.write(path, source, self.error_motions(), tip, base)
+        urdf.write(path, read, self.error_motions(), tip, base)
 
     def _is_alike(self, other: SerialArm) -> bool:
         """Whether it is the same arm without the joint errors, up to rounding."""

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ElementTree
-from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from pkmcal import arguments, screw
+from pkmcal import screw
 from pkmcal.arguments import did_you_mean
+from pkmcal.arms import urdf_file
 from pkmcal.arms.inputs import ArmArguments, JointKind
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import FileError
@@ -63,9 +61,8 @@ def write(
     origin in the parent becomes P⁻¹ E H. See `SerialArm.save_urdf`.
     """
     _, joints, _ = _chain(source, tip, base)
-    parser = ElementTree.XMLParser(target=ElementTree.TreeBuilder(insert_comments=True))
-    tree = ElementTree.parse(source, parser)
-    elements = {each.get("name"): each for each in tree.getroot().findall("joint")}
+    root = urdf_file.tree(source)
+    elements = {each.get("name"): each for each in root.findall("joint")}
     for joint, error in zip(joints, error_motions, strict=True):
         pose = screw.to_pose(np.linalg.inv(joint.parent) @ error @ joint.origin)
         element = elements[joint.name]
@@ -74,7 +71,7 @@ def write(
             origin = ElementTree.SubElement(element, "origin")
         origin.set("xyz", _text(pose[:3] / _METRE))
         origin.set("rpy", _text(pose[3:]))
-    text: str = ElementTree.tostring(tree.getroot(), encoding="unicode", xml_declaration=True)
+    text: str = ElementTree.tostring(root, encoding="unicode", xml_declaration=True)
     write_whole(path, text + "\n")
 
 
@@ -86,19 +83,15 @@ def _chain(
     path: str | os.PathLike[str], tip: str | None, base: str | None
 ) -> tuple[str, list[Joint], FloatArray]:
     """The robot's name, its moving joints from base to tip at zero, and the tip, mm."""
-    robot = _parsed(path)
-    _check_once(path, (joint.name for joint in robot.joints), "several joints are named {!r}")
-    _check_once(
-        path, (joint.child for joint in robot.joints), "{!r} is the child of several joints"
-    )
+    robot = urdf_file.read(path)
     above = {joint.child: joint for joint in robot.joints}
-    links = [link.name for link in robot.links]
     for argument, link in (("tip", tip), ("base", base)):
-        if link is not None and link not in links:
-            raise FileError(f"{argument}: {path} has no link {link!r}{did_you_mean(link, links)}")
+        if link is not None and link not in robot.links:
+            near = did_you_mean(link, robot.links)
+            raise FileError(f"{argument}: {path} has no link {link!r}{near}")
     if tip is None:
-        tip = _only_end(path, links, robot.joints)
-    chain: list[Any] = []
+        tip = _only_end(path, robot)
+    chain: list[urdf_file.Element] = []
     link = tip
     while link != base and link in above:
         if above[link] in chain:
@@ -110,68 +103,27 @@ def _chain(
     joints, place = [], np.eye(4)
     for joint in chain:
         parent = place
-        place = parent @ _origin(joint)
+        place = parent @ joint.origin
         if not np.isfinite(place).all():
             raise FileError(f"{path}: joint {joint.name!r}: origin must be finite")
         if joint.type == "fixed":
             continue
-        if joint.type not in _KINDS or joint.mimic is not None:
-            what = "mimic" if joint.mimic is not None else joint.type
+        if joint.type not in _KINDS or joint.mimics:
+            what = "mimic" if joint.mimics else joint.type
             raise FileError(f"{path}: joint {joint.name!r} is {what}, which a serial arm has not")
-        axis = np.array([1.0, 0.0, 0.0]) if joint.axis is None else np.asarray(joint.axis)
-        if axis.shape != (3,) or not np.isfinite(axis).all() or not axis.any():
-            found = " ".join(f"{number:g}" for number in axis)
-            raise FileError(
-                f"{path}: joint {joint.name!r}: axis must be a direction, found {found}"
-            )
+        if not any(joint.axis):
+            raise FileError(f"{path}: joint {joint.name!r}: axis must be a direction, found 0 0 0")
+        axis = np.array(joint.axis)
         joints.append(Joint(joint.name, _KINDS[joint.type], parent, place, axis))
     if not joints:
         raise FileError(f"{path}: no moving joint above the link {tip!r}")
     return robot.name, joints, place
 
 
-def _check_once(path: str | os.PathLike[str], names: Iterable[str], fault: str) -> None:
-    twice = [name for name, count in Counter(names).items() if count > 1]
-    if twice:
-        raise FileError(f"{path}: {fault.format(twice[0])}")
-
-
-def _parsed(path: str | os.PathLike[str]) -> Any:
-    try:
-        import yourdfpy
-    except ImportError:
-        raise ImportError("URDF files need yourdfpy: pip install 'pkmcal[urdf]'") from None
-    if not arguments.path("path", path).is_file():
-        raise FileNotFoundError(f"{path}: no such file")
-    try:
-        root = ElementTree.parse(path).getroot()
-    except ElementTree.ParseError as error:
-        raise FileError(f"{path}: not valid XML: {error}") from None
-    if root.tag != "robot":
-        raise FileError(f"{path}: not a URDF file: it begins with <{root.tag}>, not <robot>")
-    try:
-        return yourdfpy.URDF.load(
-            str(path),
-            build_scene_graph=False,
-            load_meshes=False,
-            build_collision_scene_graph=False,
-            load_collision_meshes=False,
-        ).robot
-    except (KeyError, AttributeError, ValueError, TypeError) as error:
-        raise FileError(f"{path}: not a URDF file: {error!r}") from None
-
-
-def _only_end(path: str | os.PathLike[str], links: Iterable[str], joints: Iterable[Any]) -> str:
-    parents = {joint.parent for joint in joints}
-    ends = [link for link in links if link not in parents]
+def _only_end(path: str | os.PathLike[str], robot: urdf_file.File) -> str:
+    parents = {joint.parent for joint in robot.joints}
+    ends = [link for link in robot.links if link not in parents]
     if len(ends) != 1:
-        raise FileError(f"tip: name one of the ends of {path}: {', '.join(ends) or 'it has none'}")
+        named = ", ".join(ends[:12]) + (", …" if len(ends) > 12 else "")
+        raise FileError(f"tip: name one of the ends of {path}: {named or 'it has none'}")
     return ends[0]
-
-
-def _origin(joint: Any) -> FloatArray:
-    place = np.eye(4)
-    if joint.origin is not None:
-        place[:] = joint.origin
-    place[:3, 3] *= _METRE
-    return place

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, first_largest
 from pkmcal.core import screws
 
 _ROUNDS = 60  # of turning and shifting in turn
+_ALIKE = 1e-12  # share of squares by which turnings differ that are not equally good
+_TILT = 1e-3  # rad; with tilts below it the poses do not tell where a target is
 _FLAT = 0.05  # share of the largest spread of points below which they lie in a plane, or a line
 
 
@@ -55,9 +57,7 @@ def of_points(seen: PointPairs) -> tuple[FloatArray, FloatArray]:
         mine = seen.target == k
         shifted[mine, :, k] = seen.turn[mine]
     lever = _centred(shifted).reshape(3 * len(values), 3 * count)  # of all points, by the shifts
-    inverse = np.linalg.pinv(
-        lever, rcond=1e-6
-    )  # what points do not determine stays where it is stated
+    inverse = _inverse(lever, _TILT * np.sqrt(len(values)))
     # shifts = gain · vec(turn) - still, and turn = Kabsch of `straight` + `by_shift` · shifts
     seen_by = np.einsum("ni,jk->njik", values, np.eye(3)).reshape(-1, 9)  # of Rᵀ v, by vec(R)
     gain, still = inverse @ seen_by, inverse @ point.reshape(-1)
@@ -66,9 +66,12 @@ def of_points(seen: PointPairs) -> tuple[FloatArray, FloatArray]:
     turns = Rotation.create_group("O").as_matrix()
     for _ in range(_ROUNDS if count else 1):
         shifts = turns.reshape(-1, 9) @ gain.T - still
-        turns = _nearest(straight + np.einsum("ijk,sk->sij", by_shift, shifts))
+        common = straight + np.einsum("ijk,sk->sij", by_shift, shifts)
+        # a turning that points in a plane or a line do not determine stays as it is
+        turns = _nearest(common + _ALIKE * np.linalg.norm(straight) * turns)
     off = (turns.reshape(-1, 9) @ seen_by.T) - point.reshape(-1)
-    best = int(np.argmin(((off - off @ inverse.T @ lever.T) ** 2).sum(axis=1)))
+    misfit = ((off - off @ inverse.T @ lever.T) ** 2).sum(axis=1)
+    best = first_largest(-misfit, _ALIKE * float((point**2).sum()))
     shift = inverse @ off[best]
     point = seen.point + (shifted.reshape(lever.shape) @ shift).reshape(-1, 3)
     place = seen.values.mean(axis=0) - turns[best] @ point.mean(axis=0)
@@ -104,6 +107,18 @@ def of_heights(values: FloatArray, point: FloatArray) -> FloatArray:
     frame[2] = (values - point @ up).mean()
     frame[3:5] = np.arctan2(up[1], up[2]), -np.arcsin(np.clip(up[0], -1.0, 1.0))
     return frame
+
+
+def _inverse(lever: FloatArray, floor: float) -> FloatArray:
+    """Pseudo-inverse of mm per mm; what poses determine less than `floor` stays where it is stated.
+
+    The floor is absolute: with poses of one orientation the lever is rounding alone, and a floor
+    relative to its largest singular value would let that decide.
+    """
+    left, singular, right = np.linalg.svd(lever, full_matrices=False)
+    kept = singular > floor
+    inverse: FloatArray = (right[kept].T / singular[kept]) @ left[:, kept].T
+    return inverse
 
 
 def _centred(rows: FloatArray) -> FloatArray:

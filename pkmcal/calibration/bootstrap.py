@@ -27,6 +27,7 @@ from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.least_squares import Search
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.measurements.observation import corrected
 from pkmcal.result import Result
 
 _TOGETHER = 20  # replicates that one task computes
@@ -211,7 +212,11 @@ class Replicate:
         signs = np.where(random.integers(0, 2, int(self._pose.max()) + 1), 1.0, -1.0)
         of_rows = np.split(signs[self._pose], np.cumsum([len(m) for m in equations.sets])[:-1])
         drawn = tuple(s[:, None] * r for s, r in zip(of_rows, self._residuals, strict=True))
-        values = [seen.values + r for seen, r in zip(at.predicted, drawn, strict=True)]
+        kinds = [measured.kind for measured in equations.sets]
+        values = [
+            corrected(kind, seen.values, residual)
+            for kind, seen, residual in zip(kinds, at.predicted, drawn, strict=True)
+        ]
         return self._solved(equations.with_values(values, centre), replace(at, residuals=drawn))
 
     def _solved(self, equations: Equations, at: Evaluation) -> FloatArray:

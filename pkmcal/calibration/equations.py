@@ -9,15 +9,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Int32Array, mm_per_unit, rms
+from pkmcal.arrays import FloatArray, Int32Array, IntArray, mm_per_unit, rms
 from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_poses
 from pkmcal.calibration.parameters import POINTS, FitData, Parameters
 from pkmcal.core import instruments
 from pkmcal.core.library import STATUS
 from pkmcal.display import first_rows
+from pkmcal.measurements import orientation
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import Predicted, difference, distance_per_point, predict
+from pkmcal.measurements.observation import (
+    Predicted,
+    by_difference,
+    difference,
+    distance_per_point,
+    predict,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +101,9 @@ class Equations:
         self._guess = np.tile(parameters.robot.home, (len(self.actuators), 1))
         for measured, framed, place in zip(self.sets, self._framed, self.pose_of, strict=True):
             if measured.kind in ("pose", "position") and not framed:
-                self._guess[place, : len(measured.components)] = measured.values
+                self._guess[place, :3] = measured.values[:, :3]
+                if measured.kind == "pose":
+                    self._guess[place, 3:] = orientation.shortest(measured.values[:, 3:])
         self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
         self.components = np.concatenate([np.full(len(m), len(m.components)) for m in self.sets])
         self.first = np.cumsum(self.components) - self.components  # equation of each row
@@ -104,22 +113,49 @@ class Equations:
         """Evaluate at `theta` (n,)."""
         robot = self.parameters.robot._with_values(self.parameters.values_at(theta))
         solved = robot.forward(self.actuators, self._guess)
+        predicted = self._predicted(solved.pose, theta)
+        residuals = self._residuals(predicted)
+        return Evaluation(theta, robot, solved.pose, solved.status, predicted, residuals)
+
+    def _predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
+        """Readings of each set at poses (K, 6)."""
         frame = self.parameters.frame_at(theta)
-        predicted, residuals = [], []
-        for i, measured in enumerate(self.sets):
-            seen = predict(
+        return tuple(
+            predict(
                 measured.kind,
-                solved.pose[self.pose_of[i]],
+                pose[self.pose_of[i]],
                 frame=frame if self._framed[i] else None,
                 origin=self.parameters.origin,
                 **self._known[i],
                 **{name: theta[columns] for name, columns in self._columns[i].items()},
             )
-            predicted.append(seen)
-            residuals.append(difference(measured.kind, measured.values, seen.values))
-        return Evaluation(
-            theta, robot, solved.pose, solved.status, tuple(predicted), tuple(residuals)
+            for i, measured in enumerate(self.sets)
         )
+
+    def _residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
+        """Measured less predicted of each set."""
+        return tuple(
+            difference(measured.kind, measured.values, seen.values)
+            for measured, seen in zip(self.sets, predicted, strict=True)
+        )
+
+    def misfit(self, pose: FloatArray, theta: FloatArray) -> FloatArray:
+        """How far off the worst reading at each pose (K, 6) is, mm (K,); inf without a pose.
+
+        Angles count as their arc.
+        """
+        worst = np.zeros(len(pose))
+        residuals = self._residuals(self._predicted(pose, theta))
+        for measured, place, residual in zip(self.sets, self.pose_of, residuals, strict=True):
+            arcs = mm_per_unit(measured.units, self.parameters.robot.length)
+            off = np.linalg.norm(residual * arcs, axis=1)
+            np.maximum.at(worst, place, np.where(np.isfinite(off), off, np.inf))
+        return worst
+
+    def start_from(self, rows: IntArray, poses: FloatArray) -> None:
+        """Start the forward kinematics of some distinct rows of actuators from poses (s, 6)."""
+        self._guess = self._guess.copy()
+        self._guess[rows] = poses
 
     def with_values(self, values: Sequence[FloatArray], prior_centre: FloatArray) -> Equations:
         """The same with other measured values (N, k) of each set, and another centre (n,)."""
@@ -134,7 +170,8 @@ class Equations:
     def start(self) -> Evaluation:
         """Evaluate at the present parameters, an unknown frame aligned with the readings.
 
-        Rows that fail from a measured pose are tried from home.
+        Rows that fail from a measured pose are tried from home, those that then miss grossly in
+        every assembly mode.
         """
         theta = self.parameters.start.copy()
         evaluation = self.at(theta)
@@ -196,7 +233,10 @@ class Equations:
         self._guess = np.where(evaluation.status[:, None] == 0, evaluation.pose, self._guess)
 
     def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
-        """Derivative of the predicted values of each set to the parameters, (N, k, n)."""
+        """Derivative of the predicted values of each set to the parameters, (N, k, n).
+
+        With the opposite sign that of the residuals.
+        """
         p = self.parameters
         by_geometry = evaluation.robot.error_twists(evaluation.pose, self.actuators)[:, :, p.places]
         parts = []
@@ -210,7 +250,7 @@ class Equations:
                 by_point = seen.by_target if name == "target" else seen.by_anchor
                 assert by_point is not None
                 np.put_along_axis(part, np.repeat(columns[:, None, :], k, axis=1), by_point, axis=2)
-            parts.append(part)
+            parts.append(by_difference(self.sets[i].kind, part, evaluation.residuals[i]))
         return parts
 
     def whitened(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
@@ -274,6 +314,13 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     sigma = measured.sigma
     if sigma is None:
         return np.tile(mm_per_unit(measured.units, length), (len(measured), 1))
+    if measured.kind == "pose" and not _same_turnings(sigma):
+        sigma = orientation.covariance(sigma, measured.values[:, 3:])
     if sigma.ndim == 2:
         return 1.0 / sigma
     return np.linalg.inv(np.linalg.cholesky(sigma))
+
+
+def _same_turnings(sigma: FloatArray) -> bool:
+    """Whether standard deviations (N, 6) are the same about every axis."""
+    return sigma.ndim == 2 and bool((sigma[:, 4:] == sigma[:, 3:4]).all())

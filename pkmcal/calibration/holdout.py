@@ -13,6 +13,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray, IntArray, propagate
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.mode_slips import in_their_modes
 from pkmcal.calibration.parameters import FitData
 from pkmcal.measurements.measurements import Measurements
 
@@ -70,7 +71,8 @@ def evaluate(
     if not held:
         return HeldOut()
     equations = Equations([data for data, _ in held], estimator.equations.parameters)
-    before, after = equations.at(estimator.start.theta), equations.at(estimate.evaluation.theta)
+    after = in_their_modes(equations, equations.at(estimate.evaluation.theta))
+    before = equations.at(estimator.start.theta)
     scaled = estimate.covariance * np.outer(estimator.scale, estimator.scale)
     variances = []
     for part, (data, like) in zip(equations.jacobian(after), held, strict=True):

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, first_largest
 
 _KINDS = 4  # kinds of parameters whose combinations are looked for
 _OUTSIDE = 1e-5  # share of a combination outside some parameters that does not count
+_ALIKE = 1e-3  # share by which entries of a combination differ that are not equal
+_SURE = 6  # decimals of a coefficient that are more than rounding
 _SPELLED = 6  # parameters whose coefficients are printed
 _IN_ONE_THREAD = 8192  # numbers
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
@@ -183,21 +185,20 @@ def sparse_basis(unidentifiable: FloatArray, names: Sequence[str]) -> FloatArray
 
 
 def _reduced(basis: FloatArray) -> FloatArray:
-    """Eliminate: each combination has a parameter that the others are without."""
-    basis = basis.copy()
-    d = basis.shape[1]
-    pivots: list[int] = []
-    for k in range(d):
-        sizes = np.abs(basis[:, k:]).max(axis=1)
-        sizes[pivots] = 0.0
-        row = int(np.argmax(sizes > 0.999 * sizes.max()))
-        column = k + int(np.argmax(np.abs(basis[row, k:])))
-        basis[:, [k, column]] = basis[:, [column, k]]
-        basis[:, k] /= basis[row, k]
-        others = [j for j in range(d) if j != k]
-        basis[:, others] -= np.outer(basis[:, k], basis[row, others])
-        pivots.append(row)
-    scaled: FloatArray = basis / basis[np.abs(basis).argmax(axis=0), np.arange(d)]
+    """Eliminate: each combination has a parameter that the others are without.
+
+    Which parameters these are depends on the space that the columns span alone, not on the columns:
+    the linear algebra library turns these in their space as rounding has it.
+    """
+    rest, pivots = basis.copy(), list[int]()
+    for _ in range(basis.shape[1]):
+        sizes = np.linalg.norm(rest, axis=1)
+        pivots.append(first_largest(sizes, _ALIKE * float(sizes.max())))
+        along = rest[pivots[-1]] / sizes[pivots[-1]]
+        rest -= np.outer(rest @ along, along)
+    reduced = np.linalg.solve(basis[pivots].T, basis.T).T
+    largest = [first_largest(sizes, _ALIKE * float(sizes.max())) for sizes in np.abs(reduced).T]
+    scaled: FloatArray = reduced / reduced[largest, np.arange(len(pivots))]
     return scaled
 
 
@@ -224,7 +225,7 @@ def as_sum(combination: FloatArray, names: Sequence[str]) -> str:
     groups: dict[float, list[str]] = {}
     for value, name in zip(combination, names, strict=True):
         if abs(value) > 0.01:
-            groups.setdefault(float(f"{value:.2g}"), []).append(name)
+            groups.setdefault(float(f"{round(float(value), _SURE):.2g}"), []).append(name)
     members = [name for group in groups.values() for name in group]
     if len(members) > _SPELLED and set(map(abs, groups)) != {1.0}:
         kinds = list(dict.fromkeys(_family(name) for name in names))

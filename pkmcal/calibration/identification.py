@@ -20,6 +20,7 @@ from pkmcal.measurements.observation import predict
 from pkmcal.result import Result
 
 _STRONG = 0.95  # correlation worth a word
+_ALIKE = 9  # decimals to which correlations differ that are not equal
 _UNIDENTIFIABLE = 1e-3  # mm a pose moves per mm along an unidentifiable combination
 
 
@@ -57,7 +58,7 @@ class Identification(Parts, Result):
             (self.free[i], self.free[j], float(matrix[i, j]))
             for i, j in zip(first, second, strict=True)
         ]
-        return tuple(sorted(pairs, key=lambda pair: -abs(pair[2])))
+        return tuple(sorted(pairs, key=lambda pair: -round(abs(pair[2]), _ALIKE)))
 
     def accuracy(self, poses: ArrayLike, target: ArrayLike | None = None) -> FloatArray:
         """Standard deviation of a point of the identified machine at any pose.

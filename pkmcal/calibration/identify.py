@@ -24,9 +24,11 @@ from pkmcal.calibration.fit_statistics import (
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.loss import LIMITS, LossName
+from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
 from pkmcal.calibration.parameters import KNOWN, Bounds, FitData, Known, Prior, parameters
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
+    distant_points,
     implausible_changes,
     insufficient_data,
     likely_unit_errors,
@@ -134,6 +136,8 @@ def identify(
     word("loss", loss, LIMITS)
     equations = Equations(datasets, chosen)
     start = equations.start()
+    if in_their_modes(equations, start) is not start:
+        start = equations.start()  # an unknown frame was laid with rows of other modes
     try:
         if not start.ok:
             raise ArgumentError(equations.failures(start))
@@ -165,6 +169,8 @@ def _warnings(
             f"residuals are {np.sqrt(result.chi2_per_dof):.3g} times what sigma says:"
             f" {_remedy(result, estimator, estimate)}"
         )
+    notes += in_other_modes(equations, estimate.evaluation)
+    notes += distant_points(estimate.evaluation, equations.parameters)
     notes += beyond_strokes(equations, estimator.start, estimate.evaluation)
     kept = estimate.state.determined.rank - estimate.state.fitted.rank
     if kept:
@@ -252,8 +258,11 @@ def _unknown(argument: str, given: str | Sequence[str], count: int) -> list[bool
 def _result(estimator: Estimator, estimate: Estimate, held: HeldOut) -> Identification:
     chosen, search = estimator.equations.parameters, estimator.search
     covariance = reported_covariance(estimator, estimate)
+    robot = as_given(chosen.robot.replace(chosen.values_at(estimate.evaluation.theta)))
+    if isinstance(robot, Robot):
+        robot = robot.closing(estimator.equations.actuators, estimate.evaluation.pose)
     return Identification(
-        robot=as_given(chosen.robot.replace(chosen.values_at(estimate.evaluation.theta))),
+        robot=robot,
         table=parameter_table(estimator, estimate, covariance),
         identifiability=identifiability(estimator, estimate),
         misfit=misfit(estimator, estimate),

@@ -2,15 +2,21 @@
 
 SciPy has no design by exchange. Everything is in coordinates in which all candidates have unit
 information about every combination of parameters: that of a choice is between 0 and 1, unitless.
+
+An exchange ends in a local optimum, and of nearly equal candidates rounding would decide in which.
+So what differs by less than `_ALIKE` is equal, of equals the first is taken, and the exchange
+starts more than once and keeps the best.
 """
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, first_largest
 from pkmcal.calibration.identifiability import ROUNDING, decompose
 
 Criterion = Literal["prediction", "D", "A"]
@@ -18,7 +24,9 @@ Criterion = Literal["prediction", "D", "A"]
 CRITERIA: tuple[Criterion, ...] = ("prediction", "D", "A")
 
 _TRIED = 12  # members that matter least, one of which must want to be exchanged
-_BETTER = 1e-9  # share by which an exchange must gain
+_ALIKE = 1e-6  # share by which an exchange must gain; rounding moves gains by up to 1e-7
+_STARTS = (1e-2, 1.0, 1e-4)  # candidates' worth of information that growing begins with
+_ROUNDED = 1e-9  # share by which a predicted error may exceed the one that was asked for
 _NOTHING = 1e-12  # share of the information of all candidates that is none
 
 
@@ -86,58 +94,109 @@ class Design:
 
     def grown(self, count: int) -> IntArray:
         """The best `count` candidates that exchanges find, in order."""
-        chosen: list[int] = []
-        while len(chosen) < count:
-            chosen.append(int(np.argmax(self._gains(chosen))))
-        return self._exchanged(chosen)
+        grown = [list(itertools.islice(self._growing(worth), count)) for worth in _STARTS]
+        ridge = self._lacking(grown[0])
+        found = [self._exchanged(chosen, ridge) for chosen in grown]
+        costs = np.array([self._log_cost(chosen, ridge) for chosen in found])
+        return found[first_largest(-costs, _ALIKE)]
 
     def reaching(self, error: float) -> IntArray:
         """As few candidates as predict an error (mm) that all together do."""
-        chosen: list[int] = []
-        while self.predicted(np.array(chosen, dtype=np.intp)) > error:
-            chosen.append(int(np.argmax(self._gains(chosen))))
-        best = self._exchanged(chosen)
+        error *= 1.0 + _ROUNDED
+        found = []
+        for worth in _STARTS:
+            growing, chosen = self._growing(worth), list[int]()
+            while self.predicted(np.array(chosen, dtype=np.intp)) > error:
+                chosen.append(next(growing))
+            found.append(self._reduced(chosen, error))
+        return min(found, key=len)
+
+    def _worth(self, candidates: float) -> FloatArray:
+        """Information of so many candidates, alike in all directions."""
+        worth: FloatArray = candidates / len(self._blocks) * np.eye(self._blocks.shape[2])
+        return worth
+
+    def _lacking(self, chosen: list[int]) -> FloatArray:
+        """What stands for the information that a choice lacks.
+
+        Choices too small to identify everything differ in what they identify only if the rest is
+        not unknown beyond all measure.
+        """
+        information = self._information(np.array(chosen, dtype=np.intp))
+        if np.linalg.eigvalsh(information)[0] < _NOTHING:
+            return np.asarray(self._ridge + self._worth(min(_STARTS)))
+        return np.asarray(self._ridge)
+
+    def _growing(self, worth: float) -> Iterator[int]:
+        """Candidates one by one, always the one that helps most those that entered before."""
+        ridge, chosen = self._ridge + self._worth(worth), list[int]()
+        while len(chosen) < len(self._blocks):
+            gains = self._gains(chosen, ridge)
+            chosen.append(first_largest(gains, _ALIKE * gains.max()))
+            yield chosen[-1]
+
+    def _reduced(self, chosen: list[int], error: float) -> IntArray:
+        """Fewer that still predict an error (mm)."""
+        ridge = self._lacking(chosen)
+        best = self._exchanged(chosen, ridge)
         while len(best) > 1:
-            fewer = self._exchanged(np.delete(best, np.argmin(self._losses(best))).tolist())
+            least = self._least(best.tolist(), ridge)[0]
+            fewer = self._exchanged([j for j in best.tolist() if j != least], ridge)
             if self.predicted(fewer) > error:
                 break
             best = fewer
         return best
 
-    def _exchanged(self, chosen: list[int]) -> IntArray:
+    def _exchanged(self, chosen: list[int], ridge: FloatArray) -> IntArray:
         """Members that matter least make room for the best of all, until none has to."""
-        tried = 0
-        while tried < min(_TRIED, len(chosen)):
-            i = chosen[int(np.argsort(self._losses(chosen), kind="stable")[tried])]
-            others = [j for j in chosen if j != i]
-            gains = self._gains(others)
-            best = int(np.argmax(gains))
-            if gains[best] > (1.0 + _BETTER) * gains[i]:
-                chosen, tried = [*others, best], 0
-            else:
-                tried += 1
+        exchanged = True
+        while exchanged:
+            exchanged = False
+            for i in self._least(chosen, ridge):
+                others = [j for j in chosen if j != i]
+                gains = self._gains(others, ridge)
+                best = first_largest(gains, _ALIKE * gains.max())
+                if gains[best] > (1.0 + _ALIKE) * gains[i]:
+                    chosen, exchanged = [*others, best], True
+                    break
         return np.sort(np.array(chosen, dtype=np.intp))
+
+    def _least(self, chosen: list[int], ridge: FloatArray) -> list[int]:
+        """The `_TRIED` members that matter least, in order; of equals the first."""
+        at = np.sort(np.array(chosen, dtype=np.intp))
+        losses = self._changes(self._blocks[at], at, -1.0, ridge)
+        order: list[int] = []
+        while len(order) < min(_TRIED, len(at)):
+            least = first_largest(-losses, _ALIKE * abs(losses.min()))
+            order.append(int(at[least]))
+            losses[least] = np.inf
+        return order
 
     def _information(self, chosen: IntArray) -> FloatArray:
         rows = self._blocks[chosen].reshape(-1, self._blocks.shape[2])
         information: FloatArray = rows.T @ rows + self._prior
         return information
 
-    def _gains(self, chosen: list[int]) -> FloatArray:
+    def _gains(self, chosen: list[int], ridge: FloatArray) -> FloatArray:
         """What each candidate (N,) would add to these; nothing for themselves."""
-        at = np.array(chosen, dtype=np.intp)
-        gains = self._changes(self._blocks, at, 1.0)
+        at = np.sort(np.array(chosen, dtype=np.intp))
+        gains = self._changes(self._blocks, at, 1.0, ridge)
         gains[at] = -np.inf
         return gains
 
-    def _losses(self, chosen: list[int] | IntArray) -> FloatArray:
-        """What each of these would take away."""
-        at = np.array(chosen, dtype=np.intp)
-        return self._changes(self._blocks[at], at, -1.0)
+    def _log_cost(self, chosen: IntArray, ridge: FloatArray) -> float:
+        """Logarithm of what the criterion makes least."""
+        information = self._information(chosen) + ridge
+        if self._determinant:
+            return -float(np.linalg.slogdet(information)[1])
+        cost = float(np.trace(np.linalg.solve(information, self._cost)))
+        return float(np.log(max(cost, np.finfo(float).tiny)))
 
-    def _changes(self, blocks: FloatArray, chosen: IntArray, sign: float) -> FloatArray:
+    def _changes(
+        self, blocks: FloatArray, chosen: IntArray, sign: float, ridge: FloatArray
+    ) -> FloatArray:
         """By how much the criterion changes if a block is added to the chosen ones, or removed."""
-        covariance = np.linalg.inv(self._information(chosen) + self._ridge)
+        covariance = np.linalg.inv(self._information(chosen) + ridge)
         through = blocks @ covariance
         own = np.eye(blocks.shape[1]) + sign * (through @ blocks.transpose(0, 2, 1))
         if self._determinant:

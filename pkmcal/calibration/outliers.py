@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, first_largest
 from pkmcal.calibration.identifiability import triangle
 
 _FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
+_ALIKE = 1e-9  # share by which rows are further off than others that are not equally far off
+_NONE = np.finfo(float).tiny
 _MOST = 4  # at most one row in so many can be odd
 
 
@@ -64,7 +66,10 @@ def outliers(
             squares[mine] = _squares(left[e], jacobian[e], covariance, part[mine])
         spread = median_ratio(squares[kept], components[kept])
         chance = _chance(squares / max(spread, 1.0), components)
-        worst = int(np.argmin(np.where(kept, chance, np.inf)))
+        # where the chance is 0 to the last digit, the squares decide; they exceed its logarithm
+        excess = np.where(chance > 0, -np.log(np.maximum(chance, _NONE)), squares)
+        excess = np.where(kept, np.maximum(excess, 0.0), -1.0)
+        worst = first_largest(excess, _ALIKE * float(excess.max()))
         if chance[worst] >= _FALSE_ALARM / rows:
             break
         kept[worst] = False

@@ -113,7 +113,10 @@ class Parts:
 
     @property
     def stderr(self) -> FloatArray:
-        """Standard deviations (n,); inf where neither measurements nor prior determine."""
+        """Standard deviations (n,); inf where neither measurements nor prior determine.
+
+        They know no bounds: for numbers `at_bounds` they are those without the bound.
+        """
         return self.table.stderr
 
     @property

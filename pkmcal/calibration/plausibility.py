@@ -21,6 +21,8 @@ FAR = 0.25  # share of the machine's size by which errors of manufacture do not 
 _BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
 _LEAST_FREEDOM = 0.5  # degrees of freedom from which residuals show how good a fit is
 MISFIT_RATIO = 0.2  # of the misfit that another reading may leave to be named as what was meant
+_REMOTE = 3.0  # times a machine's reach within which a point of its platform is
+_ALIKE = 1e-6  # share by which misfits differ that are not equal
 _FACTORS = {
     "mm": (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)),
     "rad": (
@@ -49,7 +51,9 @@ def likely_unit_errors(
             words: _misfit(_alone(replace(data, measured=other), parameters), other.units, size)
             for words, other in _readings(data.measured, parameters.robot.actuator_units)
         }
-        words = min(trials, key=lambda text: trials[text])
+        # exchanges that a symmetric machine cannot tell apart misfit alike
+        least = min(trials.values())
+        words = next(text for text in trials if trials[text] <= least * (1.0 + _ALIKE))
         if trials[words] < MISFIT_RATIO * present:
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
             off = (
@@ -157,6 +161,27 @@ def implausible_changes(start: Evaluation, end: Evaluation, parameters: Paramete
         f"{names} moved by up to {moved.max():.3g} mm, further than errors of a machine: check that"
         " the robot file describes this one, or free fewer parameters"
     ]
+
+
+def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
+    """Find points of the platform that were sought near it and found far away.
+
+    Poses that hardly turn do not tell where a target is; noise may then carry it anywhere.
+    """
+    reach = float(np.linalg.norm(end.pose[:, :3], axis=1).max())
+    size = _REMOTE * max(reach, parameters.robot.length)
+    found = []
+    for (role, name), first in parameters.points.items():
+        place = end.theta[first : first + 3]
+        moved = float(np.linalg.norm(place - parameters.start[first : first + 3]))
+        far = float(np.linalg.norm(place))
+        if role != "anchor" and min(moved, far) > size:
+            found.append(
+                f"{role} {name} was found {far:.3g} mm from the platform's origin, beyond the"
+                f" machine's size ({size:.0f} mm): measure poses that turn more, or state where it"
+                " is"
+            )
+    return found
 
 
 def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: bool) -> list[str]:

@@ -69,7 +69,7 @@ def limits(
     if outliers:
         yield filled("outliers: ", f"rows {first_rows(outliers, 10)}")
     if at_bounds:
-        yield filled("at a bound: ", ", ".join(at_bounds))
+        yield filled("at a bound, ± as if it were not there: ", ", ".join(at_bounds))
 
 
 def parameter_rows(table: ParameterTable) -> Table:

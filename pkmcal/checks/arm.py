@@ -10,17 +10,19 @@ import numpy as np
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arms.inputs import ERRORS
 from pkmcal.checks.finding import Finding
-from pkmcal.checks.function import whole_size
+from pkmcal.checks.function import USUAL, whole_size
 
 _TURNED = 0.2  # rad: no joint is turned so far from its place by error
 _SHIFTED = 0.1  # of the arm's length: none is shifted so far
+_STEP = 5.0  # deg: twists of drawings are its multiples
+_EXACTLY = 1e-6  # rad
 _ONE_AXIS = 1e-6  # of the arm's length, or rad: so near to each other two axes are one
 
 
 def wrong_length(arm: SerialArm) -> Iterator[Finding]:
     """An arm that is too small or too large to be one."""
     places = np.vstack([arm.points, arm.home[None, :3, 3]])
-    yield from whole_size(float(np.linalg.norm(places, axis=1).max()))
+    yield from whole_size(float(np.linalg.norm(places, axis=1).max()), USUAL)
 
 
 def wrong_errors(arm: SerialArm) -> Iterator[Finding]:
@@ -44,6 +46,26 @@ def wrong_errors(arm: SerialArm) -> Iterator[Finding]:
                 )
 
 
+def twists_in_degrees(arm: SerialArm) -> Iterator[Finding]:
+    """Angles between neighbouring axes that are round numbers of degrees, taken for radians."""
+    typed = np.arange(_STEP, 360.0, _STEP)
+    axes = np.vstack([[0.0, 0.0, 1.0], arm.axes, arm.home[:3, 2]])
+    for i, (one, other) in enumerate(pairwise(axes)):
+        twist = float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))
+        meant = typed[np.abs(np.arccos(np.cos(typed)) - twist) <= _EXACTLY]
+        if not meant.size:
+            continue
+        ends = [f"joint {k}" if 1 <= k <= len(arm.axes) else "" for k in (i, i + 1)]
+        first, second = ends[0] or "the base's z axis", ends[1] or "the tool's z axis"
+        yield Finding(
+            "angle",
+            tuple(k for k, end in zip((i, i + 1), ends, strict=True) if end),
+            f"{first} and {second} are {np.degrees(twist):.6g} deg apart, which is"
+            f" {meant[0]:g} rad less full turns",
+            f"was {meant[0]:g} deg meant? Denavit-Hartenberg angles are in rad",
+        )
+
+
 def coaxial(arm: SerialArm) -> Iterator[Finding]:
     """Neighbours on one axis, of which the second moves nothing that the first does not."""
     screws = arm.screws / np.array([1.0, 1.0, 1.0, *(arm.length,) * 3])
@@ -62,4 +84,4 @@ def coaxial(arm: SerialArm) -> Iterator[Finding]:
             )
 
 
-ARM_CHECKS = (wrong_length, wrong_errors, coaxial)
+ARM_CHECKS = (wrong_length, wrong_errors, twists_in_degrees, coaxial)

@@ -9,7 +9,13 @@ from pkmcal.arguments import instance
 from pkmcal.arms.arm import SerialArm
 from pkmcal.checks.arm import ARM_CHECKS
 from pkmcal.checks.finding import Finding
-from pkmcal.checks.function import not_closed, singular, unreachable, wrong_unit
+from pkmcal.checks.function import (
+    not_closed,
+    singular,
+    unreachable,
+    unusual_size,
+    wrong_unit,
+)
 from pkmcal.checks.layout import (
     angles_as_coordinates,
     contradicted,
@@ -67,6 +73,8 @@ class GeometryCheck(Result):
         count = len(self.findings)
         if not count:
             yield f"{self.robot.name}: no problems found"
+            if isinstance(self.robot, Robot) and (remark := unusual_size(self.robot)):
+                yield remark
             return
         yield f"{self.robot.name}: {count} finding{'s' if count > 1 else ''}"
         rows = [
@@ -112,10 +120,13 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
     Notes
     -----
     Limbs count as alike within 3 % of the base's radius, so that a calibrated machine, which has
-    errors of manufacture, raises no alarm; a slip smaller than that is not seen.
+    errors of manufacture, raises no alarm; a slip smaller than that is not seen. A machine below
+    10 mm or above 100 m is no finding, for there are such; where nothing else is found ``print``
+    remarks on its size, since all of its lengths may be in another unit.
 
-    Of a serial arm fewer things can be checked: lengths and joint errors in another unit (unit,
-    angle), and neighbouring joints on one axis (double), where ``Finding.limbs`` counts joints.
+    Of a serial arm fewer things can be checked: lengths, joint errors and Denavit–Hartenberg twists
+    in another unit (unit, angle), and neighbouring joints on one axis (double), where
+    ``Finding.limbs`` counts joints.
 
     Examples
     --------

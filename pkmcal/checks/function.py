@@ -18,8 +18,10 @@ from pkmcal.kinematics.robot import Robot
 _FULL_TURN = 2 * np.pi
 _STEEP = 0.5  # rad: no axis is tilted so far from its reference by error
 _APART = 60.0  # times: two lengths of one machine do not differ by more
-_SMALLEST, _LARGEST = 10.0, 1e5  # mm: a machine is larger, or smaller
+_SMALLEST, _LARGEST = 0.01, 1e6  # mm: any machine is larger, or smaller
+USUAL = (10.0, 1e5)  # mm: most are; micromachines and machines of cables are not
 _FACTORS = ((1e3, "metres"), (25.4, "inches"), (1e-3, "micrometres"))
+_NOISE, _SAME = 0.005, 1e-4  # of the largest length: errors of joints that are meant to be at 0
 _STEPS = 40  # of a move to the end of a stroke
 _POSES, _SPREAD = 200, 0.2  # drawn around home to look for a pose that is not singular
 _SINGULAR = 1e-7  # conditioning: numerically none
@@ -49,7 +51,7 @@ def wrong_unit(robot: Robot) -> Iterator[Finding]:
     sizes = _sizes(robot)
     if not sizes:  # all joints in one point, which `doubled` says
         return
-    yield from whole_size(max(sizes.values()))
+    yield from whole_size(max(sizes.values()), (_SMALLEST, _LARGEST))
     middle = float(np.exp(np.median(np.log(list(sizes.values())))))
     found = False
     for name, value in sizes.items():
@@ -66,10 +68,22 @@ def wrong_unit(robot: Robot) -> Iterator[Finding]:
         yield from _mended(robot)
 
 
-def whole_size(largest: float) -> Iterator[Finding]:
+def unusual_size(robot: Robot) -> str:
+    """A remark on a machine whose size is rare, for the unit may be another; else empty."""
+    largest = max(_sizes(robot).values(), default=USUAL[0])
+    if USUAL[0] <= largest <= USUAL[1]:
+        return ""
+    likely = "metres" if largest < USUAL[0] else "micrometres"
+    return (
+        f"its largest length is {largest:.4g} mm, as few machines have: see length under [units] if"
+        f" that is in {likely}"
+    )
+
+
+def whole_size(largest: float, within: tuple[float, float]) -> Iterator[Finding]:
     """A machine whose largest length, mm, is that of none."""
-    if not _SMALLEST <= largest <= _LARGEST:
-        likely = "metres" if largest < _SMALLEST else "micrometres"
+    if not within[0] <= largest <= within[1]:
+        likely = "metres" if largest < within[0] else "micrometres"
         yield Finding(
             "unit",
             (),
@@ -107,7 +121,19 @@ def _sizes(robot: Robot) -> dict[str, float]:
         "cranks": float(slots[:, SLOTS.index("crank")].max()),
         "strokes": max(ends, default=0.0),
     }
-    return {name: value for name, value in sizes.items() if value > 1e-9}
+    least = _NOISE * max(sizes.values())
+    meant = {"base joints": _alike(base.points), "platform joints": _alike(platform.points)}
+    return {
+        name: value
+        for name, value in sizes.items()
+        if value > 1e-9 and (value > least or meant.get(name, True))
+    }
+
+
+def _alike(points: FloatArray) -> bool:
+    """Whether some joints are equally far from the origin, as in tables and not by error."""
+    far = np.sort(np.linalg.norm(points, axis=1))
+    return bool((np.diff(far) <= _SAME * far[1:]).any())
 
 
 def _mended(robot: Robot) -> Iterator[Finding]:

@@ -8,12 +8,15 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from pkmcal import screw
 from pkmcal.arrays import FloatArray, wrapped
 from pkmcal.core.library import DRIVERS, SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 
-_SAME_ANGLE = 1e-6  # rad
+_POINT = 0.01  # of the largest length: joints no further from each other are meant to be in one
+_TILTED = 0.5  # rad: a plane is so far from another by intention
+_FLAT = 0.2  # of the longer side: points no wider than this are rather on a line
 ALIKE = 0.03  # of the base's radius: by less, errors of manufacture make limbs differ
 
 
@@ -42,16 +45,16 @@ class Joints:
         """Polar angles about the z axis, rad."""
         return np.arctan2(self.points[:, 1], self.points[:, 0])
 
-    @property
-    def senses(self) -> frozenset[int]:
+    def senses(self, room: float) -> frozenset[int]:
         """Ways the joints follow each other in one turn: +1 counter-clockwise, -1 clockwise.
 
-        Joints at the same angle may follow each other either way.
+        Joints that lie `room` mm apart, or less, may follow each other either way.
         """
         steps = np.roll(self.angles, -1) - self.angles
+        same = np.minimum(room / np.maximum(self.radii, room), 1.0)
         found = set()
         for way in (1, -1):
-            forward = np.mod(way * steps + _SAME_ANGLE, 2 * np.pi) - _SAME_ANGLE
+            forward = np.mod(way * steps + same, 2 * np.pi) - same
             if abs(float(forward.sum()) - 2 * np.pi) < 1e-3:
                 found.add(way)
         return frozenset(found)
@@ -87,10 +90,63 @@ def joints(robot: Robot) -> tuple[Joints, Joints]:
     return Joints("base", slots[:, 0:3]), Joints("platform", slots[:, 3:6])
 
 
+def along_axis(robot: Robot) -> tuple[Joints, Joints]:
+    """Base and platform joints of a machine at home, seen along the axis they lie around.
+
+    That is z, unless the base joints lie in a plane that is clearly tilted against it, as those of
+    a machine do whose frame follows something else. (Three joints always do: they count if they
+    are equally far from their middle.)
+    """
+    base, platform = joints(robot)
+    middle = base.points.mean(axis=0)
+    spread, plane = np.linalg.svd(base.points - middle)[1:]  # the last row is across the plane
+    upright = abs(plane[2, 2]) >= np.cos(_TILTED)
+    room, count = ALIKE * size(robot), len(base.points)
+    if upright or count < 3 or spread[1] < max(_FLAT * spread[0], room):
+        return base, platform
+    turn = plane * np.array([[1.0], [1.0], [np.linalg.det(plane)]])
+    turned = Joints("base", (base.points - middle) @ turn.T)
+    flat = spread[2] <= _FLAT * spread[1] if count > 3 else np.ptp(turned.radii) <= 2 * room
+    if not flat:
+        return base, platform
+    at_home = platform.points @ screw.from_pose(robot.model.home)[:3, :3].T
+    return turned, Joints("platform", at_home @ turn.T)
+
+
+def slider_ways(robot: Robot) -> FloatArray:
+    """Direction of each slider as stated (limbs, 3), unit; 0 for other limbs."""
+    return np.array([
+        limb.frames["base"][:, 2] if KINDS[limb.kind].driver == "slider" else np.zeros(3)
+        for limb in robot.model.limbs
+    ])  # fmt: skip
+
+
+def on_rails(robot: Robot) -> bool:
+    """Whether the carriages of all limbs run on parallel rails side by side, three at least.
+
+    Such a machine has no axis that its limbs lie around (Triaglide, Hexaglide).
+    """
+    ways, points = slider_ways(robot), joints(robot)[0].points
+    if not ways.any(axis=1).all() or np.abs(np.cross(ways, ways[0])).max() > ALIKE:
+        return False
+    across = points - np.outer(points @ ways[0], ways[0])
+    spread, along = np.linalg.svd(across - across.mean(axis=0))[1:]
+    places = np.sort(across @ along[0])
+    rails = 1 + int((np.diff(places) > ALIKE * size(robot)).sum())
+    return bool(spread[1] <= ALIKE * spread[0] and rails >= 3)
+
+
 def size(robot: Robot) -> float:
-    """Root mean square distance of the base joints from their middle, mm; or `Robot.length`."""
+    """Root mean square distance of the base joints from their middle, mm, or `Robot.length`.
+
+    Of a machine whose joints all meet in one point, the largest rod or crank.
+    """
     base = joints(robot)[0].points
-    return max(float(np.sqrt(((base - base.mean(axis=0)) ** 2).sum(axis=1).mean())), robot.length)
+    wide = float(np.sqrt(((base - base.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    slots = robot.geometry.slots
+    arm = float(slots[:, [SLOTS.index("rod"), SLOTS.index("crank")]].max())
+    found = max(wide, robot.length)
+    return arm if found <= _POINT * arm else found
 
 
 def majority(values: FloatArray, room: float) -> tuple[NDArray[np.bool_], float]:
@@ -123,7 +179,8 @@ class Trait:
         """Limbs (from 0) that are unlike the others by more than `room` mm, and what others have.
 
         Where more than half are alike: those that are like no other, and the value of the many.
-        Where limbs come in alike groups: two that are like no other, and NaN. Otherwise none.
+        Where limbs come in alike groups: two that are like no other, or one of six, and NaN.
+        Otherwise none.
         """
         place = np.flatnonzero(np.isfinite(self.values))
         if len(place) < 3:
@@ -135,22 +192,27 @@ class Trait:
         limbs = place[alone].tolist()
         if 2 * many.sum() > len(values):
             return limbs, usual / self.scale
-        return (limbs if len(limbs) == 2 and len(values) >= 4 else []), np.nan
+        count = len(values)
+        odd_ones = len(limbs) == 2 <= count - 2 or (
+            len(limbs) == 1 and count >= 6 and not count % 2
+        )
+        return (limbs if odd_ones else []), np.nan
 
 
 def traits(robot: Robot) -> list[Trait]:
     """What alike limbs have in common."""
-    base, platform = joints(robot)
+    base, platform = along_axis(robot)
     mm = size(robot)
     degree = mm * np.pi / 180
     limbs = robot.model.limbs
+    rails = on_rails(robot)
     between = np.degrees(np.abs(wrapped(base.angles - platform.angles)))
-    off_axis = (base.radii > 1e-6 * mm) & (platform.radii > 1e-6 * mm)
+    near = np.minimum(base.radii, platform.radii) <= ALIKE * mm
     found = [
-        Trait("base radius", "mm", base.radii, 1.0),
+        Trait("base radius", "mm", np.full(len(limbs), np.nan) if rails else base.radii, 1.0),
         Trait("platform radius", "mm", platform.radii, 1.0),
         Trait("angle between base and platform joint", "deg",
-              np.where(off_axis, between, np.nan), degree),
+              np.where(near | rails, np.nan, between), degree),
         Trait("height of the base joint", "mm", base.points[:, 2], 1.0),
         Trait("height of the platform joint", "mm", platform.points[:, 2], 1.0),
     ]  # fmt: skip
@@ -165,9 +227,11 @@ def traits(robot: Robot) -> list[Trait]:
         if driver == "crank":
             rods.append(Trait("crank", "mm", slot["crank"], 1.0))
         unit, shown, scale = ("deg", 180 / np.pi, degree) if driver == "crank" else ("mm", 1.0, 1.0)
+        # from one side or the other a rail's carriage drives, and stands elsewhere
+        at_home = np.full(len(limbs), np.nan) if rails else drive * shown
         own = (
             *rods,
-            Trait(f"{driver} at home", unit, drive * shown, scale),
+            Trait(f"{driver} at home", unit, at_home, scale),
             Trait("offset", unit, slot["offset"] * shown, scale),
             Trait("gain", "1", slot["gain"], mm),
             Trait("lower end of the stroke", unit, ends[:, 0] * shown, scale),

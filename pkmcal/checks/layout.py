@@ -9,7 +9,16 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.checks.finding import Finding, named
-from pkmcal.checks.joint_layout import ALIKE, Joints, joints, size, traits
+from pkmcal.checks.joint_layout import (
+    ALIKE,
+    Joints,
+    along_axis,
+    joints,
+    on_rails,
+    size,
+    slider_ways,
+    traits,
+)
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 
@@ -120,7 +129,13 @@ def doubled(robot: Robot) -> Iterator[Finding]:
     count = len(robot.model.limbs)
     both = np.hstack([base.points, platform.points])
     pairs = combinations(range(count), 2)
-    copies = [(i, j) for i, j in pairs if float(np.linalg.norm(both[i] - both[j])) <= room]
+    ways = slider_ways(robot)
+    crossing = np.linalg.norm(np.cross(ways[:, None], ways), axis=2) > ALIKE  # at a point of both
+    copies = [
+        (i, j)
+        for i, j in pairs
+        if float(np.linalg.norm(both[i] - both[j])) <= room and not crossing[i, j]
+    ]
     for i, j in copies:
         place = ", ".join(f"{number:.6g}" for number in base.points[i])
         yield Finding(
@@ -133,6 +148,8 @@ def doubled(robot: Robot) -> Iterator[Finding]:
         return
     for side in (base, platform):
         near = np.linalg.norm(side.points[:, None] - side.points, axis=2) <= room
+        if side.side == "base":
+            near &= ~crossing
         shared = np.flatnonzero(near.sum(axis=1) > 2)
         if len(shared) and not copies:
             yield Finding(
@@ -144,9 +161,13 @@ def doubled(robot: Robot) -> Iterator[Finding]:
 
 
 def swapped(robot: Robot) -> Iterator[Finding]:
-    """A platform that is wider than its base."""
-    base, platform = (float(np.median(side.radii)) for side in joints(robot))
-    if platform > _WIDER * base > 0:
+    """A platform that is wider than its base; of a planar machine if both are regular."""
+    room = ALIKE * size(robot)
+    sides = along_axis(robot)
+    if robot.model.map == "planar" and not all(_has_circle(side, room) for side in sides):
+        return  # arms reach in to platforms of any width
+    base, platform = (float(np.median(side.radii)) for side in sides)
+    if platform > _WIDER * base > room:
         yield Finding(
             "swapped",
             (),
@@ -158,53 +179,58 @@ def swapped(robot: Robot) -> Iterator[Finding]:
 
 def opposite_order(robot: Robot) -> Iterator[Finding]:
     """Base joints counted one way round and platform joints another."""
-    base, platform = joints(robot)
-    if platform.radii.min() <= ALIKE * float(base.radii.max()):
+    base, platform = along_axis(robot)
+    room = ALIKE * size(robot)
+    if min(base.radii.min(), platform.radii.min()) <= room:
         return
-    if base.senses == platform.senses or base.senses & platform.senses:
+    below, above = base.senses(room), platform.senses(room)
+    if below == above or below & above:
         return
-    mirrored = bool(base.senses and platform.senses)
+    mirrored = bool(below and above)
     yield Finding(
         "order",
         (),
-        f"seen from above, the base joints run {_way(base)} and the platform joints"
-        f" {_way(platform)}",
+        f"seen from above, the base joints run {_way(below)} and the platform joints {_way(above)}",
         "one of the tables has a left-handed frame: turn the sign of its x or of its y"
         if mirrored
         else "were two joints exchanged? Joint 1 of the base and of the platform belong to limb 1",
     )
 
 
-def _way(side: Joints) -> str:
-    if not side.senses:
+def _way(senses: frozenset[int]) -> str:
+    if not senses:
         return "neither way round"
-    return "counter-clockwise" if 1 in side.senses else "clockwise"
+    return "counter-clockwise" if 1 in senses else "clockwise"
 
 
 def off_circle(robot: Robot) -> Iterator[Finding]:
-    """Joints that are off the circle of the others."""
+    """Joints that are off the circle of the others, each by itself: two alike are a design."""
     room = ALIKE * size(robot)
-    for side in joints(robot):
+    for side, written in zip(along_axis(robot), joints(robot), strict=True):
+        if side.side == "base" and on_rails(robot):
+            continue
         found = side.circle(room)
         if found is None:
             continue
         centre, radius, on = found
         where = "" if not centre.any() else f" about ({centre[0]:.6g}, {centre[1]:.6g}) mm"
-        for i in np.flatnonzero(~on).tolist():
-            away = float(np.linalg.norm(side.points[i, :2] - centre))
+        distance = np.linalg.norm(side.points[:, :2] - centre, axis=1)
+        alone = (np.abs(distance[:, None] - distance) <= room).sum(axis=1) == 1
+        for i in np.flatnonzero(~on & alone).tolist():
+            away = float(distance[i])
             yield Finding(
                 "circle",
                 (i + 1,),
                 f"{side.side} joint {i + 1} is {abs(away - radius):.4g} mm off the circle of radius"
                 f" {radius:.6g} mm{where} that {on.sum()} of {len(on)} {side.side} joints lie on",
-                f"check its x and y: ({side.points[i, 0]:.6g}, {side.points[i, 1]:.6g}) mm",
+                "check its x, y and z: ({:.6g}, {:.6g}, {:.6g}) mm".format(*written.points[i]),
             )
 
 
 def unlike(robot: Robot) -> Iterator[Finding]:
     """Limbs that are unlike the others."""
     room = ALIKE * size(robot)
-    circles = {f"{side.side} radius" for side in joints(robot) if _has_circle(side, room)}
+    circles = {f"{side.side} radius" for side in along_axis(robot) if _has_circle(side, room)}
     kinds = {KINDS[limb.kind].name for limb in robot.model.limbs}
     for trait in traits(robot):
         if trait.name in circles:  # `off_circle` reports it
@@ -217,6 +243,8 @@ def unlike(robot: Robot) -> Iterator[Finding]:
             f"{usual:.6g} {trait.unit} with the others"
             if np.isfinite(usual)
             else "unlike each other, where the others come in alike pairs"
+            if len(limbs) > 1
+            else "like no other, where the others come in alike groups"
         )
         same = " of the same kind" if len(kinds) == 1 else ""
         yield Finding(

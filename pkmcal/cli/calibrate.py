@@ -15,15 +15,16 @@ from pkmcal.arguments import word
 from pkmcal.calibration.loss import LIMITS
 from pkmcal.calibration.parameters import KNOWN
 from pkmcal.cli.geometry_options import free_names, read_deviations
-from pkmcal.cli.options import Free, Json, Prior, RobotOrArm
-from pkmcal.cli.output import contents, folder
+from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm
+from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
 from pkmcal.exceptions import ArgumentError
-from pkmcal.files.provenance import comment
 from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.report.as_json import as_json
+from pkmcal.report.report import FILES as REPORT
 
 
 def calibrate(
@@ -79,6 +80,7 @@ def calibrate(
             help="Write report.html, which any browser shows, report.json and robot.toml.",
         ),
     ] = None,
+    force: Force = False,
     json: Json = False,
 ) -> int:
     """Identify the geometry of a machine from measurements of it.
@@ -88,14 +90,13 @@ def calibrate(
     Example: pkmcal calibrate examples/linear-delta/robot.toml examples/linear-delta/probe.csv
     --report out
     """
-    given = pk.load(robot)
+    read = Inputs()
+    given = pk.load(read.robot(robot))
     machine = as_machine(given)
-    for option, written in (("--out", out), ("--report", report)):
-        if written is not None:
-            _refuse_own_input(option, written, robot)
-    held = [] if holdout is None or not Path(holdout).is_file() else [Path(holdout)]
-    files = contents(robot, csv, *held)
-    measured = pk.read_measurements(csv, machine)
+    measured = pk.read_measurements(read.file(csv), machine)
+    held = None if holdout is None else _read_holdout(holdout, read, machine)
+    output = None if out is None else Output(out, ["robot.toml", "residuals.png"], read, force)
+    reported = None if report is None else Output(report, REPORT, read, force)
     if tracker is not None:
         measured = _seen_by(read_tracker(tracker), measured)
     chosen = free_names(machine, free)
@@ -110,25 +111,24 @@ def calibrate(
             frame=word("--frame", frame, KNOWN),
             target=word("--target", target, KNOWN),
             attachment=word("--attachment", attachment, KNOWN),
-            holdout=None if holdout is None else _read_holdout(holdout, machine),
+            holdout=held,
         )
-    if out is not None:
-        found.robot.save(folder(out) / "robot.toml", comment(files))
-        with progress("picture"):
-            found.plot(out / "residuals.png")
-    page = None
-    if report is not None:
-        with progress("report"):
-            page = found.report(folder(report), files)[0]
+    if output is not None:
+        with progress("picture"), output.draft() as draft:
+            found.robot.save(draft / "robot.toml", read.comment())
+            found.plot(draft / "residuals.png")
+    if reported is not None:
+        with progress("report"), reported.draft() as draft:
+            found.report(draft, read.contents())
     if json:
-        typer.echo(as_json(found, "parameters", "correlations"))
+        say(as_json(found, "parameters", "correlations"))
     else:
-        typer.echo(found.summary())
-        if out is not None:
-            typer.echo(f"\ncalibrated robot: {out / 'robot.toml'}")
-            typer.echo(f"residuals: {out / 'residuals.png'}")
-        if page is not None:
-            typer.echo(f"\nreport: {page}")
+        say(found.summary())
+        if output is not None:
+            say(f"\ncalibrated robot: {output.paths[0]}")
+            say(f"residuals: {output.paths[1]}")
+        if reported is not None:
+            say(f"\nreport: {reported.paths[0]}")
     return 0 if found.converged and not found.warnings else 1
 
 
@@ -163,18 +163,10 @@ def _seen_by(tracker: Tracker, measured: Measurements) -> Measurements:
     return replace(measured, sigma=tracker.covariance(measured.values))
 
 
-def _read_holdout(text: str, robot: Calibratable) -> float | Measurements:
+def _read_holdout(text: str, read: Inputs, robot: Calibratable) -> float | Measurements:
     """Return a fraction, a number of poses, or the measurements of a file."""
     try:
         number = float(text)
     except ValueError:
-        return pk.read_measurements(text, robot)
+        return pk.read_measurements(read.file(text), robot)
     return int(number) if number.is_integer() else number
-
-
-def _refuse_own_input(option: str, out: Path, robot: str) -> None:
-    written = out / "robot.toml"
-    if written.exists() and Path(robot).exists() and written.samefile(robot):
-        raise ArgumentError(
-            f"{option} {out}: would overwrite {robot}, which is an input; name another folder"
-        )

@@ -9,7 +9,9 @@ import numpy as np
 import typer
 
 import pkmcal as pk
+from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Json, RobotOrArm
+from pkmcal.cli.output import say
 from pkmcal.display import first_rows
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.report.as_json import as_json
@@ -32,25 +34,28 @@ def check(
 
     Example: pkmcal check hexapod
     """
-    machine = pk.load(robot)
-    measured = None if measurements is None else pk.read_measurements(measurements, machine)
+    read = Inputs()
+    machine = pk.load(read.robot(robot))
+    measured = None
+    if measurements is not None:
+        measured = pk.read_measurements(read.file(measurements), machine)
     found = pk.check_geometry(machine)
     unsolved: list[int] = []
     if measured is not None:
         unsolved = np.flatnonzero(~as_machine(machine).forward(measured.actuators).ok).tolist()
     if json:
-        read = None
+        said = None
         if measured is not None:
-            read = {"kind": measured.kind, "rows": len(measured), "without_pose": unsolved}
-        parts = {"robot": machine, "findings": found.findings, "ok": found.ok, "measurements": read}
-        typer.echo(as_json(parts))
+            said = {"kind": measured.kind, "rows": len(measured), "without_pose": unsolved}
+        parts = {"robot": machine, "findings": found.findings, "ok": found.ok, "measurements": said}
+        say(as_json(parts))
     else:
-        typer.echo(found)
+        say(found)
         if measured is not None:
             rows = f"{len(measured)} row{'s' * (len(measured) > 1)} of kind {measured.kind}"
-            typer.echo(f"{measurements}: {rows}, readable")
+            say(f"{measurements}: {rows}, readable")
     if unsolved:
-        typer.echo(
+        say(
             f"{measurements}: {machine.name} has no pose at the actuators of {len(unsolved)}"
             f" of them (rows {first_rows(unsolved, 10)});\ncheck their units, signs and columns",
             err=json,

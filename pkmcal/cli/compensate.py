@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, cast
 
@@ -11,13 +12,13 @@ import typer
 
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
-from pkmcal.cli.options import Json, ParallelRobot, Seed
-from pkmcal.cli.output import contents, folder
+from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.options import Force, Json, ParallelRobot, Seed
+from pkmcal.cli.output import Output, say
 from pkmcal.compensation.compensate import Method, Orientation
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
-from pkmcal.files.provenance import comment
 from pkmcal.kinematics.robot import Robot
 from pkmcal.loading import load_parallel
 from pkmcal.measurements.pose_csv import read_poses, write_poses
@@ -62,6 +63,7 @@ def compensate(
         Path | None,
         typer.Option(metavar="DIR", help="Write poses, commands, corrections: DIR/corrected.csv."),
     ] = None,
+    force: Force = False,
     json: Json = False,
 ) -> int:
     """Correct the commands of a machine by measured poses (eq. 18 of the 2TPR&2TPS paper).
@@ -71,9 +73,11 @@ def compensate(
     Example: pkmcal compensate 2tpr2tps examples/2tpr2tps-compensation/desired.csv
     examples/2tpr2tps-compensation/measured.csv
     """
-    machine = load_parallel(robot)
-    poses = read_poses(desired, machine)
-    reached = read_reached(measured)
+    read = Inputs()
+    machine = load_parallel(read.robot(robot))
+    poses = read_poses(read.file(desired), machine)
+    reached = read_reached(read.file(measured))
+    output = None if out is None else Output(out, ["corrected.csv"], read, force)
     if len(reached) != len(poses):
         raise ArgumentError(f"{measured}: {len(reached)} rows for the {len(poses)} of {desired}")
     found = pk.compensate(
@@ -87,25 +91,25 @@ def compensate(
         seed=seed,
         bounds=bounds,
     )
-    if out is not None:
+    if output is not None:
         units = [f"[{unit}]" for unit in machine.actuator_units]
         columns = {
             f"{word}{i + 1} {unit}": values[:, i]
             for word, values in (("q", found.actuators), ("dq", found.correction))
             for i, unit in enumerate(units)
         }
-        read = contents(robot, desired, measured)
-        write_poses(folder(out) / "corrected.csv", poses, columns, comment=comment(read))
+        with output.draft() as draft:
+            write_poses(draft / "corrected.csv", poses, columns, comment=read.comment())
     if json:
-        typer.echo(as_json(found))
+        say(as_json(found))
     else:
-        typer.echo(found)
-        if out is not None:
-            typer.echo(f"\ncommands: {out / 'corrected.csv'}")
+        say(found)
+        if output is not None:
+            say(f"\ncommands: {output.paths[0]}")
     return 0 if np.isfinite(found.actuators).all() and not found.gross.any() else 1
 
 
-def read_reached(path: Path) -> FloatArray:
+def read_reached(path: str | PathLike[str]) -> FloatArray:
     """Measured poses (N, 6) or positions (N, 3) of a file, mm and rad.
 
     Raises

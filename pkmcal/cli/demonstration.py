@@ -13,14 +13,16 @@ import numpy as np
 import typer
 
 from pkmcal import display
+from pkmcal.arguments import checked_seed
 from pkmcal.arrays import FloatArray, rms
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.identify import identify
-from pkmcal.cli.options import Json, Seed
-from pkmcal.cli.output import contents, folder
+from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.options import Force, Json, Seed
+from pkmcal.cli.output import Output, say, seal
 from pkmcal.cli.progress import progress
+from pkmcal.files import provenance
 from pkmcal.files.atomic import write_whole
-from pkmcal.files.provenance import comment
 from pkmcal.kinematics.robot import Robot
 from pkmcal.loading import load
 from pkmcal.measurements.measurements import Measurements
@@ -37,6 +39,15 @@ MEASURED, CHECKED = 30, 100  # poses
 # Where poses are drawn: y and z in mm, alpha and beta in degrees
 _LOWEST = np.array([-80.0, 330.0, -20.0, -20.0])
 _HIGHEST = np.array([80.0, 450.0, 20.0, 20.0])
+FILES = {
+    "measured.csv": "measurements by the tracker",
+    "checked.csv": f"the same at the {CHECKED} other poses",
+    "corrected.csv": "corrected leg lengths for these poses",
+    "error.png": "the error of each pose before and after",
+    "robot.toml": "the calibrated machine",
+    "report.json": "all results as data",
+    "report.html": "the report: open it in a browser",
+}
 _MARGIN = 5.0  # mm that a leg keeps from the ends of its stroke, for its errors
 
 
@@ -45,6 +56,7 @@ def demo(
         "pkmcal-demo"
     ),
     seed: Seed = 1,
+    force: Force = False,
     json: Json = False,
 ) -> int:
     """Calibrate a simulated machine from beginning to end.
@@ -54,14 +66,16 @@ def demo(
 
     Example: pkmcal demo --seed 7 --out my-demo
     """
+    output = Output(out, list(FILES), Inputs(), force)
     with progress("demonstration"):
         result = demonstrate(seed)
-        files = result.write(folder(out))
+        with output.draft() as draft:
+            result.write(draft)
     if json:
-        typer.echo(as_json(result))
+        say(as_json(result))
     else:
-        listed = [[str(path), what] for path, what in files.items()]
-        typer.echo(f"{result}\n\n{display.Table(['file', 'content'], listed, left=2)}")
+        listed = [[str(out / name), what] for name, what in FILES.items()]
+        say(f"{result}\n\n{display.Table(['file', 'content'], listed, left=2)}")
     return 0 if result.trusted else 1
 
 
@@ -142,32 +156,17 @@ class Demonstration(Result):
             " determine it, those of two do."
         )
 
-    def write(self, folder: Path) -> dict[Path, str]:
-        """Write measurements and results to an existing folder.
-
-        Returns
-        -------
-        dict of Path to str
-            The files and what they hold.
-        """
-        figure = _figure(self)
-        files = {
-            folder / "measured.csv": "measurements by the tracker",
-            folder / "checked.csv": f"the same at the {len(self.poses)} other poses",
-            folder / "corrected.csv": "corrected leg lengths for these poses",
-            folder / "error.png": "the error of each pose before and after",
-            folder / "robot.toml": "the calibrated machine",
-            folder / "report.json": "all results as data",
-            folder / "report.html": "the report: open it in a browser",
-        }
-        measured, checked, corrected, picture, *_ = files
+    def write(self, folder: Path) -> None:
+        """Write measurements and results, the `FILES`, to an existing folder."""
+        measured, checked, corrected, picture, *_ = (folder / name for name in FILES)
+        machine = Inputs()
+        machine.robot(MACHINE)
         for readings, file in ((self.measured, measured), (self.checked, checked)):
-            readings.write(file, comment(contents(MACHINE)))
-        read = contents(MACHINE, measured, checked)
-        write_whole(corrected, comment(read) + _commands(self))
-        write_whole(picture, figure)
+            readings.write(file, machine.comment())
+        read = machine.contents() | {file.name: seal(file) for file in (measured, checked)}
+        write_whole(corrected, provenance.comment(read) + _commands(self))
+        write_whole(picture, _figure(self))
         self.identification.report(folder, read)
-        return files
 
 
 def demonstrate(seed: int = 1) -> Demonstration:
@@ -189,7 +188,7 @@ def demonstrate(seed: int = 1) -> Demonstration:
     >>> result.identification.rank, bool(result.after.max() < 0.1 * result.before.max())
     (25, True)
     """
-    random = np.random.default_rng(seed)
+    random = np.random.default_rng(checked_seed(seed))
     nominal = load(MACHINE)
     free = nominal.model.free
     drawn = dict(zip(free, random.normal(0.0, SIGMA, len(free)), strict=True))

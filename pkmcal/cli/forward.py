@@ -9,11 +9,11 @@ import numpy as np
 import typer
 
 import pkmcal as pk
-from pkmcal.cli.options import Json, Radians, RobotOrArm
-from pkmcal.cli.output import contents, folder
+from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.options import Force, Json, Radians, RobotOrArm
+from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
 from pkmcal.core.library import POSE, STATUS
-from pkmcal.files.provenance import comment
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.command_csv import read_commands
 from pkmcal.measurements.pose_csv import write_poses
@@ -31,6 +31,7 @@ def forward(
     ],
     rad: Radians = False,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write poses.csv.")] = None,
+    force: Force = False,
     json: Json = False,
 ) -> int:
     """Print where actuator coordinates lead a machine.
@@ -39,19 +40,21 @@ def forward(
 
     Example: pkmcal forward 2tpr2tps 450,452,400,405
     """
-    machine = as_machine(pk.load(robot))
+    read = Inputs()
+    machine = as_machine(pk.load(read.robot(robot)))
     row = numbers_on_line("actuators", actuators, machine.actuator_units, rad)
-    q = read_commands(actuators, machine.actuator_units) if row is None else row
+    q = read_commands(read.file(actuators), machine.actuator_units) if row is None else row
+    output = None if out is None else Output(out, ["poses.csv"], read, force)
     solved = machine.forward(q)
-    if out is not None:
-        read = contents(robot, *([Path(actuators)] if row is None else []))
-        write_poses(folder(out) / "poses.csv", solved.pose, comment=comment(read))
+    if output is not None:
+        with output.draft() as draft:
+            write_poses(draft / "poses.csv", solved.pose, comment=read.comment())
     if json:
-        typer.echo(as_json({"pose": solved.pose, "status": solved.status}))
+        say(as_json({"pose": solved.pose, "status": solved.status}))
     else:
-        typer.echo(table(POSE, POSE_UNITS, solved.pose))
+        say(table(POSE, POSE_UNITS, solved.pose))
         for i in np.flatnonzero(~solved.ok):
-            typer.echo(f"row {i}: {STATUS[int(solved.status[i])]}")
-        if out is not None:
-            typer.echo(f"\nposes: {out / 'poses.csv'}")
+            say(f"row {i}: {STATUS[int(solved.status[i])]}")
+        if output is not None:
+            say(f"\nposes: {output.paths[0]}")
     return 0 if solved.ok.all() else 1

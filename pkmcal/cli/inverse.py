@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from pkmcal.cli.options import Json, ParallelRobot, Radians
-from pkmcal.cli.output import contents, folder
+from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.options import Force, Json, ParallelRobot, Radians
+from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
-from pkmcal.files.provenance import comment
 from pkmcal.loading import load_parallel
 from pkmcal.measurements.command_csv import write_commands
 from pkmcal.measurements.pose_csv import read_poses
@@ -36,6 +36,7 @@ def inverse(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write commands.csv, exact.")
     ] = None,
+    force: Force = False,
     json: Json = False,
 ) -> int:
     """Print the actuator coordinates that lead to poses.
@@ -44,24 +45,26 @@ def inverse(
 
     Example: pkmcal inverse hexapod 20,-10,860,5,0,3
     """
-    machine = load_parallel(robot)
+    read = Inputs()
+    machine = load_parallel(read.robot(robot))
     row = numbers_on_line("poses", poses, POSE_UNITS, rad)
-    rows = read_poses(poses, machine) if row is None else row
+    rows = read_poses(read.file(poses), machine) if row is None else row
+    output = None if out is None else Output(out, ["commands.csv"], read, force)
     if match:
         rows = machine.complete(rows)
     q = machine.inverse(rows)
     allowed = machine.feasible(rows)
-    if out is not None:
-        read = contents(robot, *([Path(poses)] if row is None else []))
-        units = machine.actuator_units
-        write_commands(folder(out) / "commands.csv", units, q, comment=comment(read))
+    if output is not None:
+        with output.draft() as draft:
+            units = machine.actuator_units
+            write_commands(draft / "commands.csv", units, q, comment=read.comment())
     if json:
-        typer.echo(as_json({"actuators": q, "units": machine.actuator_units, "ok": allowed.ok}))
+        say(as_json({"actuators": q, "units": machine.actuator_units, "ok": allowed.ok}))
     else:
         heads = [f"q{i + 1}" for i in range(machine.n_actuators)]
-        typer.echo(table(heads, machine.actuator_units, q))
+        say(table(heads, machine.actuator_units, q))
         for line in allowed.broken():
-            typer.echo(line)
-        if out is not None:
-            typer.echo(f"\ncommands: {out / 'commands.csv'}")
+            say(line)
+        if output is not None:
+            say(f"\ncommands: {output.paths[0]}")
     return 0 if allowed.ok.all() else 1

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import typer
-
 from pkmcal import display, loading
 from pkmcal.arms.arm import SerialArm
 from pkmcal.cli.options import Json
+from pkmcal.cli.output import say
 from pkmcal.core.library import POSE
 from pkmcal.measurements.calibratable import ArmMachine
 from pkmcal.report.as_json import as_json
@@ -34,7 +33,7 @@ def machines(json: Json = False) -> int:
             "free": machine.model.free,
         }
     if json:
-        typer.echo(as_json(rows))
+        say(as_json(rows))
         return 0
     table = [
         [
@@ -45,5 +44,5 @@ def machines(json: Json = False) -> int:
         ]
         for name, row in rows.items()
     ]
-    typer.echo(str(display.Table(["machine", "limbs", "moves in", "free"], table, left=3)))
+    say(str(display.Table(["machine", "limbs", "moves in", "free"], table, left=3)))
     return 0

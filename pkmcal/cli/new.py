@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +12,7 @@ import typer
 from pkmcal.arguments import did_you_mean
 from pkmcal.arms.arm_file import is_arm
 from pkmcal.cli.options import BuiltIn, Json
+from pkmcal.cli.output import say
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
@@ -76,13 +78,13 @@ def new(
     """
     text = template(machine)
     path = Path(f"{machine}.toml") if file is None else file
-    if path.exists():
+    if os.path.lexists(path):  # a link that leads nowhere, too
         raise ArgumentError(f"{path} exists already; name another file")
     write_whole(path, text)
     if json:
-        typer.echo(as_json({"machine": machine, "file": str(path)}))
+        say(as_json({"machine": machine, "file": str(path)}))
     else:
-        typer.echo(f"{path}: {machine}; change what differs on your machine")
+        say(f"{path}: {machine}; change what differs on your machine")
     return 0
 
 

@@ -59,6 +59,12 @@ Poses = Annotated[
 ]
 Radians = Annotated[bool, typer.Option("--rad", help="Angles on the line are in radians.")]
 Seed = Annotated[
-    int, typer.Option(metavar="N", min=0, help="Of the random numbers: one seed, one result.")
+    int,
+    typer.Option(
+        metavar="N", min=0, max=2**64 - 1, help="Of the random numbers: one seed, one result."
+    ),
+]
+Force = Annotated[
+    bool, typer.Option("--force", help="Replace files that are inputs, or that others wrote.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON alone; mm and rad.")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from os import PathLike
 from pathlib import Path
 from typing import Annotated
 
@@ -14,11 +15,11 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.optimal_design import CRITERIA
 from pkmcal.calibration.plan_poses import UNKNOWN, Plan, plan_poses
 from pkmcal.cli.geometry_options import free_names, read_deviations
-from pkmcal.cli.options import Free, Json, Prior, RobotOrArm, Seed
-from pkmcal.cli.output import contents, folder
+from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
+from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
 from pkmcal.exceptions import ArgumentError
-from pkmcal.files.provenance import comment
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
@@ -72,6 +73,7 @@ def plan(
         Path | None,
         typer.Option(metavar="DIR", help="Write poses.csv and commands.csv, the actuators."),
     ] = None,
+    force: Force = False,
     json: Json = False,
 ) -> int:
     """Choose the poses to measure for a calibration.
@@ -81,16 +83,21 @@ def plan(
 
     Example: pkmcal plan hexapod --kind pose --count 20 --out plan
     """
-    machine: Robot | SerialArm = load(robot)
+    read = Inputs()
+    machine: Robot | SerialArm = load(read.robot(robot))
     seen = as_machine(machine)
     chosen = free_names(seen, free)
+    candidates = _drawn(machine, seed) if poses is None else _places(machine, read.file(poses))
+    used = None if targets is None else _places(machine, read.file(targets))
+    names = ["poses.csv", "commands.csv"]
+    output = None if out is None else Output(out, names, read, force)
     with progress("choosing poses"):
         made = plan_poses(
             machine,
-            _drawn(machine, seed) if poses is None else _places(machine, poses),
+            candidates,
             count=30 if count is None and accuracy is None else count,
             accuracy=accuracy,
-            targets=None if targets is None else _places(machine, targets),
+            targets=used,
             criterion=word("--criterion", criterion, CRITERIA),
             kind=word("--kind", kind, COMPONENTS),
             noise=noise,
@@ -98,12 +105,15 @@ def plan(
             prior=read_deviations("--prior", prior or [], seen, chosen),
             unknown=[word("--unknown", each, UNKNOWN) for each in unknown or ()],
         )
-    read = comment(contents(robot, *(path for path in (poses, targets) if path is not None)))
-    written = [] if out is None else _write(made, folder(out), read)
+    written: list[Path] = []
+    if output is not None:
+        with output.draft() as draft:
+            _write(made, draft, read.comment())
+        written = output.paths
     if json:
-        typer.echo(as_json(made))
+        say(as_json(made))
     else:
-        typer.echo("\n".join([str(made), *([""] if written else []), *map(str, written)]))
+        say("\n".join([str(made), *([""] if written else []), *map(str, written)]))
     return 0 if np.isfinite(made.predicted) else 1
 
 
@@ -116,15 +126,14 @@ def _drawn(machine: Robot | SerialArm, seed: int) -> FloatArray:
     return sample_poses(machine, _DRAWN, seed, share=_SHARE)
 
 
-def _places(machine: Robot | SerialArm, path: Path) -> FloatArray:
+def _places(machine: Robot | SerialArm, path: PathLike[str]) -> FloatArray:
     """Poses of a file, or an arm's joint coordinates."""
     if isinstance(machine, SerialArm):
         return read_commands(path, machine.actuator_units)
     return read_poses(path, machine)
 
 
-def _write(made: Plan, out: Path, head: str) -> list[Path]:
-    poses, commands = out / "poses.csv", out / "commands.csv"
-    write_poses(poses, made.poses, comment=head)
-    write_commands(commands, made.robot.actuator_units, made.actuators, comment=head)
-    return [poses, commands]
+def _write(made: Plan, out: Path, head: str) -> None:
+    units = made.robot.actuator_units
+    write_poses(out / "poses.csv", made.poses, comment=head)
+    write_commands(out / "commands.csv", units, made.actuators, comment=head)

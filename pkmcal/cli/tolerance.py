@@ -12,18 +12,20 @@ import typer
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
 from pkmcal.cli.geometry_options import read_deviations
-from pkmcal.cli.options import Json, ParallelRobot, Poses, Seed
-from pkmcal.cli.output import contents, folder
+from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.options import Force, Json, ParallelRobot, Poses, Seed
+from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
 from pkmcal.error_model.sensitivity import own_names
 from pkmcal.error_model.tolerance import Sigma, Tolerance
 from pkmcal.exceptions import ArgumentError
-from pkmcal.files.provenance import comment
+from pkmcal.files.toml_table import LARGEST
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import reach
 from pkmcal.loading import load_parallel
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
+from pkmcal.report.drawing import KINDS
 
 _CELLS = 40  # of a map, along each axis
 _MACHINES = 2_000  # of a map: its colours are good to 3 %
@@ -43,13 +45,14 @@ def tolerance(
         float | None,
         typer.Option(
             metavar="MM",
+            max=LARGEST,
             help="The inverse question: which sigma may each joint have, so that 99.7 % of the"
-            " machines are within this distance?",
+            " machines are within this distance at all poses?",
         ),
     ] = None,
     poses: Poses = None,
     samples: Annotated[
-        int, typer.Option(metavar="N", min=2, help="How many machines are drawn.")
+        int, typer.Option(metavar="N", min=2, max=10**9, help="How many machines are drawn.")
     ] = 100_000,
     seed: Seed = 0,
     map: Annotated[
@@ -57,6 +60,7 @@ def tolerance(
         typer.Option(metavar="A,B", help="Draw a map over two coordinates: 'y,z'. With --sigma."),
     ] = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Where files go.")] = None,
+    force: Force = False,
     json: Json = False,
 ) -> int:
     """Predict the pose error of machines whose geometry has random errors.
@@ -70,8 +74,16 @@ def tolerance(
         raise ArgumentError("tolerance takes --sigma or --allowed, one of the two")
     if map is not None and (out is None or allowed is not None):
         raise ArgumentError("--map is drawn for --sigma, into the folder of --out")
-    machine = load_parallel(robot)
-    at = pk.sample_poses(machine, seed=seed) if poses is None else read_poses(poses, machine)
+    read = Inputs()
+    machine = load_parallel(read.robot(robot))
+    at = (
+        pk.sample_poses(machine, seed=seed)
+        if poses is None
+        else read_poses(read.file(poses), machine)
+    )
+    names = ["tolerance.csv", *([] if map is None else [f"map.{kind}" for kind in KINDS])]
+    output = None if out is None else Output(out, names, read, force)
+    deviations = read_deviations("--sigma", sigma or [], machine, own_names(machine))
     with ThreadPoolExecutor() as executor:
         if allowed is not None:
             with progress("tolerances"):
@@ -80,7 +92,6 @@ def tolerance(
                 )
             found, text = shared.check, as_json(shared) if json else str(shared)
         else:
-            deviations = read_deviations("--sigma", sigma or [], machine, own_names(machine))
             assert deviations is not None
             with progress("machines x poses") as moved:
                 found = pk.tolerance(
@@ -93,13 +104,13 @@ def tolerance(
                     progress=moved,
                 )
             text = as_json(found, "position_share") if json else str(found)
-            if map is not None and out is not None:
-                _draw_map(machine, map, deviations, seed, executor, folder(out))
-    if out is not None:
-        read = contents(robot, *([] if poses is None else [poses]))
-        table = folder(out) / "tolerance.csv"
-        write_poses(table, found.poses, _columns(found), comment=comment(read))
-    typer.echo(text)
+        if output is not None:
+            with output.draft() as draft:
+                table = draft / "tolerance.csv"
+                write_poses(table, found.poses, _columns(found), comment=read.comment())
+                if map is not None and deviations is not None:
+                    _draw_map(machine, map, deviations, seed, executor, draft)
+    say(text)
     return 1 if found.failed.any() else 0
 
 

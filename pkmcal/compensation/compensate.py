@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,23 +32,23 @@ _LISTED = 12  # a longer list of poses is printed with its middle left out
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Compensation(Result):
-    """Corrected commands. Rows are poses; a row that a limb cannot reach is NaN.
+    """Corrected commands, of poses of any leading shape; one that a limb cannot reach is NaN.
 
     Attributes
     ----------
-    actuators : ndarray (N, n)
+    actuators : ndarray (..., n)
         What to command: the ideal commands with the correction added, mm or rad.
-    correction : ndarray (N, n)
+    correction : ndarray (..., n)
         ΔL of eq. 18, mm or rad.
-    objective : ndarray (N,)
+    objective : ndarray (...)
         E of eq. 18 at the correction of the last pass: 0 for the exact method unless one
         correction serves all poses, and the remainder of the swarm.
-    history : ndarray (N, passes) or (N, passes · (iterations + 1))
+    history : ndarray (..., passes) or (..., passes · (iterations + 1))
         Exact: E with the correction that was in force at each measurement, which is the error of
         the actuators' readings, as the ideal machine sees them. Of a swarm: its lowest E
         before the first and after every iteration, pass by pass; with one correction for all
         poses, the root mean square of E over them.
-    gross : ndarray of bool (N,)
+    gross : ndarray of bool (...)
         The error of the position exceeds ``robot.length``: not one of the geometry but of units,
         of the frame of the measurements, or of the order of their rows.
     method, orientation : str
@@ -68,12 +68,12 @@ class Compensation(Result):
 
     @property
     def failed(self) -> BoolArray:
-        """Rows without a command (N,): a limb cannot reach the desired or the measured pose."""
-        return np.asarray(np.isnan(self.actuators).any(axis=1))
+        """Rows without a command (...): a limb cannot reach the desired or the measured pose."""
+        return np.asarray(np.isnan(self.actuators).any(axis=-1))
 
     def failures(self) -> str:
         """Say which rows have no command, or an implausible error; empty where there are none."""
-        count, parts = len(self.actuators), []
+        count, parts = self.gross.size, []
         for rows, why in (
             (self.failed, "have no command, because a limb cannot reach them"),
             (self.gross, "have implausible errors: check units, frame and order of the rows"),
@@ -85,9 +85,10 @@ class Compensation(Result):
         return "; ".join(parts)
 
     def _parts(self) -> Iterator[str | Table]:
-        count = len(self.actuators)
+        count = self.gross.size
         title = f"{count} pose{'s' * (count != 1)}"
-        known = self.history[np.isfinite(self.history).all(axis=1)]
+        history = self.history.reshape(count, -1)
+        known = history[np.isfinite(history).all(axis=1)]
         if not len(known):
             yield f"{title}; no pose that was both desired and measured is within reach"
             return
@@ -101,9 +102,10 @@ class Compensation(Result):
         yield _ASSUMED[self.orientation]
         heads = ["row"]
         heads += [f"{q}{i} [{u}]" for q in ("q", "dq") for i, u in enumerate(self.units, 1)]
+        columns = (each.reshape(count, -1) for each in (self.actuators, self.correction))
         rows = [
             [str(row), *(fixed(float(value), 4) for value in (*q, *dq))]
-            for row, (q, dq) in enumerate(zip(self.actuators, self.correction, strict=True))
+            for row, (q, dq) in enumerate(zip(*columns, strict=True))
         ]
         if len(rows) > _LISTED:
             rows[_LISTED - 4 : -3] = [["⋮"] * len(heads)]
@@ -136,11 +138,11 @@ def compensate(
     ----------
     robot : Robot
         The ideal machine: the one whose inverse kinematics makes the commands.
-    desired : array_like (N, 6)
+    desired : array_like (..., 6)
         Desired poses, mm and rad.
-    measured : array_like (N, 6) or (N, 3), or callable
+    measured : array_like (..., 6) or (..., 3), or callable
         Poses or positions that were reached with the ideal commands; or a function that takes
-        commands (N, n), has them carried out and returns what was measured.
+        commands (..., n), has them carried out and returns what was measured.
     method : {"exact", "pso"}
         The minimiser in closed form; or a particle swarm that looks for it (eq. 19), as published.
         The closed form gives the same answer without the swarm's remainder and in no time.
@@ -201,8 +203,8 @@ def compensate(
     if whole("passes", passes, 1) > 1 and not callable(measured):
         raise ArgumentError("passes: more than one needs measured to be a function of the commands")
     poses, shape = as_rows("desired", desired, 6)
-    if len(shape) != 1 or not len(poses):
-        raise ArgumentError(f"desired must have shape (N, 6), found {(*shape, 6)}")
+    if not len(poses):
+        raise ArgumentError(f"desired must be at least one pose, found shape {(*shape, 6)}")
     ideal = robot.inverse(poses, match)
     seed = checked_seed(seed)
     half_width = None if bounds is None else _half_width(bounds, ideal.shape[1])
@@ -210,10 +212,14 @@ def compensate(
     gross = np.zeros(len(poses), dtype=bool)
     history = []
     for _ in range(passes):
-        reached = measured(ideal + correction) if callable(measured) else measured
-        at = _pose_of(reached, poses, orientation)
+        sent = (ideal + correction).reshape(*shape, -1)
+        reached: Any = measured(sent) if callable(measured) else measured
+        at = _pose_of(reached, poses, shape, orientation)
         gross |= np.linalg.norm((at - poses)[:, :3], axis=1) > robot.length
-        off = ideal - robot.inverse(at, match)
+        there = robot.inverse(at, match)
+        off = robot.nearest_turns(ideal, near=there) - there
+        if common:
+            off = about_their_mean(robot.turns, off)
         if method == "pso":
             step, of_pass = _by_swarm(off, common, half_width, seed, swarm)
         else:
@@ -222,15 +228,25 @@ def compensate(
         history.append(of_pass)
         correction = correction + step
     return Compensation(
-        actuators=ideal + correction,
-        correction=correction,
-        objective=np.linalg.norm(off - step, axis=1),
-        history=np.concatenate(history, axis=1),
-        gross=gross,
+        actuators=(ideal + correction).reshape(*shape, -1),
+        correction=correction.reshape(*shape, -1),
+        objective=np.linalg.norm(off - step, axis=1).reshape(shape),
+        history=np.concatenate(history, axis=1).reshape(*shape, -1),
+        gross=gross.reshape(shape),
         method=method,
         orientation=orientation,
         units=robot.actuator_units,
     )
+
+
+def about_their_mean(turns: FloatArray, off: FloatArray) -> FloatArray:
+    """Differences (N, n) of angles at the turn nearest to their mean on the circle."""
+    off, known = off.copy(), np.isfinite(off).all(axis=1)
+    for i in np.flatnonzero(np.isfinite(turns)) if known.any() else ():
+        to_angle = 2 * np.pi / turns[i]
+        about = np.angle(np.exp(1j * to_angle * off[known, i]).mean()) / to_angle
+        off[:, i] -= turns[i] * np.rint((off[:, i] - about) / turns[i])
+    return off
 
 
 def _mean(off: FloatArray) -> FloatArray:
@@ -269,7 +285,9 @@ def _by_swarm(
     )
 
 
-def _pose_of(reached: ArrayLike, desired: FloatArray, orientation: Orientation) -> FloatArray:
+def _pose_of(
+    reached: ArrayLike, desired: FloatArray, batch: tuple[int, ...], orientation: Orientation
+) -> FloatArray:
     """The measured poses, their orientation from where `orientation` says."""
     given = as_numbers("measured", reached, 6)
     width = given.shape[-1] if given.ndim else 0
@@ -282,7 +300,7 @@ def _pose_of(reached: ArrayLike, desired: FloatArray, orientation: Orientation) 
         )
     else:
         rows, shape = as_rows("measured", given, 6)
-    if shape != (len(desired),):
+    if shape != batch:
         raise ArgumentError(
             f"measured must have one row for each of {len(desired)} poses, found {given.shape}"
         )

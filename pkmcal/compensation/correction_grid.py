@@ -47,11 +47,13 @@ class CorrectionGrid(Result):
     method : {"linear", "cubic"}
         How `at` interpolates.
     error : ndarray (n,)
-        Largest error of interpolation of each actuator, mm or rad, found half-way between the
-        nodes: at the middles of all edges, faces and cells. At one of them it is largest where
-        the correction bends evenly.
+        Error of interpolation of each actuator, mm or rad: the largest at the places half-way
+        between nodes, the middles of all edges, faces and cells. No bound: it is largest there
+        where the correction bends evenly; cubic interpolation has been seen a quarter further off
+        beside them.
     position_error, position_error_rms : float
-        Error of the position there, mm, by interpolation alone: largest and root mean square.
+        Error of the position at these places, mm, by interpolation alone: largest and root mean
+        square.
     checked, reached : int
         How many such places there are, and at how many the correction is known.
     actuator_units : tuple of str
@@ -138,9 +140,10 @@ class CorrectionGrid(Result):
         worst = ", ".join(f"{value:.2g}" for value in self.error)
         yield f"corrections over {spans}; other coordinates {held or 'none'} (mm, deg)"
         yield (
-            f"interpolation ({self.method}) half-way between nodes, at {self.reached} of"
-            f" {self.checked} places: error of the position {self.position_error:.2g} mm at most,"
-            f" {self.position_error_rms:.2g} mm rms; of the actuators {worst} at most"
+            f"interpolation ({self.method}), checked half-way between nodes, at {self.reached} of"
+            f" {self.checked} places: largest error of the position there"
+            f" {self.position_error:.2g} mm, {self.position_error_rms:.2g} mm rms; of the actuators"
+            f" {worst}"
         )
         if self.failures():
             yield self.failures()
@@ -214,7 +217,8 @@ def correction_grid(
 
     def wanted(places: tuple[FloatArray, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
         aims = ideal(robot, _poses(names, places, base[0]))
-        return aims.poses, aims.actuators, calibrated.inverse(aims.poses, match) - aims.actuators
+        to_command = calibrated.inverse(aims.poses, match, near=aims.actuators)
+        return aims.poses, aims.actuators, to_command - aims.actuators
 
     corrections = wanted(nodes)[2].reshape(*(len(axis) for axis in nodes), -1)
     between = tuple(np.sort(np.r_[axis, 0.5 * (axis[1:] + axis[:-1])]) for axis in nodes)

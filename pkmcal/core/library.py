@@ -45,6 +45,7 @@ STATUS = {
     lib.PKM_SINGULAR: "singular",
     lib.PKM_INFEASIBLE: "infeasible",
     lib.PKM_INVALID: "invalid input",
+    lib.PKM_NOT_CLOSED: "does not close",
 }
 ROWS_PER_THREAD = 10_000  # fewer do not pay for a thread
 PARTS_PER_THREAD = 4  # one that another program keeps waiting leaves parts to the others

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,12 +15,17 @@ from pkmcal.core.library import (
     ISA,
     MAPS,
     ROWS,
+    SLOTS,
     call,
     ensure,
     in_threads,
     part,
     pointer,
 )
+
+CLOSURE_TOLERANCE = 2e-3  # of a machine's size
+FAR_HOME = 10.0  # times the limbs' numbers: a home beyond is that of another geometry
+_OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 
 
 class Closure(NamedTuple):
@@ -52,11 +58,15 @@ class Machine:
         A key of `MAPS`.
     limbs : list of dict
         Of each limb: driver, rows (names), actuator, branch, frames (3, 3) by axis, lever,
-        weights of the sphere row and the other rows.
+        weights of the sphere row and the other rows; `angle`, whether its q̃ is one, and `near`,
+        the q̃ in the middle of its stroke, or NaN.
     length : float
         Characteristic length, mm.
     slots, home : ndarray
         Geometry (limbs, SLOTS) and pose (6,) at which the order of elimination is chosen.
+    closure_tolerance : float
+        What more rows than free coordinates may miss, mm; by default `CLOSURE_TOLERANCE` of the
+        size.
     isa : int
         Index into `ISAS`.
     """
@@ -68,6 +78,7 @@ class Machine:
         length: float,
         slots: FloatArray,
         home: FloatArray,
+        closure_tolerance: float | None = None,
         isa: int = ISA,
     ) -> None:
         struct = ffi.new("pkm_machine *")
@@ -75,7 +86,11 @@ class Machine:
         struct.limbs = len(limbs)
         struct.actuators = 1 + max(limb["actuator"] for limb in limbs)
         struct.length = length
-        struct.size = float(np.abs(slots).sum(axis=1).max() + np.abs(home[:3]).sum())
+        joints = float(np.abs(slots).sum(axis=1).max())
+        struct.size = joints + min(float(np.abs(home[:3]).sum()), FAR_HOME * joints)
+        if closure_tolerance is None:
+            closure_tolerance = CLOSURE_TOLERANCE * struct.size
+        struct.closure_tolerance = closure_tolerance
         weights: list[float] = []
         for i, limb in enumerate(limbs):
             struct.driver[i] = DRIVERS.index(limb["driver"])
@@ -83,6 +98,8 @@ class Machine:
             struct.actuator[i] = limb["actuator"]
             struct.branch[i] = limb["branch"]
             struct.lever[i] = limb["lever"]
+            struct.angle[i] = limb["angle"]
+            struct.near[i] = limb["near"]
             for axis, frame in limb["frames"].items():
                 place = 9 * (len(AXES) * i + list(AXES).index(axis))
                 struct.frame[place : place + 9] = frame.ravel().tolist()
@@ -95,12 +112,51 @@ class Machine:
         self.actuators: int = struct.actuators
         self.m = len(MAPS[map])
         self.rows = len(weights)
+        first = {limb["actuator"]: i for i, limb in reversed(list(enumerate(limbs)))}
+        self._angles = {a: i for a, i in first.items() if limbs[i]["angle"]}
 
-    def inverse(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
-        """Poses (N, 6) to actuator coordinates (N, n)."""
+    def with_tolerance(self, closure_tolerance: float) -> Machine:
+        """The same with another `closure_tolerance`, mm."""
+        other = copy(self)
+        other.struct = ffi.new("pkm_machine *", self.struct[0])
+        other.struct.closure_tolerance = closure_tolerance
+        return other
+
+    def inverse(
+        self, slots: FloatArray, pose: FloatArray, near: FloatArray | None = None
+    ) -> FloatArray:
+        """Poses (N, 6) to actuator coordinates (N, n).
+
+        Of angles, the turn nearest to `near` (n,) or (N, n), or to the machine's own reference:
+        the middle of the stroke, or the home pose.
+        """
         q = np.empty((len(pose), self.actuators))
-        call("inverse", self.struct, len(pose), slots, 0, pose, q, isa=self.isa)
+        about, stride = ffi.NULL if near is None else near, 0
+        if near is not None and near.ndim == 2:
+            stride = self.actuators
+        call("inverse", self.struct, len(pose), slots, 0, pose, about, stride, q, isa=self.isa)
         return q
+
+    def turns(self, slots: FloatArray) -> FloatArray:
+        """How far each actuator goes in a whole turn, (n,); infinite where it is no angle."""
+        out = np.full(self.actuators, np.inf)
+        for a, i in self._angles.items():
+            out[a] = 2 * np.pi / abs(slots[i, _GAIN])
+        return out
+
+    def nearest_turns(
+        self, slots: FloatArray, q: FloatArray, near: FloatArray | None = None
+    ) -> FloatArray:
+        """Coordinates (N, n) with whole turns added, as `inverse` gives them."""
+        if not self._angles:
+            return q
+        out: FloatArray = q.copy()
+        turns = self.turns(slots)
+        for a, i in self._angles.items():
+            own = (self.struct.near[i] - slots[i, _OFFSET]) / slots[i, _GAIN]
+            about = own if near is None else near[..., a]
+            out[:, a] -= turns[a] * np.rint((q[:, a] - about) / turns[a])
+        return out
 
     def forward(
         self,

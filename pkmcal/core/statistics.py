@@ -117,16 +117,19 @@ class Stream:
             return np.full(len(self._mean), np.nan)
         return np.asarray(self._squares / self.count + self._mean**2)
 
-    def quantile(self, share: float) -> FloatArray:
-        """Value (k,) that `share` of the values do not exceed.
+    def quantile(self, share: float, failed_below: float = 0.0) -> FloatArray:
+        """Value (k,) that `share` of all columns do not exceed, the failed ones among them.
 
-        It lies in the bin of the order statistic: off by less than a bin's width, which is 1/128
-        of the standard deviation that made the bins; beyond the bins, between their end and the
-        extreme value.
+        A failed column is beyond every value: `failed_below` of them count as -inf, the others as
+        inf, and so does a quantile that lies among them. Otherwise it lies in the bin of the order
+        statistic: off by less than a bin's width, which is 1/128 of the standard deviation that
+        made the bins; beyond the bins, between their end and the extreme value.
         """
-        if not self.count:
+        rank = share * (self.count + self.failed - 1) - failed_below * self.failed
+        if not self.count and not self.failed:
             return np.full(len(self._mean), np.nan)
-        rank = share * (self.count - 1)
+        if rank < 0 or rank > self.count - 1:
+            return np.full(len(self._mean), -np.inf if rank < 0 else np.inf)
         below = np.cumsum(self._in_bin, axis=1)
         found = np.empty(len(self._mean))
         for i, (ends, inside) in enumerate(zip(below, self._in_bin, strict=True)):

@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ AHEAD = 32  # tasks that are handed to an executor before the first of them is l
 
 QUANTITIES = ("x", "y", "z", "alpha", "beta", "gamma", "distance")
 Progress = Callable[[int, int], object]
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +89,11 @@ class Draw:
                 stream.add(values)
         return streams
 
+    def farthest(self) -> FloatArray:
+        """Largest size over the poses of each of `QUANTITIES` for each machine, (7, count)."""
+        batches = [np.abs(batch).max(axis=0) for batch in self.errors()]  # NaN where one is NaN
+        return np.concatenate(batches, axis=1)
+
 
 def simulate(
     draw: Draw, executor: Executor | None = None, progress: Progress | None = None
@@ -110,45 +117,82 @@ def simulate(
     workers = arguments.executor(executor)
     if progress is not None:
         arguments.function("progress", progress)
-    chunks = -(-draw.count // CHUNK)
-    pilot_seed, *seeds = draw.seed.spawn(chunks + 1)
-    sizes = [CHUNK] * (chunks - 1) + [draw.count - CHUNK * (chunks - 1)]
+    chunks, pilot_seed = _chunks(draw)
 
     def tasks() -> Iterator[Draw]:
-        for first in range(0, len(draw.poses), POSES):
-            part = slice(first, first + POSES)
-            block = replace(draw, poses=draw.poses[part], actuators=draw.actuators[part])
+        for block in _blocks(draw):
             (pilot,) = replace(block, seed=pilot_seed, count=PILOT).errors()
             bins = tuple(Bins.around(v[:, np.isfinite(v).all(axis=0)]) for v in pilot)
-            for seed, count in zip(seeds, sizes, strict=True):
+            for seed, count in chunks:
                 yield replace(block, seed=seed, count=count, bins=bins)
 
-    done, block = 0, list[Stream]()
-    for place, (task, found) in enumerate(_in_order(tasks(), workers)):
-        if place % chunks == 0:
-            block = found
+    done, combined = 0, list[Stream]()
+    for place, (task, found) in enumerate(_in_order(Draw.run, tasks(), workers)):
+        if place % len(chunks) == 0:
+            combined = found
         else:
-            for stream, other in zip(block, found, strict=True):
+            for stream, other in zip(combined, found, strict=True):
                 stream.merge(other)
         done += task.count * len(task.poses)
         if progress is not None:
             progress(done, draw.count * len(draw.poses))
-        if place % chunks == chunks - 1:
-            yield from block
+        if place % len(chunks) == len(chunks) - 1:
+            yield from combined
+
+
+def farthest(draw: Draw, executor: Executor | None = None) -> FloatArray:
+    """Largest pose error of each machine over all poses.
+
+    Parameters
+    ----------
+    draw, executor
+        See `simulate`; the machines are the same.
+
+    Returns
+    -------
+    ndarray (7, count)
+        Of `QUANTITIES`, their sizes; inf for a machine that has no pose at one of them.
+    """
+    workers = arguments.executor(executor)
+    chunks, _ = _chunks(draw)
+    largest = np.zeros((len(QUANTITIES), draw.count))
+    tasks = (
+        replace(block, seed=seed, count=count) for block in _blocks(draw) for seed, count in chunks
+    )
+    for place, (task, found) in enumerate(_in_order(Draw.farthest, tasks, workers)):
+        first = place % len(chunks) * CHUNK
+        part = largest[:, first : first + task.count]
+        np.maximum(part, np.where(np.isnan(found), np.inf, found), out=part)
+    return largest
+
+
+def _chunks(draw: Draw) -> tuple[list[tuple[np.random.SeedSequence, int]], np.random.SeedSequence]:
+    """Seed and size of each chunk of machines, and the seed of the pilot."""
+    count = -(-draw.count // CHUNK)
+    pilot, *seeds = draw.seed.spawn(count + 1)
+    sizes = [CHUNK] * (count - 1) + [draw.count - CHUNK * (count - 1)]
+    return list(zip(seeds, sizes, strict=True)), pilot
+
+
+def _blocks(draw: Draw) -> Iterator[Draw]:
+    """All machines at a few poses at a time."""
+    for first in range(0, len(draw.poses), POSES):
+        part = slice(first, first + POSES)
+        yield replace(draw, poses=draw.poses[part], actuators=draw.actuators[part])
 
 
 def _in_order(
-    tasks: Iterator[Draw], executor: Executor | None
-) -> Iterator[tuple[Draw, list[Stream]]]:
+    work: Callable[[Draw], Found], tasks: Iterator[Draw], executor: Executor | None
+) -> Iterator[tuple[Draw, Found]]:
     """Each task with its result, in order; with an executor, `AHEAD` of them are on their way."""
     if executor is None:
         for task in tasks:
-            yield task, task.run()
+            yield task, work(task)
         return
-    waiting: deque[tuple[Draw, Future[list[Stream]]]] = deque()
+    waiting: deque[tuple[Draw, Future[Found]]] = deque()
     try:
         for task in tasks:
-            waiting.append((task, executor.submit(Draw.run, task)))
+            waiting.append((task, executor.submit(work, task)))
             if len(waiting) >= AHEAD:
                 first, future = waiting.popleft()
                 yield first, future.result()

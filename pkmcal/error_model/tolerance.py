@@ -16,12 +16,13 @@ from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.error_model.monte_carlo import Draw, Progress, simulate
 from pkmcal.exceptions import ArgumentError
-from pkmcal.kinematics.perturbed import ideal
+from pkmcal.kinematics.perturbed import Geometries, Ideal, forward_of, ideal, quantities_off
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
 
 WORST = 3.0  # standard deviations by which every number is off in the worst case
 SHARES = {"interval95": (0.025, 0.975), "interval997": (0.0015, 0.9985)}
+_NONE = 1e-12  # of the largest effect on a position or an orientation: no effect
 _LISTED = 12  # numbers of the geometry that are printed
 
 Sigma = float | Mapping[str, float] | ArrayLike
@@ -44,20 +45,25 @@ class Tolerance(Result):
     poses : ndarray (..., 6)
         Ideal poses.
     mean, std : ndarray (..., 6)
-        Of the pose error (eq. 16) of the machines, solved exactly.
+        Of the pose error (eq. 16) of the machines, solved exactly: of those `samples` - `failed`
+        that have a pose.
     interval95, interval997 : ndarray (..., 6, 2)
-        Between these lie 95 % and 99.7 % of the machines, as many below as above.
+        Between these lie 95 % and 99.7 % of the machines, as many below as above. A machine
+        without a pose lies beyond every limit: where too many have none, the ends are infinite.
     distance_rms, distance95, distance997 : ndarray (...)
-        Root mean square distance of the position from the ideal one, and what 95 % and 99.7 % of
-        the machines do not exceed.
+        Root mean square distance of the position from the ideal one, of the machines that have a
+        pose, and what 95 % and 99.7 % of all machines do not exceed; inf where too many have none.
     linear_std : ndarray (..., 6)
         Standard deviation by linear propagation, J Σ Jᵀ.
     worst_case : ndarray (..., 6)
-        Linear, with every number off by three standard deviations in the worst direction.
+        With every number off by three standard deviations, to the side that is worst by linear
+        propagation, or all to the other side: the larger error of the two machines, solved
+        exactly; inf where one has no pose. No bound: where the error is far from linear, another
+        combination may be worse.
     contribution : ndarray (..., 6, k)
         Share of each number in the linear variance, percent; 0 where there is no variance.
     failed : ndarray of int (...)
-        Machines that have no pose there; they count in none of the above.
+        Machines that have no pose there.
     """
 
     robot: Robot
@@ -89,10 +95,15 @@ class Tolerance(Result):
         return share
 
     def failures(self) -> str:
-        """Say how many machines have no pose; empty where all were solved."""
-        failed = int(np.sum(self.failed))
-        total = self.samples * (self.poses.size // 6)
-        return f"{failed} of {total} machines and poses were not solved" if failed else ""
+        """Say how many machines have no pose; empty where all have one."""
+        failed, count = int(np.sum(self.failed)), self.poses.size // 6
+        if not failed:
+            return ""
+        where = "" if count == 1 else f" at {count} poses"
+        return (
+            f"{failed} of {self.samples * count} machines{where} have no pose: mean, std and rms"
+            " are of the others; intervals count them as beyond every limit"
+        )
 
     def _parts(self) -> Iterator[str | Table]:
         count = self.poses.size // 6
@@ -114,9 +125,12 @@ class Tolerance(Result):
         yield Table(["error", *heading], rows, left=1)
         distance = (self.distance_rms, self.distance95, self.distance997)
         typical, most95, most997 = (_shown(v) for v in distance)
+        within95, within997 = (
+            "no limit" if most == "inf" else f"{most} mm" for most in (most95, most997)
+        )
         yield (
-            f"distance: {typical} mm rms; 95 % of the machines within {most95} mm, 99.7 % within"
-            f" {most997} mm\n"
+            f"distance: {typical} mm rms; 95 % of the machines within {within95}, 99.7 % within"
+            f" {within997}\n"
         )
         share = self.position_share
         order = np.argsort(-share, kind="stable")[:_LISTED]
@@ -133,8 +147,8 @@ class Tolerance(Result):
 
 
 def _shown(values: FloatArray) -> str:
-    """Show one value as it is, several by their root mean square."""
-    good = values[np.isfinite(values)]
+    """Show one value as it is, several by their root mean square; poses that are NaN left out."""
+    good = values[~np.isnan(values)]
     if not good.size:
         return "nan"
     return display.fixed(float(good[0]) if values.size == 1 else rms(good), 4)
@@ -190,6 +204,9 @@ def tolerance(
 
     Notes
     -----
+    A machine that has no pose is further off than any limit, and counts so in the intervals and in
+    what 95 % and 99.7 % of the machines do not exceed.
+
     Memory does not grow with `samples`: the moments are combined chunk by chunk, and the intervals
     come from counts in 2048 bins over ±8 standard deviations, which places their ends to less than
     1/128 of a standard deviation; drawing 100 000 machines places that of 99.7 % to 1/40.
@@ -215,7 +232,7 @@ def tolerance(
     draw = Draw(robot.model, places, deviations, at.poses, at.actuators, root, int(samples))
     columns: list[list[FloatArray | float]] = []
     for stream in simulate(draw, executor, progress):
-        ends = {name: [stream.quantile(p) for p in pair] for name, pair in SHARES.items()}
+        ends = {name: [stream.quantile(p, 0.5) for p in pair] for name, pair in SHARES.items()}
         columns.append([
             stream.mean[:6],
             stream.std[:6],
@@ -225,6 +242,9 @@ def tolerance(
             stream.quantile(0.997)[6],
             stream.failed,
         ])  # fmt: skip
+    lost = np.isnan(at.poses).any(axis=1)
+    for k in np.flatnonzero(lost).tolist():  # no pose to be far from
+        columns[k][:-1] = [np.full_like(column, np.nan) for column in columns[k][:-1]]
     mean, std, within95, within997, distance_rms, far95, far997, failed = (
         np.array(column).reshape((*at.shape, *np.shape(column[0])))
         for column in zip(*columns, strict=True)
@@ -244,10 +264,28 @@ def tolerance(
         far95,
         far997,
         np.sqrt(total[..., 0]).reshape(*at.shape, 6),
-        WORST * np.abs(effect).sum(axis=-1).reshape(*at.shape, 6),
+        _worst_case(robot, at, places, effect, deviations).reshape(*at.shape, 6),
         share.reshape(*at.shape, 6, len(places)),
         failed.astype(np.intp),
     )
+
+
+def _worst_case(
+    robot: Robot, at: Ideal, places: IntArray, effect: FloatArray, deviations: FloatArray
+) -> FloatArray:
+    """Largest error (N, 6) of the two machines that are worst by the linear `effect` (N, 6, k)."""
+    size = np.abs(effect).reshape(-1, 2, 3, len(places))
+    felt = (size > _NONE * size.max(axis=(2, 3), keepdims=True)).reshape(effect.shape)
+    sides = np.where(felt, np.sign(effect), 0.0)
+    geometries = Geometries(robot.geometry, places, 12)
+    found = np.full((len(effect), 6), np.nan)
+    for row in np.flatnonzero(np.isfinite(effect).all(axis=(1, 2))).tolist():
+        errors = WORST * deviations * np.vstack([sides[row], -sides[row]])
+        slots, pose = geometries.with_errors(errors), at.poses[row]
+        moved = quantities_off(forward_of(robot, slots, at.actuators[row], pose), pose)[:6]
+        two = np.abs(np.stack([moved[:, :6].diagonal(), moved[:, 6:].diagonal()]))
+        found[row] = np.where(np.isnan(two), np.inf, two).max(axis=0)
+    return found
 
 
 def sigma_of(robot: Robot, sigma: Sigma) -> tuple[IntArray, FloatArray]:

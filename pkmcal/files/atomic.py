@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import os
+import secrets
+import time
 from os import PathLike
+from pathlib import Path
 
 from pkmcal import arguments
+
+_PART = ".pkmcal-{}.part"  # short: a name may be as long as the file system allows
+_GONE = 3600.0  # seconds after which whoever wrote a part was killed
 
 
 def write_whole(path: str | PathLike[str], content: str | bytes) -> None:
     """Write a file: beside its place first, then moved there.
+
+    Who reads meanwhile sees the old file or the new one, also if several write at once. What is
+    written is on the disk before it takes the place of what was there, and keeps its mode; a
+    symbolic link is followed.
 
     Parameters
     ----------
@@ -21,14 +31,56 @@ def write_whole(path: str | PathLike[str], content: str | bytes) -> None:
     Raises
     ------
     OSError
-        The folder does not exist or cannot be written; what was there before is untouched.
+        The folder does not exist or cannot be written, the disk is full: with the path; what was
+        there before is untouched.
     """
     path = arguments.path("path", path)
-    if not path.parent.is_dir():
-        raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
-    beside = path.with_name(f".{path.name}.{os.getpid()}.part")
+    place = Path(os.path.realpath(path))
+    if not place.parent.is_dir():
+        raise FileNotFoundError(f"{path}: the folder {place.parent} does not exist")
+    if place.is_dir():
+        raise IsADirectoryError(f"{path}: this is a folder")
+    _sweep(place.parent)
+    beside = place.with_name(_PART.format(secrets.token_hex(8)))
     try:
-        beside.write_bytes(content.encode() if isinstance(content, str) else content)
-        os.replace(beside, path)
+        _write(beside, content.encode() if isinstance(content, str) else content)
+        if place.exists():
+            os.chmod(beside, place.stat().st_mode & 0o7777)
+        os.replace(beside, place)
+        _synchronise(place.parent)
+    except OSError as error:  # names the part
+        if error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from None
     finally:
         beside.unlink(missing_ok=True)
+
+
+def _write(path: Path, content: bytes) -> None:
+    with open(path, "xb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _synchronise(folder: Path) -> None:
+    """Have the new name on the disk, too, where the system can."""
+    if os.name != "posix":
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError:  # a file system without it; the file itself is on the disk
+        pass
+    finally:
+        os.close(handle)
+
+
+def _sweep(folder: Path) -> None:
+    """Remove parts of writers that were killed."""
+    for part in folder.glob(_PART.format("*")):
+        try:
+            if time.time() - part.stat().st_mtime > _GONE:
+                part.unlink()
+        except OSError:  # another swept it, or it is another's
+            continue

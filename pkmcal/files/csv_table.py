@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import codecs
 import csv
+import io
 import math
 import re
 from collections.abc import Callable, Collection
@@ -23,6 +24,8 @@ from numpy.typing import NDArray
 from pkmcal import arguments
 from pkmcal.arguments import did_you_mean
 from pkmcal.exceptions import FileError
+from pkmcal.files import reading
+from pkmcal.files.reading import LONGEST_NAME, MOST_CELLS, MOST_COLUMNS
 from pkmcal.files.xlsx_rows import xlsx_rows
 
 # What one unit is in mm, in rad: (multiply by, divide by), so that 1 um is 1/1000 mm exactly.
@@ -89,14 +92,19 @@ class Table:
         self.path = arguments.path("path", path)
         self._separator = ""
         if self.path.suffix.lower() in (".xlsx", ".xlsm", ".xls"):
-            every = xlsx_rows(self.path)
+            every = xlsx_rows(path)
         else:
-            lines = _content(self.path)
+            lines = _lines(self.path, reading.content(path, reading.MOST_TABLE))
             self._separator = max(",;\t", key=lines[0][1].count) if lines else ","
             every = [(line, self._cells(line, text)) for line, text in lines]
         if not every:
             raise FileError(f"{self.path}: the file is empty: expected a line of column names")
         self._header_line, headings = every[0]
+        if len(headings) > MOST_COLUMNS or len(headings) * len(every) > MOST_CELLS:
+            raise FileError(
+                f"{self.path}: {len(headings)} columns and {len(every) - 1} rows; at most"
+                f" {MOST_COLUMNS} columns and {MOST_CELLS} cells are read"
+            )
         rows = [(line, cells) for line, cells in every[1:] if any(cells)]
         if not rows:
             raise FileError(
@@ -129,6 +137,12 @@ class Table:
         return [cell.strip() for cell in cells]
 
     def _add(self, i: int, heading: str, cells: tuple[str, ...]) -> None:
+        heading = " ".join(heading.split())
+        if len(heading) > LONGEST_NAME:
+            raise self.header_error(
+                f"the heading of column {i + 1} has {len(heading)} characters, at most"
+                f" {LONGEST_NAME} are taken"
+            )
         match = _HEADING.fullmatch(heading)
         loose = _LOOSE.fullmatch(heading)
         if match is None or not match["name"]:
@@ -207,7 +221,12 @@ class Table:
         values = np.empty(len(self))
         for row, cell in enumerate(self.columns[name].cells):
             values[row] = math.nan if blank and not cell else self._number(name, row, cell)
-        return values * times / over, quantity
+        with np.errstate(over="ignore"):
+            converted = values * times / over
+        if (row := int(np.argmax(np.isinf(converted)))) or np.isinf(converted[0]):
+            cell = self.columns[name].cells[row]
+            raise self.cell_error(name, row, f"expected a smaller number, found {cell!r}")
+        return converted, quantity
 
     def _conversion(
         self, column: Column, quantities: tuple[str, ...]
@@ -270,13 +289,16 @@ def _plain(unit: str, known: Collection[str]) -> str:
     return lower if unit not in known and lower in known else unit
 
 
-def _content(path: Path) -> list[tuple[int, str]]:
+def _lines(path: Path, content: bytes) -> list[tuple[int, str]]:
     """Lines that are neither empty nor comments, with their numbers counted from 1."""
-    content = path.read_bytes()
     utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:
         text = content.decode("utf-16" if utf16 else "utf-8-sig")
     except UnicodeDecodeError as error:
         raise FileError(f"{path}: not a UTF-8 text file ({error.reason})") from None
-    numbered = enumerate(re.split("\r\n|\r|\n", text), start=1)
-    return [(i, line) for i, line in numbered if line.strip() and not line.lstrip().startswith("#")]
+    numbered = enumerate(io.StringIO(text, newline=None), start=1)
+    return [
+        (i, line.rstrip("\n"))
+        for i, line in numbered
+        if not line.isspace() and not line.lstrip().startswith("#")
+    ]

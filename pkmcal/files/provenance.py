@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 
-_LONGEST = 120  # letters of a name
-
 
 def version() -> str:
     """The version of this package."""
@@ -16,8 +14,12 @@ def version() -> str:
 
 
 def checksums(files: Mapping[str, bytes]) -> dict[str, str]:
-    """SHA-256 of files by their printable names."""
-    return {printable(name): hashlib.sha256(data).hexdigest() for name, data in files.items()}
+    """SHA-256 of files by their names, in which control characters are escaped."""
+    return {_escaped(name): hashlib.sha256(data).hexdigest() for name, data in files.items()}
+
+
+def _escaped(name: str) -> str:
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in name)
 
 
 def comment(files: Mapping[str, bytes]) -> str:
@@ -33,15 +35,3 @@ def comment(files: Mapping[str, bytes]) -> str:
     lines = [f"# Written by pkmcal {version()} from"]
     lines += [f"#   {name}, sha256 {digest}" for name, digest in checksums(files).items()]
     return "\n".join(lines) + "\n"
-
-
-def printable(text: str, longest: int = _LONGEST) -> str:
-    r"""A name on one line: control characters replaced, a long one cut.
-
-    Examples
-    --------
-    >>> printable("rod\n1")
-    'rod�1'
-    """
-    shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
-    return shown if len(shown) <= longest else shown[: longest - 1] + "…"

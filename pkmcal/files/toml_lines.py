@@ -2,17 +2,32 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from functools import cached_property
 from typing import Any
 
 from pkmcal.exceptions import FileError
+from pkmcal.files.reading import LONGEST_NAME
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
+
+MOST_NESTED = 50  # keys and lists, one within the other
+_TOO_DEEP = f"keys and lists nested deeper than {MOST_NESTED}"
+_MOST_DOTS = 1000
+# What the end of a statement hangs on: text, in which brackets mean nothing, brackets, line ends.
+_TOKEN = re.compile(
+    r'"""(?:[^"\\]|\\.|"(?!""))*"{3,5}'
+    r"|'''(?:[^']|'(?!''))*'{3,5}"
+    r'|"(?:[^"\\\n]|\\.)*"'
+    r"|'[^'\n]*'"
+    r"|#[^\n]*|[\[\]{}\n]",
+    re.DOTALL,
+)
 
 KeyPath = tuple[str | int, ...]  # keys from the top, and places in arrays of tables
 
@@ -47,12 +62,36 @@ class Source:
     def __init__(self, content: bytes, place: str) -> None:
         self.place = place
         try:
-            self._text = content.decode("utf-8-sig")
-            self.data: dict[str, Any] = tomllib.loads(self._text)
+            self._text = content.decode("utf-8-sig").replace("\r\n", "\n")
         except UnicodeDecodeError as error:
             raise FileError(f"{place}: not a text file in UTF-8 (byte {error.start})") from None
-        except (ValueError, RecursionError) as error:  # syntax, an endless number or nesting
+        for number, line in enumerate(self._text.split("\n"), 1):
+            if line.count(".") > _MOST_DOTS:  # the parser's time grows with their square
+                raise FileError(f"{place}, line {number}: more than {_MOST_DOTS} dots on a line")
+        try:
+            self.data: dict[str, Any] = tomllib.loads(self._text)
+        except ValueError as error:  # syntax, or an endless number
             raise FileError(f"{place}: not valid TOML: {error}") from None
+        except RecursionError:
+            raise FileError(f"{place}: {_TOO_DEEP}") from None
+        self._limit()
+
+    def _limit(self) -> None:
+        """Refuse keys that are nested too deep or too long."""
+        below: list[tuple[Any, int]] = [(self.data, 0)]
+        while below:
+            value, depth = below.pop()
+            if depth > MOST_NESTED:
+                raise FileError(f"{self.place}: {_TOO_DEEP}")
+            if isinstance(value, dict):
+                if long := next((key for key in value if len(key) > LONGEST_NAME), None):
+                    raise FileError(
+                        f"{self.place}: the key {long[:20]!r}… has {len(long)} characters,"
+                        f" at most {LONGEST_NAME} are taken"
+                    )
+                below += [(each, depth + 1) for each in value.values()]
+            elif isinstance(value, list):
+                below += [(each, depth + 1) for each in value]
 
     def where(self, *path: str | int) -> str:
         """File and line of what stands there, or else of the table it would stand in."""
@@ -87,18 +126,18 @@ class Source:
     def _statements(self) -> Iterator[tuple[int, str, dict[str, Any]]]:
         """Each heading, and each key with its value: where it begins, its text, its data.
 
-        A statement ends where it is TOML by itself: one that is not closed yet is none.
+        A statement ends with the line on which its brackets are closed.
         """
-        first, text = 0, ""
-        for line, more in enumerate(self._text.replace("\r\n", "\n").split("\n"), 1):
-            first, text = (first, f"{text}\n{more}") if text else (line, more.lstrip())
-            try:
-                said = tomllib.loads(text)
-            except ValueError:
-                continue
-            if said:
-                yield first, text, said
-            text = ""
+        begin, line, open_brackets = 0, 1, 0
+        for token in _TOKEN.finditer(self._text + "\n"):
+            found = token[0]
+            open_brackets += (found in ("[", "{")) - (found in ("]", "}"))
+            if found == "\n" and not open_brackets:
+                text = self._text[begin : token.start()]
+                if said := tomllib.loads(text):
+                    yield line, text.lstrip(), said
+                line += text.count("\n") + 1
+                begin = token.end()
 
 
 def _keys(heading: dict[str, Any]) -> Iterator[str]:

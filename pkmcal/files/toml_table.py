@@ -10,10 +10,12 @@ from typing import Any, NoReturn
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import Unit
 from pkmcal.exceptions import FileError
+from pkmcal.files.reading import LONGEST_NAME
 from pkmcal.files.toml_lines import KeyPath, Source
 
 LENGTH_UNITS: dict[str, float] = {"mm": 1.0, "m": 1000.0, "in": 25.4}
 ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": math.pi / 180.0}
+LARGEST = 1e15  # of a number: beside it a double has no room for a mm
 SHOWN = 60  # so many characters of what was found
 
 
@@ -126,6 +128,8 @@ class Table:
         value = self[key]
         if not isinstance(value, str) or not value.strip():
             self.fail(key, f"must be a text, found {shown(value)}")
+        if len(value) > LONGEST_NAME:
+            self.fail(key, f"has {len(value)} characters, at most {LONGEST_NAME} are taken")
         return value
 
     def choice(self, key: str, known: Iterable[str], what: str) -> str:
@@ -155,6 +159,8 @@ class Table:
             number = math.inf
         if not math.isfinite(number):
             self.fail(key, f"must be finite, found {shown(value)}")
+        if abs(number) > LARGEST:
+            self.fail(key, f"must be at most {LARGEST:g} in mm and rad, found {shown(value)}")
         return number
 
     def number(self, key: str, unit: Unit, default: float | None = None) -> float:

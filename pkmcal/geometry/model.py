@@ -107,6 +107,8 @@ class Model:
         Pose of the machine's own frame in the frame poses are given in.
     tool_frame : ndarray (6,) or None
         Pose of the tool in the platform's own frame.
+    closure_tolerance : float or None
+        What more closures than free coordinates may miss, mm; None means 2e-3 of the size.
     file : str or None
         Where the model was read; a built-in machine has none.
     """
@@ -121,6 +123,7 @@ class Model:
     stated: Mapping[str, float]
     base_frame: FloatArray | None = None
     tool_frame: FloatArray | None = None
+    closure_tolerance: float | None = None
     file: str | None = None
 
     @property

@@ -13,8 +13,9 @@ import numpy as np
 from pkmcal import arguments
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, Unit
-from pkmcal.core.library import MAPS, POSE
+from pkmcal.core.library import MAPS, MAX_LIMBS, POSE
 from pkmcal.exceptions import ArgumentTypeError, FileError
+from pkmcal.files import reading
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import ANGLE_UNITS, LENGTH_UNITS, Table, Units, shown
@@ -27,7 +28,10 @@ from pkmcal.geometry.robot_file_writer import text_of
 # What a data sheet states beside single numbers: of the circles of the joints, and of the legs at
 # home, which a machine with length limbs has.
 STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_diameter", "length")
-TOP = ("name", "units", "frames", "pose", "parameters", "calibration", "stated", "limb")
+TOP = (
+    "name", "units", "closure_tolerance", "frames", "pose", "parameters", "calibration", "stated",
+    "limb",
+)  # fmt: skip
 
 
 _BUILTIN = resources.files("pkmcal") / "builtin"
@@ -38,6 +42,11 @@ def builtin_names(folder: str = "machines") -> tuple[str, ...]:
     found = (_BUILTIN / folder).iterdir()
     names = (entry.name for entry in found)
     return tuple(sorted(name[: -len(".toml")] for name in names if name.endswith(".toml")))
+
+
+def is_built_in(robot: str) -> bool:
+    """Whether this is the name of a built-in machine."""
+    return robot in _builtin()
 
 
 def _builtin() -> dict[str, Any]:
@@ -91,10 +100,10 @@ def located(robot: str | os.PathLike[str]) -> tuple[bytes, str, str | None]:
     if isinstance(robot, str) and robot in known:
         return known[robot].read_bytes(), f"built-in machine {robot}", None
     path = Path(robot)
-    if path.is_file():
-        return path.read_bytes(), str(path), str(path)
     if path.is_dir():
         raise FileError(f"{path}: this is a folder, not a robot file")
+    if path.exists():  # also a pipe
+        return reading.content(robot, reading.MOST_ROBOT), str(path), str(path)
     if isinstance(robot, str) and path.name == robot and not path.suffix:
         raise FileError(f"unknown machine {robot!r}{did_you_mean(robot, known)}")
     near = (each.name for each in path.parent.glob("*.toml"))
@@ -129,7 +138,10 @@ def parse(source: Source, file: str | None) -> Model:
     top.only(TOP)
     top.units = read_units(top)
     parameters = Parameters(_section(top, "parameters"))
-    limbs = read_limbs(top.tables("limb", "a robot"), parameters)
+    described = top.tables("limb", "a robot")
+    if len(described) > MAX_LIMBS:
+        described[MAX_LIMBS].fail("", f"a robot has at most {MAX_LIMBS} limbs")
+    limbs = read_limbs(described, parameters)
     values = parameters.finish([number.name for number in limbs.numbers])
     geometry = Geometry(limbs.numbers, parameters.ordered_units(), limbs.values | values)
 
@@ -150,8 +162,18 @@ def parse(source: Source, file: str | None) -> Model:
         stated=_read_stated(_section(top, "stated"), geometry, limbs.limbs),
         base_frame=_read_pose(frames, "base", POSE) if "base" in frames else None,
         tool_frame=_read_pose(frames, "tool", POSE) if "tool" in frames else None,
+        closure_tolerance=_read_tolerance(top),
         file=file,
     )
+
+
+def _read_tolerance(top: Table) -> float | None:
+    if "closure_tolerance" not in top:
+        return None
+    found = top.number("closure_tolerance", "mm")
+    if not found > 0.0:
+        top.fail("closure_tolerance", f"must be positive, found {top['closure_tolerance']!r}")
+    return found
 
 
 def _section(top: Table, key: str) -> Table:

@@ -17,7 +17,9 @@ HEADER = "# A robot for pkmcal: lengths in mm, angles in rad.\n"
 
 def text_of(model: Model) -> str:
     """The TOML text of a model, in mm and rad."""
-    head = {"name": model.name, "units": {"length": "mm", "angle": "rad"}}
+    head: dict[str, Any] = {"name": model.name, "units": {"length": "mm", "angle": "rad"}}
+    if model.closure_tolerance is not None:
+        head["closure_tolerance"] = model.closure_tolerance
     blocks = [HEADER, lines(head)]
     blocks += [f"[{key}]\n{lines(table)}" for key, table in _sections(model).items() if table]
     limbs = (_limb(limb, i, model.geometry) for i, limb in enumerate(model.limbs))

@@ -11,13 +11,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arguments import did_you_mean, words
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import BoolArray, FloatArray, wrapped
 from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Closure, Machine
 from pkmcal.exceptions import ArgumentError
 
 ITERATIONS = 30
 SETTLED = 1e-12  # of the machine's size
+KEPT = 1e-9  # of the size, or rad: a matched coordinate that is off by more was not kept
 
 
 def matched_coordinates(
@@ -45,7 +46,12 @@ def matched_coordinates(
 
 
 def complete(
-    machine: Machine, map: str, slots: FloatArray, pose: FloatArray, matched: Sequence[int]
+    machine: Machine,
+    map: str,
+    slots: FloatArray,
+    pose: FloatArray,
+    matched: Sequence[int],
+    near: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Poses on the machine's manifold that keep the matched coordinates.
 
@@ -64,11 +70,13 @@ def complete(
         Where to start, and what to keep.
     matched : sequence of int
         Places in x y z α β γ.
+    near : ndarray (n,) or (N, n), optional
+        Coordinates that angles are given nearest to, as for `Machine.inverse`.
 
     Returns
     -------
     pose : ndarray (N, 6)
-        NaN where there is none.
+        NaN where no pose was found that keeps what is matched.
     q : ndarray (N, n)
         The actuator coordinates there.
     """
@@ -81,7 +89,7 @@ def complete(
         raise ArgumentError(f"match must name {freedom} coordinates here, found {len(matched)}")
     own = pose.copy()
     wanted = own[:, matched]
-    q = machine.inverse(slots, own)
+    q = machine.inverse(slots, own, near)
     size = machine.struct.size
     live: BoolArray = np.asarray(np.isfinite(q).all(axis=1))
     done = np.zeros(len(own), dtype=bool)
@@ -101,10 +109,38 @@ def complete(
         q[rows] += step[:, len(free) :]
         done[rows] = good & (np.abs(step).max(axis=1) <= SETTLED * size)
     own[~done], q[~done] = np.nan, np.nan
+    q = machine.nearest_turns(slots, q, near)  # a long step may have gone round
     own = machine.forward(slots, q, own, threads=None)[0]
     if machine.rows > len(free):
         own, q = _correct_actuators(machine, slots, own, q, matched, wanted)
+    if map == "spatial":
+        own = _as_wanted(own, matched, wanted)
+    kept = _missing(own, matched, wanted) <= KEPT * np.where(np.array(matched) < 3, size, 1.0)
+    lost = ~kept.all(axis=1)  # a stationary point of least squares that is no solution, or no pose
+    own[lost], q[lost] = np.nan, np.nan
     return own, q
+
+
+def _missing(own: FloatArray, matched: Sequence[int], wanted: FloatArray) -> FloatArray:
+    """How far the matched coordinates of poses (N, 6) are from those wanted, mm or rad."""
+    off = own[:, matched] - wanted
+    off = np.where(np.array(matched) < 3, off, wrapped(off))
+    return np.asarray(np.abs(off))
+
+
+def _as_wanted(own: FloatArray, matched: Sequence[int], wanted: FloatArray) -> FloatArray:
+    """Poses with their rotations written as is nearer to what is wanted.
+
+    α + π, π - β, γ + π is the same rotation as α, β, γ.
+    """
+    other = own.copy()
+    other[:, 3:] = wrapped(own[:, 3:] * [1.0, -1.0, 1.0] + np.pi)
+    angles = [i for i in matched if i >= 3]
+    places = [i >= 3 for i in matched]
+    off, other_off = (
+        _missing(each, angles, wanted[:, places]).sum(axis=1) for each in (own, other)
+    )
+    return np.where((other_off < off)[:, None], other, own)
 
 
 def _system(closure: Closure, free: list[int], matched: Sequence[int]) -> FloatArray:

@@ -20,8 +20,8 @@ from pkmcal.result import RowResult
 class Solved(Protocol):
     """What a result asks of the machine it comes from; `Kinematics` describes each."""
 
-    def closure_by_twist(self, own: FloatArray, q: FloatArray) -> FloatArray:
-        """Closure rows by a scaled twist, (N, rows, m)."""
+    def closure_by_twist(self, own: FloatArray, q: FloatArray | None = None) -> FloatArray:
+        """Closure rows by a scaled twist, (N, rows, m); q by default the inverse of the poses."""
 
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (N, n)."""
@@ -36,12 +36,13 @@ class Forward(RowResult):
     pose : ndarray (..., 6)
         x y z in mm, α β γ in rad; NaN where `status` is not 0.
     status : ndarray of int (...)
-        0 ok, 1 not converged, 2 singular, 3 infeasible, 4 invalid input; `ok` and `failed` are
-        masks of it, `failures` says it in words.
+        0 ok, 1 not converged, 2 singular, 3 infeasible, 4 invalid input, 5 does not close: of more
+        closures than free coordinates one misses by more than ``robot.closure_tolerance``. `ok`
+        and `failed` are masks of it, `failures` says it in words.
     iterations : ndarray of int (...)
         Newton steps taken.
     residual : ndarray (...)
-        Largest closure error, mm; NaN where `status` is not 0.
+        Largest closure error, mm; NaN where `status` is not 0 or 5.
     """
 
     STATUS = STATUS
@@ -74,16 +75,19 @@ class Forward(RowResult):
     def same_side(self) -> BoolArray:
         """Whether the determinant has the sign it has at the guess (...), computed when asked for.
 
-        False means that the pose is another assembly mode than the guess's, with a singularity
-        between. True where it is unknown: with more closures than free coordinates.
+        At the guess with the actuators that lead there. False means that the pose is another
+        assembly mode than the guess's, with a singularity between. True where it is unknown: with
+        more closures than free coordinates, and where a limb does not reach the guess.
         """
         steps = self._closure_by_twist(self._own)
         if steps.shape[-2] != steps.shape[-1]:
             return np.asarray(self.ok)
-        same = np.array(self.ok)
-        there, at_guess = steps[same], self._closure_by_twist(self._guess)[same]
-        same[same] = np.sign(np.linalg.det(there)) == np.sign(np.linalg.det(at_guess))
-        return same
+        same = np.asarray(self.ok)
+        at_guess = self._machine.closure_by_twist(np.atleast_2d(self._guess))
+        with np.errstate(invalid="ignore"):  # rows that failed, guesses out of reach
+            there, sign = (np.sign(np.linalg.det(each)) for each in (steps, at_guess))
+        sign = sign[0] if self._guess.ndim == 1 else sign.reshape(same.shape)
+        return np.asarray(same & ((there == sign) | np.isnan(sign)))
 
     @cached_property
     def certificate(self) -> Certificate:
@@ -95,6 +99,15 @@ class Forward(RowResult):
         """
         problem = self._machine.assembly_problem(self._q)
         return certify_rows(problem, self._own.reshape(-1, 6)).reshape(self.status.shape)
+
+    def failures(self) -> str:
+        """What failed and where, in one line; empty where nothing did."""
+        said = super().failures()
+        if not said or self._guess.ndim > 1 or not np.isfinite(self._guess).all():
+            return said
+        if not np.isfinite(self._machine.closure_by_twist(self._guess[None])).all():
+            said += "; a limb does not reach the guess, by default the home pose"
+        return said
 
     def _closure_by_twist(self, own: FloatArray) -> FloatArray:
         """Closure rows by a scaled twist (..., rows, m), at a pose for each row or one for all."""

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
-from pkmcal.arrays import FloatArray, as_numbers, as_rows
-from pkmcal.core.library import MAPS, POSE
+from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows
+from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
@@ -19,6 +19,7 @@ from pkmcal.geometry.model import Limb, Model
 from pkmcal.kinematics.complete import complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
+from pkmcal.kinematics.limits import stroke_margin
 from pkmcal.modes.find import AssemblyProblem
 
 Match = bool | str | Sequence[str] | None
@@ -55,7 +56,9 @@ class Kinematics:
         if sum(len(limb["weights"]) for limb in limbs) == len(self.coordinates):
             for limb in limbs:  # nothing to weigh: all closures hold
                 limb["weights"] = [1.0] * len(limb["weights"])
-        self.machine = Machine(model.map, limbs, self.length, self.slots, self.own_home)
+        self.machine = Machine(
+            model.map, limbs, self.length, self.slots, self.own_home, model.closure_tolerance
+        )
 
     @property
     def home(self) -> FloatArray:
@@ -87,7 +90,9 @@ class Kinematics:
                 return radius
         return 1.0
 
-    def inverse(self, pose: ArrayLike, match: Match = None) -> FloatArray:
+    def inverse(
+        self, pose: ArrayLike, match: Match = None, *, near: ArrayLike | None = None
+    ) -> FloatArray:
         """Actuator coordinates of a pose, limb by limb in closed form.
 
         Parameters
@@ -98,12 +103,16 @@ class Kinematics:
             By default the six numbers are taken as given. Where limbs constrain the pose, `match`
             names the coordinates to keep and the machine determines the others (`complete`);
             True takes those the robot file declares.
+        near : array_like (n,) or (..., n), optional
+            Coordinates: an actuator that turns is given at the turn nearest to them. By default
+            it is the turn nearest to the middle of its stroke, or, where the file states none, to
+            the home pose.
 
         Returns
         -------
         ndarray (..., n)
-            mm or rad. A row that a limb cannot reach is NaN. Limbs that share an actuator are
-            averaged.
+            mm or rad. A row that a limb cannot reach, or without a pose that keeps what is matched,
+            is NaN. Limbs that share an actuator are averaged, angles on their circle.
 
         Raises
         ------
@@ -115,11 +124,54 @@ class Kinematics:
         Length limbs: eq. 3 of the 2TPR&2TPS paper, ‖p + R b - base‖.
         """
         rows, shape = self.own_rows(pose)
+        about = None if near is None else self._near(near, shape)
         if match is None:
-            q = self.machine.inverse(self.slots, rows)
+            q = self.machine.inverse(self.slots, rows, about)
         else:
-            q = self._completed(rows, match)[1]
+            q = self._completed(rows, match, about)[1]
         return q.reshape(*shape, self.n_actuators)
+
+    @property
+    def turns(self) -> FloatArray:
+        """How far each actuator goes in a whole turn, (n,): rad, infinite where it is no angle.
+
+        A coordinate and the same with whole turns added are one position of the machine.
+        """
+        return self.machine.turns(self.slots)
+
+    def nearest_turns(self, q: ArrayLike, near: ArrayLike | None = None) -> FloatArray:
+        """Actuator coordinates with whole turns added, so that they are near others.
+
+        The difference of two positions is ``robot.nearest_turns(a, near=b) - b``.
+
+        Parameters
+        ----------
+        q : array_like (..., n)
+            mm or rad.
+        near : array_like (n,) or (..., n), optional
+            As for `inverse`.
+
+        Returns
+        -------
+        ndarray (..., n)
+            Lengths as they are.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("rotary-delta")
+        >>> np.degrees(robot.nearest_turns(np.radians([-179, 0, 0]), near=np.radians([179, 0, 0])))
+        array([181.,   0.,   0.])
+        """
+        rows, shape = as_rows("q", q, self.n_actuators)
+        about = None if near is None else self._near(near, shape)
+        found = self.machine.nearest_turns(self.slots, rows, about)
+        return found.reshape(*shape, self.n_actuators)
+
+    def _near(self, near: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+        """Coordinates (n,), or (N, n) for N rows of a batch of this shape."""
+        rows, near_shape = as_rows("near", near, self.n_actuators)
+        return rows[0] if near_shape == () else _for_each("near", rows, near_shape, shape)
 
     def forward(
         self, q: ArrayLike, guess: ArrayLike | None = None, threads: int | None = None
@@ -151,17 +203,7 @@ class Kinematics:
             start = self.own_home
         else:
             start, guess_shape = self.own_rows(guess, "guess")
-            if guess_shape == ():
-                start = start[0]
-            elif guess_shape != shape:
-                try:
-                    start = np.broadcast_to(start.reshape(*guess_shape, 6), (*shape, 6))
-                except ValueError:
-                    wanted, found = (*shape, 6), (*guess_shape, 6)
-                    raise ArgumentError(
-                        f"guess must be (6,) or broadcast to {wanted}, found {found}"
-                    ) from None
-                start = np.ascontiguousarray(start).reshape(-1, 6)
+            start = start[0] if guess_shape == () else _for_each("guess", start, guess_shape, shape)
         own, status, iterations, residual = self.machine.forward(
             self.slots, rows, start, threads, shape
         )
@@ -259,11 +301,13 @@ class Kinematics:
         rows, shape = as_rows(name, pose, 6)
         return self.frames.inward(rows), shape
 
-    def _completed(self, rows: FloatArray, match: Match) -> tuple[FloatArray, FloatArray]:
+    def _completed(
+        self, rows: FloatArray, match: Match, near: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         if match is None:
             raise ArgumentError("match must be True or names of coordinates, found None")
         places = matched_coordinates(match, self.model.match, self.coordinates)
-        return complete(self.machine, self.model.map, self.slots, rows, places)
+        return complete(self.machine, self.model.map, self.slots, rows, places, near)
 
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (n,) or (N, n), for certificates and searches for modes."""
@@ -278,9 +322,54 @@ class Kinematics:
             q,
         )
 
-    def closure_by_twist(self, own: FloatArray, q: FloatArray) -> FloatArray:
-        """Closure rows by a scaled twist, (N, rows, m), at own poses (N, 6) and q (N, n)."""
+    def closure_by_twist(self, own: FloatArray, q: FloatArray | None = None) -> FloatArray:
+        """Closure rows by a scaled twist, (N, rows, m), at own poses (N, 6) and q (N, n).
+
+        By default q is the inverse of the poses as the pose map has them.
+        """
+        if q is None:
+            on_map = own.copy()
+            if self.model.map in ("translation", "planar"):  # what these do not move is 0
+                on_map[:, [i for i, name in enumerate(POSE) if name not in self.coordinates]] = 0.0
+            q = self.machine.inverse(self.slots, on_map)
         return self.machine.closure(self.slots, own, q).by_step
+
+    def drives(self, q: FloatArray) -> FloatArray:
+        """q̃ of each limb (N, limbs) at actuator coordinates (N, n)."""
+        actuators = [limb.actuator for limb in self.model.limbs]
+        offset, gain = self.slots[:, SLOTS.index("offset")], self.slots[:, SLOTS.index("gain")]
+        found: FloatArray = gain * q[:, actuators] + offset
+        return found
+
+    def short_way(self, start: FloatArray, end: FloatArray) -> FloatArray:
+        """Coordinates (n,) of `end` at the turn nearest to `start`, unless a stroke forbids it."""
+        near = self.nearest_turns(end, near=start)
+        allowed = self._in_strokes(near) | ~self._in_strokes(end)
+        return np.where(allowed, near, end)
+
+    def _in_strokes(self, q: FloatArray) -> BoolArray:
+        """Which actuators (n,) keep the strokes of all their limbs at coordinates (n,)."""
+        kept = np.ones(self.n_actuators, dtype=bool)
+        for limb, drive in zip(self.model.limbs, self.drives(q[None])[0], strict=True):
+            kept[limb.actuator] &= bool(stroke_margin(limb, drive) >= 0.0)
+        return kept
+
+
+def _for_each(
+    name: str, rows: FloatArray, given: tuple[int, ...], shape: tuple[int, ...]
+) -> FloatArray:
+    """Rows of a batch `given` as (N, width), one for each row of a batch of this shape."""
+    if given == shape:
+        return rows
+    width = rows.shape[1]
+    try:
+        each = np.broadcast_to(rows.reshape(*given, width), (*shape, width))
+    except ValueError:
+        wanted, found = (*shape, width), (*given, width)
+        raise ArgumentError(
+            f"{name} must be ({width},) or broadcast to {wanted}, found {found}"
+        ) from None
+    return np.ascontiguousarray(each).reshape(-1, width)
 
 
 def _limb(limb: Limb) -> dict[str, Any]:
@@ -291,6 +380,8 @@ def _limb(limb: Limb) -> dict[str, Any]:
         "rows": rows,
         "actuator": limb.actuator,
         "branch": limb.branch,
+        "angle": kind.actuator_unit == "rad",
+        "near": np.nan if limb.stroke is None else sum(limb.stroke) / 2,
         "frames": limb.frames,
         "lever": limb.couple,
         "weights": [1.0, *(limb.weights or [1.0] * len(rows))],

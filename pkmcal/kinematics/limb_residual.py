@@ -24,9 +24,9 @@ class LimbResidual:
     ----------
     robot : Robot
         The machine; what is not free keeps its value.
-    poses : array_like (N, 6)
+    poses : array_like (..., 6)
         Measured, mm and rad.
-    actuators : array_like (N, n)
+    actuators : array_like (..., n)
         What was commanded, mm or rad.
     free : sequence of str, optional
         Names or wildcards of what a particle's coordinates are; the robot's default set.
@@ -64,10 +64,10 @@ class LimbResidual:
         require_parallel(robot)
         rows, shape = as_rows("poses", poses, 6)
         q, q_shape = as_rows("actuators", actuators, robot.n_actuators)
-        if len(shape) != 1 or shape != q_shape or not len(rows):
+        if shape != q_shape or not len(rows):
             raise ArgumentError(
-                f"poses must have shape (N, 6) and actuators (N, {robot.n_actuators}), N > 0;"
-                f" found {(*shape, 6)} and {(*q_shape, robot.n_actuators)}"
+                f"poses must have shape (..., 6), not empty, and actuators (..., {q.shape[1]});"
+                f" found {(*shape, 6)} and {(*q_shape, q.shape[1])}"
             )
         geometry = robot.geometry
         self.free = tuple(geometry.match(robot.model.free if free is None else free, "free"))

@@ -86,9 +86,8 @@ def feasibility(
     room = np.zeros((3, drive.shape[1]))
     for i, limb in enumerate(limbs):
         if limb.stroke is not None:
-            low, high = limb.stroke
-            room[0, i] = abs(low) + abs(high)
-            stroke[:, i] = np.minimum(drive[:, i] - low, high - drive[:, i])
+            room[0, i] = abs(limb.stroke[0]) + abs(limb.stroke[1])
+            stroke[:, i] = stroke_margin(limb, drive[:, i])
         for k, cone, margin, direction in (
             (1, limb.base_cone, base_cone, on_base),
             (2, limb.platform_cone, platform_cone, on_platform),
@@ -101,6 +100,12 @@ def feasibility(
     return Feasibility(
         np.isfinite(drive), kept[0], kept[1], kept[2], drive, stroke, base_cone, platform_cone
     )
+
+
+def stroke_margin(limb: Limb, drive: FloatArray) -> FloatArray:
+    """How far inside its limb's stroke each q̃ (N,) is; infinite where the limb states none."""
+    low, high = limb.stroke or (-np.inf, np.inf)
+    return np.minimum(drive - low, high - drive)
 
 
 def _inside(cone: Cone, direction: FloatArray) -> FloatArray:

@@ -5,22 +5,25 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import fields, replace
+from functools import cached_property
 from os import PathLike
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance, whole
-from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.arrays import FloatArray, as_rows, wrapped
+from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
+from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Model
 from pkmcal.kinematics import overconstrained
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
-from pkmcal.modes.find import assemblies, continue_path, find_modes, pose_distance
+from pkmcal.modes.find import assemblies, continue_path, find_modes, nearest_first, pose_distance
 
 
 class Robot(Kinematics):
@@ -109,13 +112,16 @@ class Robot(Kinematics):
         residual = self.machine.closure(self.slots, rows, q).residual
         return np.asarray(np.abs(residual).max(axis=1)).reshape(shape)
 
-    def feasible(self, pose: ArrayLike) -> Feasibility:
+    def feasible(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> Feasibility:
         """Which limits of which limbs a pose keeps.
 
         Parameters
         ----------
         pose : array_like (..., 6)
             x y z in mm, α β γ in rad.
+        actuators : array_like (..., n), optional
+            The coordinates that lead to these poses: of a limb that turns, they say which turn its
+            stroke is compared with. By default it is the turn nearest to the middle of the stroke.
 
         Returns
         -------
@@ -124,6 +130,10 @@ class Robot(Kinematics):
         """
         rows, shape = self.own_rows(pose)
         drive, on_base, on_platform = self.machine.limbs(self.slots, rows)
+        if actuators is not None:
+            there = self.drives(self._batch(actuators, shape))
+            angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
+            drive = np.where(angle, there + wrapped(drive - there), drive)
         found = feasibility(self.model.limbs, drive, on_base, on_platform)
         return Feasibility(
             *(
@@ -171,15 +181,14 @@ class Robot(Kinematics):
             whole("starts", starts, 0, note=" or None")
         problem = self.assembly_problem(rows[0])
         found = find_modes(problem, starts)
-        apart = pose_distance(found.poses, self.own_home[None], self.length)
-        order = np.argsort(apart)
+        order = nearest_first(found.poses, self.own_home[None], self.length)
         own = np.ascontiguousarray(found.poses[order])
         poses = self.frames.outward(own)
 
         def continued(pose: FloatArray, actuators: ArrayLike | None, steps: int) -> FloatArray:
             own = self.frames.inward(pose[None])
             if actuators is None:
-                begin = self.machine.inverse(self.slots, own)
+                begin = self.short_way(rows[0], self.machine.inverse(self.slots, own)[0])[None]
             else:
                 begin = as_rows("actuators", actuators, self.n_actuators)[0]
             end = continue_path(problem, own, begin, steps)
@@ -264,10 +273,14 @@ class Robot(Kinematics):
         own = self.frames.inward(given)
         if actuators is None:
             return given, own, self.machine.inverse(self.slots, own), shape
+        return given, own, self._batch(actuators, shape), shape
+
+    def _batch(self, actuators: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+        """Coordinates as rows (N, n), which must be a batch of this shape."""
         q, q_shape = as_rows("actuators", actuators, self.n_actuators)
         if q_shape != shape:
             raise ArgumentError(f"actuators are a batch {q_shape}, poses a batch {shape}")
-        return given, own, q, shape
+        return q
 
     def _by_numbers(self, own: FloatArray, q: FloatArray, twists: bool) -> FloatArray:
         """How the machine's own pose follows each number of each limb, (N, 6, numbers)."""
@@ -307,12 +320,41 @@ class Robot(Kinematics):
     def _with_values(self, values: FloatArray) -> Robot:
         """`replace` for numbers (p,) near the present ones, without ordering the elimination anew.
 
-        Three times as fast, for machines that live as long as one step of a search.
+        Three times as fast, for machines that live as long as one step of a search; closures may
+        miss by any length on its way.
         """
         changed = copy(self)
+        changed.machine = self._of_any_misfit
         changed.model = replace(self.model, geometry=self.geometry.replace(values))
         changed.slots = np.ascontiguousarray(changed.model.geometry.slots)
         return changed
+
+    @cached_property
+    def _of_any_misfit(self) -> Machine:
+        return self.machine.with_tolerance(np.inf)
+
+    @property
+    def closure_tolerance(self) -> float:
+        """What more closures than free coordinates may miss, mm; beyond it no pose is stated."""
+        return float(self.machine.struct.closure_tolerance)
+
+    def closing(self, q: ArrayLike, guess: ArrayLike) -> Robot:
+        """The robot with a `closure_tolerance` of at least twice what it misses at coordinates.
+
+        Parameters
+        ----------
+        q : array_like (..., n)
+            Actuator coordinates that it has been at.
+        guess : array_like (6,) or (..., 6)
+            Poses near those there.
+        """
+        if self.machine.rows <= self.machine.m:
+            return self
+        found = self._with_values(self.geometry.values).forward(q, guess)
+        missed = float(np.nanmax(found.residual, initial=0.0))
+        if 2.0 * missed <= self.closure_tolerance:
+            return self
+        return Robot(replace(self.model, closure_tolerance=2.0 * missed))
 
     def save(self, path: str | PathLike[str], comment: str = "") -> None:
         """Write the robot file; `load` reads it back to the last bit.

@@ -203,7 +203,9 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
         Home is no good pose.
     """
     if not _good(robot, robot.home[None])[0]:
-        raise ArgumentError(f"{robot.name}: home breaks a limit or is singular")
+        broken = robot.feasible(robot.home[None]).broken()
+        why = f"home breaks a limit: {'; '.join(broken)}" if broken else "home is singular"
+        raise ArgumentError(f"{robot.name}: {why.replace(' in rows 0', '')}")
     joints = np.abs(robot.geometry.slots[:, :6]).sum(axis=1)
     size = float(joints.max() + np.abs(robot.home[:3]).sum())
     found = {}

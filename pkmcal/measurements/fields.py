@@ -12,6 +12,8 @@ from pkmcal.arrays import FloatArray, Int64Array, as_numbers
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.tracker import Tracker
 
+_ROUNDED = 1e-9  # share by which a covariance may miss symmetry, as what was computed or typed does
+
 
 def numbers(name: str, given: ArrayLike) -> FloatArray:
     """A copy as finite doubles."""
@@ -46,8 +48,11 @@ def sigma_array(
         return np.asarray(0.5 * (covariance + covariance.transpose(0, 2, 1)))
     sigma = numbers("sigma", given)
     if sigma.ndim == 3 and sigma.shape == (rows, k, k):
+        mirrored = sigma.transpose(0, 2, 1)
+        odd = np.abs(sigma - mirrored).max(axis=(1, 2)) > _ROUNDED * np.abs(sigma).max(axis=(1, 2))
+        sigma = np.asarray(0.5 * (sigma + mirrored))
         for row, matrix in enumerate(sigma):
-            if (matrix != matrix.T).any() or np.linalg.eigvalsh(matrix)[0] <= 0:
+            if odd[row] or np.linalg.eigvalsh(matrix)[0] <= 0:
                 raise ArgumentError(
                     f"sigma: row {row} is not a covariance matrix (symmetric, positive)"
                 )

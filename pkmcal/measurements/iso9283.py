@@ -36,8 +36,10 @@ class Performance(Result):
         RP: mean distance of the measured points from their mean, and three standard deviations of
         it; NaN where a pose was measured once.
     distance_accuracy : ndarray (P,)
-        AD: measured less commanded distance between the means of two poses, for every pair of
-        them, of 300 poses at most. It does not depend on where the instrument stands.
+        AD: mean distance between the points of two poses, the first of the one to the first of the
+        other and so on, less the commanded distance; for every pair of them, of 300 poses at most.
+        Where one was measured more often, its further points are left out. It does not depend on
+        where the instrument stands.
     """
 
     repeats: IntArray
@@ -86,8 +88,9 @@ def performance(measured: ArrayLike, commanded: ArrayLike, pose: ArrayLike) -> P
     Notes
     -----
     ISO 9283:1998, 7.2.1 (AP = ‖barycentre − command‖), 7.2.2 (RP = l̄ + 3 S_l with l_j the distance
-    from the barycentre) and 7.3.2 (AD = D̄ − D_c). The standard asks for 30 repeats of five poses
-    at rated load and speed; here they are what the measurements have.
+    from the barycentre) and 7.3.2 (AD = D̄ − D_c with D̄ the mean of the distances D_j between the
+    j-th points of both poses, in the order measured). The standard asks for 30 repeats of five
+    poses at rated load and speed; here they are what the measurements have.
 
     Examples
     --------
@@ -123,5 +126,24 @@ def performance(measured: ArrayLike, commanded: ArrayLike, pose: ArrayLike) -> P
         repeats=repeats,
         accuracy=np.linalg.norm(centre - sent, axis=1),
         repeatability=mean(away) + _SIGMAS * spread,
-        distance_accuracy=pdist(centre[some]) - pdist(sent[some]),
+        distance_accuracy=_paired_distances(points, group, some) - pdist(sent[some]),
     )
+
+
+def _paired_distances(points: FloatArray, group: IntArray, some: IntArray) -> FloatArray:
+    """Mean distance between the j-th points of two poses, for every pair of `some`."""
+    from scipy.spatial.distance import pdist
+
+    rows = [np.flatnonzero(group == pose) for pose in some]
+    total, count = (np.zeros(len(some) * (len(some) - 1) // 2) for _ in range(2))
+    for repeat in range(max(map(len, rows))):
+        own = np.full((len(some), 3), np.nan)
+        for k, row in enumerate(rows):
+            if repeat < len(row):
+                own[k] = points[row[repeat]]
+        distance = pdist(own)
+        both = np.isfinite(distance)
+        total[both] += distance[both]
+        count += both
+    mean: FloatArray = total / count
+    return mean

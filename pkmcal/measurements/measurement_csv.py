@@ -40,6 +40,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentTypeError, FileError
 from pkmcal.files.column_names import BESIDE, RESERVED, known_as
 from pkmcal.files.csv_table import Table
+from pkmcal.files.reading import LONGEST_NAME
 from pkmcal.measurements.components import COMPONENTS, Kind
 from pkmcal.measurements.measurements import Measurements
 
@@ -262,14 +263,19 @@ def _read_targets(table: Table, kind: Kind) -> dict[str, Any]:
     if not named:
         return {name: _one(place) for name, place in fields.items()}
     names = table.texts("target")
-    order = list(dict.fromkeys(names))
-    index = np.array([order.index(name) for name in names])
-    first = [names.index(name) for name in order]
+    long = next((row for row, name in enumerate(names) if len(name) > LONGEST_NAME), None)
+    if long is not None:
+        message = f"a name has at most {LONGEST_NAME} characters, found {len(names[long])}"
+        raise table.cell_error("target", long, message)
+    places_of: dict[str, int] = {}
+    index = np.array([places_of.setdefault(name, len(places_of)) for name in names])
+    order = list(places_of)
+    first = np.unique(index, return_index=True)[1].tolist()
     for name, places in fields.items():
         moved = (places != places[first][index]).any(axis=1)
         if moved.any():
             row = int(np.argmax(moved))
-            line = table.lines[names.index(names[row])]
+            line = table.lines[first[index[row]]]
             what = "place" if name == "target" else name
             raise table.cell_error(
                 "target", row, f"{names[row]!r} has another {what} here than in line {line}"

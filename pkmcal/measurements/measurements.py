@@ -51,6 +51,8 @@ class Measurements(Result):
     sigma : scalar, (k,), (N, 1), (N, k) or (N, k, k) array, or Tracker, optional
         Standard deviation of the values in their own units; k is the number of components of the
         kind. (N, k, k) are covariance matrices. One number for poses counts as mm and as rad.
+        Deviations of α β γ are those of turnings about the axes at right angles nearest to
+        theirs: equal ones say that the instrument is as sure about every axis.
         For heights and distances (N,) will do. A `Tracker` gives each position the covariance
         that follows from where it stands. None: not known. Kept as (N, k) or (N, k, k).
     target : (3,), (N, 3) or (k, 3) array, optional

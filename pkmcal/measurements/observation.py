@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, wrapped
+from pkmcal.arrays import FloatArray
 from pkmcal.core import instruments
-from pkmcal.core.poses import compose, compose_rates
+from pkmcal.core.poses import compose
+from pkmcal.measurements import orientation
 from pkmcal.measurements.components import Kind
 
 _ORIGIN = np.zeros(3)
@@ -22,7 +23,8 @@ class Predicted:
     Attributes
     ----------
     values : ndarray (N, k)
-        In mm and rad, as `Measurements` of the kind have them.
+        In mm and rad, as `Measurements` of the kind have them. Derivatives of the three angles of
+        poses are those of the turning in the instrument's axes.
     by_twist : ndarray (N, k, 6)
         Derivative to the twist of the platform: ω, then the velocity of its origin, in base axes.
     by_target : ndarray (N, k, 3) or None
@@ -98,20 +100,42 @@ def _distances(pose: FloatArray, target: FloatArray, anchor: FloatArray) -> Pred
 
 
 def _poses(pose: FloatArray, frame: FloatArray | None, origin: FloatArray) -> Predicted:
-    if frame is None:
-        return Predicted(pose, instruments.seen_pose_rates(_NOWHERE, pose))
-    whole = compose(origin, frame[None])[0]
-    seen = compose(whole, pose)
-    by_frame = compose_rates(origin, np.tile(frame, (len(pose), 1)), pose, seen)
-    return Predicted(seen, instruments.seen_pose_rates(whole, seen), by_frame=by_frame)
+    place = _points(pose, _ORIGIN, frame, origin)
+    turn = place.by_twist[:, :, 3:]  # of the base, as the instrument has it
+    by_twist = np.concatenate(
+        [place.by_twist, np.concatenate([turn, np.zeros_like(turn)], axis=2)], axis=1
+    )
+    if frame is None or place.by_frame is None:
+        return Predicted(pose, by_twist)
+    inner, outer = frame[None, 3:], origin[None, 3:]
+    by_angles = orientation.rotations(outer) @ orientation.axes_of_angles(inner)
+    by_frame = np.zeros((len(pose), 6, 6))
+    by_frame[:, :3], by_frame[:, 3:, 3:] = place.by_frame, by_angles
+    return Predicted(compose(compose(origin, frame[None])[0], pose), by_twist, by_frame=by_frame)
 
 
 def difference(kind: Kind, values: FloatArray, predicted: FloatArray) -> FloatArray:
-    """Measured less predicted, (N, k); angles the short way round."""
+    """Measured less predicted, (N, k); of orientations the rotation vector between them."""
     residual: FloatArray = values.reshape(predicted.shape) - predicted
     if kind == "pose":
-        residual[:, 3:] = wrapped(residual[:, 3:])
+        residual[:, 3:] = orientation.between(values[:, 3:], predicted[:, 3:])
     return residual
+
+
+def corrected(kind: Kind, predicted: FloatArray, residual: FloatArray) -> FloatArray:
+    """Values (N, k) that differ from the predicted ones by a residual: inverts `difference`."""
+    values: FloatArray = predicted + residual
+    if kind == "pose":
+        values[:, 3:] = orientation.turned(predicted[:, 3:], residual[:, 3:])
+    return values
+
+
+def by_difference(kind: Kind, derivative: FloatArray, residual: FloatArray) -> FloatArray:
+    """How `difference` shrinks, (N, k, n), from a derivative of `Predicted`."""
+    if kind == "pose":
+        turning = orientation.by_turning(residual[:, 3:]) @ derivative[:, 3:]
+        return np.concatenate([derivative[:, :3], turning], axis=1)
+    return derivative
 
 
 def distance_per_point(residual: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from pkmcal.measurements.calibratable import ArmMachine, Solvable
 from pkmcal.measurements.components import COMPONENTS, Kind
 from pkmcal.measurements.fields import numbers
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import predict
+from pkmcal.measurements.observation import corrected, predict
 from pkmcal.measurements.tracker import Tracker
 
 _ARM = 200.0  # mm; an instrument good to 0.02 mm over it is good to 1e-4 rad
@@ -36,8 +36,8 @@ class VirtualMachine:
     seed : int
         Of the noise. Each call of `measure` draws on; two machines with one seed read the same.
     angle_noise : float, optional
-        Standard deviation of measured angles in rad; by default that of `noise` on an arm of
-        200 mm.
+        Standard deviation of measured orientations about every axis, rad; by default that of
+        `noise` on an arm of 200 mm.
 
     Examples
     --------
@@ -126,7 +126,7 @@ class VirtualMachine:
         point, fixed = places[::-1] if kind == "distance" else places
         exact = predict(kind, np.asarray(solved.pose), point, fixed).values
         noise, sigma = self._drawn(blank, exact)
-        values = (exact + noise).reshape(blank.values.shape)
+        values = corrected(kind, exact, noise).reshape(blank.values.shape)
         return dataclasses.replace(blank, values=values, sigma=sigma)
 
     def _drawn(self, blank: Measurements, exact: FloatArray) -> tuple[FloatArray, Any]:

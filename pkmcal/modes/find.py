@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core import screws
+from pkmcal.core.library import SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.modes.assemblies import Assemblies, Signs
 from pkmcal.modes.certificate import Certificate, Closures, certify, newton
@@ -20,7 +21,11 @@ FLAT = 1e-9  # points this near a plane, beside their spread, are in it
 CLOSED = 1e-10  # of the terms of a closure: what Newton's method did not bring there is no mode
 BLURRED = 1e-4  # rad, or lengths: near a singularity poses without a proof are not known better
 AT_ONCE = 2000  # certificates: 12 x 12 matrices in memory
+_LENGTHS = (*SLOTS[:6], "offset", "rod", "crank")  # of a crank, the offset is a few radians
 STARTS = 2000  # random ones, where the paths prove nothing
+
+_EQUAL = 1e-7  # share of the machine's size by which distances of poses differ that are not equal
+_DECIMALS = 6  # of R, and of p in the machine's size, that are more than rounding
 
 
 class AssemblyProblem(NamedTuple):
@@ -57,8 +62,14 @@ class AssemblyProblem(NamedTuple):
         return spheres if self.q.ndim > 1 else spheres[0]
 
     def closures(self) -> Closures:
-        """The closures as quadratic equations."""
-        size = self.machine.struct.size
+        """The closures as quadratic equations.
+
+        Anchors and lengths are as exact as the numbers they are computed from: those of the limbs,
+        and the actuators', which are the limb's length or the anchor's way less the offset. Home
+        has no part in it: it may be that of another geometry. Nor have gains and angles.
+        """
+        lengths = np.isin(SLOTS, _LENGTHS)
+        size = 2.0 * float(np.abs(self.slots[:, lengths]).sum(axis=1).max())
         return Closures(self.map, self.rows, self.spheres(), self.length, size, self.levers)
 
 
@@ -224,6 +235,21 @@ def pose_distance(poses: FloatArray, pose: FloatArray, length: float) -> FloatAr
     """Distance of poses (N, 6) from one (1, 6), mm: of p, and largest entry of R times length."""
     difference = _scaled(frames_of(poses) - frames_of(pose), length)
     return np.asarray(np.abs(difference).max(axis=1, initial=0.0) * length)
+
+
+def nearest_first(poses: FloatArray, pose: FloatArray, length: float) -> IntArray:
+    """Order of poses (N, 6) by `pose_distance` from one (1, 6).
+
+    Poses equally far, as symmetric machines have them, come in the order of R and p, so that
+    rounding does not decide.
+    """
+    apart = pose_distance(poses, pose, length)
+    order = np.argsort(apart)
+    step = np.diff(apart[order], prepend=apart[order[:1]]) > _EQUAL * length
+    shell = np.empty(len(poses), dtype=np.intp)
+    shell[order] = np.cumsum(step)
+    entries = np.round(_scaled(frames_of(poses), length), _DECIMALS)
+    return np.lexsort((*entries.T[::-1], shell))
 
 
 def signs(problem: AssemblyProblem, poses: FloatArray) -> Signs:

@@ -28,6 +28,10 @@ class Sample(Protocol):
     def pose(self) -> FloatArray:
         """Poses (N, 6)."""
 
+    @property
+    def actuators(self) -> FloatArray:
+        """Their coordinates (N, n)."""
+
 
 class Sampled(Protocol):
     """What is asked of a move; `Move` describes each."""
@@ -118,8 +122,8 @@ def _margins(move: Sampled, times: FloatArray) -> FloatArray:
 
     Reach is left where a limb's actuator can no longer move it: where its transmission is 0.
     """
-    pose = move.sample(times).pose
-    feasible = move.robot.feasible(pose)
+    at = move.sample(times)
+    pose, feasible = at.pose, move.robot.feasible(at.pose, at.actuators)
     there = dexterity(move.robot, np.vstack([move.start, pose]))
     found = [np.where(feasible.reach, np.nan_to_num(there.transmission[1:, None]), -1.0)]
     for what in Feasibility.LIMITS[1:]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -21,6 +22,7 @@ from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.kinematics.workspace import moved_coordinates
 from pkmcal.moves import derivatives
 from pkmcal.moves.events import Event, events
+from pkmcal.moves.peaks import STEPS, largest, peaks
 from pkmcal.moves.time_laws import (
     CUBIC,
     QUINTIC,
@@ -34,7 +36,6 @@ from pkmcal.result import Result
 from pkmcal.screw import from_pose, to_pose
 
 _LAWS = {"cubic": CUBIC, "quintic": QUINTIC}
-_STEPS = 2000  # along a move, in search of peaks
 
 Space = Literal["pose", "coordinates", "joint"]
 
@@ -129,16 +130,20 @@ class Move(Result):
 
     def _parts(self) -> Iterator[str | Table]:
         yield f"{self.robot.name}: straight in {self._straight}, {self.duration:.4g} s"
-        at = self.sample(np.linspace(0.0, self.duration, _STEPS + 1))
+        ends = self.sample(np.array([0.0, self.duration]))
+        speeds, accelerations = peaks(self.sample, self.duration)
         rows = []
         for i, unit in enumerate(self.robot.actuator_units):
             factor, unit = displayed(1.0, unit)
-            numbers = (at.actuators[0, i], at.actuators[-1, i], np.abs(at.velocities[:, i]).max(),
-                       np.abs(at.accelerations[:, i]).max())  # fmt: skip
+            numbers = (*ends.actuators[:, i], speeds[i], accelerations[i])
             rows.append([f"q{i + 1} [{unit}]", *(f"{number * factor:.4g}" for number in numbers)])
         head = ["actuator", "from", "to", "top speed [/s]", "top acceleration [/s²]"]
         yield Table(head, rows, left=1)
-        yield f"conditioning {np.min(self.conditioning(at.time)):.3g} at least"
+        times = np.linspace(0.0, self.duration, STEPS + 1)
+        worse = largest(
+            lambda t: -self.conditioning(t)[:, None], times, -self.conditioning(times)[:, None]
+        )
+        yield f"conditioning {-worse[0]:.3g} at least"
         yield from map(str, self.events())
 
     # --------------------------------------------------------------------------------------------
@@ -147,7 +152,8 @@ class Move(Result):
         position, velocity, acceleration = self.law.sample(times)
         motion = derivatives.straight(self.start, self.end, (position, velocity, acceleration))
         pose = to_pose(motion[:, 0])
-        return motion, (self.robot.inverse(pose), *self.robot.rates(motion))
+        q = self.robot.inverse(pose, near=self._turns_at(position))
+        return motion, (q, *self.robot.rates(motion))
 
     def _in_joint(self, times: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
         robot, frames, slots = self.robot, self.robot.frames, self.robot.slots
@@ -167,14 +173,54 @@ class Move(Result):
         first, last = frames.inward(np.stack([self.start, self.end]))
         matched = [POSE.index(name) for name in moved_coordinates(robot)]
         way = (last - first)[matched]
-        own, q = complete(
-            robot.machine, robot.model.map, slots, first + share * (last - first), matched
-        )
+        own, q = self._completed(share)
+        near = self._turns_at(share[:, 0])
+        q = q if near is None else robot.nearest_turns(q, near=near)
         velocity, acceleration = completed_rates(
             robot.machine, robot.model.map, slots, own, q, matched, (speed * way, bend * way)
         )
         motion = robot.machine.motion(slots, own, q, velocity, acceleration)[0]
         return frames.motion_outward(motion), (q, velocity, acceleration)
+
+    def _completed(self, share: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Own poses and actuators at shares (N, 1) of a way that is straight in coordinates."""
+        robot = self.robot
+        first, last = robot.frames.inward(np.stack([self.start, self.end]))
+        matched = [POSE.index(name) for name in moved_coordinates(robot)]
+        way = first + share * (last - first)
+        return complete(robot.machine, robot.model.map, robot.slots, way, matched)
+
+    def _turns_at(self, share: FloatArray) -> FloatArray | None:
+        """Coordinates (N, n) near those at shares (N,) of the way, whose angles do not jump."""
+        if self._continuous is None:
+            return None
+        shares = np.linspace(0.0, 1.0, len(self._continuous))
+        return np.stack([np.interp(share, shares, q) for q in self._continuous.T], axis=1)
+
+    @cached_property
+    def _continuous(self) -> FloatArray | None:
+        """Coordinates (k, n) evenly along the way, each angle near the one before.
+
+        None where no actuator turns.
+        """
+        turns = self.robot.turns
+        if np.isinf(turns).all():
+            return None
+        share = np.linspace(0.0, 1.0, STEPS + 1)
+        if self.space == "coordinates":
+            q = self._completed(share[:, None])[1]
+        else:
+            still = np.zeros_like(share)
+            motion = derivatives.straight(self.start, self.end, (share, still, still))
+            q = self.robot.inverse(to_pose(motion[:, 0]))
+        known = np.isfinite(q).all(axis=1)
+        if not known.any():
+            return np.zeros_like(q)
+        for i in np.flatnonzero(np.isfinite(turns)).tolist():
+            q[known, i] = np.unwrap(q[known, i], period=turns[i])
+        for i in range(q.shape[1]):  # what is out of reach has no angle
+            q[:, i] = np.interp(share, share[known], q[known, i])
+        return q
 
     @property
     def _straight(self) -> str:
@@ -211,9 +257,11 @@ def move(
         "pose": the platform's origin goes straight and the platform turns about one axis (SLERP);
         "coordinates": those that the robot file declares to match, or else its free coordinates,
         go straight, and the machine determines the others, as by `Robot.complete`;
-        "joint": the actuators go straight.
+        "joint": the actuators go straight, those that turn the short way round unless a stroke
+        forbids it.
     velocity, acceleration, jerk : array_like () or (n,), optional
-        Limits of the actuators, mm or rad, and s; without `duration` at least one is needed.
+        Limits of the actuators, mm or rad, and s; without `duration` at least one is needed. They
+        hold between samples too: see Notes.
 
     Returns
     -------
@@ -225,6 +273,14 @@ def move(
     ValueError
         An end that the machine cannot take, a straight path that it cannot follow, no duration and
         no limits, limits that are not positive.
+
+    Notes
+    -----
+    The largest velocity and acceleration are sought along the path at 2001 places, and wherever the
+    position or the velocity changes by more from one to the next than these can explain, in ever
+    smaller steps; each maximum is then closed in on to rounding. What can be missed is shorter than
+    a step, 1/2000 of the duration, and changes the position (a velocity) or the velocity (an
+    acceleration) there by less than the largest of them does in a step.
 
     Examples
     --------
@@ -247,6 +303,7 @@ def move(
         if value is not None
     }
     q = robot.inverse(np.stack(ends))
+    q[1] = robot.short_way(q[0], q[1])
     if law == "jerk-limited":
         if space != "joint" or duration is not None or len(limits) < 3:
             raise ArgumentError(
@@ -315,30 +372,15 @@ def _fastest(unit: Move, limits: dict[str, FloatArray]) -> float:
     """The shortest duration within limits: speeds go with 1/T and accelerations with 1/T²."""
     if not limits:
         raise ArgumentError("give a duration, or limits of velocity or acceleration")
-    parts: dict[str, Callable[[MoveSample], FloatArray]] = {
-        "velocity": lambda at: at.velocities,
-        "acceleration": lambda at: at.accelerations,
-    }
+    largest = dict(zip(("velocity", "acceleration"), peaks(unit.sample, 1.0), strict=True))
     shortest = 0.0
     for name, most in limits.items():
         order = 1 if name == "velocity" else 2
-        peaks = _peaks(unit, parts[name])
-        if not np.isfinite(peaks).all():
+        if not np.isfinite(largest[name]).all():
             raise ArgumentError(
                 "the path leaves the machine's reach or is singular: no fastest move"
             )
-        shortest = max(shortest, float(((peaks / most) ** (1 / order)).max()))
+        shortest = max(shortest, float(((largest[name] / most) ** (1 / order)).max()))
     if shortest == 0.0:
         raise ArgumentError("start and end are the same pose: give a duration")
     return shortest
-
-
-def _peaks(unit: Move, part: Callable[[MoveSample], FloatArray]) -> FloatArray:
-    """The largest size of each actuator's velocity or acceleration, looked at again closely."""
-    coarse = np.linspace(0.0, 1.0, _STEPS + 1)
-    sizes = np.abs(part(unit.sample(coarse)))
-    peaks = sizes.max(axis=0)
-    for i, k in enumerate(sizes.argmax(axis=0).tolist()):
-        near = np.linspace(coarse[max(k - 1, 0)], coarse[min(k + 1, _STEPS)], _STEPS + 1)
-        peaks[i] = max(peaks[i], np.abs(part(unit.sample(near)))[:, i].max())
-    return np.asarray(peaks)

@@ -37,10 +37,17 @@ def as_json(result: Any, *attributes: str) -> str:
     """
     plain = _plain(result) | {name: _plain(getattr(result, name)) for name in attributes}
     lines = (
-        f"  {json.dumps(key)}: {json.dumps(value, ensure_ascii=False, allow_nan=False)}"
+        f"  {json.dumps(key)}: {_escaped(json.dumps(value, ensure_ascii=False, allow_nan=False))}"
         for key, value in plain.items()
     )
     return "{\n" + ",\n".join(lines) + "\n}"
+
+
+def _escaped(line: str) -> str:
+    """JSON without what could steer a terminal: marks of writing direction and the like."""
+    if line.isprintable():
+        return line
+    return "".join(c if c.isprintable() else json.dumps(c)[1:-1] for c in line)
 
 
 def _plain(value: Any) -> Any:

@@ -13,7 +13,7 @@ from pkmcal.arrays import FloatArray, propagate, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
-from pkmcal.files.provenance import printable
+from pkmcal.display import printable
 from pkmcal.kinematics.workspace import reach, sample_poses, workspace
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.iso9283 import performance

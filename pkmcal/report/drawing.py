@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
+from pkmcal.display import printable
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 
@@ -37,11 +38,13 @@ _CONTEXT: Any = {
     "grid.color": GRID,
     "axes.axisbelow": True,
 }
+KINDS = ("png", "svg")
 _METADATA: dict[str, dict[str, None]] = {
     "png": {"Software": None},
     "svg": {"Date": None, "Creator": None},  # the same bytes for the same figure
 }
 _DPI = 120
+_LONGEST_LINE, _LONGEST_TEXT = 200, 2000  # letters of one text
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -84,7 +87,12 @@ def encoded(figure: Figure, kind: str, salt: str = "pkmcal", background: str = "
         Colour, or "none".
     """
     import matplotlib
+    from matplotlib.text import Text
 
+    for text in figure.findobj(Text):
+        written = text.get_text()
+        if (shown := _shown(written)) != written:
+            text.set_text(shown)
     content = io.BytesIO()
     settings = {**_CONTEXT, "svg.hashsalt": salt}
     with matplotlib.rc_context(settings), warnings.catch_warnings():
@@ -93,6 +101,12 @@ def encoded(figure: Figure, kind: str, salt: str = "pkmcal", background: str = "
             content, format=kind, dpi=_DPI, metadata=_METADATA[kind], facecolor=background
         )
     return content.getvalue()
+
+
+def _shown(text: str) -> str:
+    """A text of a figure, in which there may be names of others: without control characters."""
+    lines = (printable(line, _LONGEST_LINE) for line in text[:_LONGEST_TEXT].split("\n"))
+    return "\n".join(lines)
 
 
 def write(figure: Figure, path: Path) -> None:
@@ -114,7 +128,7 @@ def write(figure: Figure, path: Path) -> None:
 def write_both(figure: Figure, path: Path) -> list[Path]:
     """Write `path`.png and `path`.svg and return these paths."""
     written = []
-    for kind in ("png", "svg"):
+    for kind in KINDS:
         written.append(path.with_name(f"{path.name}.{kind}"))
         write(figure, written[-1])
         figure.set_layout_engine("none")  # laid out once, so that both are the same picture

@@ -8,7 +8,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
-from pkmcal.files.provenance import printable
+from pkmcal.display import printable
 from pkmcal.report.contents import Slice, WorkspaceAccuracy
 from pkmcal.report.drawing import BLUE, FAINT, GREEN, ORANGE, empty_figure, in_context
 from pkmcal.report.skeleton import Skeleton, exaggerated

@@ -11,8 +11,9 @@ import numpy as np
 from pkmcal import display
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
+from pkmcal.display import printable
 from pkmcal.files.atomic import write_whole
-from pkmcal.files.provenance import checksums, comment, printable, version
+from pkmcal.files.provenance import checksums, comment, version
 from pkmcal.report import contents
 from pkmcal.report.as_json import as_json
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
 _SMALL = 1e-3  # below which numbers are written with a power of ten
 _TEMPLATE = "report.html.jinja"
+FILES = ("report.html", "report.json", "robot.toml")
 
 
 def write(found: Identification, folder: Path, files: Mapping[str, bytes]) -> list[Path]:
@@ -41,7 +43,7 @@ def write(found: Identification, folder: Path, files: Mapping[str, bytes]) -> li
         The folder cannot be written.
     """
     facts = gather(found, files)
-    page, numbers, robot = (folder / name for name in ("report.html", "report.json", "robot.toml"))
+    page, numbers, robot = (folder / name for name in FILES)
     found.robot.save(robot, comment(files))
     write_whole(numbers, as_json(_as_data(facts)) + "\n")
     write_whole(page, html(facts))

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pkmcal.arrays import propagate
-from pkmcal.display import displayed
-from pkmcal.files.provenance import printable
+from pkmcal.display import displayed, printable
 from pkmcal.report.drawing import BLUE, GREEN, ORANGE, PINK, empty_figure, in_context
 
 if TYPE_CHECKING:

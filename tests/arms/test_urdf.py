@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-
-pytest.importorskip("yourdfpy")
+from pkmcal.arms import urdf_file
 
 # a fixed flange between moving joints, an oblique axis, an origin at 90 degrees and one left out
 URDF = """<?xml version="1.0"?>
@@ -130,12 +129,22 @@ def test_all_else_stays_in_the_file(source: Path, tmp_path: Path) -> None:
             {"tip": "tool0"},
             "'tool0' is the child of several joints",
         ),
-        ('axis xyz="0 1 1"', 'axis xyz="0 1"', {"tip": "tool0"}, "'j2': axis .*, found 0 1"),
+        (
+            'axis xyz="0 1 1"',
+            'axis xyz="0 1"',
+            {"tip": "tool0"},
+            "'j2': xyz must be .* '0 1'",
+        ),
         ('axis xyz="0 1 1"', 'axis xyz="0 0 0"', {"tip": "tool0"}, "'j2': axis .*, found 0 0 0"),
-        ('xyz="0 0 0.05"', 'xyz="0 nan 0"', {"tip": "tool0"}, "'t': origin must be finite"),
+        (
+            'xyz="0 0 0.05"',
+            'xyz="0 nan 0"',
+            {"tip": "tool0"},
+            "'t': xyz must be .* '0 nan 0'",
+        ),
         ("</robot>", "", {"tip": "tool0"}, "not valid XML"),
         ("robot", "mujoco", {"tip": "tool0"}, "begins with <mujoco>, not <robot>"),
-        ('name="j1" ', "", {"tip": "tool0"}, "not a URDF file: KeyError"),
+        ('name="j1" ', "", {"tip": "tool0"}, "<joint> has no name"),
     ],
 )
 def test_mistakes_are_named(
@@ -154,3 +163,65 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 def test_errors_do_not_go_into_another_arms_file(source: Path, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"source: .* holds another arm"):
         pk.load("3r").save_urdf(tmp_path / "new.urdf", source, tip="tool0")
+
+
+# --- what is not as it should be -----------------------------------------------------------------
+
+DEEP = "<gazebo>" + "<p>" * 300 + "</p>" * 300 + "</gazebo>"
+LAUGHS = '<!DOCTYPE r [<!ENTITY a "aa"><!ENTITY b "&a;&a;">]>'
+
+
+@pytest.mark.parametrize(
+    "old, new, message",
+    [
+        ('<link name="fore"/>', DEEP + '<link name="fore"/>', "nested deeper than 100"),
+        ('<child link="fore"/>', "<child/>", "joint 'j2': <child> has no link"),
+        ('<child link="fore"/>', "", "joint 'j2' has no <child>"),
+        ('<child link="fore"/>', '<child link="fro"/>', "there is no link 'fro', its child"),
+        ('<child link="fore"/>', '<child link="upper"/><child link="fore"/>', "2 elements <child>"),
+        ('<parent link="rod"/>', '<parent link="tool0"/>', "'t' joins 'tool0' with itself"),
+        ('xyz="0.1 0 0"', 'xyz="0.1 0 0 0"', "'j2': xyz must be three finite numbers"),
+        ('xyz="0.1 0 0"', f'xyz="{"0 " * 100_000}"', "'j2': xyz must be three finite numbers"),
+        ('rpy="0.1 0.2 0.3"', 'rpy=""', "'f': rpy must be three finite numbers, found ''"),
+        ('rpy="0.1 0.2 0.3"', 'rpy="1 2"', "'f': rpy must be three finite numbers, found '1 2'"),
+        ('rpy="0.1 0.2 0.3"', 'rpy="1 2 inf"', "'f': rpy must be three finite numbers"),
+        ("<!-- the shoulder -->", '<xacro:include xmlns:xacro="http://www.ros.org/wiki/xacro"/>',
+         "<xacro:include>: give the file that xacro makes"),
+        ('<?xml version="1.0"?>', '<?xml version="1.0"?>' + LAUGHS, "a document type"),
+        ('<?xml version="1.0"?>', '<?xml version="1.0" encoding="zzz"?>', "unknown encoding: zzz"),
+        ('<?xml version="1.0"?>', '<?xml version="1.0" encoding="big5"?>', "not valid XML: multi"),
+    ],
+)  # fmt: skip
+def test_a_file_that_is_not_whole_is_refused_and_not_cut_short(
+    old: str, new: str, message: str, source: Path
+) -> None:
+    assert old in URDF
+    source.write_text(URDF.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(pk.FileError, match=rf"arm\.urdf: .*{message}"):
+        pk.SerialArm.from_urdf(source, tip="tool0")
+
+
+def test_a_file_that_ends_anywhere_is_refused(source: Path) -> None:
+    whole = URDF.rstrip()
+    for end in range(1, len(whole), 7):
+        source.write_text(whole[:end], encoding="utf-8")
+        with pytest.raises(pk.FileError, match="not valid XML"):
+            pk.SerialArm.from_urdf(source, tip="tool0")
+
+
+def test_what_belongs_to_links_is_not_looked_at(source: Path) -> None:
+    arm = pk.SerialArm.from_urdf(source, tip="tool0")
+    source.write_text(URDF.replace('<box size="1 1 1"/>', ""), encoding="utf-8")
+    np.testing.assert_array_equal(pk.SerialArm.from_urdf(source, tip="tool0").home, arm.home)
+
+
+def test_another_library_reads_the_same_joints(source: Path) -> None:
+    yourdfpy = pytest.importorskip("yourdfpy")
+    other = yourdfpy.URDF.load(str(source), load_meshes=False)
+    read = urdf_file.read(source)
+    assert [joint.name for joint in read.joints] == [joint.name for joint in other.robot.joints]
+    for mine, theirs in zip(read.joints, other.robot.joints, strict=True):
+        assert (mine.parent, mine.child, mine.type) == (theirs.parent, theirs.child, theirs.type)
+        origin = np.eye(4) if theirs.origin is None else theirs.origin.copy()
+        origin[:3, 3] *= 1000.0
+        np.testing.assert_allclose(mine.origin, origin, atol=1e-13)

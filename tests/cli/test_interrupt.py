@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from pkmcal.files import atomic
 from pkmcal.files.atomic import write_whole
 
 # Says when the program is loaded, so that the signal meets its work.
@@ -55,12 +56,11 @@ def test_interrupt_while_a_file_is_written_leaves_the_old_one(
 ) -> None:
     (tmp_path / "robot.toml").write_text("old")
 
-    def stopped(self: Path, content: bytes) -> int:
-        with open(self, "wb") as file:
-            file.write(content[:3])
+    def stopped(path: Path, content: bytes) -> None:
+        path.write_bytes(content[:3])
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(Path, "write_bytes", stopped)
+    monkeypatch.setattr(atomic, "_write", stopped)
     with pytest.raises(KeyboardInterrupt):
         write_whole(tmp_path / "robot.toml", "new and longer")
     assert [path.name for path in tmp_path.iterdir()] == ["robot.toml"]

@@ -26,7 +26,12 @@ def without_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Drawing takes seconds; one test draws all."""
     for name in ("errors_by_pose", "mean_errors"):
         monkeypatch.setattr(figures, name, lambda found, title: None)
-    monkeypatch.setattr(drawing, "write_both", lambda figure, path: [path.with_suffix(".png")])
+
+    def write_both(figure: None, path: Path) -> None:
+        for kind in drawing.KINDS:
+            path.with_name(f"{path.name}.{kind}").write_bytes(b"no picture")
+
+    monkeypatch.setattr(drawing, "write_both", write_both)
 
 
 @pytest.mark.usefixtures("without_figures")
@@ -59,7 +64,7 @@ def test_tables_say_what_they_were_made_of(run: Any, verb: list[str], files: lis
     assert run(verb[0], "2tpr2tps", "--poses", "at.csv", *verb[1:], "--out", "out").exit_code == 0
     digest = hashlib.sha256(Path("at.csv").read_bytes()).hexdigest()
     for name in files:
-        head = Path("out", name).read_text(encoding="utf-8").split("\n")[:3]
+        head = Path("out", name).read_text(encoding="utf-8").split("\n")[1:4]
         assert head[0] == f"# Written by pkmcal {pk.__version__} from"
         assert head[1].startswith("#   built-in machine 2tpr2tps, sha256 ")
         assert head[2] == f"#   at.csv, sha256 {digest}"

@@ -250,8 +250,8 @@ def test_bad_arguments_are_named(paper: Robot, changes: dict[str, object], argum
 
 def test_shapes_are_checked(paper: Robot) -> None:
     desired = tilted_poses(paper, 3, np.random.default_rng(7))
-    with pytest.raises(ValueError, match="desired must have shape"):
-        compensate(paper, desired[0], desired[0])
+    with pytest.raises(ValueError, match="desired must be at least one pose"):
+        compensate(paper, desired[:0], desired[:0])
     with pytest.raises(ValueError, match="one row for each of 3 poses"):
         compensate(paper, desired, desired[:2])
     with pytest.raises(ValueError, match="positions do not determine the orientation"):
@@ -280,3 +280,18 @@ def test_measurements_in_another_unit_or_frame_are_called_gross(paper: Robot) ->
     assert found.gross.tolist() == [False, True]
     assert "1 of 2 have implausible errors" in str(found)
     assert max(map(len, str(found).splitlines())) <= 100
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (2, 3)])
+def test_poses_of_any_leading_shape_are_corrected(shape: tuple[int, ...]) -> None:
+    robot = pk.load("hexapod")
+    real = robot.replace({"offset1": 0.2})
+    desired = np.broadcast_to(robot.home, (*shape, 6))
+    at = real.forward(robot.inverse(desired)).pose
+    for measured in (at, lambda q: real.forward(q).pose):
+        found = pk.compensate(robot, desired, measured)
+        assert found.actuators.shape == found.correction.shape == (*shape, 6)
+        assert found.objective.shape == found.gross.shape == found.failed.shape == shape
+        expected = np.broadcast_to([-0.2, 0, 0, 0, 0, 0], (*shape, 6))
+        np.testing.assert_allclose(found.correction, expected, rtol=0, atol=1e-9)
+        assert str(found).startswith(f"{max(1, int(np.prod(shape)))} pose")

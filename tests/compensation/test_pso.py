@@ -357,7 +357,7 @@ def test_limb_residual_has_the_same_bits_on_every_isa() -> None:
 
 
 def test_tied_numbers_follow_their_parameters() -> None:
-    from ..test_readme import DELTA
+    from ..docs.test_readme import DELTA
 
     robot = pk.load(DELTA / "robot.toml")
     poses = np.tile(robot.home, (5, 1))

@@ -21,6 +21,8 @@ from pkmcal.core.poses import (
 from pkmcal.core.screws import Arm
 from pkmcal.kinematics.limb_residual import LimbResidual
 
+from .. import generated
+
 ISAS = range(library.lib.pkm_best_isa() + 1)
 ROWS = 37
 TAILS = [*(slice(0, n) for n in range(1, 18)), slice(3, ROWS), slice(0, ROWS)]
@@ -142,6 +144,30 @@ def test_bits_are_the_same_on_every_isa_and_in_every_tail(call: str) -> None:
             found = CASES[call](isa, part)
             for array, whole in zip(found, expected, strict=True):
                 assert array.tobytes() == whole[part].tobytes()
+
+
+@pytest.mark.parametrize("kind", generated.KINDS)
+def test_angles_have_the_same_bits_near_anything(kind: str) -> None:
+    """Shared cranks, turns and guesses of a machine with whatever limbs were drawn."""
+    rng = np.random.default_rng([7, generated.KINDS.index(kind)])
+    robot = generated.machine(kind, rng, errors=0.3)
+    machine, slots = robot.machine, robot.slots
+    at = np.ascontiguousarray(generated.poses(kind, robot, ROWS, rng))
+    near = 10.0 * rng.normal(size=(ROWS, robot.n_actuators))
+
+    def found(isa: int, part: slice) -> list[np.ndarray]:
+        machine.isa = isa
+        rows, about = at[part].copy(), near[part].copy()
+        q = machine.inverse(slots, rows, about)
+        both = machine.inverse(slots, rows), machine.inverse(slots, rows, near[0])
+        forward = machine.forward(slots, q, robot.own_home, 1)
+        return [q, *both, *machine.limbs(slots, rows), *forward]
+
+    whole = found(0, slice(0, ROWS))
+    for isa in ISAS:
+        for part in TAILS:
+            for one, other in zip(found(isa, part), whole, strict=True):
+                assert np.array_equal(one, other[part], equal_nan=one.dtype.kind == "f")
 
 
 def test_every_call_that_is_compiled_for_each_isa_is_looked_at() -> None:

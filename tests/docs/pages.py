@@ -19,7 +19,7 @@ import numpy as np
 from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal.cli import main as cli
+from pkmcal.cli import verbs
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -78,7 +78,7 @@ def as_pkmcal(command: str) -> list[str]:
 
 
 def run(arguments: list[str]) -> Any:
-    return CliRunner().invoke(cli.app, arguments, prog_name="pkmcal")
+    return CliRunner().invoke(verbs.app, arguments, prog_name="pkmcal")
 
 
 def compensated() -> dict[str, Any]:

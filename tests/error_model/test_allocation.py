@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 import pkmcal as pk
 from pkmcal.error_model.allocation import Allocation
 
-from ..workspaces import poses
+from ..workspaces import WORKSPACE, poses
 
 SAMPLES = 20_000
 NOISE = 0.06  # of a 99.7 % quantile of so many machines, found twice: three deviations
@@ -41,7 +42,61 @@ def test_machines_with_these_tolerances_keep_what_is_allowed(name: str, cost: An
     assert found.reached["distance"] == pytest.approx(0.2, rel=NOISE)
     wider = {j: 1.2 * s for j, s in zip(found.joints, found.sigma, strict=True) if np.isfinite(s)}
     again = pk.tolerance(robot, poses(name, 4), wider, samples=SAMPLES, seed=9)
-    assert again.distance997.max() > 0.2 * (1.2 - 2 * NOISE)
+    assert again.distance997.max() > 0.2 * (1.2 - 3 * NOISE)
+
+
+@pytest.mark.parametrize("allowed", [0.5, {"distance": 0.5, "alpha": 2e-3, "z": 0.2}])
+@pytest.mark.parametrize("name", sorted(WORKSPACE))
+def test_the_machines_keep_all_limits_at_all_poses(name: str, allowed: Any) -> None:
+    """Machines of a generator of its own, each solved as a robot."""
+    robot = pk.load(name)
+    moved = {k: v for k, v in allowed.items() if k != "alpha"} if isinstance(allowed, dict) else {}
+    wanted = moved if moved and "alpha" not in robot.coordinates else allowed
+    at = robot.complete(poses(name, 12))
+    found = pk.allocate_tolerance(robot, at, wanted, samples=SAMPLES)
+    assert found.kept >= 99.7 - 3 * 100 * np.sqrt(0.003 / SAMPLES)
+    deviations = np.zeros(len(robot.geometry))
+    for joint, sigma in zip(found.joints, found.sigma, strict=True):
+        places = [robot.geometry.names.index(each) for each in robot.geometry.match(joint)]
+        deviations[places] = sigma if np.isfinite(sigma) else 0.0
+    limits = wanted if isinstance(wanted, dict) else {"distance": wanted}
+    rng, count, broken = np.random.default_rng(99), 600, 0
+    q = robot.inverse(at)
+    for _ in range(count):
+        machine = robot.replace(
+            robot.geometry.values + rng.normal(size=len(deviations)) * deviations
+        )
+        off = machine.forward(q, guess=at).pose - at
+        size = {"distance": np.linalg.norm(off[:, :3], axis=1), "z": np.abs(off[:, 2]),
+                "alpha": np.abs(off[:, 3])}  # fmt: skip
+        broken += any(not (size[each] <= limit).all() for each, limit in limits.items())
+    assert broken <= 0.003 * count + 4 * np.sqrt(0.003 * count)
+
+
+def test_per_pose_allows_more_and_fewer_machines_keep_it_everywhere() -> None:
+    robot = pk.load("2tpr2tps")
+    at = pk.sample_poses(robot, 30, seed=4)
+    joints = ["base*", "platform*", "offset*"]
+    every, each = (
+        pk.allocate_tolerance(robot, at, 0.5, joints=joints, per_pose=p, samples=SAMPLES)
+        for p in (False, True)
+    )
+    assert (each.sigma > 1.05 * every.sigma).all()
+    assert each.kept < 99.6 < every.kept
+    assert each.reached["distance"] == each.check.distance997.max()
+    assert every.check.distance997.max() < every.reached["distance"]
+    assert "at the worst pose" in str(each) and f"{each.kept:.2f} % of these" in str(each)
+    assert "at all poses" in str(every)
+
+
+def test_the_same_machines_are_counted_with_any_executor() -> None:
+    robot = pk.load("2tpr2tps")
+    at = poses("2tpr2tps", 20)
+    alone = pk.allocate_tolerance(robot, at, 0.5, samples=SAMPLES)
+    with ThreadPoolExecutor(3) as executor:
+        shared = pk.allocate_tolerance(robot, at, 0.5, samples=SAMPLES, executor=executor)
+    np.testing.assert_array_equal(alone.sigma, shared.sigma)
+    assert (alone.kept, alone.reached) == (shared.kept, shared.reached)
 
 
 def test_at_one_pose_contributions_are_equal() -> None:
@@ -110,6 +165,7 @@ def test_several_limits_hold_together() -> None:
         found = pk.allocate_tolerance(robot, at, allowed, samples=100_000)
         share = {name: found.reached[name] / limit for name, limit in allowed.items()}
         assert max(share.values()) == pytest.approx(1.0, rel=NOISE)
+        assert found.kept == pytest.approx(99.7, abs=0.1)
 
 
 def test_what_has_no_effect_may_be_as_wide_as_it_likes() -> None:

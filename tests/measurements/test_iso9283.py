@@ -38,6 +38,25 @@ def test_distance_accuracy_does_not_depend_on_where_the_instrument_stands() -> N
     assert there.accuracy.min() > 100 * here.accuracy.max()
 
 
+def test_distance_accuracy_is_the_mean_of_the_paired_distances() -> None:
+    """Point by point, in the order measured; further points of one pose have no partner."""
+    random = np.random.default_rng(4)
+    repeats = [30, 30, 7, 1]
+    pose = random.permutation(np.repeat([9, 2, 5, 4], repeats))
+    sent = {number: random.uniform(-100, 100, 3) for number in (2, 4, 5, 9)}
+    commanded = np.array([sent[number] for number in pose])
+    seen = commanded + random.normal(0, 3.0, commanded.shape)
+    expected = []
+    numbers = sorted(sent)
+    for i, one in enumerate(numbers):
+        for other in numbers[i + 1 :]:
+            pairs = zip(seen[pose == one], seen[pose == other], strict=False)
+            mean = np.mean([np.linalg.norm(first - second) for first, second in pairs])
+            expected.append(mean - np.linalg.norm(sent[one] - sent[other]))
+    scored = performance(seen, commanded, pose)
+    np.testing.assert_allclose(scored.distance_accuracy, expected, atol=1e-12)
+
+
 def test_a_machine_that_is_too_long_by_a_share_has_distances_too_long_by_it() -> None:
     sent = np.random.default_rng(1).uniform(-100, 100, (6, 3))
     scored = performance(1.01 * sent, sent, np.arange(6))

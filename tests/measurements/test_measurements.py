@@ -308,3 +308,16 @@ def test_a_distance_needs_its_point_and_a_target_its_shape() -> None:
         machine.measure([[np.nan, 0, 0]])
     with pytest.raises(ValueError, match=r"q must have shape \(N, 3\)"):
         machine.measure(np.zeros((2, 2, 3)))
+
+
+def test_a_covariance_that_is_symmetric_to_rounding_is_accepted() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(100):
+        turn = np.linalg.qr(rng.normal(size=(3, 3))).Q
+        stated = turn @ np.diag([1e-4, 9e-4, 1e-2]) @ turn.T
+        kept = Measurements(np.ones((1, 6)), np.zeros((1, 3)), sigma=stated[None]).sigma
+        np.testing.assert_array_equal(kept[0], kept[0].T)
+        np.testing.assert_allclose(kept[0], stated, rtol=0, atol=1e-15)
+    skew = np.eye(3) + 1e-6 * np.eye(3, k=1)
+    with pytest.raises(ValueError, match="row 0 is not a covariance"):
+        Measurements(np.ones((1, 6)), np.zeros((1, 3)), sigma=skew[None])

@@ -39,7 +39,7 @@ def differences(equations: Equations, theta: np.ndarray, scale: np.ndarray) -> n
         step = np.zeros(len(theta))
         step[j] = 1e-3 * s
         ahead, back = equations.at(theta + step), equations.at(theta - step)
-        columns.append((ahead.predicted[0].values - back.predicted[0].values) / (2e-3 * s))
+        columns.append((back.residuals[0] - ahead.residuals[0]) / (2e-3 * s))
     return np.stack(columns, axis=-1)
 
 

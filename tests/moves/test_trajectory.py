@@ -13,9 +13,11 @@ from scipy.optimize import brentq
 import pkmcal as pk
 from pkmcal.core.library import POSE
 from pkmcal.moves import derivatives
+from pkmcal.moves.peaks import peaks
 from pkmcal.report import move_figures
 
 from .. import twin
+from ..robots import made, ring
 
 STRAIGHT = ("rbt-6t03p", "hexapod", "6-rus", "linear-delta", "rotary-delta", "3rrr-planar")
 CONSTRAINED = ("2tpr2tps", "2tpr2tps-spatial", "3rps", "3prs")
@@ -323,6 +325,53 @@ def test_the_fastest_quintic_in_joint_space_is_known() -> None:
     assert by_speed.duration == pytest.approx(15 / 8 * way / 30, rel=1e-10)
     by_force = pk.trajectory.move(robot, *ends(robot), space="joint", acceleration=500.0)
     assert by_force.duration == pytest.approx(np.sqrt(10 / np.sqrt(3) * way / 500), rel=1e-10)
+
+
+def grazing(eps: float) -> pk.Robot:
+    """Six vertical sliders; turned by π + 0.5 rad the rod of the first just reaches its slider."""
+    turns = 2 * np.pi * (np.arange(6) // 2) / 3
+    sides = np.where(np.arange(6) % 2, 1, -1)
+    limbs = [
+        {"kind": "PUS", "base": ring(130.0, np.degrees(a)), "platform": ring(65.0, np.degrees(b))}
+        | {"slider": [0, 0, 1], "rod": 223.0 if i else 195.0 * (1 + eps), "branch": -1}
+        for i, (a, b) in enumerate(zip(turns + 0.3 * sides, turns + 0.8 * sides, strict=True))
+    ]
+    return made("spatial", {"z": 0.0}, limbs)
+
+
+@pytest.mark.parametrize("eps", [1e-6, 1e-9, 1e-10, 1e-11, 1e-12])
+@pytest.mark.parametrize("before", [0.7, 0.61])
+def test_limits_hold_between_samples_where_a_rod_grazes_its_reach(
+    eps: float, before: float
+) -> None:
+    """The peak is a millionth of the path wide; when it comes is known from the turn."""
+    robot, nearest = grazing(eps), np.pi + 0.5
+    start, end = [0, 0, 0, 0, 0, nearest - before], [0, 0, 0, 0, 0, nearest + 0.513]
+    share = before / (before + 0.513)
+    roots = np.roots([6, -15, 10, 0, 0, -share])
+    tau = next(r.real for r in roots if abs(r.imag) < 1e-9 and 0 < r.real < 1)
+    for limits in ({"velocity": 100.0}, {"acceleration": 1000.0}):
+        move = pk.trajectory.move(robot, start, end, **limits)
+        times = [np.linspace(0, 1, 20_001)]
+        times += [tau + way * np.geomspace(1e-12, 1e-3, 4001) for way in (-1, 1)]
+        at = move.sample(move.duration * np.sort(np.concatenate(times)))
+        for values, name in ((at.velocities, "velocity"), (at.accelerations, "acceleration")):
+            if name in limits:
+                used = np.abs(values).max() / limits[name]
+                assert used == pytest.approx(1.0, abs=1e-3)
+                # the peak goes with 1/√eps, and lengths are rounded: 2^-52 of them is some of eps
+                assert used <= 1.0 + 1e-6 + 4 * 2**-52 / eps
+
+
+@pytest.mark.parametrize(("name", "space"), MOVED)
+def test_printed_peaks_are_not_exceeded_anywhere(name: str, space: Any) -> None:
+    robot = pk.load(name)
+    move = pk.trajectory.move(robot, *ends(robot), duration=1.7, space=space)
+    at = move.sample(np.linspace(0, move.duration, 4999))
+    seen = np.abs(at.velocities).max(axis=0), np.abs(at.accelerations).max(axis=0)
+    for found, most in zip(peaks(move.sample, move.duration), seen, strict=True):
+        assert (most <= found * (1 + 1e-9) + 1e-9).all()
+        np.testing.assert_allclose(found, most, rtol=1e-4, atol=1e-9)
 
 
 # --- limits and singularities on the way ---------------------------------------------------------

@@ -316,5 +316,5 @@ def test_report_does_not_replace_the_robot_it_reads(run: Any, tmp_path: Path) ->
     delta = Path(__file__).resolve().parents[2] / "examples" / "linear-delta"
     arguments = [str(delta / "robot.toml"), str(delta / "probe.csv"), "--report", str(delta)]
     result = run("calibrate", *arguments)
-    assert result.exit_code == 2 and "would overwrite" in result.stderr
+    assert result.exit_code == 2 and "is an input" in result.stderr
     assert not (delta / "report.html").exists()

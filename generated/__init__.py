@@ -1,0 +1,1 @@
+"""The emitted headers of the core, as data of the package."""

@@ -1,0 +1,174 @@
+"""The links and joints of a URDF file, each checked.
+
+Read here, and not by a URDF library: of a joint six elements matter, and the one at hand goes on
+with what is left where its XML parser gives up, so that a file was cut short without a word.
+"""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ElementTree
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from os import PathLike
+
+import numpy as np
+
+from pkmcal import arguments, screw
+from pkmcal.arrays import FloatArray
+from pkmcal.exceptions import FileError
+from pkmcal.files import reading
+
+_METRE = 1000.0  # mm
+_MOST_NESTED = 100
+_XACRO = "{http://www.ros.org/wiki/xacro}"
+
+
+@dataclass(frozen=True)
+class Element:
+    """A joint as the file states it: origin (4, 4) in its parent link, mm; axis in its frame."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    origin: FloatArray
+    axis: tuple[float, float, float]
+    mimics: bool
+
+
+@dataclass(frozen=True)
+class File:
+    """The robot's name, its links, and its joints."""
+
+    name: str
+    links: tuple[str, ...]
+    joints: tuple[Element, ...]
+
+
+def read(path: str | PathLike[str]) -> File:
+    """Read a URDF file.
+
+    Raises
+    ------
+    ValueError
+        No XML, a document type or xacro in it, no robot; links and joints that do not make trees.
+    OSError
+        The file cannot be read.
+    """
+    root = tree(path)
+    links = tuple(_attribute(path, link, "name") for link in root.findall("link"))
+    joints = tuple(_joint(path, joint) for joint in root.findall("joint"))
+    _once(path, links, "several links are named {!r}")
+    _once(path, (joint.name for joint in joints), "several joints are named {!r}")
+    _once(path, (joint.child for joint in joints), "{!r} is the child of several joints")
+    known = set(links)
+    for joint in joints:
+        for role, link in (("parent", joint.parent), ("child", joint.child)):
+            if link not in known:
+                raise FileError(
+                    f"{path}: joint {joint.name!r}: there is no link {link!r}, its {role}"
+                )
+        if joint.parent == joint.child:
+            raise FileError(f"{path}: joint {joint.name!r} joins {joint.child!r} with itself")
+    return File(_attribute(path, root, "name"), links, joints)
+
+
+def tree(path: str | PathLike[str]) -> ElementTree.Element:
+    """The root element of the file, with its comments."""
+    if not arguments.path("path", path).exists():
+        raise FileNotFoundError(f"{path}: no such file")
+    parser = ElementTree.XMLParser(target=_Builder(f"{path}"))
+    try:
+        parser.feed(reading.content(path, reading.MOST_URDF))
+        root: ElementTree.Element = parser.close()
+    except FileError:
+        raise
+    except (ElementTree.ParseError, LookupError, ValueError) as error:  # syntax, an encoding
+        raise FileError(f"{path}: not valid XML: {error}") from None
+    if root.tag != "robot":
+        raise FileError(f"{path}: not a URDF file: it begins with <{root.tag}>, not <robot>")
+    return root
+
+
+class _Builder(ElementTree.TreeBuilder):
+    """Builds the tree, and refuses what a URDF file has not."""
+
+    def __init__(self, place: str) -> None:
+        super().__init__(insert_comments=True)
+        self._place, self._depth = place, 0
+
+    def doctype(self, name: str, *ids: str | None) -> None:
+        raise FileError(f"{self._place}: a document type, which may hold anything, is not taken")
+
+    def start(self, tag: str, attributes: dict[str, str]) -> ElementTree.Element:
+        self._depth += 1
+        if self._depth > _MOST_NESTED:
+            raise FileError(f"{self._place}: elements nested deeper than {_MOST_NESTED}")
+        if tag.startswith(_XACRO):
+            name = tag.removeprefix(_XACRO)
+            raise FileError(f"{self._place}: <xacro:{name}>: give the file that xacro makes of it")
+        return super().start(tag, attributes)
+
+    def end(self, tag: str) -> ElementTree.Element:
+        self._depth -= 1
+        return super().end(tag)
+
+
+def _joint(path: str | PathLike[str], joint: ElementTree.Element) -> Element:
+    name = _attribute(path, joint, "name")
+    kind = _attribute(path, joint, "type")
+    place = f"{path}: joint {name!r}"
+    ends = []
+    for role in ("parent", "child"):
+        found = _only(place, joint, role)
+        if found is None:
+            raise FileError(f"{place} has no <{role}>")
+        ends.append(_attribute(place, found, "link"))
+    origin = _only(place, joint, "origin")
+    pose = (*_three(place, origin, "xyz"), *_three(place, origin, "rpy"))
+    home = screw.from_pose([*(_METRE * number for number in pose[:3]), *pose[3:]])
+    axis = _three(place, _only(place, joint, "axis"), "xyz", default=(1.0, 0.0, 0.0))
+    mimics = _only(place, joint, "mimic") is not None
+    return Element(name, kind, ends[0], ends[1], np.asarray(home), axis, mimics)
+
+
+def _attribute(place: object, element: ElementTree.Element, name: str) -> str:
+    value = element.get(name)
+    if not value:
+        raise FileError(f"{place}: <{element.tag}> has no {name}")
+    if len(value) > reading.LONGEST_NAME:
+        raise FileError(f"{place}: {name} of <{element.tag}> has {len(value)} characters")
+    return value
+
+
+def _only(place: str, joint: ElementTree.Element, tag: str) -> ElementTree.Element | None:
+    found = joint.findall(tag)
+    if len(found) > 1:
+        raise FileError(f"{place} has {len(found)} elements <{tag}>")
+    return found[0] if found else None
+
+
+def _three(
+    place: str,
+    element: ElementTree.Element | None,
+    name: str,
+    default: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> tuple[float, float, float]:
+    """Three finite numbers of an attribute; the default where it is not there."""
+    if element is None or (text := element.get(name)) is None:
+        return default
+    try:
+        x, y, z = map(float, text.split())
+    except ValueError:
+        x = y = z = math.nan
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+        raise FileError(f"{place}: {name} must be three finite numbers, found {text!r:.60}")
+    return x, y, z
+
+
+def _once(path: str | PathLike[str], names: Iterable[str], fault: str) -> None:
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise FileError(f"{path}: {fault.format(twice[0])}")

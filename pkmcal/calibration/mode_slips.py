@@ -1,0 +1,88 @@
+"""Rows that were solved in another assembly mode than the one they were measured in.
+
+Forward kinematics starts from what was measured, or from home, and may end in another mode. Such a
+row misses grossly, and there is a mode that does not: so rows that miss grossly are tried in every
+mode. A reading that is wrong itself has no such mode.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.calibration.equations import Equations, Evaluation
+from pkmcal.display import first_rows
+from pkmcal.kinematics.robot import Robot
+
+_GROSS = 6.0  # times the median misfit from which a row is tried in other modes
+_LEAST = 1e-3  # mm; misfits of measurements without noise
+_HALF = 0.5  # of the misfit that another mode may leave
+_FITTING = 4.0  # times what is gross, beyond which no mode fits
+_NEIGHBOURS = 6  # rows from whose poses a machine is solved whose modes are not known
+_MOST = 0.5  # share of the poses that may miss grossly: of more, something else is wrong
+
+
+def in_their_modes(equations: Equations, evaluation: Evaluation) -> Evaluation:
+    """The equations with rows that miss grossly solved in the mode that fits them, if one does."""
+    better, poses = _better(equations, evaluation)
+    if not len(better):
+        return evaluation
+    equations.start_from(better, poses)
+    return equations.at(evaluation.theta)
+
+
+def in_other_modes(equations: Equations, evaluation: Evaluation) -> list[str]:
+    """Say which rows fit another assembly mode than the one they were solved in."""
+    better, _ = _better(equations, evaluation)
+    rows = equations.rows[np.isin(np.concatenate(equations.pose_of), better)].tolist()
+    if not rows:
+        return []
+    many = f"{len(rows)} rows fit" if len(rows) > 1 else "1 row fits"
+    return [
+        f"{many} another assembly mode than the one that the fit has for it"
+        f" (rows {first_rows(rows, 10)}): the result is not to be trusted; state home nearer to the"
+        " measured poses, or leave these rows out"
+    ]
+
+
+def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, FloatArray]:
+    """Distinct rows of actuators (s,) that another mode fits better, and their poses there."""
+    robot, pose = evaluation.robot, evaluation.pose
+    none = np.empty(0, dtype=np.intp), np.empty((0, 6))
+    if not isinstance(robot, Robot):
+        return none  # an arm has one pose
+    misfit = equations.misfit(pose, evaluation.theta)
+    solved = np.isfinite(misfit)
+    if not solved.any():
+        return none
+    limit = max(_GROSS * float(np.median(misfit[solved])), _LEAST)
+    gross = np.flatnonzero(~(misfit <= limit))
+    if not 0 < len(gross) <= _MOST * len(misfit):
+        return none
+    least, best = np.where(solved, misfit, np.inf), pose.copy()
+    modes = [_modes(robot, equations.actuators, pose, int(k), misfit <= limit) for k in gross]
+    for j in range(max(map(len, modes))):
+        trial = pose.copy()
+        for k, of_row in zip(gross, modes, strict=True):
+            trial[k] = of_row[j] if j < len(of_row) else np.nan
+        now = equations.misfit(trial, evaluation.theta)
+        nearer = now < least
+        least, best = np.where(nearer, now, least), np.where(nearer[:, None], trial, best)
+    fits = (least < _HALF * np.where(solved, misfit, np.inf)) & (least <= _FITTING * limit)
+    better = gross[fits[gross]]
+    return better, best[better]
+
+
+def _modes(
+    robot: Robot, actuators: FloatArray, pose: FloatArray, k: int, sound: BoolArray
+) -> FloatArray:
+    """Poses (j, 6) that the machine may have at the actuators of row `k`."""
+    found = robot.forward_all(actuators[k])
+    if found.complete or not sound.any():
+        return found.poses
+    there = np.flatnonzero(sound)
+    spread = np.maximum(np.ptp(actuators, axis=0), np.finfo(float).tiny)
+    apart = np.linalg.norm((actuators[there] - actuators[k]) / spread, axis=1)
+    near = there[np.argsort(apart, kind="stable")[:_NEIGHBOURS]]
+    solved = robot.forward(np.tile(actuators[k], (len(near), 1)), pose[near])
+    return np.vstack([found.poses, solved.pose[solved.ok]])

@@ -1,0 +1,44 @@
+"""What a verb reads: each file once, so that its files state the checksums of what was read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pkmcal.files import provenance
+from pkmcal.files.reading import MOST_TABLE, Input
+from pkmcal.geometry import robot_file
+
+
+class Inputs:
+    """The files that a verb reads, by their full names."""
+
+    def __init__(self) -> None:
+        self._files: dict[str, Input] = {}
+        self._built_in: list[str] = []
+
+    def file(self, path: str | Path) -> Input:
+        """Take a file; the same for the same name."""
+        return self._files.setdefault(str(path), Input(path))
+
+    def robot(self, robot: str) -> str | Input:
+        """Take a robot file, or a built-in machine by its name."""
+        if robot_file.is_built_in(robot):
+            self._built_in.append(robot)
+            return robot
+        return self.file(robot) if Path(robot).exists() else robot  # `load` refuses what is not
+
+    @property
+    def paths(self) -> list[Path]:
+        """Where the files are."""
+        return [Path(each) for each in self._files.values()]
+
+    def contents(self) -> dict[str, bytes]:
+        """What was read, by name; a built-in machine by its own."""
+        machines = (robot_file.located(name) for name in self._built_in)
+        return {place: content for content, place, _ in machines} | {
+            name: each.content(MOST_TABLE) for name, each in self._files.items()
+        }
+
+    def comment(self) -> str:
+        """Lines for the head of a file that is made of these."""
+        return provenance.comment(self.contents())

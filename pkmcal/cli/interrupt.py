@@ -1,0 +1,33 @@
+"""Ctrl-C: while the program is loaded or ends it ends at once, while a verb works it is raised.
+
+Imports next to nothing, so that it is provided for from the beginning.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+from types import FrameType
+
+STOPPED = 130  # what shells give a program that Ctrl-C ended
+WORDS = "stopped by Ctrl-C"
+
+
+def ends_at_once() -> None:
+    """There is nothing to tidy up, and an exception might end in somebody's import."""
+    _handle(_end)
+
+
+def is_raised() -> None:
+    """As KeyboardInterrupt, so that what was begun is tidied up."""
+    _handle(signal.default_int_handler)
+
+
+def _handle(handler: signal._HANDLER) -> None:
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:  # a program in the background
+        signal.signal(signal.SIGINT, handler)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    os.write(2, f"pkmcal: {WORDS}\n".encode())
+    os._exit(STOPPED)

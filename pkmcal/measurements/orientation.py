@@ -1,0 +1,107 @@
+"""Orientations as rotations: how two differ, how that changes, and how sure measured ones are.
+
+Two orientations differ by a rotation vector, the axis of the turning from one to the other times
+its angle, in the instrument's axes. It is the same whatever triple of angles names them, and
+regular at every orientation. α β γ are how orientations are read and written, no more.
+SciPy's `Rotation` does the same row by row; the core does it in lanes, and its Jacobians.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.core import screws
+from pkmcal.exceptions import ArgumentError
+
+_NONE = 1e-12  # share of a variance that is none
+
+
+def rotations(angles: FloatArray) -> FloatArray:
+    """R = Rz(γ) Ry(β) Rx(α), (N, 3, 3), of angles (N, 3)."""
+    errors = np.zeros((len(angles), 6))
+    errors[:, 3:] = angles
+    motions = screws.joint_motions(errors, np.zeros((len(angles), 3))).reshape(-1, 4, 4)
+    turns: FloatArray = motions[:, :3, :3]
+    return turns
+
+
+def between(measured: FloatArray, predicted: FloatArray) -> FloatArray:
+    """Rotation vectors (N, 3), rad, that turn the predicted angles (N, 3) into the measured."""
+    turn = rotations(measured) @ rotations(predicted).transpose(0, 2, 1)
+    vectors: FloatArray = screws.log(_motions(turn))[:, :3]
+    return vectors
+
+
+def turned(angles: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Angles (N, 3) turned by rotation vectors (N, 3); `between` gives these back."""
+    motions = screws.exp(np.hstack([vectors, np.zeros_like(vectors)])).reshape(-1, 4, 4)
+    motions[:, :3, :3] = motions[:, :3, :3] @ rotations(angles)
+    found: FloatArray = screws.pose(motions.reshape(-1, 16))[:, 3:]
+    return found
+
+
+def shortest(angles: FloatArray) -> FloatArray:
+    """The triple (N, 3) of the same orientation whose β is within ±90°."""
+    return turned(angles, np.zeros_like(angles))
+
+
+def by_turning(vectors: FloatArray) -> FloatArray:
+    """How rotation vectors (N, 3) shrink as what is predicted turns, (N, 3, 3): near 0, one."""
+    twists = np.hstack([-vectors, np.zeros_like(vectors)])
+    rates: FloatArray = screws.exp_jacobian(twists, inverse=True).reshape(-1, 6, 6)[:, :3, :3]
+    return rates
+
+
+def axes_of_angles(angles: FloatArray) -> FloatArray:
+    """Axes (N, 3, 3), columns, about which an orientation turns as α, β or γ grow."""
+    axes = np.zeros((len(angles), 3, 3))
+    axes[:, :, 0] = rotations(angles * [0.0, 1.0, 1.0])[:, :, 0]
+    axes[:, :, 1] = rotations(angles * [0.0, 0.0, 1.0])[:, :, 1]
+    axes[:, 2, 2] = 1.0
+    return axes
+
+
+def covariance(sigma: FloatArray, angles: FloatArray) -> FloatArray:
+    """Covariance (N, 6, 6) of place and rotation vector, from that of x y z α β γ.
+
+    Parameters
+    ----------
+    sigma : ndarray (N, 6) or (N, 6, 6)
+        As stated. Covariances are those of the numbers x y z α β γ and are transformed. Three
+        deviations are those of turnings about the three axes at right angles that are nearest to
+        the axes of α, β and γ: with equal ones the instrument is as sure about every axis. The
+        axes themselves meet at β = ±90°, where deviations of the numbers would say that one
+        turning is known exactly.
+    angles : ndarray (N, 3)
+        As measured.
+
+    Raises
+    ------
+    ValueError
+        Covariances of angles near β = ±90° that leave nothing of a turning's variance.
+    """
+    axes = axes_of_angles(angles)
+    if sigma.ndim == 2:
+        left, _, right = np.linalg.svd(axes)
+        axes, sigma = left @ right, sigma[:, :, None] ** 2 * np.eye(6)
+    rates = np.zeros((len(angles), 6, 6))
+    rates[:, [0, 1, 2], [0, 1, 2]] = 1.0
+    rates[:, 3:, 3:] = axes
+    carried: FloatArray = rates @ sigma @ rates.transpose(0, 2, 1)
+    scale = np.sqrt(np.diagonal(sigma, axis1=1, axis2=2))
+    scale[:, 3:] = scale[:, 3:].max(axis=1, keepdims=True)
+    least = np.linalg.eigvalsh(carried / (scale[:, :, None] * scale[:, None, :]))[:, 0]
+    if (least <= _NONE).any():
+        row = int(np.argmax(least <= _NONE))
+        raise ArgumentError(
+            f"sigma: row {row} says, so near to beta = 90 degrees, that a turning is known exactly;"
+            " state standard deviations instead of a covariance"
+        )
+    return carried
+
+
+def _motions(turns: FloatArray) -> FloatArray:
+    motions = np.tile(np.eye(4), (len(turns), 1, 1))
+    motions[:, :3, :3] = turns
+    return motions.reshape(-1, 16)

@@ -1,0 +1,112 @@
+"""Where along a move something is largest, between the samples too.
+
+Own code, since optimisers of one variable look for one extremum in a bracket, and here every peak
+of every actuator must be found before it can be bracketed. By the mean value theorem a speed
+between two times is at least the mean there, what the position changes by over the time it takes;
+an acceleration likewise from the speeds. Where that is more than any sample shows, a peak hides
+between two samples and the step is halved. Then every local maximum is closed in on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray
+
+STEPS = 2000  # along a move
+_HALVINGS = 40  # of a step, to where rounding ends it
+_THIRDS = 80  # taken off two steps around a local maximum
+_RISE = 4.0  # times what a size rises by in a step: no peak between samples is higher
+_HIDDEN = 1e-9  # relative: by so much a mean must exceed all samples
+_FINEST = 1e-13  # of the duration: what rounding leaves of a step
+
+
+class Sample(Protocol):
+    """A machine at times of a move; `MoveSample` describes each."""
+
+    @property
+    def actuators(self) -> FloatArray:
+        """Actuator coordinates (N, n)."""
+
+    @property
+    def velocities(self) -> FloatArray:
+        """Their speeds (N, n)."""
+
+    @property
+    def accelerations(self) -> FloatArray:
+        """Their accelerations (N, n)."""
+
+
+def peaks(sample: Callable[[FloatArray], Sample], duration: float) -> tuple[FloatArray, FloatArray]:
+    """Largest speed and acceleration (n,) of each actuator on the way; NaN where one is not finite.
+
+    What can be missed between two of 2001 samples changes the position (of a speed), or the speed
+    (of an acceleration), there by less than the largest sample of it would in a step.
+    """
+    times = np.linspace(0.0, duration, STEPS + 1)
+    at = sample(times)
+    q, v, a = at.actuators, at.velocities, at.accelerations
+    for _ in range(_HALVINGS):
+        steps = np.diff(times)
+        hidden = _hides(q, v, steps) | _hides(v, a, steps)
+        places = np.flatnonzero(hidden & (steps > _FINEST * duration))
+        if not places.size:
+            break
+        middle = 0.5 * (times[places] + times[places + 1])
+        more = sample(middle)
+        q, v, a = (
+            np.insert(old, places + 1, new, axis=0)
+            for old, new in ((q, more.actuators), (v, more.velocities), (a, more.accelerations))
+        )
+        times = np.insert(times, places + 1, middle)
+    return (
+        largest(lambda t: np.abs(sample(t).velocities), times, np.abs(v)),
+        largest(lambda t: np.abs(sample(t).accelerations), times, np.abs(a)),
+    )
+
+
+def _hides(values: FloatArray, rates: FloatArray, steps: FloatArray) -> BoolArray:
+    """Steps (N - 1,) whose mean rate is larger than every rate sampled."""
+    mean = np.abs(np.diff(values, axis=0)) / steps[:, None]
+    most = np.abs(rates).max(axis=0)
+    found: BoolArray = (mean > (1 + _HIDDEN) * most).any(axis=1)
+    return found
+
+
+def largest(
+    function: Callable[[FloatArray], FloatArray], times: FloatArray, values: FloatArray
+) -> FloatArray:
+    """The largest of each column of a function of time, (k,).
+
+    Parameters
+    ----------
+    function : callable
+        Times (N,) to values (N, k).
+    times : ndarray (N,)
+        Increasing.
+    values : ndarray (N, k)
+        Of the function, there.
+
+    Returns
+    -------
+    ndarray (k,)
+        NaN where a value is NaN. Between samples a maximum is found that rises above them by no
+        more than four times the change to its neighbours.
+    """
+    most = values.max(axis=0)
+    before, here, after = values[:-2], values[1:-1], values[2:]
+    with np.errstate(invalid="ignore"):
+        rise = np.maximum(here - before, here - after)
+        top = (here >= before) & (here >= after) & (here + _RISE * rise > most)
+    rows, columns = np.nonzero(top)
+    low, high = times[rows], times[rows + 2]
+    own = np.arange(len(rows)), columns
+    for _ in range(_THIRDS if len(rows) else 0):
+        left, right = low + (high - low) / 3, high - (high - low) / 3
+        first, second = function(left)[own], function(right)[own]
+        np.maximum.at(most, columns, np.maximum(first, second))
+        low, high = np.where(first < second, left, low), np.where(first < second, high, right)
+    return np.asarray(most)

@@ -1,0 +1,165 @@
+"""Where something is chosen, rounding does not choose.
+
+Inputs that differ in their last bit, and linear algebra libraries that sum in another order, lead
+to the same choice: of poses to measure, of the combinations that are named, of outliers, of the
+order of assembly modes. OpenBLAS has kernels for several processors; its variable
+``OPENBLAS_CORETYPE`` takes those that this processor can run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.calibration.alignment import PointPairs, of_points
+from pkmcal.calibration.optimal_design import CRITERIA
+from pkmcal.modes.find import frames_of
+
+from .workspaces import WORKSPACE
+
+KERNELS = {  # and what a processor needs for them
+    "Nehalem": "sse4_2",
+    "Sandybridge": "avx",
+    "Haswell": "avx2",
+    "Zen": "avx2",
+    "SkylakeX": "avx512f",
+}
+SEEDS = range(1, 3)
+MACHINES = (*WORKSPACE, "3r")
+
+
+def moved(numbers: np.ndarray, seed: int) -> np.ndarray:
+    """Each number by one unit in the last place, up or down; not at all for seed 0."""
+    if seed == 0:
+        return numbers
+    ends = np.random.default_rng(seed).choice([-np.inf, np.inf], numbers.shape)
+    return np.nextafter(numbers, ends)
+
+
+def places(name: str, count: int) -> np.ndarray:
+    """Candidates to measure: poses, of the arm joint coordinates."""
+    if name == "3r":
+        return np.random.default_rng(0).uniform(-1.7, 1.7, (count, 3))
+    return pk.sample_poses(pk.load(name), count)
+
+
+def plan(name: str, criterion: Any, count: int, seed: int) -> list[int]:
+    candidates = moved(places(name, 40), seed)
+    found = pk.plan_poses(pk.load(name), candidates, count, criterion=criterion, kind="pose")
+    return found.indices.tolist()
+
+
+def statements(name: str, seed: int) -> list[Any]:
+    """What a calibration of all numbers, with one bad row, says in words and row numbers."""
+    robot = pk.load(name)
+    q = moved(np.asarray(pk.plan_poses(robot, places(name, 60), 50, kind="pose").actuators), seed)
+    measured = pk.VirtualMachine(robot, 0.01).measure(q, "pose")
+    values = measured.values.copy()
+    values[[7, 20], 0] += 3.0
+    pattern = "joint*" if name == "3r" else ["base*", "platform*", "offset*"]
+    found = pk.identify(robot, pk.Measurements(q, values, "pose", sigma=measured.sigma), pattern)
+    pairs = [(a, b) for a, b, value in found.correlations if abs(value) > 0.9999]
+    return [found.rank, list(found.unidentifiable), list(found.outliers), pairs]
+
+
+def modes(name: str, seed: int) -> list[list[float]]:
+    """R and p of all assembly modes at home, where symmetric machines have them in pairs."""
+    robot = pk.load(name)
+    found = robot.forward_all(moved(robot.inverse(robot.home), seed))
+    return (frames_of(found.poses).round(6) + 0.0).tolist()
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_last_bit_of_the_candidates_does_not_choose_a_plan(name: str, criterion: str) -> None:
+    for count in (4, 10):  # too few to identify everything, and enough
+        plans = [plan(name, criterion, count, seed) for seed in (0, *SEEDS)]
+        assert all(other == plans[0] for other in plans[1:])
+
+
+@pytest.mark.filterwarnings("ignore::pkmcal.exceptions.CalibrationWarning")
+@pytest.mark.parametrize("name", ["hexapod", "3rps", "2tpr2tps", "rotary-delta", "3r"])
+def test_the_last_bit_of_the_actuators_does_not_change_what_is_said(name: str) -> None:
+    said = [statements(name, seed) for seed in (0, *SEEDS)]
+    assert said[0][2] == [7, 20]
+    assert all(other == said[0] for other in said[1:])
+
+
+@pytest.mark.parametrize("name", WORKSPACE)
+def test_the_last_bit_of_the_actuators_does_not_order_assembly_modes(name: str) -> None:
+    found = modes(name, 0)
+    for seed in SEEDS:
+        np.testing.assert_allclose(modes(name, seed), found, atol=2e-6)
+
+
+@pytest.mark.parametrize("name", WORKSPACE)
+def test_the_last_bit_does_not_send_forward_kinematics_elsewhere(name: str) -> None:
+    robot = pk.load(name)
+    q = robot.inverse(pk.sample_poses(robot, 200, share=0.9))
+    solved = [robot.forward(moved(q, seed)) for seed in (0, *SEEDS)]
+    for other in solved[1:]:
+        np.testing.assert_array_equal(other.status, solved[0].status)
+        frames = frames_of(other.pose) - frames_of(solved[0].pose)
+        sure = solved[0].conditioning > 1e-4
+        assert np.abs(frames[sure]).max() < 1e-6
+
+
+@pytest.mark.parametrize("spread", [(1, 0, 0), (1, 1, 0), (1, 1, 1)], ids=["line", "plane", "all"])
+def test_the_last_bit_does_not_turn_the_frame_of_an_instrument(spread: Any) -> None:
+    rng = np.random.default_rng(0)
+    point = rng.normal(size=(20, 3)) * spread * 100.0
+    frame = np.array([300.0, -200.0, 100.0, 0.3, -0.4, 0.5])
+    motion = frames_of(frame[None])[0]
+    values = point @ motion[:9].reshape(3, 3).T + motion[9:]
+    known, turns = np.full(20, -1), np.tile(np.eye(3), (20, 1, 1))
+
+    def found(seed: int) -> np.ndarray:
+        pairs = PointPairs(moved(values, seed), point, turns, known)
+        return frames_of(of_points(pairs)[0][None])[0]
+
+    for seed in SEEDS:
+        np.testing.assert_allclose(found(seed), found(0), atol=1e-3)
+
+
+def choices() -> str:
+    """Everything above that goes through the linear algebra library, in one text."""
+    plans = [plan(name, c, 10, 0) for name in ("3r", "2tpr2tps", "hexapod") for c in CRITERIA]
+    said = [statements(name, 0) for name in ("hexapod", "2tpr2tps", "3r")]
+    return json.dumps([plans, said, modes("hexapod", 0), modes("3rps", 0)])
+
+
+def _kernels() -> list[str]:
+    try:
+        flags = set(
+            Path("/proc/cpuinfo").read_text().split("flags", 1)[1].split("\n", 1)[0].split()
+        )
+    except (OSError, IndexError):
+        return []
+    return [kernel for kernel, needed in KERNELS.items() if needed in flags]
+
+
+@pytest.mark.skipif(len(_kernels()) < 2, reason="the kernels of this processor are not known")
+def test_choices_are_the_same_with_every_kernel_of_the_linear_algebra_library() -> None:
+    root = Path(__file__).parents[1]
+    paths = os.pathsep.join([str(root), *filter(None, [os.environ.get("PYTHONPATH")])])
+    program = "from tests.test_choices import choices; print(choices())"
+    found = {}
+    for kernel in _kernels():
+        ran = subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "OPENBLAS_CORETYPE": kernel, "PYTHONPATH": paths},
+            cwd=root,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        found[kernel] = ran.stdout
+    assert len(set(found.values())) == 1, {kernel: hash(text) for kernel, text in found.items()}
