@@ -188,10 +188,10 @@ def random_numbers(family: Family, rng: np.random.Generator) -> Array:
     """Complex numbers of every limb, those that vanish in the family zero."""
     g = rng.normal(size=(len(family.rows), family.width, 2)) @ [1, 1j] / np.sqrt(2)
     for i, kinds in enumerate(family.rows):
-        for axis, place in AXIS.items():
-            g[i, place] *= axis in axes_of(kinds)
-    for i, number in family.zero:
-        g[i, number] = 0
+        for axis, entries in AXIS.items():
+            g[i, entries] *= axis in axes_of(kinds)
+    for i, place in family.zero:
+        g[i, place] = 0
     return g
 
 
@@ -208,12 +208,10 @@ def solved_at_random(
     for i, kinds in enumerate(family.rows):
         d = p + R @ g[i, 0:3] - g[i, 3:6]
         g[i, 6] = np.sqrt(d @ d)
-        for kind in kinds:  # a plane row: its one axis becomes square to d
-            axis = ROW[kind].on_base or ROW[kind].on_platform
-            assert axis is not None  # every plane row has one
-            along = d if ROW[kind].on_base else R.T @ d
-            own = AXIS[axis]
-            g[i, own] -= along * (g[i, own] @ along) / (along @ along)
+        for kind in kinds:  # a plane: its one axis becomes square to d
+            (axis,) = axes_of((kind,))
+            along = d if axis is ROW[kind].on_base else R.T @ d
+            g[i, AXIS[axis]] -= along * (g[i, AXIS[axis]] @ along) / (along @ along)
     return g.ravel(), x
 
 

@@ -39,7 +39,11 @@ def test_stored_solutions_close_and_differ(name):
 
 @pytest.mark.parametrize(
     "name",
-    ["delta", "planar", *(pytest.param(n, marks=pytest.mark.slow) for n in ("3rps", "hexapod"))],
+    [
+        "delta",
+        "planar",
+        *(pytest.param(n, marks=pytest.mark.slow) for n in ("3rps", "3prs", "hexapod")),
+    ],
 )
 def test_the_search_finds_the_stored_solutions_again(name, capsys):
     limbs, states = stored(name)
