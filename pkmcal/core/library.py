@@ -63,7 +63,7 @@ def _default_isa() -> int:
 
 
 def _of_arrays(function: Any) -> Callable[..., int]:
-    """A function of the core that takes arrays where C takes pointers to numbers.
+    """A function of the core that takes arrays, or None, where C takes pointers to numbers.
 
     Written out for its arguments: for a call of one row, looking at each costs as much as the call.
     """
@@ -71,8 +71,11 @@ def _of_arrays(function: Any) -> Callable[..., int]:
     kinds = [argument if argument in numbers else None for argument in ffi.typeof(function).args]
     names = [f"a{k}" for k in range(len(kinds))]
     types = dict(zip(names, kinds, strict=True))
-    passed = [f"buffer(t{name}, {name})" if types[name] else name for name in names]
-    known = {"function": function, "buffer": ffi.from_buffer}
+    passed = [
+        f"null if {name} is None else buffer(t{name}, {name})" if types[name] else name
+        for name in names
+    ]
+    known = {"function": function, "buffer": ffi.from_buffer, "null": ffi.NULL}
     known |= {f"t{name}": kind for name, kind in types.items()}
     made: Callable[..., int] = eval(
         f"lambda {', '.join(names)}: function({', '.join(passed)})", known

@@ -131,10 +131,8 @@ class Machine:
         the middle of the stroke, or the home pose.
         """
         q = np.empty((len(pose), self.actuators))
-        about, stride = ffi.NULL if near is None else near, 0
-        if near is not None and near.ndim == 2:
-            stride = self.actuators
-        call("inverse", self.struct, len(pose), slots, 0, pose, about, stride, q, isa=self.isa)
+        stride = self.actuators if near is not None and near.ndim == 2 else 0
+        call("inverse", self.struct, len(pose), slots, 0, pose, near, stride, q, isa=self.isa)
         return q
 
     def turns(self, slots: FloatArray) -> FloatArray:
