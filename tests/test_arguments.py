@@ -53,8 +53,10 @@ WRONG: dict[str, list[Any]] = {
 
 # Each call with arguments that fit, and of which kind they are.
 Call = tuple[Callable[..., Any], dict[str, Any], dict[str, str]]
+PRINTER = Path(__file__).parents[1] / "examples" / "linear-delta" / "printer.cfg"
 CALLS: dict[str, Call] = {
     "load": (pk.load, {"robot": "hexapod"}, {"robot": "path"}),
+    "import_printer": (pk.import_printer, {"path": PRINTER}, {"path": "path"}),
     "Robot": (pk.Robot, {"model": ROBOT.model}, {"model": "robot"}),
     **{
         name: (getattr(ROBOT, name), {"pose": POSES}, {"pose": "numbers"})
@@ -484,7 +486,7 @@ def test_every_public_call_is_among_them() -> None:
         *("Sensitivity", "SwarmResult", "Tolerance", "Workspace"),
     }
     raised = {"ArgumentError", "ArgumentTypeError", "CalibrationWarning", "Error", "FileError"}
-    no_calls = {"machines", "CONSTRICTION", "screw", "trajectory"}
+    no_calls = {"machines", "CONSTRICTION", "export", "screw", "trajectory"}
     for name in set(pk.__all__) - results - raised - no_calls:
         assert name in CALLS, name
     checked = {call.__name__ for call, _, _ in CALLS.values()}
