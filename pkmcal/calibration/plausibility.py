@@ -169,7 +169,9 @@ def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
     Poses that hardly turn do not tell where a target is; noise may then carry it anywhere.
     """
     reach = float(np.linalg.norm(end.pose[:, :3], axis=1).max())
-    size = _REMOTE * max(reach, parameters.robot.length)
+    geometry = parameters.robot.geometry
+    lengths = np.abs(geometry.values[np.array(geometry.units) == "mm"]).max(initial=0.0)
+    size = _REMOTE * max(reach, parameters.robot.length, float(lengths))
     found = []
     for (role, name), first in parameters.points.items():
         place = end.theta[first : first + 3]

@@ -181,7 +181,7 @@ def rows(function: str, *arrays: FloatArray, isa: int | None = None) -> list[Flo
         each = array.ndim > 1 or given == ""
         if array.size != (n * width if each else width) or (each and given == "!"):
             raise ArgumentError(f"{function}: {array.shape} are not {n} rows of {width} numbers")
-        arguments.append(array)
+        arguments.append(np.ascontiguousarray(array))
         if given == "*":
             arguments.append(width if each else 0)
     made = [np.empty((n, *shape)) for shape in outputs]

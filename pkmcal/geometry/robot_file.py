@@ -105,7 +105,7 @@ def located(robot: str | os.PathLike[str]) -> tuple[bytes, str, str | None]:
     if path.exists():  # also a pipe
         return reading.content(robot, reading.MOST_ROBOT), str(path), str(path)
     if isinstance(robot, str) and path.name == robot and not path.suffix:
-        raise FileError(f"unknown machine {robot!r}{did_you_mean(robot, known)}")
+        raise FileError(f"unknown machine {robot!r}{did_you_mean(robot, known, listed=len(known))}")
     near = (each.name for each in path.parent.glob("*.toml"))
     raise FileNotFoundError(f"{path}: no such file{did_you_mean(path.name, near, listed=0)}")
 

@@ -17,7 +17,7 @@ _ROUNDED = 1e-9  # share by which a covariance may miss symmetry, as what was co
 
 def numbers(name: str, given: ArrayLike) -> FloatArray:
     """A copy as finite doubles."""
-    array = np.array(as_numbers(name, given, "n"), dtype=np.float64)
+    array = np.array(as_numbers(name, given, "n"), dtype=np.float64, order="C")
     if not np.isfinite(array).all():
         first = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
         where = f" at index {', '.join(map(str, first))}" if first else ""

@@ -17,7 +17,7 @@ import pkmcal as pk
 from pkmcal.arrays import as_rows
 from pkmcal.core import library
 from pkmcal.core import poses as core_poses
-from pkmcal.core.library import ISAS, lib
+from pkmcal.core.library import ISAS, SLOTS, lib
 
 from ..workspaces import WORKSPACE, poses
 
@@ -186,7 +186,7 @@ def run(code: str, **environment: str) -> subprocess.CompletedProcess[str]:
 def test_the_core_refuses_an_isa_a_machine_and_columns_it_does_not_have() -> None:
     robot = pk.load("hexapod")
     machine, pose, q = robot.machine, robot.home[None], robot.inverse(robot.home)[None]
-    for columns in ([-1], [84], [3, 3], [4, 2]):
+    for columns in ([-1], [6 * len(SLOTS)], [3, 3], [4, 2]):
         with pytest.raises(ValueError, match="refused"):
             machine.error_jacobian(robot.slots, pose, q, np.array(columns, dtype=np.int32))
     machine.isa = 3
