@@ -70,7 +70,7 @@ def sealed(content: bytes, kind: str) -> bytes:
     Examples
     --------
     >>> print(sealed(b"x [mm]\n1\n", ".csv").decode())  # doctest: +ELLIPSIS
-    # sha256 of the rest: 83...
+    # sha256 of the rest: 6831eba9...
     x [mm]
     1
     <BLANKLINE>
