@@ -46,10 +46,10 @@ html_show_sourcelink = False
 
 
 def signature_of_class(
-    app: Any, what: str, name: str, obj: Any, options: Any, signature: str, returned: str
+    app: Any, what: str, name: str, obj: Any, options: Any, signature: str | None, returned: str
 ) -> tuple[str, None] | None:
     """No signature where functions make the object: results, and what holds private fields."""
-    if what == "class" and (issubclass(obj, Result) or "_" in re.findall(r"[(, ](\w)", signature)):
+    if what == "class" and (issubclass(obj, Result) or "_" in re.findall(r"[(, ](\w)", signature or "")):
         return "", None
     return None
 

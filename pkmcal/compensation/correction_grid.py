@@ -41,7 +41,7 @@ class CorrectionGrid(Result):
         The nodes along each coordinate, mm or rad, increasing.
     origin : ndarray (6,)
         The pose whose other coordinates hold all over the grid, mm and rad.
-    corrections : ndarray (*nodes, n)
+    corrections : ndarray (nodes…, n)
         ΔL to add to the commands of the uncalibrated machine, mm or rad; NaN where a limb cannot
         reach.
     method : {"linear", "cubic"}
@@ -119,7 +119,7 @@ class CorrectionGrid(Result):
 
     @property
     def failed(self) -> BoolArray:
-        """Nodes without a correction (*nodes,): a limb of one machine cannot reach them."""
+        """Nodes without a correction (nodes…,): a limb of one machine cannot reach them."""
         return np.asarray(np.isnan(self.corrections).any(axis=-1))
 
     def failures(self) -> str:
