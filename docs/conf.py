@@ -49,7 +49,8 @@ def signature_of_class(
     app: Any, what: str, name: str, obj: Any, options: Any, signature: str | None, returned: str
 ) -> tuple[str, None] | None:
     """No signature where functions make the object: results, and what holds private fields."""
-    if what == "class" and (issubclass(obj, Result) or "_" in re.findall(r"[(, ](\w)", signature or "")):
+    private = "_" in re.findall(r"[(, ](\w)", signature or "")
+    if what == "class" and (issubclass(obj, Result) or private):
         return "", None
     return None
 
