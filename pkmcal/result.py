@@ -70,13 +70,7 @@ class RowResult(Result):
 
     def failures(self) -> str:
         """What failed and where, in one line; empty where nothing did."""
-        status = np.ravel(self.status)
-        found = ((words, np.flatnonzero(status == code)) for code, words in self.STATUS.items())
-        return "; ".join(
-            f"{rows.size} of {status.size} rows {words} (rows {first_rows(rows)})"
-            for words, rows in found
-            if rows.size and status[rows[0]]
-        )
+        return failed_rows(np.ravel(self.status), self.STATUS)
 
     def _counts(self) -> str:
         """How many rows have which status."""
@@ -84,3 +78,32 @@ class RowResult(Result):
         parts = (f"{n} {self.STATUS[int(code)]}" for code, n in zip(codes, counts, strict=True))
         total = "1 row" if np.size(self.status) == 1 else f"{np.size(self.status)} rows"
         return f"{total}: {', '.join(parts)}" if codes.size else total
+
+
+def failed_rows(
+    status: NDArray[np.int32],
+    meanings: Mapping[int, str],
+    numbers: NDArray[np.intp] | None = None,
+    most: int = 5,
+) -> str:
+    """Say how many rows failed and why, and list the first; empty where none did.
+
+    Parameters
+    ----------
+    status : ndarray of int (N,)
+        Of each row; 0 where it was solved.
+    meanings : mapping of int to str
+        What each status means.
+    numbers : ndarray of int (N,), optional
+        What the rows are called; by default they are counted from 0.
+    most : int
+        How many rows are listed of each status.
+    """
+    parts = []
+    for code, words in meanings.items():
+        rows = np.flatnonzero(status == code)
+        if code and rows.size:
+            called = rows if numbers is None else numbers[rows]
+            listed = first_rows(called.tolist(), most)
+            parts.append(f"{rows.size} of {status.size} rows {words} (rows {listed})")
+    return "; ".join(parts)

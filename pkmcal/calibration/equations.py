@@ -14,7 +14,6 @@ from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_p
 from pkmcal.calibration.parameters import POINTS, FitData, Parameters
 from pkmcal.core import instruments
 from pkmcal.core.library import STATUS
-from pkmcal.display import first_rows
 from pkmcal.measurements import orientation
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
@@ -25,6 +24,7 @@ from pkmcal.measurements.observation import (
     distance_per_point,
     predict,
 )
+from pkmcal.result import failed_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -299,14 +299,7 @@ class Equations:
 
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""
-        status = self.status(evaluation)
-        parts = []
-        for code in sorted(set(status.tolist()) - {0}):
-            rows = self.rows[status == code].tolist()
-            parts.append(
-                f"{len(rows)} of {len(status)} rows {STATUS[code]} (rows {first_rows(rows, 10)})"
-            )
-        return "; ".join(parts)
+        return failed_rows(self.status(evaluation), STATUS, self.rows, most=10)
 
 
 def _whitening(measured: Measurements, length: float) -> FloatArray:

@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 import pkmcal as pk
-from pkmcal.cli import verbs
 from pkmcal.cli.calibrate import read_tracker
 from pkmcal.measurements.command_csv import read_commands
 from pkmcal.measurements.pose_csv import read_poses
@@ -19,16 +17,7 @@ from pkmcal.measurements.pose_csv import read_poses
 from ..simulated import hexapod_poses
 
 
-@pytest.fixture(autouse=True)
-def _in_a_folder_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-
-
-def run(*arguments: str | Path) -> Any:
-    return CliRunner().invoke(verbs.app, [str(a) for a in arguments], prog_name="pkmcal")
-
-
-def test_plan_prints_and_writes_what_plan_poses_finds(tmp_path: Path) -> None:
+def test_plan_prints_and_writes_what_plan_poses_finds(run: Any, tmp_path: Path) -> None:
     result = run("plan", "hexapod", "--kind", "pose", "--count", "12", "--out", "plan")
     assert (result.exit_code, result.stderr) == (0, "")
     robot = pk.load("hexapod")
@@ -40,7 +29,9 @@ def test_plan_prints_and_writes_what_plan_poses_finds(tmp_path: Path) -> None:
     np.testing.assert_array_equal(commands, expected.actuators)
 
 
-def test_commands_with_what_was_measured_beside_them_can_be_calibrated(tmp_path: Path) -> None:
+def test_commands_with_what_was_measured_beside_them_can_be_calibrated(
+    run: Any, tmp_path: Path
+) -> None:
     assert run("plan", "2tpr2tps", "--count", "12", "--prior", "0.5", "--out", ".").exit_code == 0
     robot = pk.load("2tpr2tps")
     written = (tmp_path / "commands.csv").read_text().splitlines()
@@ -55,19 +46,19 @@ def test_commands_with_what_was_measured_beside_them_can_be_calibrated(tmp_path:
     assert json.loads(result.stdout)["parameters"]["offset1"]["value"] == pytest.approx(0.3)
 
 
-def test_accuracy_finds_how_many_and_json_stands_alone() -> None:
+def test_accuracy_finds_how_many_and_json_stands_alone(run: Any) -> None:
     options = ["--accuracy", "0.05", "--free", "offset*", "--json"]
     found = json.loads(run("plan", "rotary-delta", *options).stdout)
     assert found["predicted"] <= 0.05 and len(found["indices"]) == len(found["poses"])
 
 
-def test_too_few_poses_are_not_to_be_trusted() -> None:
+def test_too_few_poses_are_not_to_be_trusted(run: Any) -> None:
     result = run("plan", "hexapod", "--count", "3")
     assert result.exit_code == 1
     assert "too few" in result.stdout
 
 
-def test_candidates_and_targets_come_from_files(tmp_path: Path) -> None:
+def test_candidates_and_targets_come_from_files(run: Any, tmp_path: Path) -> None:
     (tmp_path / "p.csv").write_text("x [mm],y [mm]\n0,0\n50,0\n0,50\n-50,-50\n60,10\n")
     arguments = ["--poses", "p.csv", "--targets", "p.csv", "--count", "3", "--free", "offset*"]
     result = run("plan", "linear-delta", *arguments, "--json")
@@ -75,7 +66,9 @@ def test_candidates_and_targets_come_from_files(tmp_path: Path) -> None:
     assert set(json.loads(result.stdout)["indices"]) < set(range(5))
 
 
-def test_postures_of_an_arm_are_chosen_from_a_file_of_joint_coordinates(tmp_path: Path) -> None:
+def test_postures_of_an_arm_are_chosen_from_a_file_of_joint_coordinates(
+    run: Any, tmp_path: Path
+) -> None:
     arm, degrees = pk.load("3r"), np.random.default_rng(0).uniform(-100, 100, (40, 3))
     rows = [",".join(map(repr, row)) for row in degrees.tolist()]
     (tmp_path / "c.csv").write_text("\n".join(["q1 [deg],q2 [deg],q3 [deg]", *rows]))
@@ -102,13 +95,15 @@ def test_postures_of_an_arm_are_chosen_from_a_file_of_joint_coordinates(tmp_path
         (["hexapod", "--poses", "none.csv"], "none.csv: No such file"),
     ],
 )
-def test_wrong_input_is_one_line_and_exit_code_2(arguments: list[str], words: str) -> None:
+def test_wrong_input_is_one_line_and_exit_code_2(
+    run: Any, arguments: list[str], words: str
+) -> None:
     result = run("plan", *arguments)
     assert result.exit_code == 2
     assert words in result.stderr and len(result.stderr.splitlines()) == 1
 
 
-def test_calibrate_takes_a_trackers_noise(tmp_path: Path) -> None:
+def test_calibrate_takes_a_trackers_noise(run: Any, tmp_path: Path) -> None:
     robot = pk.load("hexapod")
     q = robot.inverse(hexapod_poses(robot, 20, np.random.default_rng(0)))
     pk.VirtualMachine(robot).measure(q).write("m.csv")
@@ -135,7 +130,7 @@ def test_a_tracker_that_is_none_is_named(text: str, words: str) -> None:
         read_tracker(text)
 
 
-def test_calibrate_finds_where_wires_end(tmp_path: Path) -> None:
+def test_calibrate_finds_where_wires_end(run: Any, tmp_path: Path) -> None:
     robot = pk.load("hexapod")
     q = robot.inverse(hexapod_poses(robot, 40, np.random.default_rng(1)))
     wire = {"target": [400, 300, -100], "attachment": [60, 20, 0]}

@@ -8,7 +8,6 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
 import pytest
 
 import pkmcal as pk
@@ -16,11 +15,11 @@ from pkmcal.error_model import monte_carlo
 from pkmcal.error_model.tolerance import Tolerance
 
 from ..workspaces import poses
+from .test_tolerance import assert_same_bits
 
 distributed = pytest.importorskip("distributed", reason="the extra pkmcal[dask] is not installed")
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
-ARRAYS = ("mean", "std", "interval95", "interval997", "distance_rms", "distance95", "distance997")
 CHUNKS = 60  # at two blocks of poses: more tasks than are on their way at a time
 
 
@@ -42,11 +41,6 @@ def spread(executor: Any = None, progress: Any = None) -> Tolerance:
     return pk.tolerance(
         robot, at, 0.1, samples=samples, seed=3, executor=executor, progress=progress
     )
-
-
-def assert_same_bits(one: Tolerance, other: Tolerance) -> None:
-    for name in ARRAYS:
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
 
 
 def test_two_worker_processes_give_the_same_bits(client: Any) -> None:
