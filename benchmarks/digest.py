@@ -90,7 +90,7 @@ def of_machine(name: str) -> Iterator[Call]:
     spheres = machine.spheres(slots, own[:1])[0]
     start = start_system(model.map, kinds, spheres)
     if start is not None and machine.rows == machine.m:
-        scaled = spheres / np.repeat([300.0, 1.0], [7, 6])
+        scaled = spheres / np.repeat([300.0, 1.0], [7, spheres.shape[-1] - 7])
         yield "paths", lambda: paths.follow(machine, start.limbs, scaled, start.states, 5e-3)
 
 
@@ -152,7 +152,6 @@ def of_rows() -> Iterator[Call]:
     yield "points", lambda: instruments.points(poses, points)
     yield "points, one target", lambda: instruments.points(poses, points[0])
     yield "seen_points", lambda: instruments.seen_points(one, points)
-    yield "seen_poses", lambda: instruments.seen_pose_rates(one, poses)
     yield "distances", lambda: instruments.distances(poses, points, ends)
     yield "distances, one target", lambda: instruments.distances(poses, points[0], ends[0])
     yield "exp", lambda: motions

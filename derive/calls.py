@@ -161,8 +161,6 @@ def calls() -> list[Call]:
         formula("seen_points", "points of the base in a frame, with their derivatives by the frame"
                 " and by the point", measured.seen,
                 "frame point seen by_frame by_point", ((3,), (3, 6), (3, 3)), {"frame": "shared"}),
-        formula("seen_poses", "rates of poses as seen from a frame by the twist of the platform",
-                measured.pose, "frame seen by_twist", ((6, 6),), {"frame": "shared"}),
         formula("distances", "distances from anchors of the base to targets of the platform, with"
                 " their derivatives by the twist, the target and the anchor", measured.distance,
                 "pose target anchor distance by_twist by_target by_anchor",

@@ -11,7 +11,6 @@ import sympy as sp
 
 from .emit import Function
 from .frames import posed
-from .posemaps import euler_rate_matrix
 from .rotation import skew
 
 
@@ -63,25 +62,6 @@ def distance() -> Function:
     return f
 
 
-def pose() -> Function:
-    """Derive the rates of a pose as an instrument sees it."""
-    f = Function(
-        "measured_pose",
-        "rates of a pose as an instrument sees it, by the twist (ω, v) of the platform",
-        "Rf v and E⁻¹ Rf ω;  E (α̇, β̇, γ̇) is the turning of R = Rz(γ) Ry(β) Rx(α)",
-    )
-    _, R, _ = posed(f, "frame", "of the base, as the instrument has it")
-    seen = f.vector("seen", 6, "the pose as seen")
-    sb, cb = f.sincos("b", seen[4])
-    sg, cg = f.sincos("g", seen[5])
-    rates = euler_rate_matrix(sb, cb, sg, cg).inv()
-    rates = f.let("rates", rates.applyfunc(lambda e: sp.simplify(e.subs(sg**2, 1 - cg**2))), "E⁻¹")
-    zero = sp.zeros(3, 3)
-    matrix = sp.Matrix.vstack(sp.Matrix.hstack(zero, R), sp.Matrix.hstack(rates * R, zero))
-    f.output("by_twist", matrix, "6 x 6, row by row")
-    return f
-
-
 def functions() -> list[Function]:
     """The emitted functions of what is measured."""
-    return [point(), seen(), distance(), pose()]
+    return [point(), seen(), distance()]

@@ -1,5 +1,5 @@
 /* Generated from derive/measured.py by `python -m derive`; never edited by hand.
- * derivation f1c6514312bc8ad8
+ * derivation 829de8306451e5ba
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -208,85 +208,5 @@ INLINE void FN(measured_distance)(const real pose[6], const real target[3], cons
     by_anchor[0] = -u0;
     by_anchor[1] = -u1;
     by_anchor[2] = -u2;
-}
-#endif
-
-#ifndef NARROW
-/*
- * rates of a pose as an instrument sees it, by the twist (ω, v) of the platform
- *     Rf v and E⁻¹ Rf ω;  E (α̇, β̇, γ̇) is the turning of R = Rz(γ) Ry(β) Rx(α)
- * in  frame[6]       of the base, as the instrument has it: x y z [mm], α β γ [rad]
- * in  seen[6]        the pose as seen
- * out by_twist[36]   6 x 6, row by row
- * operations: 16 +, 35 *, 1 /, 0 sqrt
- */
-INLINE void FN(measured_pose)(const real frame[6], const real seen[6], real by_twist[36])
-{
-    real sframe_a, cframe_a;
-    FN(sincos)(frame[3], &sframe_a, &cframe_a);
-    real sframe_b, cframe_b;
-    FN(sincos)(frame[4], &sframe_b, &cframe_b);
-    real sframe_g, cframe_g;
-    FN(sincos)(frame[5], &sframe_g, &cframe_g);
-    const real frame_R0 = cframe_b*cframe_g;
-    const real t0 = cframe_a*sframe_g;
-    const real frame_R1 = sframe_a*sframe_b*cframe_g - t0;
-    const real t1 = sframe_a*sframe_g;
-    const real t2 = cframe_a*cframe_g;
-    const real frame_R2 = sframe_b*t2 + t1;
-    const real frame_R3 = cframe_b*sframe_g;
-    const real frame_R4 = sframe_b*t1 + t2;
-    const real frame_R5 = sframe_b*t0 - sframe_a*cframe_g;
-    const real frame_R7 = sframe_a*cframe_b;
-    const real frame_R8 = cframe_a*cframe_b;
-    real sb, cb;
-    FN(sincos)(seen[4], &sb, &cb);
-    real sg, cg;
-    FN(sincos)(seen[5], &sg, &cg);
-    /* E⁻¹ */
-    const real t3 = 1.0f/cb;
-    const real t4 = cg*t3;
-    const real rates0 = t4;
-    const real t5 = sg*t3;
-    const real rates1 = t5;
-    const real rates6 = sb*t4;
-    const real rates7 = sb*t5;
-    by_twist[0] = FN(fill)(0.0f);
-    by_twist[1] = FN(fill)(0.0f);
-    by_twist[2] = FN(fill)(0.0f);
-    by_twist[3] = frame_R0;
-    by_twist[4] = frame_R1;
-    by_twist[5] = frame_R2;
-    by_twist[6] = FN(fill)(0.0f);
-    by_twist[7] = FN(fill)(0.0f);
-    by_twist[8] = FN(fill)(0.0f);
-    by_twist[9] = frame_R3;
-    by_twist[10] = frame_R4;
-    by_twist[11] = frame_R5;
-    by_twist[12] = FN(fill)(0.0f);
-    by_twist[13] = FN(fill)(0.0f);
-    by_twist[14] = FN(fill)(0.0f);
-    const real t6 = -sframe_b;
-    by_twist[15] = t6;
-    by_twist[16] = frame_R7;
-    by_twist[17] = frame_R8;
-    by_twist[18] = frame_R0*rates0 + frame_R3*rates1;
-    by_twist[19] = frame_R1*rates0 + frame_R4*rates1;
-    by_twist[20] = frame_R2*rates0 + frame_R5*rates1;
-    by_twist[21] = FN(fill)(0.0f);
-    by_twist[22] = FN(fill)(0.0f);
-    by_twist[23] = FN(fill)(0.0f);
-    by_twist[24] = frame_R3*cg - frame_R0*sg;
-    by_twist[25] = frame_R4*cg - frame_R1*sg;
-    by_twist[26] = frame_R5*cg - frame_R2*sg;
-    by_twist[27] = FN(fill)(0.0f);
-    by_twist[28] = FN(fill)(0.0f);
-    by_twist[29] = FN(fill)(0.0f);
-    by_twist[30] = frame_R0*rates6 + frame_R3*rates7 + t6;
-    by_twist[31] = frame_R1*rates6 + frame_R4*rates7 + frame_R7;
-    by_twist[32] = frame_R2*rates6 + frame_R5*rates7 + frame_R8;
-    by_twist[33] = FN(fill)(0.0f);
-    by_twist[34] = FN(fill)(0.0f);
-    by_twist[35] = FN(fill)(0.0f);
 }
 #endif

@@ -34,7 +34,6 @@ enum { MAP_SPATIAL, MAP_TRANSLATION, MAP_PLANAR, MAP_2TPR2TPS };
     "compose_twists a:6! pose:6 c:6! -> twists:6,6\n" \
     "points pose:6 target:3* -> point:3 by_twist:3,6 by_target:3,3\n" \
     "seen_points frame:6! point:3 -> seen:3 by_frame:3,6 by_point:3,3\n" \
-    "seen_poses frame:6! seen:6 -> by_twist:6,6\n" \
     "distances pose:6 target:3* anchor:3* -> distance: by_twist:6 by_target:3 by_anchor:3\n" \
     "tpr2tps_lengths size:6! free:4 -> lengths:4\n" \
     "tpr2tps_jacobian size:6! free:4 -> jacobian:4,4\n" \

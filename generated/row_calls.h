@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 4993a2086d9f56cc
+ * derivation 92f796481b2717cf
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* a (n, 6) or (6), b (n, 6) or (6) -> out (n, 6): A followed by B. */
@@ -28,10 +28,6 @@ int CALL(points)(ptrdiff_t n, const double *pose, const double *target, ptrdiff_
  * base in a frame, with their derivatives by the frame and by the point. */
 int CALL(seen_points)(ptrdiff_t n, const double *frame, const double *point, double *seen,
                       double *by_frame, double *by_point);
-
-/* frame (6), seen (n, 6) -> by_twist (n, 6, 6): rates of poses as seen from a frame by the
- * twist of the platform. */
-int CALL(seen_poses)(ptrdiff_t n, const double *frame, const double *seen, double *by_twist);
 
 /* pose (n, 6), target (n, 3) or (3), anchor (n, 3) or (3) -> distance (n), by_twist (n, 6),
  * by_target (n, 3), by_anchor (n, 3): distances from anchors of the base to targets of the

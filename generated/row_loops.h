@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 4993a2086d9f56cc
+ * derivation 92f796481b2717cf
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
@@ -97,21 +97,6 @@ int CALL(seen_points)(ptrdiff_t n, const double *frame, const double *point, dou
         scatter_row(lane_seen, 3, seen, 3, row, count);
         scatter_row(lane_by_frame, 18, by_frame, 18, row, count);
         scatter_row(lane_by_point, 9, by_point, 9, row, count);
-    }
-    return 0;
-}
-
-int CALL(seen_poses)(ptrdiff_t n, const double *frame, const double *seen, double *by_twist)
-{
-    real lane_frame[6];
-    for (int k = 0; k < 6; k++) lane_frame[k] = fill(frame[k]);
-    for (ptrdiff_t first = 0; first < n; first += LANES) {
-        ptrdiff_t row[LANES];
-        real lane_seen[6], lane_by_twist[36];
-        const int count = block_rows(first, n, row);
-        gather_row(seen, 6, 6, row, lane_seen);
-        FN(measured_pose)(lane_frame, lane_seen, lane_by_twist);
-        scatter_row(lane_by_twist, 36, by_twist, 36, row, count);
     }
     return 0;
 }

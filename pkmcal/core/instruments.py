@@ -29,11 +29,6 @@ def seen_points(
     return seen, by_frame, by_point
 
 
-def seen_pose_rates(frame: FloatArray, seen: FloatArray, isa: int | None = None) -> FloatArray:
-    """Rates (N, 6, 6) of poses as seen (N, 6) by the twist (ω, v) of the platform in the base."""
-    return rows("seen_poses", frame, seen, isa=isa)[0]
-
-
 def distances(
     pose: FloatArray, target: FloatArray, anchor: FloatArray, isa: int | None = None
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

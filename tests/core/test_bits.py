@@ -115,7 +115,6 @@ def by_rows(call: Callable[..., np.ndarray], *given: np.ndarray) -> Case:
 CASES: dict[str, Case] = {
     "points": points,
     "seen_points": lambda isa, part: [*instruments.seen_points(POSES[0], POINTS[part], isa)],
-    "seen_poses": lambda isa, part: [instruments.seen_pose_rates(POSES[0], POSES[part], isa)],
     "distances": distances,
     "tpr2tps_lengths": lambda isa, part: closed_forms(isa, part, tpr2tps_lengths, (4,)),
     "tpr2tps_jacobian": lambda isa, part: closed_forms(isa, part, tpr2tps_jacobian, (4, 4)),

@@ -88,18 +88,6 @@ def test_a_point_seen_from_a_frame_follows_point_and_frame() -> None:
     )
 
 
-def test_rates_of_a_pose_seen_make_the_turning_of_the_platform() -> None:
-    R, _, places = pose("frame")
-    _, _, of_seen = pose("seen")
-    rates = value("measured_pose", "by_twist", places | of_seen).reshape(6, 6) * TWIST
-    assert rates[:3, 0] == R * V
-    angles = entries("seen", 6)[3:]
-    turned = rpy(*angles)
-    change = sum((turned.diff(x) * r for x, r in zip(angles, rates[3:, 0], strict=True)),
-                 sp.zeros(3, 3)).subs(of_seen)  # fmt: skip
-    assert sp.simplify(change - skew(R * W) * turned.subs(of_seen)).is_zero_matrix
-
-
 def test_a_twist_is_carried_from_the_machines_own_pose_to_the_users() -> None:
     A, _, places = pose("a")
     R, _, of_pose = pose("b")
