@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -56,7 +57,7 @@ def export(
     Example: pkmcal export hexapod --as c --out hexapod.h
     """
     word("--as", target, TARGETS)
-    if out.exists() and not force:
+    if os.path.lexists(out) and not force:
         raise ArgumentError(f"{out}: would be replaced; name another file, or give --force")
     machine = load_parallel(robot)
     loss = None

@@ -208,3 +208,17 @@ def test_a_file_that_changes_during_the_work_is_stated_as_it_was_read(
     monkeypatch.setattr(inverse, "read_poses", and_change)
     run("inverse", "hexapod", "p.csv", "--out", "out")
     assert digest in Path("out/commands.csv").read_text("utf-8")
+
+
+def test_export_replaces_a_file_only_if_told_to(run: Any, refused: Any) -> None:
+    header = Path("arm.h")
+    header.write_text("mine")
+    arguments = ("export", "hexapod", "--as", "c", "--out", header)
+    assert refused(*arguments).startswith("arm.h: would be replaced")
+    assert header.read_text() == "mine"
+    assert run(*arguments, "--force").exit_code == 0
+    assert "hexapod" in header.read_text()
+    link = Path("link.h")
+    link.symlink_to("nowhere.h")
+    refused("export", "hexapod", "--as", "c", "--out", link)
+    assert link.is_symlink() and not Path("nowhere.h").exists()
