@@ -174,7 +174,7 @@ def of_chance() -> Iterator[Call]:
         swarm, seen = Swarm(PAPER, lower, upper, 5), []
         for _ in range(20):
             positions = swarm.positions
-            swarm.judge((positions**2).sum(axis=1))
+            swarm.update_best((positions**2).sum(axis=1))
             swarm.move()
             seen += [positions, *swarm.best]
         return seen

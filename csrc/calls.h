@@ -68,11 +68,12 @@ int CALL(motion)(const pkm_machine *machine, ptrdiff_t n, const double *geometry
  * sixteen numbers is dropped. */
 int CALL(normals)(ptrdiff_t n, uint64_t *state, double *out);
 
-/* A swarm step by step: start within the bounds; set the particles' values in the state and judge
- * (pBest, gBest); move (eq. 19); judge again. Of one seed the same bits with every isa. */
+/* A swarm step by step: start within the bounds; set the particles' values in the state and
+ * update the best (pBest, gBest); move (eq. 19); update again. Of one seed the same bits with
+ * every isa. */
 int CALL(swarm_start)(const pkm_swarm *swarm, uint64_t seed, const double *lower,
                       const double *upper, double *state);
-int CALL(swarm_judge)(const pkm_swarm *swarm, double *state);
+int CALL(swarm_update_best)(const pkm_swarm *swarm, double *state);
 int CALL(swarm_move)(const pkm_swarm *swarm, const double *lower, const double *upper,
                      double *state);
 

@@ -1,4 +1,5 @@
-/* Forward kinematics of many rows: the quick way for all, Newton for what it did not solve. */
+/* Forward kinematics of many rows: mixed-precision Newton for all, safeguarded Newton for
+ * what it did not solve. */
 #ifndef FORWARD_H
 #define FORWARD_H
 
@@ -59,7 +60,7 @@ INLINE void store_rows(int map, const forward_call *call, const real *state, mas
     }
 }
 
-/* The safe way for up to LANES rows anywhere in the batch. */
+/* Safeguarded Newton for up to LANES rows anywhere in the batch. */
 INLINE void newton_rows(int map, const forward_call *call, const limb_numbers *shared,
                         const ptrdiff_t *row, int count)
 {
@@ -86,15 +87,15 @@ INLINE void newton_rows(int map, const forward_call *call, const limb_numbers *s
 EACH_MAP(NEWTON_ROWS)
 #undef NEWTON_ROWS
 
-/* A batch of rows the quick way; those that are not solved are appended to `lost`. */
+/* A batch of rows by mixed-precision Newton; those it does not solve are appended to `unsolved`. */
 INLINE int quick_rows(int map, const forward_call *call, const limb_numbers *shared,
-                      const prediction *start, ptrdiff_t first, batch *all, ptrdiff_t *lost)
+                      const prediction *start, ptrdiff_t first, batch *all, ptrdiff_t *unsolved)
 {
     const pkm_machine *machine = call->machine;
     const int steps = start->known ? STEPS_PREDICTED : STEPS_GUESSED;
     const int once = !shared || first == 0; /* is there anything but actuators to load? */
     ptrdiff_t row[PARTS][LANES];
-    int count[PARTS], losses = 0;
+    int count[PARTS], pending = 0;
     const ptrdiff_t left = (call->n - first + LANES - 1) / LANES;
     const int parts = left < PARTS ? (int)left : PARTS;
     all->blocks = (parts + JOINED - 1) / JOINED;
@@ -118,9 +119,9 @@ INLINE int quick_rows(int map, const forward_call *call, const limb_numbers *sha
         store_rows(map, call, all->fine[h], status, fill(steps + 2.0), all->worst[h], row[h], count[h]);
         if (any(status))
             for (int l = 0; l < count[h]; l++)
-                if (status[l]) lost[losses++] = row[h][l];
+                if (status[l]) unsolved[pending++] = row[h][l];
     }
-    return losses;
+    return pending;
 }
 
 INLINE void forward_map(int map, const forward_call *call)
@@ -129,8 +130,8 @@ INLINE void forward_map(int map, const forward_call *call)
     limb_numbers numbers[PKM_MAX_LIMBS];
     prediction start;
     batch all;
-    ptrdiff_t lost[CHUNK + LANES], zero[LANES] = {0};
-    int rows = 0, losses = 0;
+    ptrdiff_t unsolved[CHUNK + LANES], zero[LANES] = {0};
+    int rows = 0, pending = 0;
     for (int i = 0; i < machine->limbs; i++) rows += 1 + __builtin_popcount((unsigned)machine->rows[i]);
     const int square = rows == map_m(map);
     const limb_numbers *shared = call->geometry_stride ? NULL : numbers;
@@ -149,23 +150,23 @@ INLINE void forward_map(int map, const forward_call *call)
         const ptrdiff_t end = first + CHUNK < call->n ? first + CHUNK : call->n;
         if (square)
             for (; first < end; first += BATCH)
-                losses += quick_rows(map, call, shared, &start, first, &all, lost + losses);
+                pending += quick_rows(map, call, shared, &start, first, &all, unsolved + pending);
         else
-            for (; first < end; first++) lost[losses++] = first;
+            for (; first < end; first++) unsolved[pending++] = first;
         /* full blocks of what is left now, the rest with the next chunk or at the end */
-        const int whole = first < call->n ? losses - losses % LANES : losses;
+        const int whole = first < call->n ? pending - pending % LANES : pending;
         for (int k = 0; k < whole; k += LANES) {
             ptrdiff_t row[LANES];
-            const int count = losses - k < LANES ? losses - k : LANES;
-            for (int l = 0; l < LANES; l++) row[l] = lost[k + (l < count ? l : 0)];
+            const int count = pending - k < LANES ? pending - k : LANES;
+            for (int l = 0; l < LANES; l++) row[l] = unsolved[k + (l < count ? l : 0)];
             switch (map) {
 #define CASE(NAME, name, ...) case MAP_##NAME: newton_##name(call, shared, row, count); break;
                 EACH_MAP(CASE)
 #undef CASE
             }
         }
-        losses -= whole;
-        memmove(lost, lost + whole, (size_t)losses * sizeof *lost);
+        pending -= whole;
+        memmove(unsolved, unsolved + whole, (size_t)pending * sizeof *unsolved);
     }
 }
 

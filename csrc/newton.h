@@ -1,5 +1,5 @@
 /* Newton on the closures with everything that makes it safe: exchanges of rows in the elimination,
- * bounded turns, steps halved until they improve. It is what runs where the quick way in forward.h
+ * bounded turns, steps halved until they improve. It runs where mixed-precision Newton in forward.h
  * does not settle.
  *
  * A lane is done when its closures hold to rounding and the last step was so small that the next
@@ -79,9 +79,9 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
                    & (solvable | ~better);
     }
     /* closures that hold where the pose does not follow from them, or no way on: singular */
-    const mask lost = *status == fill_mask(PKM_NOT_CONVERGED);
+    const mask unsolved = *status == fill_mask(PKM_NOT_CONVERGED);
     const mask flat = ~(pivot > fill(LEAST_PIVOT));
-    *status = select_mask(lost & ((worst <= closed) | flat), fill_mask(PKM_SINGULAR), *status);
+    *status = select_mask(unsolved & ((worst <= closed) | flat), fill_mask(PKM_SINGULAR), *status);
     /* of the pose itself, and without the weights; more rows than m meet each other or they do not */
     const int rows = scaled_rows(map, machine, limb, state, phi, NULL);
     *residual = zero;

@@ -166,7 +166,7 @@ int CALL(swarm_start)(const pkm_swarm *swarm, uint64_t seed, const double *lower
     return 0;
 }
 
-int CALL(swarm_judge)(const pkm_swarm *swarm, double *state)
+int CALL(swarm_update_best)(const pkm_swarm *swarm, double *state)
 {
     if (!pkm_swarm_size(swarm)) return PKM_BAD_SWARM;
     update_best(swarm, state);

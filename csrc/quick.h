@@ -1,4 +1,4 @@
-/* The quick way of forward kinematics: the same steps for every row, so no lane waits for another.
+/* Mixed-precision Newton: the same steps for every row, so no lane waits for another.
  *
  * From the guess a linear prediction, Newton steps and one factorisation in floats; then two steps of
  * the state in doubles, whose closures are found in doubles and solved with those factors. The last

@@ -138,7 +138,7 @@ def newton(system: System, x: Array, g: Array, steps: int) -> tuple[Array, Array
 
 
 def follow(system: System, x: Array, start: Array, end: Array) -> Array:
-    """States (N, state) led from numbers `start` to `end` in a straight line, without lost ones."""
+    """States (N, state) continued straight from numbers `start` to `end`, without lost ones."""
     t, h, before, last = 0.0, 0.01, x, 0.01
     while t < 1.0 and len(x):
         h = min(h, 1.0 - t)

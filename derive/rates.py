@@ -92,7 +92,7 @@ def _rates(driver: Driver) -> Function:
 
 
 def _sphere_bend(driver: Driver) -> Function:
-    """d²Φ/dt² of the sphere row where joint and actuator move as they are told."""
+    """d²Φ/dt² of the sphere row along given motions of joint and actuator."""
     f = Function(
         f"{driver.name}_bend",
         f"{driver.name}: how the sphere row bends as joint and actuator move",
@@ -110,7 +110,7 @@ def _sphere_bend(driver: Driver) -> Function:
 
 
 def _constraint_bend(row: Constraint) -> Function:
-    """d²Φ/dt² of a constraint row where joint and platform-side axis move as they are told."""
+    """d²Φ/dt² of a constraint row along given motions of joint and platform-side axis."""
     f = Function(
         f"{row.name}_bend",
         f"{row.name}: how the row bends along a path",

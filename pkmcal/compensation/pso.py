@@ -130,7 +130,7 @@ def pso(
     history: list[float] = []
     stagnated = False
     while True:
-        swarm.judge(_values(objective, swarm.positions))
+        swarm.update_best(_values(objective, swarm.positions))
         history.append(swarm.best[1])
         done = len(history) - 1
         if progress is not None and done:

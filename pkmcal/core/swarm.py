@@ -113,10 +113,10 @@ class Swarm:
         dims = len(self._x)
         return self._state[-dims - 1 : -1].copy(), float(self._state[-1])
 
-    def judge(self, values: FloatArray) -> None:
+    def update_best(self, values: FloatArray) -> None:
         """Take the particles' values (particles,), which decide pBest and gBest."""
         self._values[:] = values
-        call("swarm_judge", self._struct, self._state, isa=self._isa)
+        call("swarm_update_best", self._struct, self._state, isa=self._isa)
 
     def move(self) -> None:
         """Eq. 19. A particle that would leave the bounds stops there, at rest in that direction."""
@@ -172,9 +172,9 @@ def minimise_eq18(
         if threads is None:
             threads = max(1, min(len(os.sched_getaffinity(0)), sets // SWARMS_PER_THREAD))
         in_threads(run, sets, threads)
-    lost = ~np.isfinite(off).all(axis=(1, 2))
-    correction[lost] = np.nan
-    history[lost] = np.nan
+    unreached = ~np.isfinite(off).all(axis=(1, 2))
+    correction[unreached] = np.nan
+    history[unreached] = np.nan
     return correction, history
 
 

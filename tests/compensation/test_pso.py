@@ -88,7 +88,7 @@ def test_a_particle_moves_by_eq_19() -> None:
     # with c1 = 0 and one dimension the random factor can be told from the move: in [0, 1)
     settings = SwarmSettings(particles=50, inertia=0.6, cognitive=0.0, social=1.0)
     flock = swarm.Swarm(settings, np.array([-100.0]), np.array([100.0]), seed=4)
-    flock.judge(np.abs(flock.positions[:, 0] - 1.0))
+    flock.update_best(np.abs(flock.positions[:, 0] - 1.0))
     v = np.zeros(50)
     for _ in range(5):
         x, leader = flock.positions[:, 0], flock.best[0][0]
@@ -99,7 +99,7 @@ def test_a_particle_moves_by_eq_19() -> None:
         assert ((rand > -1e-9) & (rand < 1 + 1e-9)).all()
         assert rand.std() > 0.1
         v = moved - x
-        flock.judge(np.abs(moved - 1.0))
+        flock.update_best(np.abs(moved - 1.0))
 
 
 def test_leader_is_the_best_value_ever_seen() -> None:
@@ -121,7 +121,7 @@ def test_of_equal_values_the_first_particle_leads() -> None:
     flock = swarm.Swarm(SwarmSettings(particles=20), np.zeros(2), np.ones(2), seed=1)
     values = np.ones(20)
     values[[6, 11, 17]] = 0.5
-    flock.judge(values)
+    flock.update_best(values)
     np.testing.assert_array_equal(flock.best[0], flock.positions[6])
 
 
@@ -209,12 +209,12 @@ def test_particles_never_leave_the_bounds_nor_jump_across() -> None:
 def test_a_particle_at_a_bound_has_lost_its_velocity() -> None:
     settings = SwarmSettings(particles=64, inertia=1.0, cognitive=0.0, social=4.0)
     flock = swarm.Swarm(settings, np.array([0.0]), np.array([1.0]), seed=0)
-    flock.judge(-flock.positions[:, 0])
+    flock.update_best(-flock.positions[:, 0])
     flock.move()
     at_bound = flock.positions[:, 0] == 1.0
     assert at_bound.any()
     leader = flock.best[0][0]
-    flock.judge(np.ones(64))  # nobody leads anew
+    flock.update_best(np.ones(64))  # nobody leads anew
     flock.move()
     # without velocity only the pull of the leader, which is inside, is left
     pulled = flock.positions[at_bound, 0]
@@ -288,9 +288,9 @@ def test_the_core_refuses_what_it_cannot_take() -> None:
     struct = library.ffi.new("pkm_swarm *", {"particles": 0, "dims": 2})
     null = library.ffi.NULL
     assert library.lib.pkm_swarm_size(struct) == 0
-    assert library.lib.pkm_base_swarm_judge(struct, null) == library.lib.PKM_BAD_SWARM
+    assert library.lib.pkm_base_swarm_update_best(struct, null) == library.lib.PKM_BAD_SWARM
     with pytest.raises(ValueError, match="the core refused the call"):
-        library.call("swarm_judge", struct, np.empty(1))
+        library.call("swarm_update_best", struct, np.empty(1))
 
 
 # --- order-2 stability -------------------------------------------------------------------------
@@ -304,12 +304,12 @@ def test_constriction_settles_and_the_printed_factors_do_not() -> None:
         flock._x *= 1e-9  # far from the bounds
         values = np.full(settings.particles, 1.0)
         values[0] = 0.0
-        flock.judge(values)
+        flock.update_best(values)
         worse = np.full(settings.particles, 2.0)
         spread: list[float] = []
         for _ in range(150):
             flock.move()
-            flock.judge(worse)
+            flock.update_best(worse)
             spread.append(float(np.var(flock.positions)))
         return np.array(spread)
 

@@ -29,7 +29,7 @@ TAILS = [*(slice(0, n) for n in range(1, 18)), slice(3, ROWS), slice(0, ROWS)]
 ELSEWHERE = {
     *("inverse", "forward", "jacobian", "forward_jacobian", "error_jacobian", "closure", "limbs"),
     *("rates", "motion", "compose", "invert", "compose_rates", "compose_twists", "normals"),
-    *("swarm_start", "swarm_judge", "swarm_move", "swarm_eq18"),
+    *("swarm_start", "swarm_update_best", "swarm_move", "swarm_eq18"),
 }
 
 rng = np.random.default_rng(20)
