@@ -217,7 +217,7 @@ class Replicate:
             corrected(kind, seen.values, residual)
             for kind, seen, residual in zip(kinds, at.predicted, drawn, strict=True)
         ]
-        return self._solved(equations.with_values(values, centre), replace(at, residuals=drawn))
+        return self._solved(equations.with_readings(values, centre), replace(at, residuals=drawn))
 
     def _solved(self, equations: Equations, at: Evaluation) -> FloatArray:
         state = self._estimate.state

@@ -111,7 +111,7 @@ class Equations:
 
     def at(self, theta: FloatArray) -> Evaluation:
         """Evaluate at `theta` (n,)."""
-        robot = self.parameters.robot._with_values(self.parameters.values_at(theta))
+        robot = self.parameters.robot.with_values(self.parameters.values_at(theta))
         solved = robot.forward(self.actuators, self._guess)
         predicted = self._predicted(solved.pose, theta)
         residuals = self._residuals(predicted)
@@ -157,7 +157,7 @@ class Equations:
         self._guess = self._guess.copy()
         self._guess[rows] = poses
 
-    def with_values(self, values: Sequence[FloatArray], prior_centre: FloatArray) -> Equations:
+    def with_readings(self, values: Sequence[FloatArray], prior_centre: FloatArray) -> Equations:
         """The same with other measured values (N, k) of each set, and another centre (n,)."""
         other = copy.copy(self)
         other.sets = tuple(

@@ -259,7 +259,7 @@ def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:
     for _ in range(_MACHINES):
         erroneous = values.copy()
         erroneous[chosen.places] += _TIMES * sigma * random.standard_normal(k)
-        machine = chosen.robot._with_values(erroneous)
+        machine = chosen.robot.with_values(erroneous)
         safe[safe] = machine.forward(q[safe], guess=poses[safe]).ok
     if not safe.any():
         raise ArgumentError(

@@ -317,11 +317,23 @@ class Robot(Kinematics):
         """
         return Robot(replace(self.model, geometry=self.geometry.replace(changes)))
 
-    def _with_values(self, values: FloatArray) -> Robot:
-        """`replace` for numbers (p,) near the present ones, without ordering the elimination anew.
+    def with_values(self, values: FloatArray) -> Robot:
+        """`replace` for the steps of a search: three times as fast, for numbers near these.
 
-        Three times as fast, for machines that live as long as one step of a search; closures may
-        miss by any length on its way.
+        The order of elimination stays, and closures may miss by any length.
+
+        Parameters
+        ----------
+        values : array (p,)
+            All numbers of the geometry, mm and rad.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")
+        >>> step = robot.with_values(robot.geometry.values + 1e-3)
+        >>> bool(step.forward(robot.inverse(robot.home)).ok)
+        True
         """
         changed = copy(self)
         changed.machine = self._of_any_misfit
@@ -350,7 +362,7 @@ class Robot(Kinematics):
         """
         if self.machine.rows <= self.machine.m:
             return self
-        found = self._with_values(self.geometry.values).forward(q, guess)
+        found = self.with_values(self.geometry.values).forward(q, guess)
         missed = float(np.nanmax(found.residual, initial=0.0))
         if 2.0 * missed <= self.closure_tolerance:
             return self

@@ -109,8 +109,8 @@ class Calibratable(Protocol):
     def replace(self, changes: FloatArray) -> Calibratable:
         """A machine with other numbers (p,), checked as those of a file are."""
 
-    def _with_values(self, values: FloatArray) -> Calibratable:
-        """The same, quickly, for numbers near the present ones."""
+    def with_values(self, values: FloatArray) -> Calibratable:
+        """The same for the steps of a search: quickly, for numbers near the present ones."""
 
     def forward(self, q: FloatArray, guess: FloatArray | None = None) -> SolvedRows:
         """Poses at actuator coordinates (N, n)."""
@@ -200,7 +200,8 @@ class ArmMachine:
         """With other joint errors (6 n,), mm and rad."""
         return ArmMachine(self.arm.replace(changes.reshape(-1, 6)))
 
-    def _with_values(self, values: FloatArray) -> ArmMachine:
+    def with_values(self, values: FloatArray) -> ArmMachine:
+        """The same as `replace`, which is quick here."""
         return self.replace(values)
 
     def forward(self, q: ArrayLike, guess: ArrayLike | None = None) -> ArmPoses:
