@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,7 +14,9 @@ from pkmcal.calibration.holdout import HeldOut
 from pkmcal.display import Table, first_rows
 from pkmcal.measurements.lack_of_fit import SIGNIFICANT
 
-_WIDTH = 100  # columns of the terminal
+_WIDTH = 100  # letters on a line of the terminal
+_SHORT = 12  # rows of a table that is not set side by side
+_BETWEEN = 3  # letters between tables side by side
 
 
 def misfit_table(misfit: Misfit, holdout: HeldOut) -> Table:
@@ -74,8 +77,6 @@ def limits(
 
 def parameter_rows(table: ParameterTable) -> Table:
     """The parameters with their uncertainty, in as many columns as one screen takes."""
-    columns = 1 if len(table.free) <= 12 else 2 if len(table.free) <= 24 else 3
-    heads = ["parameter", "value", "change"] if columns < 3 else ["parameter", "value"]
     rows = []
     for name, unit, value, sigma, start in zip(
         table.free, table.units, table.values, table.stderr, table.start, strict=True
@@ -88,8 +89,11 @@ def parameter_rows(table: ParameterTable) -> Table:
         text = display.with_uncertainty(number, deviation)
         if not np.isfinite(deviation):
             text = f"{display.fixed(number, places)} ± {deviation:g}"
-        rows.append([label, text, display.fixed(change, places)][: len(heads)])
-    return Table(heads, rows, left=1, columns=columns)
+        rows.append([label, text, display.fixed(change, places)])
+    one = Table(["parameter", "value", "change"], rows, left=1)
+    width = max(map(len, str(one).splitlines())) + _BETWEEN
+    columns = min((_WIDTH + _BETWEEN) // width, -(-len(rows) // _SHORT))
+    return replace(one, columns=max(columns, 1))
 
 
 def filled(lead: str, text: str) -> str:
