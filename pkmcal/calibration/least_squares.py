@@ -97,7 +97,7 @@ class Search:
         loss : Loss
             How rows count.
         pins : ndarray (d, n)
-            Rows that hold what measurements and prior do not tell.
+            Rows that hold the combinations that measurements and prior do not identify.
         """
         equations = self.equations
         self._refused[:] = False

@@ -226,9 +226,9 @@ def _commanded(name: str, robot: Calibratable, places: ArrayLike) -> tuple[Float
 
 def _aims(robot: Calibratable, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
     there, q = _commanded("targets", robot, targets)
-    lost = np.flatnonzero(~np.isfinite(there).all(axis=1))
-    if len(lost):
-        raise ArgumentError(f"targets: {robot.name} has no such pose (row {lost[0]})")
+    unreached = np.flatnonzero(~np.isfinite(there).all(axis=1))
+    if len(unreached):
+        raise ArgumentError(f"targets: {robot.name} has no such pose (row {unreached[0]})")
     return there, q
 
 

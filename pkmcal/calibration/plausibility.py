@@ -51,7 +51,7 @@ def likely_unit_errors(
             words: _misfit(_alone(replace(data, measured=other), parameters), other.units, size)
             for words, other in _readings(data.measured, parameters.robot.actuator_units)
         }
-        # exchanges that a symmetric machine cannot tell apart misfit alike
+        # exchanges that are equivalent on a symmetric machine misfit alike
         least = min(trials.values())
         words = next(text for text in trials if trials[text] <= least * (1.0 + _ALIKE))
         if trials[words] < MISFIT_RATIO * present:
@@ -166,7 +166,7 @@ def implausible_changes(start: Evaluation, end: Evaluation, parameters: Paramete
 def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
     """Find points of the platform that were sought near it and found far away.
 
-    Poses that hardly turn do not tell where a target is; noise may then carry it anywhere.
+    Poses that hardly turn do not determine where a target is; noise may then carry it anywhere.
     """
     reach = float(np.linalg.norm(end.pose[:, :3], axis=1).max())
     geometry = parameters.robot.geometry
