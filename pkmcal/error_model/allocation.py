@@ -305,7 +305,7 @@ class _Trial:
             else:
                 most = np.abs(found.interval997[..., POSE.index(name), :]).max()
             used[name] = float(most) / limit
-        self._refuse(int(found.failed.max()), *used.values())
+        self._refuse(int(found.n_failed.max()), *used.values())
         return used
 
     def together(self, sigma: FloatArray, seed: int) -> FloatArray:
