@@ -1,4 +1,4 @@
-"""`Chain`: what an open chain of joints computes from its screws and joint errors."""
+"""`SerialChain`: what an open chain of joints computes from its screws and joint errors."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from pkmcal.core.screws import Arm, Links
 from pkmcal.exceptions import ArgumentError
 
 
-class Chain:
+class SerialChain:
     """What a `SerialArm` computes: where its tool is, twists by joints and errors, the inverse.
 
     Its parameters are those of `SerialArm`.
