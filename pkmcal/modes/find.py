@@ -127,7 +127,7 @@ def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
         ends = endpoints(problem.machine, start, problem.map, spheres)
         real, all_proven = _real_solutions(problem, ends)
         if ends.lost > 0:
-            reason = f"{ends.lost} of {ends.paths} paths lost"
+            reason = f"{ends.lost} of {ends.paths} paths failed"
         elif ends.lost:
             reason = f"of {ends.paths} paths not as many end alike by two ways around"
     expected = len(real)
