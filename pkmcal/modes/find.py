@@ -134,7 +134,7 @@ def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
     if starts is None:
         starts = STARTS if reason else 0
     if starts:
-        real = np.concatenate([real, _from_random_starts(problem, spheres, starts)])
+        real = np.concatenate([real, from_random_starts(problem, spheres, starts)])
     poses, proof = _certified(problem, real)
     if not reason and not proof.ok.all():
         reason = f"{np.sum(~proof.ok)} modes not certified"
@@ -175,7 +175,7 @@ def _scaled(frames: Any, length: float) -> Any:
     return u
 
 
-def _from_random_starts(problem: AssemblyProblem, spheres: FloatArray, starts: int) -> FloatArray:
+def from_random_starts(problem: AssemblyProblem, spheres: FloatArray, starts: int) -> FloatArray:
     """Frames found by Newton's method from random orientations, on the sphere of some limb."""
     rng = np.random.default_rng(0)
     quaternion = rng.normal(size=(starts, 4))
