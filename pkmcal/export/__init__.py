@@ -5,7 +5,8 @@ from pkmcal.export.delta_gcode import marlin as marlin
 from pkmcal.export.delta_gcode import reprap as reprap
 from pkmcal.export.import_printer import Printer as Printer
 from pkmcal.export.klipper import klipper as klipper
-from pkmcal.export.linear_delta import Loss as Loss
+from pkmcal.export.linuxcnc import linuxcnc as linuxcnc
+from pkmcal.export.loss import Loss as Loss
 from pkmcal.export.mjcf import mjcf as mjcf
 
-__all__ = ["Loss", "Printer", "c_header", "klipper", "marlin", "mjcf", "reprap"]
+__all__ = ["Loss", "Printer", "c_header", "klipper", "linuxcnc", "marlin", "mjcf", "reprap"]

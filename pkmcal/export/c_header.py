@@ -17,6 +17,7 @@ from pkmcal.core.poses import invert
 from pkmcal.exceptions import ArgumentError
 from pkmcal.export import c_source
 from pkmcal.export.c_source import Number
+from pkmcal.export.rendering import rendered
 from pkmcal.files.atomic import write_whole
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot, require_parallel
@@ -77,16 +78,7 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"
             " a header holds machines with as many of both"
         )
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("pkmcal.export"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template("robot.h.jinja").render(_contents(robot, prefix, number))
+    return rendered("robot.h.jinja", _contents(robot, prefix, number))
 
 
 def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:

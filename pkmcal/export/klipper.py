@@ -7,7 +7,8 @@ from os import PathLike
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.exceptions import ArgumentError
-from pkmcal.export.linear_delta import FirmwareDelta, Loss, gains, of_robot
+from pkmcal.export.linear_delta import FirmwareDelta, gains, of_robot
+from pkmcal.export.loss import Loss
 from pkmcal.export.printer_config import (
     DELTA_ANGLES,
     SAME,

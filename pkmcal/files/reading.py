@@ -18,6 +18,7 @@ MOST_TABLE = 500 * MB  # bytes of a CSV file
 MOST_WORKBOOK = 50 * MB  # bytes of an Excel workbook, packed and unpacked
 MOST_ROBOT = 1 * MB  # bytes of a TOML file
 MOST_URDF = 10 * MB
+MOST_TEXT = 100 * MB  # G-code, and configurations of controllers
 MOST_CELLS = 20_000_000  # of a table
 MOST_COLUMNS = 1_000
 LONGEST_NAME = 200  # characters of a name, a heading or a key
