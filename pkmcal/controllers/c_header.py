@@ -14,6 +14,7 @@ from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import c_source
 from pkmcal.controllers.c_source import Number
+from pkmcal.controllers.rendering import rendered
 from pkmcal.core.library import AXES, DRIVERS, MAPS, ROWS, SLOTS
 from pkmcal.core.poses import invert
 from pkmcal.exceptions import ArgumentError
@@ -77,16 +78,7 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"
             " a header holds machines with as many of both"
         )
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("pkmcal.controllers"),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    return environment.get_template("robot.h.jinja").render(_contents(robot, prefix, number))
+    return rendered("robot.h.jinja", _contents(robot, prefix, number))
 
 
 def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:

@@ -110,7 +110,7 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     if firmware != "klipper":
         where = as_path("path", path)
         parse = of_reprap if firmware == "reprap" else of_marlin
-        found = parse(text_in(where), str(where))
+        found = parse(text_in(path), str(where))
         return _printer(where, found, [-1.0] * 3, _GCODE_HEAD, None, 0)
     printer = read(path)
     require_delta(printer)

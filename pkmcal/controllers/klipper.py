@@ -6,7 +6,8 @@ from os import PathLike
 
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
-from pkmcal.controllers.linear_delta import FirmwareDelta, Loss, gains, of_robot
+from pkmcal.controllers.linear_delta import FirmwareDelta, gains, of_robot
+from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.printer_config import (
     DELTA_ANGLES,
     SAME,

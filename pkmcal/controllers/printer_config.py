@@ -10,11 +10,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
-from pathlib import Path
 
 from pkmcal.arguments import path as as_path
 from pkmcal.exceptions import FileError
-from pkmcal.files import reading
+from pkmcal.files.reading import MOST_TEXT, content
 
 STEPPERS = ("stepper_a", "stepper_b", "stepper_c")
 DELTA_ANGLES = dict(zip(STEPPERS, (210.0, 330.0, 90.0), strict=True))  # where the file says nothing
@@ -150,14 +149,14 @@ class PrinterConfig:
 
 def read(path: str | PathLike[str]) -> PrinterConfig:
     """Read a printer.cfg."""
-    where = as_path("path", path)
-    return PrinterConfig(text_in(where), str(where))
+    return PrinterConfig(text_in(path), str(as_path("path", path)))
 
 
-def text_in(where: Path) -> str:
+def text_in(path: str | PathLike[str]) -> str:
     """What a text file says, line ends as they are."""
+    where = as_path("path", path)
     try:
-        return reading.content(where, reading.MOST_PRINTER).decode("utf-8-sig")
+        return content(path, MOST_TEXT).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise FileError(f"{where}: this is no text in UTF-8") from None
 

@@ -276,8 +276,10 @@ def test_three_commands_lead_from_a_config_to_its_changed_lines(run: Any, tmp_pa
     assert probed.measurements is not None
     z = probed.robot.forward(probed.measurements.actuators).pose[:, 2]
     assert np.sqrt(np.mean((z - probed.measurements.values) ** 2)) < 0.03
+    assert run("import", CONFIG, "--out", folder).exit_code == 0  # nobody has touched it
+    Path(robot).write_text(Path(robot).read_text() + "# mine\n")
     again = run("import", CONFIG, "--out", folder)
-    assert again.exit_code == 2 and "exists already" in again.stderr
+    assert again.exit_code == 2 and "would be replaced" in again.stderr
 
 
 def test_options_of_another_target_are_refused(refused: Any, tmp_path: Path) -> None:
