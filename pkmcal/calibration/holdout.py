@@ -70,7 +70,7 @@ def evaluate(
     """
     if not held:
         return HeldOut()
-    equations = Equations([data for data, _ in held], estimator.equations.parameters)
+    equations = Equations([data for data, _ in held], estimator.equations.parameters).commanded()
     after = in_their_modes(equations, equations.at(estimate.evaluation.theta))
     before = equations.at(estimator.start.theta)
     scaled = estimate.covariance * np.outer(estimator.scale, estimator.scale)

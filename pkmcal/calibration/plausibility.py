@@ -64,7 +64,7 @@ def likely_unit_errors(
 
 
 def _alone(data: FitData, parameters: Parameters) -> FloatArray:
-    (residual,) = Equations([data], parameters).start().residuals
+    (residual,) = Equations([data], parameters).commanded().start().residuals
     return residual
 
 

@@ -201,10 +201,13 @@ class Machine:
         call("jacobian", self.struct, len(pose), slots, 0, pose, out, isa=self.isa)
         return out
 
-    def forward_jacobian(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
-        """∂pose/∂q at poses (N, 6): (N, 6, n)."""
+    def forward_jacobian(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool = False
+    ) -> FloatArray:
+        """∂pose/∂q at poses (N, 6): (N, 6, n), or of the twist (ω, v) of the platform by them."""
         out = np.empty((len(pose), 6, self.actuators))
-        call("forward_jacobian", self.struct, len(pose), slots, 0, pose, q, out, isa=self.isa)
+        given = (len(pose), slots, 0, pose, q, twists, out)
+        call("forward_jacobian", self.struct, *given, isa=self.isa)
         return out
 
     def error_jacobian(

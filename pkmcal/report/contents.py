@@ -242,6 +242,7 @@ def as_seen(found: Identification, places: FloatArray) -> FloatArray:
     rows = np.zeros(len(q), dtype=np.intp)
     measured = replace(like.measured.select(rows), actuators=q, group=np.arange(len(q)))
     equations = Equations([replace(like, measured=measured, rows=rows)], known.parameters)
+    equations = equations.commanded()
     point = equations.at(found.fit.end.theta)
     jacobian = equations.jacobian(point)[0][:, :3]
     jacobian *= known.parameters.scale
