@@ -41,6 +41,24 @@ class _Alike(NamedTuple):
     equations: IntArray
 
 
+class Shares(NamedTuple):
+    """What each of G groups of equations has of the residuals.
+
+    Attributes
+    ----------
+    squares : ndarray (G,)
+        Sum of squared residuals, whitened and weighted.
+    freedom : ndarray (G,)
+        Degrees of freedom: the trace of P over the group.
+    information : ndarray (G, G)
+        Sum of the squares of P between groups: twice what the residuals inform of the variances.
+    """
+
+    squares: FloatArray
+    freedom: FloatArray
+    information: FloatArray
+
+
 class Blocks:
     """Which equations belong to which pose.
 
@@ -84,34 +102,40 @@ class Blocks:
         ]).astype(np.intp)  # fmt: skip
         self.idle = poses - len(self.pose_of_unit)
 
-    def rotations(self, by_unknown: FloatArray) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
-        """Equations (G, k) of alike poses and their Q: (G, k, u), and (G, k, k - u).
+    def rotations(self, by_unknown: FloatArray) -> Iterator[tuple[IntArray, FloatArray]]:
+        """Equations (G, k) of alike poses and Q₂ (G, k, k - u), across their unknowns.
 
         `by_unknown` is (E, u).
         """
-        u = self.unknowns
         for each in self._left:
             q = np.linalg.qr(by_unknown[each.equations], mode="complete")[0]
-            yield each.equations, q[:, :, :u], q[:, :, u:]
+            yield each.equations, q[:, :, self.unknowns :]
 
     def left(self, by_unknown: FloatArray, part: FloatArray) -> FloatArray:
         """What is left (M, ...) of equations (E, ...) when the poses have taken theirs."""
         width = part.shape[1:]
         found = [np.empty((0, *width))]
-        for equations, _, rest in self.rotations(by_unknown):
+        for equations, rest in self.rotations(by_unknown):
             mine = part[equations].reshape(*equations.shape, -1)
             found.append((rest.transpose(0, 2, 1) @ mine).reshape(-1, *width))
         return np.concatenate(found)
 
     def given_back(
-        self, by_unknown: FloatArray, weights: FloatArray, residual: FloatArray, taken: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """What is left, said of each equation again: its squared residual and its freedom, (E,).
+        self,
+        by_unknown: FloatArray,
+        group: IntArray,
+        weights: FloatArray,
+        residual: FloatArray,
+        taken: FloatArray,
+    ) -> Shares:
+        """What is left, said of groups of the equations again.
 
         Parameters
         ----------
         by_unknown : ndarray (E, u)
             As for `left`.
+        group : ndarray of int (E,)
+            Which group each equation is of, counted from 0.
         weights : ndarray (U,)
             Of each pose with equations left.
         residual : ndarray (M,)
@@ -121,21 +145,34 @@ class Blocks:
 
         Returns
         -------
-        squares, freedom : ndarray (E,)
-            Of the freedom, 1 less what the pose and what the parameters take of the equation.
+        Shares
+            With P = blocks of Q₂Q₂ᵀ less (Q₂ taken)(Q₂ taken)ᵀ, what takes noise to residuals.
         """
-        squares, freedom = np.zeros(len(by_unknown)), np.zeros(len(by_unknown))
+        count_of = int(group.max()) + 1
+        squares, freedom = np.zeros(count_of), np.zeros(count_of)
+        information = np.zeros((count_of, count_of))
+        outer = np.zeros((count_of, taken.shape[1], taken.shape[1]))
         unit = first = 0
-        for equations, own, rest in self.rotations(by_unknown):
-            count, k, left = rest.shape
+        for equations, rest in self.rotations(by_unknown):
+            count, _, left = rest.shape
             last = first + count * left
-            mine = residual[first:last].reshape(count, left, 1)
+            mine, plain = residual[first:last].reshape(count, left, 1), rest
             leverage = rest @ taken[first:last].reshape(count, left, -1)
             weight = weights[unit : unit + count, None]
-            squares[equations] = ((rest @ mine)[:, :, 0]) ** 2
-            freedom[equations] = weight * (1.0 - (own**2).sum(axis=2)) - (leverage**2).sum(axis=2)
+            of = group[equations]
+            rest = np.sqrt(weight)[:, :, None] * rest
+            blocks = rest @ rest.transpose(0, 2, 1)
+            blocks_squared = blocks * (blocks - 2.0 * leverage @ leverage.transpose(0, 2, 1))
+            free = np.einsum("nii->ni", blocks) - (leverage**2).sum(axis=2)
+            np.add.at(squares, of, ((plain @ mine)[:, :, 0]) ** 2)
+            np.add.at(freedom, of, free)
+            np.add.at(information, (of[:, :, None], of[:, None, :]), blocks_squared)
+            for g in range(count_of):
+                rows = leverage[of == g]
+                outer[g] += rows.T @ rows
             unit, first = unit + count, last
-        return squares, freedom
+        information += np.einsum("gij,hij->gh", outer, outer)
+        return Shares(squares, freedom, information)
 
     def best(
         self, closures: Closures, robot: Calibratable, states: RowStates, system: System

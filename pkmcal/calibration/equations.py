@@ -18,7 +18,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, mm_per_unit, rms
 from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_poses
 from pkmcal.calibration.closures import Closures, Commanded, RowStates, closures_of
-from pkmcal.calibration.elimination import Blocks
+from pkmcal.calibration.elimination import Blocks, Shares
 from pkmcal.calibration.parameters import POINTS, FitData, Parameters
 from pkmcal.core import instruments
 from pkmcal.core.library import STATUS
@@ -433,8 +433,8 @@ class Equations:
         weights: FloatArray,
         residual: FloatArray,
         taken: FloatArray,
-    ) -> tuple[FloatArray, FloatArray]:
-        """Squares and degrees of freedom of each group, (G,) each.
+    ) -> Shares:
+        """Squares and degrees of freedom of each group.
 
         Parameters
         ----------
@@ -454,14 +454,14 @@ class Equations:
         if not self.closures.unknowns:
             group = np.repeat(self._family_of_unit, self.components)
             every = np.repeat(weights, self.components)
+            freedom = np.bincount(group, every - (taken**2).sum(axis=1), count)
             squares = np.bincount(group, residual**2, count)
-            return squares, np.bincount(group, every - (taken**2).sum(axis=1), count)
+            return Shares(squares, freedom, np.diag(freedom))
         _, by_unknown = self._system(
             evaluation.robot, evaluation.states, evaluation.theta, noise
         )
-        of_equations = self._blocks.given_back(by_unknown, weights, residual, taken)
-        found = [np.bincount(self._group_of_equation, each, count) for each in of_equations]
-        return found[0], found[1]
+        group = self._group_of_equation
+        return self._blocks.given_back(by_unknown, group, weights, residual, taken)
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""

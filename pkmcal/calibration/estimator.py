@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pkmcal.arrays import FloatArray, mm_per_unit
+from pkmcal.calibration.elimination import Shares
 from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.identifiability import (
     Decomposed,
@@ -22,6 +23,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.lack_of_fit import SIGNIFICANT, Split, groups, split
 
 _ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
+_LEAST_FALL = 0.1  # of a variance, from one round to the next
 _LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
 LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
 LEAST_REDUNDANCY = 2.0  # the same of one group of several that share poses
@@ -75,10 +77,8 @@ class Estimate:
         Of each unit (`Equations.components`); 1 unless the loss is robust.
     covariance : ndarray (n, n)
         Scaled; nothing along combinations that are not determined.
-    freedom : ndarray (G,)
-        Equations of each group less the poses and parameters they went into: its redundancy.
-    squares : ndarray (G,)
-        Sum of the squared whitened residuals of each group, weighted.
+    shares : Shares
+        Of each group, the sum of squared residuals and what it says of the noise.
     """
 
     evaluation: Evaluation
@@ -87,8 +87,12 @@ class Estimate:
     jacobian: FloatArray
     weights: FloatArray
     covariance: FloatArray
-    freedom: FloatArray
-    squares: FloatArray
+    shares: Shares
+
+    @property
+    def freedom(self) -> FloatArray:
+        """Equations of each group less the poses and parameters they went into, (G,)."""
+        return self.shares.freedom
 
 
 class Estimator:
@@ -217,7 +221,7 @@ class Estimator:
         1 without freedom.
         """
         family_of = self.equations.family_of_group
-        freedom, squares = estimate.freedom, estimate.squares
+        squares, freedom, information = estimate.shares
         medians = None if self.loss == "linear" else self._medians(estimate.residual)
         factor, of_families = np.ones(len(freedom)), np.ones(int(family_of.max()) + 1)
         for f in range(len(of_families)):
@@ -231,9 +235,15 @@ class Estimator:
                 count = float(self.equations.components[of_family].sum())
                 variance = float(medians[f]) * count / left
             of_families[f] = np.sqrt(variance)
-            known = mine[freedom[mine] >= self.least_freedom]
-            share = squares[known] / freedom[known] / together if together > 0 else 1.0
-            factor[known] = np.sqrt(variance * share)
+            known = mine[self.unstated[mine] & (freedom[mine] >= self.least_freedom)]
+            if len(mine) == 1:
+                known = mine
+            # a step of Fisher's scoring of the restricted likelihood: of one group, its mean square
+            excess = np.linalg.solve(
+                information[np.ix_(known, known)], squares[known] - freedom[known]
+            )
+            common = variance / together if together > 0 else 1.0
+            factor[known] = np.sqrt(common * np.maximum(1.0 + excess, _LEAST_FALL))
             if len(mine) == 1 and self.unstated[f]:
                 factor[f] *= np.sqrt(self._inflation(estimate, f))
         return factor, of_families
@@ -302,9 +312,7 @@ class Estimator:
         )
         half = basis @ (rows.T / singular)
         taken = weighted @ half[:, : state.fitted.rank]
-        squares, freedom = self.equations.by_groups(
+        shares = self.equations.by_groups(
             evaluation, state.noise, weights, root * residual, taken
         )
-        return Estimate(
-            evaluation, state, residual, jacobian, weights, half @ half.T, freedom, squares
-        )
+        return Estimate(evaluation, state, residual, jacobian, weights, half @ half.T, shares)
