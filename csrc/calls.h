@@ -23,10 +23,11 @@ int CALL(forward)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
 int CALL(jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                    ptrdiff_t geometry_stride, const double *pose, double *jacobian);
 
-/* pose (n, 6), q (n, actuators) -> dpose/dq (n, 6, actuators). */
+/* pose (n, 6), q (n, actuators) -> dpose/dq (n, 6, actuators), or with `twists` the twist (omega, v) of
+ * the platform's origin in base axes by them. */
 int CALL(forward_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                            ptrdiff_t geometry_stride, const double *pose, const double *q,
-                           double *jacobian);
+                           int twists, double *jacobian);
 
 /* pose (n, 6), q (n, actuators) -> dpose/d(numbers) (n, 6, columns) at held actuators, or with
  * `twists` the twist (omega, v) of the platform's origin in base axes by them; columns are indices

@@ -42,6 +42,8 @@ def sigma_array(
 ) -> FloatArray:
     """Standard deviations (N, k) or covariances (N, k, k)."""
     rows, k = shape
+    if not k:
+        raise ArgumentError(f"sigma: nothing was read of kind {kind!r}; see actuator_sigma")
     if isinstance(given, Tracker):
         if kind != "position":
             raise ArgumentError(f"sigma: a tracker measures positions, not values of kind {kind!r}")
@@ -117,8 +119,9 @@ def target_array(
     given: ArrayLike | None, kind: str, index: Int64Array | None, rows: int
 ) -> FloatArray | None:
     """One target, one per row, or several that an index chooses from; None where none is given."""
-    if kind == "pose" and (given is not None or index is not None):
-        raise ArgumentError("target: a pose is the platform's own and takes no target")
+    if kind in ("pose", "closure") and (given is not None or index is not None):
+        own = "a pose is the platform's own" if kind == "pose" else "a closure reads no point"
+        raise ArgumentError(f"target: {own} and takes no target")
     if index is not None and index.min() < 0:
         raise ArgumentError(f"target_index counts from 0; found {index.min()}")
     if given is None:

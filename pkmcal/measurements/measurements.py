@@ -315,8 +315,16 @@ class Measurements(Result):
     def _title(self) -> str:
         many = "" if len(self) == 1 else "s"
         n = self.actuators.shape[1]
-        parts = [f"{len(self)} measured {self.kind}{many}", f"{n} actuator{'' if n == 1 else 's'}"]
-        parts.append("sigma " + self._sigma_text())
+        what = f"{len(self)} measured {self.kind}{many}"
+        if self.kind == "closure":
+            what = f"{len(self)} row{many} of actuators alone"
+        elif missing := int(np.isnan(self.values.reshape(len(self), -1)).all(axis=1).sum()):
+            what += f" ({missing} not read)"
+        parts = [what, f"{n} actuator{'' if n == 1 else 's'}"]
+        if self.kind != "closure":
+            parts.append("sigma " + self._sigma_text())
+        if self.actuator_sigma is not None:
+            parts.append("actuator_sigma stated")
         if self.target_names is not None:
             known = "" if self.target is not None else " (places not known)"
             parts.append(f"targets {' '.join(self.target_names)}{known}")
@@ -351,4 +359,7 @@ def _column(values: FloatArray, unit: str, sigma: FloatArray | None) -> list[str
     places = 4
     if sigma is not None:
         places = display.decimals(display.displayed(float(sigma.min()), unit)[0])
-    return [display.fixed(display.displayed(float(value), unit)[0], places) for value in values]
+    return [
+        "" if np.isnan(value) else display.fixed(display.displayed(float(value), unit)[0], places)
+        for value in values
+    ]
