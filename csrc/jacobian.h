@@ -16,6 +16,7 @@ INLINE void sphere_derivatives(const pkm_machine *machine, int i, const limb_num
 #define CASE(NAME, name, ...)                                                                     \
     case DRIVER_##NAME: FN(name##_derivatives)(R, p, q, limb->g, F, by_q, by_g); break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
 }
@@ -41,6 +42,7 @@ SHARED void constraint_derivatives(const pkm_machine *machine, int i, int kind,
         FN(name##_derivatives)(R, p, sphere->c, limb->g, F, P, fill(machine->lever[i]), v, by_g); \
         break;
         EACH_ROW(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     for (int k = 0; k < 3; k++) pull[k] = -v[k]; /* Φ depends on d = p + R b - c */
@@ -49,6 +51,7 @@ SHARED void constraint_derivatives(const pkm_machine *machine, int i, int kind,
 #define CASE(NAME, name, ...)                                                                     \
     case DRIVER_##NAME: FN(name##_carry)(q, limb->g, pull, F, by_q, of_anchor); break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     for (int s = 0; s < SLOTS; s++) by_g[s] += of_anchor[s];

@@ -302,7 +302,7 @@ int CALL(arm_jacobian)(const pkm_arm *arm, const pkm_links *links, int frame, pt
     const real still[3] = {fill(0.0), fill(0.0), fill(0.0)};
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
-        motion T;
+        motion T = unmoved();
         const int count = block_rows(first, n, row);
         const motion view = arm_view(arm, links, frame, theta, row);
         for (int i = 0; i < arm->joints; i++) {

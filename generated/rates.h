@@ -1,5 +1,5 @@
 /* Generated from derive/rates.py by `python -m derive`; never edited by hand.
- * derivation 655f6f2c38c2e0d0
+ * derivation e51ad75c7c0a4b9b
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*

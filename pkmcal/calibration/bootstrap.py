@@ -63,14 +63,19 @@ class Bootstrap(Result):
     linear: FloatArray
 
     @property
-    def failed(self) -> int:
+    def n_failed(self) -> int:
         """How many replicates did not converge."""
         return int(np.isnan(self.values).any(axis=1).sum())
 
+    @property
+    def failed(self) -> int:
+        """The former name of `n_failed`."""
+        return self.n_failed
+
     def failures(self) -> str:
         """Say how many replicates failed; empty where none did."""
-        count = f"{self.failed} of {len(self.values)}"
-        return f"{count} replicates did not converge" if self.failed else ""
+        count = f"{self.n_failed} of {len(self.values)}"
+        return f"{count} replicates did not converge" if self.n_failed else ""
 
     def _parts(self) -> Iterator[str | Table]:
         rows = []
@@ -85,7 +90,7 @@ class Bootstrap(Result):
                 name if shown == "mm" else f"{name} [{shown}]",
                 *(display.fixed(number, places) for number in (sigma, linear, bias, low, high)),
             ])  # fmt: skip
-        failed = f", {self.failed} did not converge" if self.failed else ""
+        failed = f", {self.n_failed} did not converge" if self.n_failed else ""
         heads = ["parameter", "stderr", "linear", "bias", "2.5 %", "97.5 %"]
         yield f"{len(self.values)} bootstrap replicates{failed}"
         yield Table(heads, rows, left=1)

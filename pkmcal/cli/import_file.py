@@ -11,8 +11,8 @@ import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.cli.options import Json
 from pkmcal.cli.output import say
+from pkmcal.controllers.import_printer import Firmware
 from pkmcal.exceptions import ArgumentError
-from pkmcal.export.import_printer import Firmware
 from pkmcal.files.atomic import write_whole
 from pkmcal.report.as_json import as_json
 

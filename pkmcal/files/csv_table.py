@@ -19,10 +19,10 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pkmcal import arguments
 from pkmcal.arguments import did_you_mean
+from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.exceptions import FileError
 from pkmcal.files import reading
 from pkmcal.files.reading import LONGEST_NAME, MOST_CELLS, MOST_COLUMNS
@@ -197,9 +197,7 @@ class Table:
             if name not in self.columns:
                 raise self.header_error(f"missing column {name!r}")
 
-    def numbers(
-        self, name: str, *quantities: str, blank: bool = False
-    ) -> tuple[NDArray[np.float64], str]:
+    def numbers(self, name: str, *quantities: str, blank: bool = False) -> tuple[FloatArray, str]:
         """A column of finite numbers in mm or rad.
 
         Parameters
@@ -268,7 +266,7 @@ class Table:
                 raise self.cell_error(name, row, "found an empty cell")
         return column.cells
 
-    def integers(self, name: str) -> NDArray[np.int64]:
+    def integers(self, name: str) -> Int64Array:
         """A column of whole numbers, without unit."""
         cells = self.texts(name)
         for row, cell in enumerate(cells):

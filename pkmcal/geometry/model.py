@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, Unit
+from pkmcal.display import Table, fixed
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 
@@ -136,3 +137,17 @@ class Model:
         """Unit of each actuator coordinate, "mm" or "rad"."""
         units = {limb.actuator: KINDS[limb.kind].actuator_unit for limb in self.limbs}
         return tuple(units[i] for i in range(self.n_actuators))
+
+    def table(self) -> Table:
+        """Kind, actuator and joints of each limb; the joints in the frames of base and platform."""
+        rows = [
+            [
+                *(str(i), limb.kind, f"q{limb.actuator + 1}"),
+                *(fixed(float(place), 3) for place in numbers[:6]),
+            ]
+            for i, (limb, numbers) in enumerate(
+                zip(self.limbs, self.geometry.slots.reshape(len(self.limbs), -1), strict=True), 1
+            )
+        ]
+        heads = [f"{x} [mm]" for x in ("base x", "y", "z", "platform x", "y", "z")]
+        return Table(["limb", "kind", "actuator", *heads], rows, left=3)

@@ -102,12 +102,10 @@ def located(robot: str | os.PathLike[str]) -> tuple[bytes, str, str | None]:
     path = Path(robot)
     if path.is_dir():
         raise FileError(f"{path}: this is a folder, not a robot file")
-    if path.exists():  # also a pipe
-        return reading.content(robot, reading.MOST_ROBOT), str(path), str(path)
-    if isinstance(robot, str) and path.name == robot and not path.suffix:
+    named = isinstance(robot, str) and path.name == robot and not path.suffix
+    if named and not path.exists():
         raise FileError(f"unknown machine {robot!r}{did_you_mean(robot, known, listed=len(known))}")
-    near = (each.name for each in path.parent.glob("*.toml"))
-    raise FileNotFoundError(f"{path}: no such file{did_you_mean(path.name, near, listed=0)}")
+    return reading.content(robot, reading.MOST_ROBOT), str(path), str(path)
 
 
 def write(model: Model, path: str | os.PathLike[str], comment: str = "") -> None:

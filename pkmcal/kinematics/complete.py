@@ -116,8 +116,8 @@ def complete(
     if map == "spatial":
         own = _as_wanted(own, matched, wanted)
     kept = _missing(own, matched, wanted) <= KEPT * np.where(np.array(matched) < 3, size, 1.0)
-    lost = ~kept.all(axis=1)  # a stationary point of least squares that is no solution, or no pose
-    own[lost], q[lost] = np.nan, np.nan
+    unsolved = ~kept.all(axis=1)  # at a stationary point that is no solution, or without a pose
+    own[unsolved], q[unsolved] = np.nan, np.nan
     return own, q
 
 

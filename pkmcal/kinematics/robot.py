@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from copy import copy
 from dataclasses import fields, replace
 from functools import cached_property
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
 from pkmcal.core.machine import Machine
+from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
@@ -24,9 +25,10 @@ from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
 from pkmcal.modes.find import assemblies, continue_path, find_modes, nearest_first, pose_distance
+from pkmcal.result import Result
 
 
-class Robot(Kinematics):
+class Robot(Kinematics, Result):
     """A parallel machine: immutable; `replace` gives a changed one.
 
     Made by `load`. Poses are x y z in mm and α β γ in rad with R = Rz(γ) Ry(β) Rx(α), platform to
@@ -62,8 +64,9 @@ class Robot(Kinematics):
     def __reduce__(self) -> tuple[type[Robot], tuple[Model]]:
         return Robot, (self.model,)
 
-    def __repr__(self) -> str:
-        return f"<Robot {self.name}: {len(self.model.limbs)} limbs, {' '.join(self.coordinates)}>"
+    def _parts(self) -> Iterator[str | Table]:
+        yield f"{self.name}: {len(self.model.limbs)} limbs, {' '.join(self.coordinates)}"
+        yield self.model.table()
 
     # poses the machine can take -------------------------------------------------------------------
 

@@ -127,14 +127,14 @@ def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
         ends = endpoints(problem.machine, start, problem.map, spheres)
         real, all_proven = _real_solutions(problem, ends)
         if ends.lost > 0:
-            reason = f"{ends.lost} of {ends.paths} paths lost"
+            reason = f"{ends.lost} of {ends.paths} paths failed"
         elif ends.lost:
             reason = f"of {ends.paths} paths not as many end alike by two ways around"
     expected = len(real)
     if starts is None:
         starts = STARTS if reason else 0
     if starts:
-        real = np.concatenate([real, _from_random_starts(problem, spheres, starts)])
+        real = np.concatenate([real, from_random_starts(problem, spheres, starts)])
     poses, proof = _certified(problem, real)
     if not reason and not proof.ok.all():
         reason = f"{np.sum(~proof.ok)} modes not certified"
@@ -175,7 +175,7 @@ def _scaled(frames: Any, length: float) -> Any:
     return u
 
 
-def _from_random_starts(problem: AssemblyProblem, spheres: FloatArray, starts: int) -> FloatArray:
+def from_random_starts(problem: AssemblyProblem, spheres: FloatArray, starts: int) -> FloatArray:
     """Frames found by Newton's method from random orientations, on the sphere of some limb."""
     rng = np.random.default_rng(0)
     quaternion = rng.normal(size=(starts, 4))

@@ -66,7 +66,7 @@ class Slice:
 
 
 def verdict(found: Identification) -> tuple[str, str]:
-    """Judge the calibration: "good", "doubtful" or "bad", and one sentence."""
+    """Rate the calibration: "good", "doubtful" or "bad", and one sentence."""
     if not found.converged:
         return "bad", "Not to be trusted: the least squares did not converge."
     if found.warnings:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.calibration.parameters import Parameters
 from pkmcal.core.instruments import seen_points
 from pkmcal.geometry.limb_kinds import KINDS
@@ -141,11 +140,11 @@ def _chain(arm: SerialArm, q: FloatArray) -> FloatArray:
     return np.array(at)
 
 
-def _around(joints: FloatArray) -> NDArray[np.intp]:
+def _around(joints: FloatArray) -> IntArray:
     """Order of the joints around their middle, the first once more at the end."""
     x, y = (joints[:, :2] - joints[:, :2].mean(axis=0)).T
     order = np.argsort(np.arctan2(y, x), kind="stable")
-    closed: NDArray[np.intp] = np.append(order, order[0])
+    closed: IntArray = np.append(order, order[0])
     return closed
 
 

@@ -27,6 +27,8 @@ def found(hexapod: pk.Robot) -> pk.Identification:
 
 def results(found: pk.Identification) -> Iterator[Result]:
     hexapod = pk.load("hexapod")
+    yield hexapod
+    yield pk.load("3r")
     yield found
     yield pk.bootstrap(found, 20)
     yield found.fit.equations.sets[0]

@@ -314,8 +314,3 @@ def test_bytes_that_are_not_text_are_an_error(tmp_path: Path) -> None:
     path.write_bytes("q1 [mm],z [µm]\n1,2\n".encode("latin-1"))
     with pytest.raises(ValueError, match="not a UTF-8 text file"):
         read_measurements(path)
-
-
-def test_a_missing_file_is_an_error_of_the_system(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match="absent"):
-        read_measurements(tmp_path / "absent.csv")

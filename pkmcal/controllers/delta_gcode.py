@@ -16,8 +16,8 @@ import numpy as np
 
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
+from pkmcal.controllers.linear_delta import FirmwareDelta, Loss, of_robot
 from pkmcal.exceptions import FileError
-from pkmcal.export.linear_delta import FirmwareDelta, Loss, of_robot
 from pkmcal.files.atomic import write_whole
 from pkmcal.kinematics.robot import Robot
 

@@ -6,9 +6,8 @@ from os import PathLike
 
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
-from pkmcal.exceptions import ArgumentError
-from pkmcal.export.linear_delta import FirmwareDelta, Loss, gains, of_robot
-from pkmcal.export.printer_config import (
+from pkmcal.controllers.linear_delta import FirmwareDelta, Loss, gains, of_robot
+from pkmcal.controllers.printer_config import (
     DELTA_ANGLES,
     SAME,
     STEPPERS,
@@ -17,6 +16,7 @@ from pkmcal.export.printer_config import (
     require_delta,
     step_of,
 )
+from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.kinematics.robot import Robot
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from pkmcal.arguments import path as as_path
 from pkmcal.exceptions import FileError
+from pkmcal.files import reading
 
 STEPPERS = ("stepper_a", "stepper_b", "stepper_c")
 DELTA_ANGLES = dict(zip(STEPPERS, (210.0, 330.0, 90.0), strict=True))  # where the file says nothing
@@ -156,7 +157,7 @@ def read(path: str | PathLike[str]) -> PrinterConfig:
 def text_in(where: Path) -> str:
     """What a text file says, line ends as they are."""
     try:
-        return where.read_bytes().decode("utf-8-sig")
+        return reading.content(where, reading.MOST_PRINTER).decode("utf-8-sig")
     except UnicodeDecodeError:
         raise FileError(f"{where}: this is no text in UTF-8") from None
 

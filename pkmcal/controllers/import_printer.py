@@ -12,9 +12,9 @@ import numpy as np
 
 from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
-from pkmcal.export.delta_gcode import of_marlin, of_reprap
-from pkmcal.export.linear_delta import FirmwareDelta, as_robot, text_of
-from pkmcal.export.printer_config import (
+from pkmcal.controllers.delta_gcode import of_marlin, of_reprap
+from pkmcal.controllers.linear_delta import FirmwareDelta, as_robot, text_of
+from pkmcal.controllers.printer_config import (
     DELTA_ANGLES,
     STEPPERS,
     PrinterConfig,

@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers.c_header import prepared
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
-from pkmcal.export.c_header import prepared
 from pkmcal.files.atomic import write_whole
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot, require_parallel

@@ -12,11 +12,11 @@ import numpy as np
 from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers import c_source
+from pkmcal.controllers.c_source import Number
 from pkmcal.core.library import AXES, DRIVERS, MAPS, ROWS, SLOTS
 from pkmcal.core.poses import invert
 from pkmcal.exceptions import ArgumentError
-from pkmcal.export import c_source
-from pkmcal.export.c_source import Number
 from pkmcal.files.atomic import write_whole
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot, require_parallel
@@ -80,7 +80,7 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("pkmcal.export"),
+        loader=PackageLoader("pkmcal.controllers"),
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

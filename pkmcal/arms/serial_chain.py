@@ -1,4 +1,4 @@
-"""`Chain`: what an open chain of joints computes from its screws and joint errors."""
+"""`SerialChain`: what an open chain of joints computes from its screws and joint errors."""
 
 from __future__ import annotations
 
@@ -25,10 +25,15 @@ from pkmcal.core.screws import Arm, Links
 from pkmcal.exceptions import ArgumentError
 
 
-class Chain:
+class SerialChain:
     """What a `SerialArm` computes: where its tool is, twists by joints and errors, the inverse.
 
     Its parameters are those of `SerialArm`.
+
+    Attributes
+    ----------
+    core : pkmcal.core.screws.Arm
+        The arm as the core has it.
     """
 
     def __init__(
@@ -46,11 +51,11 @@ class Chain:
         self._kinds = kinds_of(kinds, len(self._axes))
         self._home = motion("home", home)
         prismatic = np.array([kind == "prismatic" for kind in self._kinds], dtype=np.int32)
-        self._arm = Arm(prismatic, joint_frames(self._axes), self._points, self._home)
+        self.core = Arm(prismatic, joint_frames(self._axes), self._points, self._home)
         self._errors = np.zeros((self.n_joints, 6))
         if joint_errors is not None:
             self._errors += checked_errors(joint_errors, self.n_joints, ())
-        self._links = self._arm.links(self._errors)
+        self._links = self.core.links(self._errors)
         if not np.isfinite(self._links.numbers).all():
             raise ArgumentError("points, home or joint_errors are too large to be computed with")
 
@@ -158,7 +163,7 @@ class Chain:
             A wrong shape, no numbers, or errors that are not finite.
         """
         rows, shape, links = self._given(theta, joint_errors)
-        return self._arm.forward(rows, links, threads).reshape(*shape, 4, 4)
+        return self.core.forward(rows, links, threads).reshape(*shape, 4, 4)
 
     def jacobian(
         self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: Frame = "space"
@@ -187,7 +192,7 @@ class Chain:
         """
         seen = frame_number(frame)
         rows, shape, links = self._given(theta, joint_errors)
-        return self._arm.jacobian(rows, links, seen).reshape(*shape, 6, self.n_joints)
+        return self.core.jacobian(rows, links, seen).reshape(*shape, 6, self.n_joints)
 
     def error_jacobian(
         self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: Frame = "space"
@@ -215,7 +220,7 @@ class Chain:
         """
         seen = frame_number(frame)
         rows, shape, links = self._given(theta, joint_errors)
-        return self._arm.error_jacobian(rows, links, seen).reshape(*shape, 6, 6 * self.n_joints)
+        return self.core.error_jacobian(rows, links, seen).reshape(*shape, 6, 6 * self.n_joints)
 
     def inverse(
         self,
@@ -260,4 +265,4 @@ class Chain:
         if joint_errors is None:
             return rows, shape, self._links
         errors = checked_errors(joint_errors, self.n_joints, shape)
-        return rows, shape, self._arm.links(errors)
+        return rows, shape, self.core.links(errors)

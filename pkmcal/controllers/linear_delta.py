@@ -219,7 +219,7 @@ def text_of(firmware: FirmwareDelta, gains: Sequence[float], name: str, head: st
         "[pose]\n"
         + lines({"map": "translation", "home": {"z": round(0.5 * max(firmware.endstops), 3)}}),
         "[parameters]\n" + lines(parameters),
-        "# Heights do not tell which way x is, so angle3 stays, and hardly tell the rods.\n"
+        "# Heights do not determine which way x is, so angle3 stays, and hardly the rods.\n"
         "[calibration]\n"
         + lines({"free": ["radius", "angle1", "angle2", "offset1", "offset2", "offset3"]}),
     ]
