@@ -14,12 +14,14 @@ and with the numbers of the geometry. There are three cases:
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, mm_per_unit
+from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
@@ -87,10 +89,10 @@ class Commanded:
     """Poses that follow from what the actuators read."""
 
     unknowns = equations = 0
-    sigma = None
 
     def __init__(self, read: FloatArray) -> None:
         self.read = read
+        self.sigma: FloatArray | None = None
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
         """Solve the forward kinematics."""
@@ -234,6 +236,12 @@ def _machine(robot: Calibratable) -> Robot:
     return robot
 
 
+def has_equations(robot: Calibratable, sigmas: Sequence[FloatArray | None]) -> bool:
+    """Whether closures are equations, for these deviations of the actuators."""
+    noisy = any(sigma is not None and bool(sigma.any()) for sigma in sigmas)
+    return noisy or (isinstance(robot, Robot) and pose_steps.surplus(robot) > 0)
+
+
 def closures_of(
     robot: Calibratable, read: FloatArray, sigma: FloatArray | None
 ) -> Commanded | NoisyActuators | FreePoses:
@@ -251,9 +259,14 @@ def closures_of(
         more.
     """
     if isinstance(robot, Robot) and pose_steps.surplus(robot) > 0:
+        if sigma is not None and not sigma.all():
+            raise ArgumentError(
+                f"measurements: {robot.name} has more closures than free coordinates, which"
+                " actuators without noise cannot meet: actuator_sigma must be positive, or None"
+            )
         if sigma is None:
             sigma = np.tile(1.0 / mm_per_unit(robot.actuator_units, robot.length), (len(read), 1))
         return FreePoses(robot, read, sigma)
-    if sigma is None or not sigma.any():
+    if sigma is None or not has_equations(robot, [sigma]):
         return Commanded(read)
     return NoisyActuators(read, sigma)

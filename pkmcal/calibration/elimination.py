@@ -1,12 +1,12 @@
 """Poses are nuisance parameters: what is left of the equations when each has taken its own part.
 
 The equations of a pose, k of them with u unknowns of that pose alone, are rotated by a QR
-factorisation of their derivative by the unknowns: u of them determine the pose whatever the common
+factorisation of their derivative by the unknowns: u of them determine the pose whatever the
 parameters are, the k - u others do not depend on it to first order and are what is left,
 
     [J_x | J_θ | r] = Q [R T t; 0 J̄ r̄].
 
-With the poses at their best, the gradient and the Gauss-Newton matrix of the sum of squares by θ are
+With the poses at their best, gradient and Gauss-Newton matrix of the sum of squares by θ are
 those of r̄ and J̄ alone, and so are the marginal covariance and the degrees of freedom (G. H. Golub
 and V. Pereyra, Separable nonlinear least squares: the variable projection method, Inverse Problems
 19 (2003) R1-R26). SciPy has no least squares that does this row by row: with all poses among its
@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.calibration.closures import Closures, RowStates
 from pkmcal.measurements.calibratable import Calibratable
 
@@ -227,9 +227,12 @@ class Blocks:
         return RowStates(states.pose, states.actuators, status)
 
     def _sums(self, squares: FloatArray) -> FloatArray:
-        return np.bincount(self.pose_of, squares, self.poses)
+        sums: FloatArray = np.bincount(self.pose_of, squares, self.poses).astype(np.float64)
+        return sums
 
-    def _normal(self, residual: FloatArray, by_unknown: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _normal(
+        self, residual: FloatArray, by_unknown: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """JᵀJ (K, u, u) and Jᵀr (K, u) of every pose."""
         u = self.unknowns
         matrix, pull = np.zeros((self.poses, u, u)), np.zeros((self.poses, u))
@@ -250,7 +253,7 @@ def _size(states: RowStates) -> float:
 def _steps(
     matrix: FloatArray, pull: FloatArray, damping: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Damped Gauss-Newton steps (K, u), and how much of the sum of squares they should gain (K,)."""
+    """Damped Gauss-Newton steps (K, u), and what they should take off the squares (K,)."""
     u = matrix.shape[1]
     size = np.einsum("kii->ki", matrix)
     ridge = _RIDGE * size.sum(axis=1, keepdims=True) + np.finfo(float).tiny

@@ -9,32 +9,27 @@ themselves, set by set and row by row.
 from __future__ import annotations
 
 import copy
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, mm_per_unit, rms
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
 from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_poses
 from pkmcal.calibration.closures import Closures, Commanded, RowStates, closures_of
 from pkmcal.calibration.elimination import Blocks, Shares
-from pkmcal.calibration.parameters import POINTS, FitData, Parameters
+from pkmcal.calibration.parameters import FitData, Parameters
+from pkmcal.calibration.readings import ROUNDING, Readings, of_read
 from pkmcal.core import instruments
 from pkmcal.core.library import STATUS
 from pkmcal.measurements import orientation
 from pkmcal.measurements.calibratable import Calibratable
-from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import (
     Predicted,
     by_difference,
-    difference,
     distance_per_point,
-    predict,
 )
 from pkmcal.result import failed_rows
-
-_ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +73,7 @@ class Evaluation:
         return RowStates(self.pose, self.actuators, self.status)
 
 
-class Equations:
+class Equations(Readings):
     """The stacked residual equations of all measurements, and their Jacobian.
 
     Parameters
@@ -87,6 +82,8 @@ class Equations:
         The rows to fit; rows with the same actuators are solved once.
     parameters : Parameters
         The parameter vector.
+    unread : int
+        How many rows were left out because nothing was read there.
 
     Attributes
     ----------
@@ -99,43 +96,18 @@ class Equations:
         Of each row of the sets; -1 where none of its equations is left.
     pose_of_unit : ndarray of int (U,)
         The pose of each unit: rows of one pose have its errors in common.
+    idle : int
+        How many rows or poses say nothing: unread, or all that was read determines their pose.
     unstated : ndarray of bool (G,)
         Whose deviation is not known, of each group of equations with a noise of its own: the sets,
         then the actuators where they have equations.
     """
 
-    def __init__(self, datasets: Sequence[FitData], parameters: Parameters) -> None:
-        self.datasets = tuple(datasets)
-        self.sets = tuple(data.measured for data in datasets)
-        self.rows = np.concatenate([data.rows for data in datasets])
-        self.parameters = parameters
-        self._framed = [data.framed for data in datasets]
-        self._columns = [  # of the points that are sought, by what `predict` calls them
-            {
-                name: parameters.columns_of(role, data.measured)
-                for name, role in POINTS[data.measured.kind].items()
-                if role in data.sought
-            }
-            for data in datasets
-        ]
-        self._known = [
-            {
-                name: m.attachments if role == "attachment" else m.targets
-                for name, role in POINTS[m.kind].items()
-                if name not in columns
-            }
-            for m, columns in zip(self.sets, self._columns, strict=True)
-        ]
-        # several targets or repeats at the same actuators are one pose
-        actuators = np.concatenate([m.actuators for m in self.sets])
-        noises = [m.actuator_sigma for m in self.sets]
-        stated = [sigma for sigma in noises if sigma is not None]
-        key = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
-        distinct, inverse = np.unique(key, axis=0, return_inverse=True)
-        n = actuators.shape[1]
-        self.actuators = np.ascontiguousarray(distinct[:, :n])
-        edges = np.cumsum([0, *map(len, self.sets)])
-        self.pose_of = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
+    def __init__(
+        self, datasets: Sequence[FitData], parameters: Parameters, unread: int = 0
+    ) -> None:
+        super().__init__(datasets, parameters)
+        self.datasets, self._unread = tuple(datasets), unread
         guess = np.tile(parameters.robot.home, (len(self.actuators), 1))
         for measured, framed, place in zip(self.sets, self._framed, self.pose_of, strict=True):
             if measured.kind in ("pose", "position") and not framed:
@@ -145,28 +117,21 @@ class Equations:
                     guess[place[read], 3:] = orientation.shortest(measured.values[read, 3:])
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
-        self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
-        self._present = np.concatenate([np.isfinite(m.values).reshape(-1) for m in self.sets])
-        self._whole = bool(self._present.all())
-        self.set_of = np.repeat(np.arange(len(self.sets)), np.diff(edges))
         self._no_sigma = np.array([m.sigma is None for m in self.sets])
-        sigma = np.ascontiguousarray(distinct[:, n:]) if stated else None
+        sigma = self.actuator_sigma
         self._take(closures_of(parameters.robot, self.actuators, sigma), sigma is None)
 
     def _take(self, closures: Closures, estimated: bool) -> None:
         """Build the units for these closures; `estimated`: their deviations are not known."""
         self.closures = closures
-        of_row = np.concatenate([
-            np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in self.sets
-        ])  # fmt: skip
-        pose_of_row = np.concatenate(self.pose_of)
+        of_row, pose_of_row = self.count, np.concatenate(self.pose_of)
         if not closures.unknowns:
             self.unstated: BoolArray = self._no_sigma
             self.components: IntArray = of_row[of_row > 0]
             self.pose_of_unit: IntArray = pose_of_row[of_row > 0]
             self.unit_of_row: IntArray = np.where(of_row > 0, np.cumsum(of_row > 0) - 1, -1)
             self._family_of_unit = self.set_of[of_row > 0]
-            self.idle = int((of_row == 0).sum())
+            self.idle = self._unread + int((of_row == 0).sum())
             return
         self.unstated = np.append(self._no_sigma, estimated)
         poses = len(self.actuators)
@@ -222,8 +187,8 @@ class Equations:
                 return self._system(robot, states, theta, factors)
 
             states = self._blocks.best(self.closures, robot, states, system)
-        predicted = self._predicted(states.pose, theta)
-        residuals = self._residuals(predicted)
+        predicted = self.predicted(states.pose, theta)
+        residuals = self.residuals(predicted)
         return Evaluation(
             theta, robot, states.pose, states.actuators, states.status, predicted, residuals
         )
@@ -234,8 +199,8 @@ class Equations:
         """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
         off, by_unknown = self.closures.residual(robot, states)
         twists = self.closures.twists(robot, states)
-        predicted = self._predicted(states.pose, theta)
-        residuals = self._residuals(predicted)
+        predicted = self.predicted(states.pose, theta)
+        residuals = self.residuals(predicted)
         by_pose = [
             by_difference(m.kind, seen.by_twist @ twists[place], residual)
             for m, seen, place, residual in zip(
@@ -252,9 +217,7 @@ class Equations:
         """Measured less predicted (M,), whitened: what is left when poses have taken their part."""
         if not self.closures.unknowns:
             return self.whitened(evaluation.residuals, noise)
-        off, by_unknown = self._system(
-            evaluation.robot, evaluation.states, evaluation.theta, noise
-        )
+        off, by_unknown = self._system(evaluation.robot, evaluation.states, evaluation.theta, noise)
         return -self._blocks.left(by_unknown, off)
 
     def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
@@ -268,44 +231,6 @@ class Equations:
         by_all[:, : len(p.places)] = of_closures.reshape(len(by_all), -1) / noise[-1]
         _, by_unknown = self._system(robot, states, evaluation.theta, noise)
         return self._blocks.left(by_unknown, np.concatenate([by_all, readings]))
-
-    def _predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
-        """Readings of each set at poses (K, 6)."""
-        frame = self.parameters.frame_at(theta)
-        return tuple(
-            predict(
-                measured.kind,
-                pose[self.pose_of[i]],
-                frame=frame if self._framed[i] else None,
-                origin=self.parameters.origin,
-                **self._known[i],
-                **{name: theta[columns] for name, columns in self._columns[i].items()},
-            )
-            for i, measured in enumerate(self.sets)
-        )
-
-    def _residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
-        """Measured less predicted of each set."""
-        return tuple(
-            difference(measured.kind, measured.values, seen.values)
-            for measured, seen in zip(self.sets, predicted, strict=True)
-        )
-
-    def misfit(self, pose: FloatArray, theta: FloatArray) -> FloatArray:
-        """How far off the worst reading at each pose (K, 6) is, mm (K,); inf without a pose.
-
-        Angles count as their arc. NaN where nothing was read.
-        """
-        worst = np.full(len(pose), np.nan)
-        residuals = self._residuals(self._predicted(pose, theta))
-        for measured, place, residual in zip(self.sets, self.pose_of, residuals, strict=True):
-            arcs = mm_per_unit(measured.units, self.parameters.robot.length)
-            known = np.where(np.isfinite(measured.values.reshape(residual.shape)), residual, 0.0)
-            off = np.linalg.norm(known * arcs, axis=1)
-            off = np.where(np.isfinite(off), off, np.inf)
-            read = np.isfinite(measured.values.reshape(residual.shape)).any(axis=1)
-            np.fmax.at(worst, place[read], off[read])
-        return worst
 
     def start_from(self, rows: IntArray, poses: FloatArray) -> None:
         """Start the forward kinematics of some distinct rows of actuators from poses (s, 6)."""
@@ -409,23 +334,6 @@ class Equations:
             parts.append(by_difference(self.sets[i].kind, part, evaluation.residuals[i]))
         return parts
 
-    def whitened(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
-        """Parts (N, k, ...) of all sets in units of their standard deviation, stacked: (M, ...).
-
-        `noise` (G,) multiplies what `Measurements.sigma` says. What was not read is left out.
-        """
-        stacked = []
-        for part, white, factor in zip(parts, self._whiten, noise[: len(parts)], strict=True):
-            if not self._whole:
-                part = np.nan_to_num(part, nan=0.0)
-            if white.ndim == 3:
-                scaled = np.einsum("nij,nj...->ni...", white, part)
-            else:
-                scaled = white.reshape(*white.shape, *(1,) * (part.ndim - 2)) * part
-            stacked.append((scaled / factor).reshape(-1, *part.shape[2:]))
-        whole = np.concatenate(stacked)
-        return whole if self._whole else whole[self._present]
-
     def by_groups(
         self,
         evaluation: Evaluation,
@@ -454,46 +362,27 @@ class Equations:
         if not self.closures.unknowns:
             group = np.repeat(self._family_of_unit, self.components)
             every = np.repeat(weights, self.components)
-            freedom = np.bincount(group, every - (taken**2).sum(axis=1), count)
-            squares = np.bincount(group, residual**2, count)
+            left = every - (taken**2).sum(axis=1)
+            freedom = np.bincount(group, left, count).astype(np.float64)
+            squares = np.bincount(group, residual**2, count).astype(np.float64)
             return Shares(squares, freedom, np.diag(freedom))
-        _, by_unknown = self._system(
-            evaluation.robot, evaluation.states, evaluation.theta, noise
-        )
+        _, by_unknown = self._system(evaluation.robot, evaluation.states, evaluation.theta, noise)
         group = self._group_of_equation
         return self._blocks.given_back(by_unknown, group, weights, residual, taken)
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""
-        parts = [_rounded(m, self.parameters.robot.length) for m in self.sets]
-        readings = float(np.linalg.norm(self.whitened(parts, noise)))
+        readings = super().rounding(noise)
         sigma = self.closures.sigma
         if sigma is None:
             return readings
-        size = _ROUNDING * float(np.abs(self.actuators).max())
+        size = ROUNDING * float(np.abs(self.actuators).max())
         return float(np.hypot(readings, size / noise[-1] * np.linalg.norm(1.0 / sigma)))
-
-    def unwhiten(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:
-        """Invert `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad."""
-        parts, rest = [], whitened
-        for measured, white, factor in zip(self.sets, self._whiten, noise, strict=True):
-            mine, rest = np.split(rest, [len(measured) * white.shape[1]])
-            part = factor * mine.reshape(len(measured), -1)
-            if white.ndim == 3:
-                parts.append(np.linalg.solve(white, part[:, :, None])[:, :, 0])
-            else:
-                parts.append(part / white)
-        return parts
-
-    def white(self, i: int) -> FloatArray:
-        """Matrices (N, k, k) that make the noise of set `i` one, as its sigma says."""
-        white = self._whiten[i]
-        return white if white.ndim == 3 else white[:, :, None] * np.eye(white.shape[1])
 
     def distances(self, evaluation: Evaluation) -> FloatArray:
         """How far off each measured point is, mm, in the order of the sets."""
         return np.concatenate([
-            distance_per_point(_of_read(m, r))
+            distance_per_point(of_read(m, r))
             for m, r in zip(self.sets, evaluation.residuals, strict=True)
         ])  # fmt: skip
 
@@ -518,44 +407,3 @@ class Equations:
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""
         return failed_rows(self.status(evaluation), STATUS, self.rows, most=10)
-
-
-def _rounded(measured: Measurements, length: float) -> FloatArray:
-    """Rounding errors (N, k) of what is predicted, mm and rad."""
-    values = measured.values.reshape(len(measured), -1)
-    lengths = np.array([unit == "mm" for unit in measured.units])
-    size = np.max(np.nan_to_num(np.abs(values[:, lengths])), initial=0.0) + length
-    return np.broadcast_to(_ROUNDING * size / mm_per_unit(measured.units, length), values.shape)
-
-
-def _of_read(measured: Measurements, residual: FloatArray) -> FloatArray:
-    """Residuals (N, k) of what was read, 0 beside it; NaN in rows where nothing was."""
-    read = np.isfinite(measured.values.reshape(residual.shape))
-    if not residual.shape[1]:
-        return np.full((len(residual), 1), np.nan)
-    if read.all():
-        return residual
-    known = np.where(read, residual, 0.0)
-    known[~read.any(axis=1)] = np.nan
-    return known
-
-
-def _whitening(measured: Measurements, length: float) -> FloatArray:
-    """Factors (N, k) or matrices (N, k, k) that make the noise one; 1 mm where it is not known."""
-    sigma = measured.sigma
-    if sigma is None:
-        return np.tile(mm_per_unit(measured.units, length), (len(measured), 1))
-    if measured.kind == "pose" and not _same_turnings(sigma):
-        sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, 3:]))
-    if sigma.ndim == 2:
-        return 1.0 / sigma
-    missing = np.isnan(measured.values)
-    if missing.any():  # what was read has its marginal covariance
-        apart = missing[:, :, None] | missing[:, None, :]
-        sigma = np.where(apart, np.eye(sigma.shape[1]), sigma)
-    return np.linalg.inv(np.linalg.cholesky(sigma))
-
-
-def _same_turnings(sigma: FloatArray) -> bool:
-    """Whether standard deviations (N, 6) are the same about every axis."""
-    return sigma.ndim == 2 and bool((sigma[:, 4:] == sigma[:, 3:4]).all())

@@ -160,7 +160,7 @@ class Estimator:
         return self._loss(self.loss, np.maximum(np.sqrt(medians), 1.0))
 
     def _medians(self, residual: FloatArray) -> FloatArray:
-        """Variance (F,) that whitened residuals (M,) of each family of units show by their median."""
+        """Variance (F,) that whitened residuals (M,) of each family show by their median."""
         squares, components = self._squares(residual), self.equations.components
         family_of = self.equations.family_of_unit
         return np.array([
@@ -264,15 +264,22 @@ class Estimator:
         if self.equations.closures.unknowns:  # poses of their own take part in what they scatter
             return Split(0.0, 0.0, 0.0, 0.0, 1.0)
         group, residual = self._groups[i], estimate.evaluation.residuals[i]
-        k = residual.shape[1]
-        leverage = len(residual) * k - float(estimate.freedom[i])
+        k, whole = residual.shape[1], np.isfinite(residual).all(axis=1)
+        leverage = float(self.equations.components[self.equations.set_of == i].sum())
+        leverage -= float(estimate.freedom[i])
         if plain:
             lengths = min(k, 3)
             white = np.tile(np.eye(lengths), (len(residual), 1, 1))
-            return split(residual[:, :lengths], white, group, leverage * lengths / k)
-        weights = estimate.weights[self.equations.set_of == i]
-        white = self.equations.white(i) * np.sqrt(weights)[:, None, None]
-        return split(residual, white / estimate.state.noise[i], group, leverage)
+            leverage *= lengths / k
+            residual = residual[:, :lengths]
+        else:
+            weights = estimate.weights[self.equations.set_of == i]
+            white = self.equations.white(i) * np.sqrt(weights)[:, None, None]
+            white = white / estimate.state.noise[i]
+        if not whole.all():  # repeats of a part of a pose are left out
+            group = np.unique(group[whole], return_inverse=True)[1]
+            residual, white = residual[whole], white[whole]
+        return split(residual, white, group, leverage)
 
     def _settled(self, old: IterationState, new: IterationState) -> bool:
         if old.fitted.rank != new.fitted.rank:
@@ -312,7 +319,5 @@ class Estimator:
         )
         half = basis @ (rows.T / singular)
         taken = weighted @ half[:, : state.fitted.rank]
-        shares = self.equations.by_groups(
-            evaluation, state.noise, weights, root * residual, taken
-        )
+        shares = self.equations.by_groups(evaluation, state.noise, weights, root * residual, taken)
         return Estimate(evaluation, state, residual, jacobian, weights, half @ half.T, shares)

@@ -130,9 +130,7 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
     )
 
 
-def misfit(
-    estimator: Estimator, estimate: Estimate, start: Evaluation, end: Evaluation
-) -> Misfit:
+def misfit(estimator: Estimator, estimate: Estimate, start: Evaluation, end: Evaluation) -> Misfit:
     """Residuals before and after, χ² per degree of freedom, noise and outliers.
 
     `start` and `end` are the equations with poses that follow from the actuators.

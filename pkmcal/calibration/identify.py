@@ -10,6 +10,7 @@ import numpy as np
 
 from pkmcal.arguments import instance, word
 from pkmcal.arms.arm import SerialArm
+from pkmcal.calibration.closures import has_equations
 from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.fit import Fit
@@ -132,9 +133,10 @@ def identify(
     elif holdout is not None:
         pairs = [draw(data, holdout) for data in datasets]
         datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
+    datasets, unread = _telling(machine, datasets)
     chosen = parameters(machine, datasets, free, prior, bounds)
     word("loss", loss, LIMITS)
-    equations = Equations(datasets, chosen)
+    equations = Equations(datasets, chosen, unread)
     commanded = equations.commanded()
     start = commanded.start()
     if in_their_modes(commanded, start) is not start:
@@ -168,7 +170,9 @@ def _warnings(
     notes = implausible_changes(estimator.start, estimate.evaluation, equations.parameters)
     if notes or result.rms > _POOR * result.rms_before or result.chi2_per_dof > _NOISY:
         notes = likely_unit_errors(datasets, equations.parameters, fit.start) or notes
-    notes += insufficient_data(estimator.equations, result.rank, result.dof, bool(len(estimator.prior)))
+    notes += insufficient_data(
+        estimator.equations, result.rank, result.dof, bool(len(estimator.prior))
+    )
     if result.chi2_per_dof > _NOISY:
         notes.append(
             f"residuals are {np.sqrt(result.chi2_per_dof):.3g} times what sigma says:"
@@ -177,6 +181,14 @@ def _warnings(
     notes += in_other_modes(equations, fit.end)
     notes += distant_points(fit.end, equations.parameters)
     notes += beyond_strokes(equations, fit.start, fit.end)
+    unknown = estimator.unstated & (estimate.freedom < estimator.least_freedom)
+    if estimator.equations.closures.unknowns and unknown.any():
+        names = [f"of measurements {i + 1}" for i in range(len(equations.sets))]
+        names = [n for n, u in zip([*names, "of the actuators"], unknown, strict=True) if u]
+        notes.append(
+            f"too little is left over to estimate the noise {' and '.join(names)}: state sigma and"
+            " actuator_sigma"
+        )
     kept = estimate.state.determined.rank - estimate.state.fitted.rank
     if kept:
         notes.append(
@@ -230,6 +242,32 @@ def _datasets(
     if any(data.unknown_attachment for data in datasets) and not distances:
         raise ArgumentError("attachment: distances alone have one, it cannot be unknown")
     return datasets
+
+
+def _telling(machine: Calibratable, datasets: list[FitData]) -> tuple[list[FitData], int]:
+    """Leave rows out that say nothing: unread, where poses follow from the actuators exactly.
+
+    And count them.
+    """
+    if has_equations(machine, [data.measured.actuator_sigma for data in datasets]):
+        return datasets, 0
+    kept, unread = [], 0
+    for data in datasets:
+        values = data.measured.values.reshape(len(data.measured), -1)
+        read = np.isfinite(values).any(axis=1)
+        unread += int((~read).sum())
+        if read.all():
+            kept.append(data)
+        elif read.any():
+            measured = data.measured.select(read)
+            kept.append(replace(data, measured=measured, rows=data.rows[read]))
+    if not kept:
+        raise ArgumentError(
+            f"measurements: nothing was read but the actuators; poses of {machine.name} follow from"
+            " these, which then say nothing of its geometry: measure poses, points, heights or"
+            " distances"
+        )
+    return kept, unread
 
 
 def _as_fitted(

@@ -104,6 +104,7 @@ def read_measurements(path: str | PathLike[str], robot: Actuated | None = None) 
     table.rename(known_as)
     table.leave_out(BESIDE)
     several = _several_targets(table)
+    values: FloatArray | None
     _refuse_unknown(table, several)
     actuators, units = _read_actuators(table)
     _compare(table, units, robot)
@@ -116,7 +117,9 @@ def read_measurements(path: str | PathLike[str], robot: Actuated | None = None) 
         actuators, values, fields = _read_several(table, several, actuators, fields)
     else:
         columns = [_read(table, *component, blank=True)[0] for component in COMPONENTS[kind]]
-        values = columns[0] if len(columns) == 1 else np.stack(columns, axis=1) if columns else None
+        values = np.stack(columns, axis=1) if columns else None
+        if len(columns) == 1:
+            values = columns[0]
         fields |= _read_targets(table, kind)
     try:
         return Measurements(actuators, values, kind, actuator_units=units, **fields)

@@ -219,8 +219,7 @@ class Measurements(Result):
         per_row: dict[str, Any] = {
             name: None if value is None else value[picked]
             for name, value in vars(self).items()
-            if name
-            in ("actuators", "values", "sigma", "group", "target_index", "actuator_sigma")
+            if name in ("actuators", "values", "sigma", "group", "target_index", "actuator_sigma")
         }
         for name in ("target", "attachment"):
             place = getattr(self, name)

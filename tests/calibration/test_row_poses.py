@@ -82,12 +82,15 @@ def dense(drawn: Simulated, sigma_lengths: float) -> tuple[np.ndarray, float, np
 
     start = np.concatenate([ANCHORS.ravel(), np.zeros(4), np.zeros(3 * rows)])
     there = least_squares(
-        lambda x: np.linalg.norm(x.reshape(rows, 1, 3) - ANCHORS, axis=2).ravel()
-        - drawn.lengths.ravel(),
+        lambda x: (
+            np.linalg.norm(x.reshape(rows, 1, 3) - ANCHORS, axis=2).ravel() - drawn.lengths.ravel()
+        ),
         np.tile([0.0, 0.0, 600.0], rows),
     ).x
     start[16:] = there
-    found = least_squares(residual, start, "3-point", x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    found = least_squares(
+        residual, start, "3-point", x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15
+    )
     covariance = np.linalg.pinv(found.jac.T @ found.jac)[:16, :16]
     return found.x[:16], 2.0 * found.cost, covariance
 
@@ -169,7 +172,9 @@ def hexapod_drawn(robot: pk.Robot, noise: float) -> tuple[np.ndarray, pk.Measure
     values[lengths] += rng.normal(0, 0.3, int(lengths.sum()))
     true = robot.replace(values)
     q = robot.inverse(pk.sample_poses(robot, 16))
-    read = pk.VirtualMachine(true, noise=0.02, seed=1).measure(q + rng.normal(0, noise, q.shape), "pose")
+    read = pk.VirtualMachine(true, noise=0.02, seed=1).measure(
+        q + rng.normal(0, noise, q.shape), "pose"
+    )
     return q, pk.Measurements(q, read.values, "pose", sigma=read.sigma)
 
 
@@ -223,7 +228,9 @@ def test_noisy_actuators_of_a_hexapod_are_unknowns_like_its_poses() -> None:
         start[places],
         np.hstack([m.values[:, :3], np.zeros((len(q), 3))]).ravel(),
     ])  # fmt: skip
-    best = least_squares(residual, first, "3-point", x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    best = least_squares(
+        residual, first, "3-point", x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15
+    )
     deviation = np.sqrt(np.diag(np.linalg.pinv(best.jac.T @ best.jac)))[: len(places)]
     np.testing.assert_allclose((found.values - best.x[: len(places)]) / deviation, 0.0, atol=1e-3)
     np.testing.assert_allclose(found.stderr, deviation, rtol=1e-3)
@@ -231,7 +238,9 @@ def test_noisy_actuators_of_a_hexapod_are_unknowns_like_its_poses() -> None:
     assert found.dof == 6 * 16 - len(names)
 
 
-@pytest.mark.filterwarnings("ignore:residuals are")  # where the noise of the actuators is not stated
+@pytest.mark.filterwarnings(
+    "ignore:residuals are"
+)  # where the noise of the actuators is not stated
 def test_stated_actuator_noise_makes_the_stated_deviations_true() -> None:
     robot = pk.load("hexapod")
     z: dict[bool, list[np.ndarray]] = {True: [], False: []}
