@@ -23,7 +23,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.lack_of_fit import SIGNIFICANT, Split, groups, split
 
 _ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
-_LEAST_FALL = 0.1  # of a variance, from one round to the next
+_LEAST_FALL = 0.1  # of a mean square, which a step of scoring does not go below
 _LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
 LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
 LEAST_REDUNDANCY = 2.0  # the same of one group of several that share poses
@@ -243,7 +243,8 @@ class Estimator:
                 information[np.ix_(known, known)], squares[known] - freedom[known]
             )
             common = variance / together if together > 0 else 1.0
-            factor[known] = np.sqrt(common * np.maximum(1.0 + excess, _LEAST_FALL))
+            least = _LEAST_FALL * squares[known] / freedom[known]
+            factor[known] = np.sqrt(common * np.maximum(1.0 + excess, least))
             if len(mine) == 1 and self.unstated[f]:
                 factor[f] *= np.sqrt(self._inflation(estimate, f))
         return factor, of_families
