@@ -7,6 +7,7 @@
 #include "motion.h"
 #include "poses.h"
 #include "pso.h"
+#include "readings.h"
 #include "serial.h"
 #include "measured.h"
 #include "tpr2tps.h"

@@ -251,10 +251,11 @@ SHARED void responses(const pkm_machine *machine, ptrdiff_t n, const double *geo
 
 int CALL(forward_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                            ptrdiff_t geometry_stride, const double *pose, const double *q,
-                           double *jacobian)
+                           int twists, double *jacobian)
 {
     if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
-    responses(machine, n, geometry, geometry_stride, pose, q, NULL, machine->actuators, 0, jacobian);
+    responses(machine, n, geometry, geometry_stride, pose, q, NULL, machine->actuators, twists,
+              jacobian);
     return 0;
 }
 

@@ -19,7 +19,7 @@ _ALIASES = {
     "pose": "group",
 }
 BESIDE = ("index", "time", "timestamp", "date", "comment")  # not looked at
-RESERVED = ("sigma", "cov", "target", "attachment")
+RESERVED = ("sigma", "cov", "target", "attachment", "actuator_sigma")
 
 
 def known_as(name: str) -> str:

@@ -230,7 +230,7 @@ class Robot(Kinematics, Result):
         """
         given, own, q, shape = self._commanded(pose, actuators)
         errors = self._by_numbers(own, q, twists=False)
-        errors = self._through_ties(self.frames.rates_outward(own, given, errors))
+        errors = self.through_ties(self.frames.rates_outward(own, given, errors))
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def error_twists(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
@@ -258,8 +258,33 @@ class Robot(Kinematics, Result):
         """
         _, own, q, shape = self._commanded(pose, actuators)
         errors = self._by_numbers(own, q, twists=True)
-        errors = self._through_ties(self.frames.twists_outward(own, errors))
+        errors = self.through_ties(self.frames.twists_outward(own, errors))
         return errors.reshape(*shape, 6, len(self.geometry))
+
+    def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
+        """How the platform turns and moves by each actuator coordinate.
+
+        Parameters
+        ----------
+        pose, actuators : array_like
+            As for `error_jacobian`.
+
+        Returns
+        -------
+        ndarray (..., 6, n)
+            Twists as by `error_twists`, rad and mm per mm or rad.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")
+        >>> twists = robot.actuator_twists(robot.home, robot.inverse(robot.home))
+        >>> bool(np.allclose(twists[5], twists[5, 0]))  # all legs lift it alike
+        True
+        """
+        _, own, q, shape = self._commanded(pose, actuators)
+        by_q = self.machine.forward_jacobian(self.slots, own, q, twists=True)
+        return self.frames.twists_outward(own, by_q).reshape(*shape, 6, self.n_actuators)
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Pose, actuator coordinates and batch shape of poses (..., 6)."""
@@ -295,7 +320,7 @@ class Robot(Kinematics, Result):
             )
         return self.machine.error_jacobian(self.slots, own, q, columns, twists)
 
-    def _through_ties(self, errors: FloatArray) -> FloatArray:
+    def through_ties(self, errors: FloatArray) -> FloatArray:
         """The same (N, 6, p) with the columns of named parameters after those of the numbers."""
         count = len(self.geometry) - errors.shape[2]
         if not count:

@@ -118,6 +118,9 @@ class Calibratable(Protocol):
     def error_twists(self, pose: FloatArray, actuators: FloatArray) -> FloatArray:
         """Derivative (N, 6, p) of the platform's twist to each number."""
 
+    def actuator_twists(self, pose: FloatArray, actuators: FloatArray) -> FloatArray:
+        """Derivative (N, 6, n) of the platform's twist to each actuator coordinate."""
+
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Poses (N, 6), actuator coordinates (N, n) and batch shape of what a user commands."""
 
@@ -217,6 +220,10 @@ class ArmMachine:
         In base axes, at joint coordinates `actuators` (N, n); an arm needs no pose.
         """
         return self.arm.error_jacobian(actuators, frame="tip")
+
+    def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
+        """The same by each joint coordinate, (N, 6, n)."""
+        return self.arm.jacobian(actuators, frame="tip")
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Pose, coordinates and batch shape of joint coordinates (..., n)."""

@@ -11,11 +11,16 @@ columns                               meaning
 ``sigma [mm]``                        standard deviation of the row, of every component
 ``sigma.x [mm]``, ``sigma.alpha``…    … or of each component
 ``cov.x.y [mm*mm]`` …                 … or their covariances, all on and above the diagonal
+``actuator_sigma [mm]``               standard deviation of what every actuator read
+``actuator_sigma.q1 [mm]`` …          … or of each of them
 ``group``                             a whole number, the same for repeats of one pose
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
 ====================================  =============================================================
+
+An empty cell of what was measured says that it was not read there; without any measured column the
+actuators are all that is known.
 
 `pkmcal.files.column_names` matches headings, also as instruments and controllers write them:
 capitals, ``Joint 1``, ``J1``, ``Axis 1``, ``Leg 1`` for q1, ``Height`` for z, ``Roll``, ``Pitch``,
@@ -99,18 +104,22 @@ def read_measurements(path: str | PathLike[str], robot: Actuated | None = None) 
     table.rename(known_as)
     table.leave_out(BESIDE)
     several = _several_targets(table)
+    values: FloatArray | None
     _refuse_unknown(table, several)
     actuators, units = _read_actuators(table)
     _compare(table, units, robot)
     kind = _kind(table, several)
     fields: dict[str, Any] = {"sigma": _read_sigma(table, kind)}
+    fields["actuator_sigma"] = _read_actuator_sigma(table, units)
     if "group" in table.columns:
         fields["group"] = table.integers("group")
     if several:
         actuators, values, fields = _read_several(table, several, actuators, fields)
     else:
-        columns = [_read(table, *component)[0] for component in COMPONENTS[kind]]
-        values = columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
+        columns = [_read(table, *component, blank=True)[0] for component in COMPONENTS[kind]]
+        values = np.stack(columns, axis=1) if columns else None
+        if len(columns) == 1:
+            values = columns[0]
         fields |= _read_targets(table, kind)
     try:
         return Measurements(actuators, values, kind, actuator_units=units, **fields)
@@ -128,7 +137,8 @@ def _several_targets(table: Table) -> tuple[str, ...]:
 def _refuse_unknown(table: Table, several: tuple[str, ...]) -> None:
     components = _AXES + _ANGLES
     names = [*(f"q{i + 1}" for i in range(len(table.columns))), *components, "distance"]
-    names += ["sigma", "group", "target"]
+    names += ["sigma", "group", "target", "actuator_sigma"]
+    names += [f"actuator_sigma.q{i + 1}" for i in range(len(table.columns))]
     names += [f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES]
     names += [f"{target}.{axis}" for target in several for axis in _AXES]
     deviations = [f"sigma.{name}" for name in components]
@@ -178,9 +188,7 @@ def _kind(table: Table, several: tuple[str, ...]) -> Kind:
     if len(there) > 1:
         raise table.header_error(f"more than one thing measured: {' and '.join(there)}")
     if not there:
-        raise table.header_error(
-            "nothing measured: expected columns x, y, z, or z alone, or distance, or A.x, A.y, A.z"
-        )
+        return "closure"
     if "distance" in names:
         return "distance"
     if several:
@@ -222,6 +230,27 @@ def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
         if not (column > 0).all():
             row = int(np.argmin(column > 0))
             raise table.cell_error(name, row, f"must be positive, found {column[row]:g}")
+    return np.stack(columns, axis=1)
+
+
+def _read_actuator_sigma(table: Table, units: tuple[str, ...]) -> FloatArray | None:
+    """Deviations (rows, n) of what the actuators read."""
+    each = [f"actuator_sigma.q{i + 1}" for i in range(len(units))]
+    given = [name for name in table.columns if name.startswith("actuator_sigma")]
+    if not given:
+        return None
+    if given == ["actuator_sigma"]:
+        if len(set(units)) > 1:
+            raise table.header_error(
+                "column 'actuator_sigma' for lengths and angles: expected"
+                f" {each[0]!r} to {each[-1]!r}"
+            )
+        columns = [table.numbers("actuator_sigma", units[0])[0]] * len(units)
+    else:
+        table.require(each)
+        if len(given) > len(each):
+            raise table.header_error("column 'actuator_sigma' does not go with those of actuators")
+        columns = [table.numbers(name, unit)[0] for name, unit in zip(each, units, strict=True)]
     return np.stack(columns, axis=1)
 
 

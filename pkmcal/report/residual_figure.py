@@ -104,7 +104,7 @@ def _quantiles(panel: Axes, found: Identification) -> None:
     estimate = found.fit.estimate
     weighted = (
         estimate.jacobian
-        * np.sqrt(np.repeat(estimate.weights, found.fit.equations.components))[:, None]
+        * np.sqrt(np.repeat(estimate.weights, estimate.state.loss.components))[:, None]
     )
     redundancy = 1.0 - propagate(weighted[:, None], estimate.covariance)
     checked = redundancy > 1e-6  # the others are fitted exactly, whatever was measured

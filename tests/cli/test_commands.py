@@ -257,7 +257,7 @@ ROWS = "-330,-330,-330,0.6\n-347,-317,-332,0.8\n"
     [
         ("q1 [mm],q2 [mm],z [mm]\n-330,-330,0.6\n", "m.csv, line 1: 2 actuator columns, q1 to q2"),
         ("q1 [mm],q3 [mm],z [mm]\n-330,-330,0.6\n", "m.csv, line 1: missing column 'q2'"),
-        ("q1 [mm],q2 [mm],q3 [mm]\n-330,-330,-330\n", "m.csv, line 1: nothing measured"),
+        ("q1 [mm],q2 [mm],q3 [mm]\n-330,-330,-330\n", "nothing was read but the actuators"),
         ("q1 [mm],q2 [mm],q3 [mm],z\n-330,-330,-330,0.6\n", "line 1: column 'z' has no unit"),
         ("q1 [mm],q2 [mm],q3 [deg],z [mm]\n-330,-330,-330,0.6\n", "column 'q3' is an angle"),
         (HEADER + "-330,-330,low,0.6\n", "m.csv, line 2, column 'q3': expected a number"),
