@@ -8,18 +8,13 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, mm_per_unit
 from pkmcal.calibration.equations import Equations, Evaluation
-from pkmcal.calibration.identifiability import (
-    Decomposed,
-    Directions,
-    decompose,
-    directions,
-    triangle,
-)
+from pkmcal.calibration.identifiability import Decomposed, Directions, decompose, directions
 from pkmcal.calibration.least_squares import Search
 from pkmcal.calibration.loss import Loss, LossName
 from pkmcal.calibration.outliers import median_ratio
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.lack_of_fit import SIGNIFICANT, Split, groups, split
+from pkmcal.statistics.linear_fit import triangle
 
 _ROUNDS = 20  # of estimating noise and unidentifiable combinations anew
 _LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise

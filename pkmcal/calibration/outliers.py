@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, first_largest
-from pkmcal.calibration.identifiability import triangle
+from pkmcal.statistics.linear_fit import triangle
 
 _FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
 _ALIKE = 1e-9  # share by which rows are further off than others that are not equally far off
