@@ -25,6 +25,7 @@ from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.least_squares import Search
+from pkmcal.calibration.uncertainty import poses_of_rows
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.observation import corrected
@@ -175,13 +176,7 @@ class Replicate:
     def __init__(self, fit: Fit) -> None:
         self._equations, self._estimate = equations, estimate = fit.equations, fit.estimate
         # rows of one pose take one sign
-        edges = np.cumsum([0, *map(len, equations.sets)])
-        self._pose = np.concatenate(equations.pose_of)
-        for k, measured in enumerate(equations.sets):
-            if measured.group is not None:
-                mine = slice(edges[k], edges[k + 1])
-                self._pose[mine] = measured.pose_index + self._pose.max() + 1
-        _, self._pose = np.unique(self._pose, return_inverse=True)
+        self._pose = poses_of_rows(equations)
         self._residuals = equations.unwhiten(self._corrected(), estimate.state.noise)
 
     def _corrected(self) -> FloatArray:

@@ -8,13 +8,19 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, mm_per_unit
 from pkmcal.calibration.equations import Equations, Evaluation
-from pkmcal.calibration.identifiability import Decomposed, Directions, decompose, directions
+from pkmcal.calibration.identifiability import (
+    ROUNDING,
+    Decomposed,
+    Directions,
+    decompose,
+    directions,
+)
 from pkmcal.calibration.least_squares import Search
 from pkmcal.calibration.loss import Loss, LossName
-from pkmcal.calibration.outliers import median_ratio
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.lack_of_fit import SIGNIFICANT, Split, groups, split
+from pkmcal.statistics import prior_test
 from pkmcal.statistics.linear_fit import triangle
+from pkmcal.statistics.robust_scale import median_ratio
 
 _ROUNDS = 20  # of estimating noise and unidentifiable combinations anew
 _LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
@@ -97,14 +103,12 @@ class Estimator:
         self.unstated = np.array([m.sigma is None for m in equations.sets])
         set_of = np.repeat(equations.set_of, equations.components)
         self._equations_of = [set_of == i for i in range(len(self.unstated))]
-        self._groups = [groups(measured) for measured in equations.sets]
         self._at_start = self.search.jacobian(start, np.ones(len(self.unstated)))
         self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
 
     def solve(self) -> Estimate:
         """Estimate the parameters and, where no sigma is stated, the noise of each set."""
-        ones = np.ones(len(self.unstated))
-        state = self._state(ones, self._first_loss(), None)
+        state = self._state(self._first_noise(), self._first_loss(), None)
         if not state.fitted.rank:
             names = ", ".join(self.equations.parameters.names)
             raise ArgumentError(f"they depend on none of {names}")
@@ -130,6 +134,38 @@ class Estimator:
     def _loss(self, name: LossName, width: FloatArray) -> Loss:
         of_rows = width[self.equations.set_of]
         return Loss(name, self.equations.components, of_rows)
+
+    def _first_noise(self) -> FloatArray:
+        """1 mm where it is not stated; with a prior what the data alone show at the start.
+
+        Noise and prior could else excuse each other: much of one leaves little of the other.
+        """
+        ones = np.ones(len(self.unstated))
+        if not len(self.prior) or self.loss != "linear":
+            return ones
+        residual = self.equations.whitened(self.start.residuals, ones)
+        alone = self._alone(self._at_start, residual)
+        return ones if alone is None else self._kept(ones * alone, ones)
+
+    def _alone(self, jacobian: FloatArray, residual: FloatArray) -> FloatArray | None:
+        """Deviation of what no parameters explain in each set, without the prior's help.
+
+        None where too few equations are left to show it.
+        """
+        _, singular, rows = np.linalg.svd(triangle(jacobian))
+        told = singular > ROUNDING * singular[0]
+        basis = jacobian @ (rows[told].T / singular[told])
+        left = residual - basis @ (basis.T @ residual)
+        squares = np.array([left[mine] @ left[mine] for mine in self._equations_of])
+        freedom = np.array([mine.sum() - (basis[mine] ** 2).sum() for mine in self._equations_of])
+        if freedom.sum() < prior_test.LEAST_FREEDOM or (freedom < LEAST_FREEDOM).any():
+            return None
+        deviation: FloatArray = np.sqrt(squares / freedom)
+        return deviation
+
+    def _kept(self, noise: FloatArray, stated: FloatArray) -> FloatArray:
+        """Estimated noise of sets where none is stated, else what multiplies the stated one."""
+        return np.where(self.unstated, np.maximum(noise, _LEAST_NOISE), stated)
 
     def _first_loss(self) -> Loss:
         """Limits wide enough for the nominal machine, and no wider than gross errors allow."""
@@ -179,11 +215,7 @@ class Estimator:
     def _revised(self, estimate: Estimate) -> IterationState:
         """Estimate unstated noise and limits of the loss, and split the directions anew."""
         factor = self._spread(estimate)
-        noise = np.where(
-            self.unstated,
-            np.maximum(estimate.state.noise * factor, _LEAST_NOISE),
-            estimate.state.noise,
-        )
+        noise = self._kept(estimate.state.noise * factor, estimate.state.noise)
         # while the model is still far off, outliers are rows further off than most
         width = np.where(self.unstated, 1.0, np.maximum(factor, 1.0))
         return self._state(noise, self._loss(self.loss, width), estimate.evaluation)
@@ -192,6 +224,10 @@ class Estimator:
         """Deviation of the whitened residuals of each set, (sets,); 1 without freedom."""
         rows, components = self.equations.set_of, self.equations.components
         squares = self._squares(estimate.residual)
+        if len(self.prior) and self.loss == "linear":
+            alone = self._alone(estimate.jacobian, estimate.residual)
+            if alone is not None:
+                return alone
         factor = np.ones(len(self.unstated))
         for i in np.flatnonzero(estimate.freedom >= LEAST_FREEDOM):
             mine, k = squares[rows == i], components[rows == i]
@@ -199,34 +235,8 @@ class Estimator:
                 variance = mine.sum() / estimate.freedom[i]
             else:
                 variance = median_ratio(mine, k) * k.sum() / estimate.freedom[i]
-            if self.unstated[i]:
-                variance *= self._inflation(estimate, int(i))
             factor[i] = np.sqrt(variance)
         return factor
-
-    def _inflation(self, estimate: Estimate, i: int) -> float:
-        """Factor on the variance under lack of fit, which the repeats of a pose share."""
-        repeated = self._repeats(estimate, i)
-        if not repeated.chance < SIGNIFICANT:
-            return 1.0
-        of_poses = repeated.missed / repeated.missed_freedom
-        return of_poses / ((repeated.pure + repeated.missed) / float(estimate.freedom[i]))
-
-    def repeats(self, estimate: Estimate, plain: bool = False) -> list[Split]:
-        """Pure error and lack of fit of each set, whitened; `plain`: of their lengths in mm."""
-        return [self._repeats(estimate, i, plain) for i in range(len(self._groups))]
-
-    def _repeats(self, estimate: Estimate, i: int, plain: bool = False) -> Split:
-        group, residual = self._groups[i], estimate.evaluation.residuals[i]
-        k = residual.shape[1]
-        leverage = len(residual) * k - float(estimate.freedom[i])
-        if plain:
-            lengths = min(k, 3)
-            white = np.tile(np.eye(lengths), (len(residual), 1, 1))
-            return split(residual[:, :lengths], white, group, leverage * lengths / k)
-        weights = estimate.weights[self.equations.set_of == i]
-        white = self.equations.white(i) * np.sqrt(weights)[:, None, None]
-        return split(residual, white / estimate.state.noise[i], group, leverage)
 
     def _settled(self, old: IterationState, new: IterationState) -> bool:
         if old.fitted.rank != new.fitted.rank:

@@ -11,6 +11,7 @@ from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.estimator import Estimate
 from pkmcal.calibration.identifiability import decompose
 from pkmcal.calibration.parameters import Parameters
+from pkmcal.calibration.uncertainty import Uncertainty
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,15 +26,22 @@ class Fit:
         They at the nominal machine, an unknown frame aligned with the readings.
     estimate : Estimate
         They at the solution, with its statistics.
-    covariance : ndarray (n, n)
-        Of the reported parameters along determined combinations, mm and rad; inf where the noise
-        is not known.
+    uncertainty : Uncertainty
+        How sure it is.
     """
 
     equations: Equations
     start: Evaluation
     estimate: Estimate
-    covariance: FloatArray
+    uncertainty: Uncertainty
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Of the reported parameters (n, n) along determined combinations, mm and rad.
+
+        inf where the noise is not known.
+        """
+        return self.uncertainty.matrix
 
     @property
     def parameters(self) -> Parameters:

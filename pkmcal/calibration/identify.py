@@ -19,7 +19,7 @@ from pkmcal.calibration.fit_statistics import (
     misfit,
     parameter_table,
     repeats,
-    reported_covariance,
+    tested_prior,
 )
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
@@ -28,16 +28,19 @@ from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
 from pkmcal.calibration.parameters import KNOWN, Bounds, FitData, Known, Prior, parameters
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
+    contradicted_prior,
     distant_points,
     implausible_changes,
     insufficient_data,
     likely_unit_errors,
 )
+from pkmcal.calibration.row_errors import likely_row_errors
+from pkmcal.calibration.uncertainty import Uncertainty, uncertainty
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable, as_given, as_machine
-from pkmcal.measurements.lack_of_fit import joined
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.statistics.covariance import RULES, CovarianceRule
 
 _POOR = 0.1  # share of the misfit that a fit worth its name does not leave
 _NOISY = 9.0  # chi²/dof that a slip in sigma does not explain
@@ -55,6 +58,7 @@ def identify(
     holdout: float | Measurements | None = None,
     bounds: Bounds = None,
     attachment: Known | Sequence[Known] = "known",
+    covariance: CovarianceRule = "auto",
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -93,6 +97,11 @@ def identify(
     attachment : {"known", "unknown"} or a sequence of them
         Whether the points of the platform from which distances are measured are known or to be
         found, from where `Measurements.attachment` puts them: ``attachment1.x`` ….
+    covariance : {"auto", "classical", "cluster"}
+        How uncertain the parameters are. "cluster": rows of one pose may share an error, as
+        several targets and repeats do. "classical": all errors are independent. "auto": cluster
+        where the residuals show a shared error or the loss is robust, else classical. The values
+        are the same.
 
     Returns
     -------
@@ -134,6 +143,7 @@ def identify(
         datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
     chosen = parameters(machine, datasets, free, prior, bounds)
     word("loss", loss, LIMITS)
+    word("covariance", covariance, RULES)
     equations = Equations(datasets, chosen)
     start = equations.start()
     if in_their_modes(equations, start) is not start:
@@ -144,11 +154,17 @@ def identify(
         estimator = Estimator(equations, start, loss)
         estimate = estimator.solve()
     except ValueError as error:
-        hint = likely_unit_errors(datasets, chosen, start)
+        hint = likely_unit_errors(datasets, chosen, start) or likely_row_errors(
+            datasets, chosen, start
+        )
         if not hint and not start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
-    result = _result(estimator, estimate, evaluate(held, estimator, estimate))
+    sure = uncertainty(estimator, estimate, covariance)
+    outside = replace(
+        evaluate(held, estimator, estimate, sure), drawn=not isinstance(holdout, Measurements)
+    )
+    result = _result(estimator, estimate, outside, sure)
     notes = _warnings(result, estimator, estimate, datasets)
     for text in notes:
         warnings.warn(text, CalibrationWarning, stacklevel=2)
@@ -167,9 +183,10 @@ def _warnings(
     if result.chi2_per_dof > _NOISY:
         notes.append(
             f"residuals are {np.sqrt(result.chi2_per_dof):.3g} times what sigma says:"
-            f" {_remedy(result, estimator, estimate)}"
+            f" {_remedy(result)}"
         )
     notes += in_other_modes(equations, estimate.evaluation)
+    notes += contradicted_prior(result.prior_test, equations.parameters)
     notes += distant_points(estimate.evaluation, equations.parameters)
     notes += beyond_strokes(equations, estimator.start, estimate.evaluation)
     kept = estimate.state.determined.rank - estimate.state.fitted.rank
@@ -185,9 +202,9 @@ def _warnings(
     return notes
 
 
-def _remedy(result: Identification, estimator: Estimator, estimate: Estimate) -> str:
+def _remedy(result: Identification) -> str:
     """Advise on residuals far above sigma; repeats decide between its two causes."""
-    scatter = joined(estimator.repeats(estimate)).scatter
+    scatter = result.fit.uncertainty.repeats().scatter
     if scatter**2 > _NOISY:
         return f"repeats of a pose scatter {scatter:.3g} times as much as it, state the true sigma"
     cure = "free more parameters"
@@ -255,19 +272,21 @@ def _unknown(argument: str, given: str | Sequence[str], count: int) -> list[bool
     return [word(argument, each, KNOWN) == "unknown" for each in said]
 
 
-def _result(estimator: Estimator, estimate: Estimate, held: HeldOut) -> Identification:
+def _result(
+    estimator: Estimator, estimate: Estimate, held: HeldOut, sure: Uncertainty
+) -> Identification:
     chosen, search = estimator.equations.parameters, estimator.search
-    covariance = reported_covariance(estimator, estimate)
     robot = as_given(chosen.robot.replace(chosen.values_at(estimate.evaluation.theta)))
     if isinstance(robot, Robot):
         robot = robot.closing(estimator.equations.actuators, estimate.evaluation.pose)
     return Identification(
         robot=robot,
-        table=parameter_table(estimator, estimate, covariance),
+        prior_test=tested_prior(estimator, estimate),
+        table=parameter_table(estimator, estimate, sure),
         identifiability=identifiability(estimator, estimate),
-        misfit=misfit(estimator, estimate),
+        misfit=misfit(estimator, estimate, sure),
         holdout=held,
-        repeats=repeats(estimator, estimate),
+        repeats=repeats(sure),
         search=SearchRecord(search.converged, search.evaluations, tuple(search.history)),
-        fit=Fit(estimator.equations, estimator.start, estimate, covariance),
+        fit=Fit(estimator.equations, estimator.start, estimate, sure),
     )

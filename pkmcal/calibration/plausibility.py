@@ -15,6 +15,7 @@ from pkmcal.calibration.parameters import FitData, Parameters
 from pkmcal.display import first_rows
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.statistics.prior_test import PriorTest
 
 _GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
 FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
@@ -184,6 +185,22 @@ def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
                 " is"
             )
     return found
+
+
+def contradicted_prior(test: PriorTest | None, parameters: Parameters) -> list[str]:
+    """Say where the measurements contradict the prior, and how wide one would have to be."""
+    if test is None or not test.contradicted:
+        return []
+    pulls = np.nan_to_num(test.pulls)
+    stated = [i for i, sigma in enumerate(parameters.prior) if np.isfinite(sigma)]
+    worst = [k for k in np.argsort(-np.abs(pulls), kind="stable")[:3] if pulls[k]]
+    shown = ", ".join(f"{parameters.names[stated[k]]} by {abs(pulls[k]):.1f}" for k in worst)
+    chance = min(test.chance, test.pull_chance)
+    return [
+        f"the measurements contradict the prior (p {chance:.1g}): they pull {shown} of the"
+        " deviations that prior and noise let expect; a prior"
+        f" {test.factor:.2g} times as wide would agree"
+    ]
 
 
 def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: bool) -> list[str]:

@@ -8,21 +8,47 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pkmcal import display
+from pkmcal.calibration.distances import Distances
 from pkmcal.calibration.fit_statistics import Identifiability, Misfit, ParameterTable, Repeats
 from pkmcal.calibration.holdout import HeldOut
 from pkmcal.display import Table, first_rows
-from pkmcal.measurements.lack_of_fit import SIGNIFICANT
+from pkmcal.statistics.noise import SIGNIFICANT
 
 _WIDTH = 100  # columns of the terminal
+_SHARED = 0.5  # of a reading's own noise, from which what its pose shares is said
+_FEW = 10.0  # degrees of freedom below which a standard deviation says too little
 
 
 def misfit_table(misfit: Misfit, holdout: HeldOut) -> Table:
     """Misfit before and after, of fitted points and of those held out."""
-    rows = [["fitted", _short(misfit.rms_before), _short(misfit.rms), ""]]
+    rows = [
+        ["fitted, before", *_cells(misfit.before, misfit.outliers)],
+        ["fitted, after", *_cells(misfit.after, misfit.outliers)],
+    ]
+    odd = bool(misfit.outliers or holdout.odd)
     if np.isfinite(holdout.rms):
-        pair = _short(holdout.rms_before), _short(holdout.rms)
-        rows.append(["held out", *pair, f"expected {_short(holdout.expected)}"])
-    return Table(["rms [mm]", "before", "after", ""], rows, left=1)
+        known = np.isfinite(holdout.expected)
+        expected = f"{_short(holdout.expected)} expected" if known else ""
+        rows += [
+            ["held out, before", *_cells(holdout.before, holdout.odd)],
+            ["held out, after", *_cells(holdout.after, holdout.odd), expected],
+        ]
+    heads = ["misfit [mm]", "rms", "median", "95 %", "without outliers", ""]
+    kept = [0, 1, 2, 3, *([4] if odd else []), *([5] if np.isfinite(holdout.rms) else [])]
+    rows = [[*row, ""][: len(heads)] for row in rows]
+    return Table([heads[k] for k in kept], [[row[k] for k in kept] for row in rows], left=1)
+
+
+def _cells(distances: Distances, outliers: Sequence[int]) -> list[str]:
+    without = _short(distances.rms_without_outliers)
+    if outliers:
+        without += f" ({len(outliers)})"
+    return [
+        _short(distances.rms),
+        _short(distances.median),
+        _short(distances.quantile95),
+        without,
+    ]
 
 
 def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -> str:
@@ -32,11 +58,8 @@ def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -
     if np.isfinite(chi2):
         shown = f"{chi2:.2f}" if chi2 < 100 else f"{chi2:.2g}"
         facts.append(f"chi²/dof {shown} (1 ± {np.sqrt(2 / misfit.dof):.2f} expected)")
+    facts += _noise(misfit)
     misses = repeats.lack_of_fit_chance < SIGNIFICANT
-    estimated = [_short(noise) for noise in misfit.noise if np.isfinite(noise)]
-    if estimated:
-        included = ", lack of fit included" if misses else ""
-        facts.append(f"noise {', '.join(estimated)} mm, estimated from the residuals{included}")
     if np.isfinite(repeats.repeatability):
         text = f"repeats scatter by {_short(repeats.repeatability)} mm"
         if misses:
@@ -48,14 +71,28 @@ def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -
     return filled("", "; ".join(facts))
 
 
+def _noise(misfit: Misfit) -> Iterator[str]:
+    """The noise that was estimated, and what of it a pose shares."""
+    estimated = [_short(noise) for noise in misfit.noise if np.isfinite(noise)]
+    if estimated:
+        yield f"noise {', '.join(estimated)} mm, estimated from the residuals"
+    shared = [
+        f"{_short(own)} mm of a reading alone, {_short(pose)} mm that its pose shares"
+        for own, pose in zip(misfit.reading_noise, misfit.pose_noise, strict=True)
+        if pose > _SHARED * own
+    ]
+    if shared:
+        yield f"residuals: {', '.join(shared)}"
+
+
 def limits(
     identifiability: Identifiability,
     parameters: int,
     correlations: Sequence[tuple[str, str, float]],
+    odd: str,
     outliers: Sequence[int],
-    at_bounds: Sequence[str],
 ) -> Iterator[str]:
-    """Where the result has limits: rank, correlations, outliers, bounds."""
+    """Where the result has limits: rank, correlations, outliers; `odd` names the last."""
     if identifiability.rank < parameters:
         gap = f", gap {identifiability.gap:.0e}" if np.isfinite(identifiability.gap) else ""
         yield f"rank {identifiability.rank} of {parameters}{gap}; unidentifiable combinations:"
@@ -67,18 +104,34 @@ def limits(
         more = f" and {len(correlations) - 3} more" if len(correlations) > 3 else ""
         yield filled("correlated: ", shown + more)
     if outliers:
-        yield filled("outliers: ", f"rows {first_rows(outliers, 10)}")
-    if at_bounds:
-        yield filled("at a bound, ± as if it were not there: ", ", ".join(at_bounds))
+        where = "" if odd.startswith("row ") else f": {odd}"
+        yield filled("outliers: ", f"rows {first_rows(outliers, 10)}{where}")
 
 
-def parameter_rows(table: ParameterTable) -> Table:
-    """The parameters with their uncertainty, in as many columns as one screen takes."""
+def bounds(names: Sequence[str]) -> str:
+    """Which parameters ended at a bound."""
+    return filled("at a bound, ± as if it were not there: ", ", ".join(names))
+
+
+def parameter_rows(table: ParameterTable) -> Iterator[str | Table]:
+    """The parameters with their uncertainty, in as many columns as one screen takes.
+
+    Where few degrees of freedom are left, half widths of 95 % intervals, and a line that says so.
+    """
+    sure = np.isfinite(table.stderr)
+    least = float(table.dof[sure].min()) if sure.any() else np.inf
+    half = (table.interval95[:, 1] - table.interval95[:, 0]) / 2.0
+    wide = least < _FEW
     columns = 1 if len(table.free) <= 12 else 2 if len(table.free) <= 24 else 3
-    heads = ["parameter", "value", "change"] if columns < 3 else ["parameter", "value"]
+    heads = ["parameter", "value ± 95 %" if wide else "value", "change"][: 3 if columns < 3 else 2]
     rows = []
     for name, unit, value, sigma, start in zip(
-        table.free, table.units, table.values, table.stderr, table.start, strict=True
+        table.free,
+        table.units,
+        table.values,
+        half if wide else table.stderr,
+        table.start,
+        strict=True,
     ):
         number, shown_unit = display.displayed(float(value), unit)
         deviation, _ = display.displayed(float(sigma), unit)
@@ -89,7 +142,13 @@ def parameter_rows(table: ParameterTable) -> Table:
         if not np.isfinite(deviation):
             text = f"{display.fixed(number, places)} ± {deviation:g}"
         rows.append([label, text, display.fixed(change, places)][: len(heads)])
-    return Table(heads, rows, left=1, columns=columns)
+    yield Table(heads, rows, left=1, columns=columns)
+    if wide:
+        yield filled(
+            "",
+            "± are half widths of 95 % intervals, by Student's t: as few as"
+            f" {least:.2g} degrees of freedom are left",
+        )
 
 
 def filled(lead: str, text: str) -> str:

@@ -10,10 +10,13 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
+from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import Covariance, CovarianceRule, covariance
 from pkmcal.statistics.linear_fit import LinearFit, linear_fit, numbered
 from pkmcal.statistics.noise import Noise, Split, joined, noise, split
 from pkmcal.statistics.pseudo_residuals import PseudoResiduals, pseudo_residuals
+
+FEW = 5.0  # degrees of freedom below which residuals hardly show the noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +73,16 @@ def labels(equations: Equations) -> Labels:
     )
 
 
+def stated_variances(measured: Measurements) -> FloatArray | None:
+    """Mean variance of the lengths of each row (N,), mm², as sigma says; None where it does not."""
+    sigma = measured.sigma
+    if sigma is None:
+        return None
+    squares = sigma**2 if sigma.ndim == 2 else np.diagonal(sigma, axis1=1, axis2=2)
+    means: FloatArray = squares[:, :3].mean(axis=1)
+    return means
+
+
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
     """Covariance, degrees of freedom and noise of an estimate.
@@ -118,6 +131,11 @@ class Uncertainty:
             return np.zeros(len(self.reported))
         return self.covariance.freedom(self.reported)
 
+    @property
+    def poses(self) -> IntArray:
+        """Number of the pose of each row (N,)."""
+        return poses_of_rows(self._equations)
+
     @cached_property
     def by_cluster(self) -> FloatArray:
         """Covariance (p, p) in the basis that allows for whatever rows of a pose share."""
@@ -127,7 +145,9 @@ class Uncertainty:
 
     def in_units(self, whitened: FloatArray) -> FloatArray:
         """Whitened values (M,) in mm and rad."""
-        return np.concatenate([p.ravel() for p in self._equations.unwhiten(whitened, self._factors)])
+        return np.concatenate(
+            [p.ravel() for p in self._equations.unwhiten(whitened, self._factors)]
+        )
 
     @cached_property
     def adjusted(self) -> FloatArray:
@@ -140,9 +160,17 @@ class Uncertainty:
         return chosen
 
     def noise(self, i: int) -> Noise:
-        """Variances in mm² of a length of set `i`."""
+        """Variances in mm² of a length of set `i`; NaN where nothing shows them."""
+        stated = self.stated_variances(i)
+        if stated is not None and self.fit.freedom < FEW:
+            return Noise(float(stated.mean()), 0.0)
         mine = self.lengths_of(i)
-        return noise(self.adjusted[mine], numbered(self.fit.key[mine]))
+        retained = self.covariance.sandwich.retained[mine]
+        return noise(self.adjusted[mine], retained, numbered(self.fit.key[mine]))
+
+    def stated_variances(self, i: int) -> FloatArray | None:
+        """`stated_variances` of set `i`."""
+        return stated_variances(self._equations.sets[i])
 
     def repeats(self, plain: bool = False) -> Split:
         """Pure error and lack of fit, whitened; `plain`: of lengths in mm."""

@@ -73,6 +73,10 @@ class Measurements(Result):
         The point in the platform frame, mm, from which distances are measured: of a wire, a ball
         bar, a leg. One for all rows, one per row, or with `target_index` one for each target.
         None: the platform's origin.
+    lines : (N,) array of int, optional
+        The line of each row in the file it was read from, to name it by.
+    file : str
+        The name of that file.
 
     Raises
     ------
@@ -98,6 +102,8 @@ class Measurements(Result):
     target_names: tuple[str, ...] | None = None
     actuator_units: tuple[str, ...] | None = None
     attachment: FloatArray | None = None
+    lines: Int64Array | None = None
+    file: str = ""
 
     # The types above are those of the attributes; anything array-like is taken.
     def __init__(
@@ -113,6 +119,8 @@ class Measurements(Result):
         target_names: Sequence[str] | None = None,
         actuator_units: str | Sequence[str] | None = None,
         attachment: ArrayLike | None = None,
+        lines: ArrayLike | None = None,
+        file: str = "",
     ) -> None:
         word("kind", kind, COMPONENTS)
         q = numbers("actuators", actuators)
@@ -140,6 +148,8 @@ class Measurements(Result):
             "target_names": names_of_targets(target_names, index, place),
             "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
             "attachment": attachment_array(attachment, kind, targets, len(q)),
+            "lines": None if lines is None else integers("lines", lines, len(q)),
+            "file": file,
         }
         self.__setstate__(fields)
 
@@ -215,7 +225,7 @@ class Measurements(Result):
         per_row: dict[str, Any] = {
             name: None if value is None else value[picked]
             for name, value in vars(self).items()
-            if name in ("actuators", "values", "sigma", "group", "target_index")
+            if name in ("actuators", "values", "sigma", "group", "target_index", "lines")
         }
         for name in ("target", "attachment"):
             place = getattr(self, name)

@@ -96,6 +96,22 @@ class Sandwich:
         return self.adjusted(self.fit.residual[:, None])[:, 0]
 
     @cached_property
+    def retained(self) -> FloatArray:
+        """Variance of each adjusted residual (M,), in that of its error.
+
+        1, or less where the fit has used up what the cluster could show.
+        """
+        kept = np.ones(len(self.fit.residual))
+        for rows, _ in self._blocks:
+            part = self.fit.design[rows]
+            inner = part @ part.transpose(0, 2, 1)
+            values, vectors = np.linalg.eigh(inner)
+            spent = 1.0 - values <= _SPENT
+            if spent.any():
+                kept[rows] -= np.einsum("gij,gj->gi", vectors**2, spent)
+        return kept
+
+    @cached_property
     def data(self) -> FloatArray:
         """Covariance (p, p) in the basis as far as the data's errors make it."""
         pulls = sums(self.fit.design * self.residual[:, None], self.fit.cluster)

@@ -28,6 +28,20 @@ def t_factor(freedom: FloatArray) -> FloatArray:
     return factor
 
 
+def deviation_interval(freedom: float) -> tuple[float, float]:
+    """How many times an estimated deviation the true one may be, in 95 % of estimates.
+
+    Examples
+    --------
+    >>> low, high = deviation_interval(1.0)
+    >>> round(low, 2), round(high, 1)
+    (0.45, 31.9)
+    """
+    from scipy.special import chdtri
+
+    return tuple(float(np.sqrt(freedom / chdtri(freedom, p))) for p in (0.025, 0.975))  # type: ignore[return-value]
+
+
 def t_tail(value: float, freedom: float) -> float:
     """Chance of a t variable further from zero on either side."""
     from scipy.special import stdtr

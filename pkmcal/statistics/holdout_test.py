@@ -15,7 +15,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import numbered, sums
-from pkmcal.statistics.noise import Noise, noise
+from pkmcal.statistics.noise import Noise
 
 CHANCE = 0.01  # below which points contradict the fit …
 RATIO = 1.2  # … if their rms and their median are also so much larger than expected
@@ -80,17 +80,20 @@ class Lengths:
         return float(np.median(np.sqrt(np.bincount(self.row, self.residual**2) / counts)))
 
 
-def holdout_test(fitted: Lengths, held: Lengths, covariance: FloatArray) -> HoldoutTest:
+def holdout_test(
+    fitted: Lengths, held: Lengths, split: Noise, covariance: FloatArray
+) -> HoldoutTest:
     """Compare.
 
     Parameters
     ----------
     fitted, held : Lengths
         Rows that were fitted, and not.
+    split : Noise
+        Variances of the errors of both.
     covariance : ndarray (p, p)
         Of the parameters in the basis of the fit, in the unit of `held`.
     """
-    split = noise(fitted.residual, numbered(fitted.pose, fitted.component))
     expected = split.total + float(
         np.einsum("ij,jk,ik->", held.design, covariance, held.design)
     ) / len(held.residual)

@@ -41,19 +41,27 @@ class Noise:
         return self.total - self.shared
 
 
-def noise(adjusted: FloatArray, key: IntArray) -> Noise:
-    """Split the variance of residuals (M,), adjusted for leverage, by the key (M,) that may share.
+def noise(adjusted: FloatArray, retained: FloatArray, key: IntArray) -> Noise:
+    """Split the variance of residuals; NaN where the fit has used up all of them.
+
+    Parameters
+    ----------
+    adjusted, retained : ndarray (M,)
+        Residuals adjusted for leverage, and the share of their variance that this could restore.
+    key : ndarray of int (M,)
+        Those with the same may share an error.
 
     Examples
     --------
-    >>> together = noise(np.array([1.0, 1.0, -1.0, -1.0]), np.array([0, 0, 1, 1]))
+    >>> together = noise(np.array([1.0, 1.0, -1.0, -1.0]), np.ones(4), np.array([0, 0, 1, 1]))
     >>> together.shared, together.single
     (1.0, 0.0)
     """
-    total = float(np.mean(adjusted**2))
+    shown = float(retained.sum())
+    total = float((adjusted**2).sum()) / shown if shown > 0 else float("nan")
     counts = np.bincount(key)
     pairs = float((counts.astype(np.float64) ** 2 - counts).sum())
-    if not pairs:
+    if not (pairs and shown > 0):
         return Noise(total, 0.0)
     cross = float((sums(adjusted, key) ** 2).sum() - (adjusted**2).sum())
     return Noise(total, min(max(cross / pairs, 0.0), total))

@@ -85,8 +85,9 @@ def prior_test(
     variance, freedom : float
         Of the noise; inf degrees of freedom where it is stated.
     """
-    basis, singular, _ = np.linalg.svd(without, full_matrices=False)
-    if len(singular):
+    basis = np.zeros((len(data), 0))
+    if without.shape[1]:
+        basis, singular, _ = np.linalg.svd(without, full_matrices=False)
         basis = basis[:, singular > _ROUNDING * singular[0]]
     own = with_prior - basis @ (basis.T @ with_prior)
     left = data - basis @ (basis.T @ data)

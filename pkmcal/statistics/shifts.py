@@ -117,7 +117,7 @@ def shifted(
         also = tuple(
             other.candidate
             for other in sorted(trials, key=lambda trial: -trial.drop)
-            if other is not best
+            if other.candidate != best.candidate
             and other.basis.shape[1] <= same
             and best.drop - other.drop < _ALIKE * variance
         )

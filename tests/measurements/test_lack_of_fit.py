@@ -12,7 +12,7 @@ import pytest
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.lack_of_fit import groups, split
+from pkmcal.measurements.repeats import groups
 from pkmcal.measurements.measurements import Measurements
 
 from ..simulated import hexapod_poses, tilted_poses, with_errors

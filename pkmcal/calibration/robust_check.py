@@ -1,0 +1,95 @@
+"""Whether a few rows carry a least-squares fit: a robust fit beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.estimator import Estimator
+from pkmcal.calibration.fit import Fit
+from pkmcal.calibration.outliers import outliers
+from pkmcal.calibration.parameters import FitData
+from pkmcal.statistics.robust_scale import median_ratio, robust_ratio
+
+_SUSPECT = 1.25  # ratio of the linear model's noises from which the robust fit is made
+_MOST = 500  # poses of which it is made, drawn at random
+
+
+@dataclass(frozen=True)
+class RobustCheck:
+    """A robust fit beside a least-squares one.
+
+    Attributes
+    ----------
+    ratio : float
+        Noise of the least-squares fit over that of the robust one.
+    rows : tuple of int
+        Rows that disagree with the rest there.
+    rms : float
+        Of the other rows there, mm.
+    """
+
+    ratio: float
+    rows: tuple[int, ...]
+    rms: float
+
+
+def robust_check(fit: Fit) -> RobustCheck | None:
+    """Compare a least-squares fit with a robust one; None where they agree.
+
+    The linear model at the solution says whether the robust fit is worth its time.
+    """
+    equations, estimate = fit.equations, fit.estimate
+    linear = fit.uncertainty.fit
+    ratio = robust_ratio(linear.design, linear.residual, equations.components)
+    if not ratio > _SUSPECT:
+        return None
+    few = Equations(_drawn(fit), fit.parameters)
+    start = few.at(fit.start.theta)
+    try:
+        estimator = Estimator(few, start, "cauchy")
+        robust = estimator.solve()
+    except ValueError:
+        return None
+    unit = np.ones(len(equations.sets))
+    p = robust.state.fitted.rank
+    m, own = int(few.components.sum()), int(equations.components.sum())
+    if m <= p or own <= p:
+        return None
+    plain = equations.whitened(estimate.evaluation.residuals, unit)
+    left = few.whitened(robust.evaluation.residuals, unit) ** 2
+    squares = np.add.reduceat(left, few.first)
+    scale = median_ratio(squares, few.components) * m / (m - p)
+    odd = outliers(
+        robust.residual,
+        robust.jacobian @ robust.state.fitted.identifiable,
+        few.components,
+        robust.weights,
+        estimator.prior @ robust.state.fitted.identifiable,
+    )
+    off = np.delete(few.distances(robust.evaluation), odd)
+    if not scale > 0 or not off.size:
+        return None
+    return RobustCheck(
+        ratio=float(np.sqrt(plain @ plain / (own - p) / scale)),
+        rows=tuple(few.rows[odd].tolist()),
+        rms=float(np.sqrt(np.mean(off**2))),
+    )
+
+
+def _drawn(fit: Fit) -> list[FitData]:
+    """The fitted rows, or those of some poses if there are more than needed."""
+    equations = fit.equations
+    pose = fit.uncertainty.poses
+    count = int(pose.max()) + 1
+    if count <= _MOST:
+        return list(equations.datasets)
+    chosen = np.isin(pose, np.random.default_rng(0).permutation(count)[:_MOST])
+    drawn = []
+    for i, data in enumerate(equations.datasets):
+        mine = np.flatnonzero(chosen[equations.set_of == i])
+        if len(mine):
+            drawn.append(replace(data, measured=data.measured.select(mine), rows=data.rows[mine]))
+    return drawn
