@@ -104,6 +104,7 @@ class Equations:
                 self._guess[place, :3] = measured.values[:, :3]
                 if measured.kind == "pose":
                     self._guess[place, 3:] = orientation.shortest(measured.values[:, 3:])
+        self.deviations = tuple(np.ones(len(m.components)) for m in self.sets)
         self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
         self.components = np.concatenate([np.full(len(m), len(m.components)) for m in self.sets])
         self.first = np.cumsum(self.components) - self.components  # equation of each row
@@ -165,6 +166,14 @@ class Equations:
             for measured, given in zip(self.sets, values, strict=True)
         )
         other.parameters = replace(self.parameters, start=prior_centre)
+        return other
+
+    def reweighted(self, deviations: Sequence[FloatArray]) -> Equations:
+        """The same where the components (k,) of each set have other relative deviations."""
+        other = copy.copy(self)
+        pairs = zip(self._whiten, deviations, strict=True)
+        other._whiten = [white / relative for white, relative in pairs]
+        other.deviations = tuple(deviations)
         return other
 
     def start(self) -> Evaluation:
@@ -278,11 +287,6 @@ class Equations:
             else:
                 parts.append(part / white)
         return parts
-
-    def white(self, i: int) -> FloatArray:
-        """Matrices (N, k, k) that make the noise of set `i` one, as its sigma says."""
-        white = self._whiten[i]
-        return white if white.ndim == 3 else white[:, :, None] * np.eye(white.shape[1])
 
     def distances(self, evaluation: Evaluation) -> FloatArray:
         """How far off each measured point is, mm, in the order of the sets."""

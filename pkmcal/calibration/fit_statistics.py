@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit, rms
 from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.identifiability import as_sum, observability, sparse_basis
@@ -55,6 +55,9 @@ class Misfit:
     chi2_per_dof: float
     dof: float
     noise: tuple[float, ...]
+    component_noise: tuple[tuple[float, ...], ...]
+    components: tuple[tuple[str, ...], ...]
+    told_apart: bool
     reading_noise: tuple[float, ...]
     pose_noise: tuple[float, ...]
     residuals: tuple[FloatArray, ...]
@@ -155,13 +158,26 @@ def misfit(estimator: Estimator, estimate: Estimate, uncertainty: Uncertainty) -
     )
     split = [uncertainty.noise(i) for i in range(len(equations.sets))]
     shown = estimator.unstated & uncertainty.known
+    by_component = tuple(
+        tuple((sigma * relative / arcs if known else np.full(len(arcs), np.nan)).tolist())
+        for sigma, relative, arcs, known in zip(
+            state.noise,
+            equations.deviations,
+            [mm_per_unit(m.units, estimator.start.robot.length) for m in equations.sets],
+            shown,
+            strict=True,
+        )
+    )
     named = np.isin(np.arange(len(equations.rows)), odd)
     return Misfit(
         rms=equations.rms(estimate.evaluation),
         rms_before=equations.rms(estimator.start),
         chi2_per_dof=float("nan") if no_sigma else float((squares + prior @ prior) / dof),
         dof=dof,
-        noise=tuple(np.where(shown, state.noise, np.nan).tolist()),
+        noise=tuple(rms(np.array(each[:3])) for each in by_component),
+        component_noise=by_component,
+        components=tuple(m.components for m in equations.sets),
+        told_apart=any((relative != 1.0).any() for relative in equations.deviations),
         reading_noise=tuple(float(np.sqrt(part.single)) for part in split),
         pose_noise=tuple(float(np.sqrt(part.shared)) for part in split),
         residuals=estimate.evaluation.residuals,

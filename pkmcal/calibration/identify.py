@@ -35,7 +35,7 @@ from pkmcal.calibration.plausibility import (
     likely_unit_errors,
 )
 from pkmcal.calibration.row_errors import likely_row_errors
-from pkmcal.calibration.uncertainty import Uncertainty, uncertainty
+from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable, as_given, as_machine
@@ -160,7 +160,11 @@ def identify(
         if not hint and not start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
-    sure = uncertainty(estimator, estimate, covariance)
+    unlike = unlike_components(estimator, estimate)
+    if unlike is not None:
+        estimator = Estimator(equations.reweighted(unlike[1]), start, loss)
+        estimate = estimator.solve()
+    sure = uncertainty(estimator, estimate, covariance, None if unlike is None else unlike[0])
     outside = replace(
         evaluate(held, estimator, estimate, sure), drawn=not isinstance(holdout, Measurements)
     )

@@ -72,7 +72,12 @@ def moved(fit: Fit, held: Sequence[FitData], like: Sequence[int]) -> tuple[Moved
     like : sequence of int
         The fitted set of each, whose noise it has.
     """
-    later = Equations(held, fit.parameters)
+    later = Equations(held, fit.parameters).reweighted(
+        [
+            np.ones(len(data.measured.components)) if _differs(fit, data, i) else of_fit
+            for data, i, of_fit in zip(held, like, _deviations(fit, like), strict=True)
+        ]
+    )
     evaluation = in_their_modes(later, later.at(fit.end.theta))
     good = np.concatenate([evaluation.status[place] == 0 for place in later.pose_of])
     chosen = fit.parameters
@@ -125,11 +130,20 @@ def _candidates(names: Sequence[str]) -> list[tuple[list[int], bool]]:
 
 def _noise_factor(fit: Fit, data: FitData, like: int) -> float:
     """What multiplies the deviations of a set of the later session."""
-    factor = float(fit.estimate.state.noise[like])
-    stated, of_fit = data.measured.sigma is not None, fit.equations.sets[like].sigma is not None
-    if stated == of_fit:
-        return factor
+    if not _differs(fit, data, like):
+        return float(fit.estimate.state.noise[like])
+    stated = data.measured.sigma is not None
     return 1.0 if stated else float(np.sqrt(fit.uncertainty.noise(like).total))
+
+
+def _deviations(fit: Fit, like: Sequence[int]) -> list[FloatArray]:
+    return [fit.equations.deviations[i] for i in like]
+
+
+def _differs(fit: Fit, data: FitData, like: int) -> bool:
+    """Whether kind or stated sigma of a set are not those of the fitted set."""
+    own, of_fit = data.measured, fit.equations.sets[like]
+    return own.kind != of_fit.kind or (own.sigma is None) != (of_fit.sigma is None)
 
 
 def _first_session(fit: Fit) -> tuple[FloatArray, FloatArray, np.ndarray]:

@@ -49,6 +49,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "chi2_per_dof",
     "dof",
     "noise",
+    "component_noise",
     "reading_noise",
     "pose_noise",
     "repeatability",
@@ -262,6 +263,14 @@ class Parts:
         included. NaN, too, where no equations are left to show it.
         """
         return self.misfit.noise
+
+    @property
+    def component_noise(self) -> tuple[tuple[float, ...], ...]:
+        """The same of each component, mm and rad.
+
+        Components are told apart where the residuals call for it: lengths and angles, x y and z.
+        """
+        return self.misfit.component_noise
 
     @property
     def reading_noise(self) -> tuple[float, ...]:

@@ -46,20 +46,22 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     ratio = robust_ratio(linear.design, linear.residual, equations.components)
     if not ratio > _SUSPECT:
         return None
-    few = Equations(_drawn(fit), fit.parameters)
+    drawn = _drawn(fit)
+    few = Equations([data for data, _ in drawn], fit.parameters).reweighted(
+        [equations.deviations[i] for _, i in drawn]
+    )
     start = few.at(fit.start.theta)
     try:
         estimator = Estimator(few, start, "cauchy")
         robust = estimator.solve()
     except ValueError:
         return None
-    unit = np.ones(len(equations.sets))
     p = robust.state.fitted.rank
     m, own = int(few.components.sum()), int(equations.components.sum())
     if m <= p or own <= p:
         return None
-    plain = equations.whitened(estimate.evaluation.residuals, unit)
-    left = few.whitened(robust.evaluation.residuals, unit) ** 2
+    plain = equations.whitened(estimate.evaluation.residuals, np.ones(len(equations.sets)))
+    left = few.whitened(robust.evaluation.residuals, np.ones(len(few.sets))) ** 2
     squares = np.add.reduceat(left, few.first)
     scale = median_ratio(squares, few.components) * m / (m - p)
     odd = outliers(
@@ -79,17 +81,18 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     )
 
 
-def _drawn(fit: Fit) -> list[FitData]:
-    """The fitted rows, or those of some poses if there are more than needed."""
+def _drawn(fit: Fit) -> list[tuple[FitData, int]]:
+    """The fitted rows, or those of some poses if there are more than needed; and their sets."""
     equations = fit.equations
     pose = fit.uncertainty.poses
     count = int(pose.max()) + 1
     if count <= _MOST:
-        return list(equations.datasets)
+        return [(data, i) for i, data in enumerate(equations.datasets)]
     chosen = np.isin(pose, np.random.default_rng(0).permutation(count)[:_MOST])
     drawn = []
     for i, data in enumerate(equations.datasets):
         mine = np.flatnonzero(chosen[equations.set_of == i])
         if len(mine):
-            drawn.append(replace(data, measured=data.measured.select(mine), rows=data.rows[mine]))
+            few = replace(data, measured=data.measured.select(mine), rows=data.rows[mine])
+            drawn.append((few, i))
     return drawn

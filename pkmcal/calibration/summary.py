@@ -76,6 +76,14 @@ def _noise(misfit: Misfit) -> Iterator[str]:
     estimated = [_short(noise) for noise in misfit.noise if np.isfinite(noise)]
     if estimated:
         yield f"noise {', '.join(estimated)} mm, estimated from the residuals"
+    for names, deviations in zip(misfit.components, misfit.component_noise, strict=True):
+        lengths, angles = deviations[:3], deviations[3:]
+        if len(set(lengths)) > 1:
+            each = " ".join(map(_short, lengths))
+            yield f"noise of {' '.join(names[:3])} {each} mm"
+        if angles and misfit.told_apart:
+            each = " ".join(dict.fromkeys(_short(float(np.degrees(a))) for a in angles))
+            yield f"noise of the angles {each} deg"
     shared = [
         f"{_short(own)} mm of a reading alone, {_short(pose)} mm that its pose shares"
         for own, pose in zip(misfit.reading_noise, misfit.pose_noise, strict=True)

@@ -11,10 +11,12 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.statistics.covariance import Covariance, CovarianceRule, covariance
+from pkmcal.statistics.clusters import shared_error_score
+from pkmcal.statistics.covariance import SHARED, Covariance, CovarianceRule, covariance
 from pkmcal.statistics.linear_fit import LinearFit, linear_fit, numbered
 from pkmcal.statistics.noise import Noise, Split, joined, noise, split
 from pkmcal.statistics.pseudo_residuals import PseudoResiduals, pseudo_residuals
+from pkmcal.statistics.variance_components import told_apart, variance_components
 
 FEW = 5.0  # degrees of freedom below which residuals hardly show the noise
 
@@ -184,16 +186,59 @@ class Uncertainty:
         return joined(parts)
 
 
-def uncertainty(estimator: Estimator, estimate: Estimate, rule: CovarianceRule) -> Uncertainty:
-    """Say how sure an estimate is; `rule` is that of `identify`."""
+def uncertainty(
+    estimator: Estimator,
+    estimate: Estimate,
+    rule: CovarianceRule,
+    classes: IntArray | None = None,
+) -> Uncertainty:
+    """Say how sure an estimate is.
+
+    Parameters
+    ----------
+    estimator, estimate : Estimator, Estimate
+        The fit.
+    rule : {"auto", "classical", "cluster"}
+        That of `identify`.
+    classes : ndarray of int (M,), optional
+        Classes of equations whose variances were estimated apart; see `unlike_components`.
+    """
     equations, state = estimator.equations, estimate.state
     named = labels(equations)
-    robust = estimator.loss != "linear"
+    fit, pseudo = _linear_fit(estimator, estimate, named)
+    chosen = equations.parameters
+    rates = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
+    spare = bool((estimate.freedom >= LEAST_FREEDOM)[estimator.unstated].all())
+    apart = None
+    if classes is not None:
+        apart = variance_components(fit, classes, _prior_residual(estimator, estimate))
+    return Uncertainty(
+        labels=named,
+        fit=fit,
+        pseudo=pseudo,
+        covariance=covariance(
+            fit,
+            rule,
+            stated=not estimator.unstated.any(),
+            robust=estimator.loss != "linear",
+            components=apart,
+        ),
+        reported=rates @ fit.back,
+        known=spare,
+        _equations=equations,
+        _factors=state.noise,
+    )
+
+
+def _linear_fit(
+    estimator: Estimator, estimate: Estimate, named: Labels
+) -> tuple[LinearFit, PseudoResiduals]:
+    state = estimate.state
     pseudo = PseudoResiduals(estimate.residual, 1.0, 1.0)
-    if robust:
+    if estimator.loss != "linear":
         pseudo = pseudo_residuals(
             estimate.residual,
-            equations.components,
+            estimator.equations.components,
             estimate.weights,
             state.loss.decline(estimate.residual),
             state.determined.rank,
@@ -206,16 +251,55 @@ def uncertainty(estimator: Estimator, estimate: Estimate, rule: CovarianceRule) 
         named.pose,
         named.component,
     )
-    chosen = equations.parameters
-    rates = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
-    spare = bool((estimate.freedom >= LEAST_FREEDOM)[estimator.unstated].all())
-    return Uncertainty(
-        labels=named,
-        fit=fit,
-        pseudo=pseudo,
-        covariance=covariance(fit, rule, stated=not estimator.unstated.any(), robust=robust),
-        reported=rates @ fit.back,
-        known=spare,
-        _equations=equations,
-        _factors=state.noise,
-    )
+    return fit, pseudo
+
+
+def _prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:
+    chosen = estimator.equations.parameters
+    left: FloatArray = estimator.prior @ ((chosen.start - estimate.evaluation.theta) / chosen.scale)
+    return left
+
+
+def unlike_components(
+    estimator: Estimator, estimate: Estimate
+) -> tuple[IntArray, list[FloatArray]] | None:
+    """Whether components of a set without sigma have unlike variances.
+
+    Tried in turn: lengths and angles, x y and z and angles, each component.
+
+    Returns
+    -------
+    classes : ndarray of int (M,)
+        Of the equations.
+    deviations : list of ndarray (k,)
+        Relative deviation of each component of each set.
+
+    None where nothing speaks for it, where sigma is stated and for robust losses, which allow for
+    anything.
+    """
+    equations = estimator.equations
+    several = any(len(m.components) > 1 for m in equations.sets)
+    if estimator.loss != "linear" or not estimator.unstated.all() or not several:
+        return None
+    named = labels(equations)
+    fit, _ = _linear_fit(estimator, estimate, named)
+    score = shared_error_score(fit)
+    shared = 0.0
+    if score > SHARED:
+        split = noise(fit.residual, np.ones(len(fit.residual)), fit.key)
+        shared = split.shared / split.total
+    place = np.concatenate([np.tile(np.arange(len(m.components)), len(m)) for m in equations.sets])
+    schemes = (np.zeros(6), [0, 0, 0, 1, 1, 1], [0, 0, 1, 2, 2, 2], np.arange(6))
+    candidates = [
+        numbered(named.set_of, np.asarray(scheme, dtype=np.intp)[place]) for scheme in schemes
+    ]
+    found = told_apart(fit, candidates, _prior_residual(estimator, estimate), shared)
+    if found is None:
+        return None
+    of_equation = np.sqrt(found.variances)[found.classes]
+    first = equations.first[np.cumsum([0, *map(len, equations.sets[:-1])])]
+    deviations = [
+        of_equation[at : at + len(m.components)]
+        for at, m in zip(first, equations.sets, strict=True)
+    ]
+    return found.classes, deviations

@@ -12,7 +12,7 @@ statsmodels' mixed models have random effects, but no classes of residual varian
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -118,22 +118,27 @@ def variance_components(
 
 
 def told_apart(
-    fit: LinearFit, candidates: Iterable[IntArray], prior_residual: FloatArray
+    fit: LinearFit, candidates: Sequence[IntArray], prior_residual: FloatArray, shared: float
 ) -> VarianceComponents | None:
-    """The finest classes that the residuals call for; None where one variance will do.
+    """The finest classes that the residuals call for; None where the first will do.
 
     Parameters
     ----------
     fit : LinearFit
-        The fit with equal variances.
-    candidates : iterable of ndarray of int (M,)
+        The fit with the variances of the first classes.
+    candidates : sequence of ndarray of int (M,)
         Classes, coarse ones first.
     prior_residual : ndarray (q,)
         Residuals of the prior's rows.
+    shared : float
+        Share of the variance that equations of one cluster and component have in common: their
+        squares then say less than as many independent ones.
     """
-    present = variance_components(fit, np.zeros(len(fit.residual), dtype=np.intp), prior_residual)
+    together = len(fit.residual) / (int(fit.key.max()) + 1)
+    inflation = 1.0 + (together - 1.0) * shared**2
+    present = variance_components(fit, candidates[0], prior_residual)
     found = None
-    for classes in candidates:
+    for classes in candidates[1:]:
         many = int(classes.max()) + 1
         if present is None or fit.freedom < _LEAST_FREEDOM * many:
             continue
@@ -141,6 +146,7 @@ def told_apart(
         more = many - len(present.variances)
         if other is None or more <= 0:
             continue
-        if chi2_tail(2.0 * (other.likelihood - present.likelihood), more) < _DIFFERENT:
+        gained = 2.0 * (other.likelihood - present.likelihood) / inflation
+        if chi2_tail(gained, more) < _DIFFERENT:
             present = found = other
     return found
