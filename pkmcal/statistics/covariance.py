@@ -94,7 +94,8 @@ class Covariance:
         prior = ((contrasts @ self.fit.prior.T) ** 2).sum(axis=1)
         with np.errstate(divide="ignore", invalid="ignore"):
             factor = np.where(prior > 0, (1.0 + prior / data) ** 2, 1.0)
-        found: FloatArray = np.where(data > 0, own * factor, np.where(prior > 0, np.inf, own))
+            mixed = own * factor
+        found: FloatArray = np.where(data > 0, mixed, np.where(prior > 0, np.inf, own))
         return found
 
 
