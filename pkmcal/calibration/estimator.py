@@ -152,7 +152,7 @@ class Estimator:
 
         None where too few equations are left to show it.
         """
-        _, singular, rows = np.linalg.svd(triangle(jacobian))
+        _, singular, rows = np.linalg.svd(triangle(jacobian), full_matrices=False)
         told = singular > ROUNDING * singular[0]
         basis = jacobian @ (rows[told].T / singular[told])
         left = residual - basis @ (basis.T @ residual)

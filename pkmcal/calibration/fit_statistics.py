@@ -96,7 +96,7 @@ def parameter_table(
     shown = uncertainty.matrix.copy()
     shown[unknown] = shown[:, unknown] = np.nan
     shown[unknown, unknown] = np.inf
-    stderr = np.sqrt(np.diagonal(shown))
+    stderr = np.sqrt(np.maximum(np.diagonal(shown), 0.0))
     freedom = np.where(np.isfinite(stderr), uncertainty.freedom, 0.0)
     values = chosen.reported(theta)
     half = t_factor(freedom) * np.where(np.isfinite(stderr), stderr, np.inf)
@@ -120,7 +120,7 @@ def parameter_table(
 
 def _correlation(covariance: FloatArray, known: BoolArray) -> FloatArray:
     """Correlations (n, n) of a covariance; NaN beside parameters that are not determined."""
-    deviation = np.sqrt(np.diagonal(covariance))
+    deviation = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
     scale = np.where(known & (deviation > 0), deviation, np.nan)
     matrix: FloatArray = covariance / np.outer(scale, scale)
     return matrix

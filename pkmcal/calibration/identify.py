@@ -190,7 +190,7 @@ def _warnings(
             f" {_remedy(result)}"
         )
     notes += in_other_modes(equations, estimate.evaluation)
-    notes += contradicted_prior(result.prior_test, equations.parameters)
+    notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(estimate.evaluation, equations.parameters)
     notes += beyond_strokes(equations, estimator.start, estimate.evaluation)
     kept = estimate.state.determined.rank - estimate.state.fitted.rank

@@ -12,7 +12,7 @@ from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit, rms
 from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.parameters import FitData, Parameters
-from pkmcal.display import first_rows
+from pkmcal.display import chance_text, first_rows
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.prior_test import PriorTest
@@ -187,19 +187,21 @@ def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
     return found
 
 
-def contradicted_prior(test: PriorTest | None, parameters: Parameters) -> list[str]:
+def contradicted_prior(
+    test: PriorTest | None, parameters: Parameters, with_outliers: bool
+) -> list[str]:
     """Say where the measurements contradict the prior, and how wide one would have to be."""
     if test is None or not test.contradicted:
         return []
     pulls = np.nan_to_num(test.pulls)
     stated = [i for i, sigma in enumerate(parameters.prior) if np.isfinite(sigma)]
     worst = [k for k in np.argsort(-np.abs(pulls), kind="stable")[:3] if pulls[k]]
-    shown = ", ".join(f"{parameters.names[stated[k]]} by {abs(pulls[k]):.1f}" for k in worst)
-    chance = min(test.chance, test.pull_chance)
+    shown = ", ".join(f"{parameters.names[stated[k]]} {abs(pulls[k]):.1f}" for k in worst)
+    pulled = f" and pull {shown} times as far as prior and noise let expect" if worst else ""
     return [
-        f"the measurements contradict the prior (p {chance:.1g}): they pull {shown} of the"
-        " deviations that prior and noise let expect; a prior"
-        f" {test.factor:.2g} times as wide would agree"
+        f"the measurements contradict the prior ({chance_text(test.chance_of_either)}){pulled}: a"
+        f" prior {test.factor:.2g} times as wide would agree"
+        + (", or leave the outliers out" if with_outliers else "")
     ]
 
 

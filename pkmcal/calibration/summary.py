@@ -21,34 +21,26 @@ _FEW = 10.0  # degrees of freedom below which a standard deviation says too litt
 
 def misfit_table(misfit: Misfit, holdout: HeldOut) -> Table:
     """Misfit before and after, of fitted points and of those held out."""
-    rows = [
-        ["fitted, before", *_cells(misfit.before, misfit.outliers)],
-        ["fitted, after", *_cells(misfit.after, misfit.outliers)],
-    ]
-    odd = bool(misfit.outliers or holdout.odd)
+    rows = [["fitted", *_cells(misfit.before, misfit.after, misfit.outliers), ""]]
     if np.isfinite(holdout.rms):
         known = np.isfinite(holdout.expected)
-        expected = f"{_short(holdout.expected)} expected" if known else ""
-        rows += [
-            ["held out, before", *_cells(holdout.before, holdout.odd)],
-            ["held out, after", *_cells(holdout.after, holdout.odd), expected],
-        ]
-    heads = ["misfit [mm]", "rms", "median", "95 %", "without outliers", ""]
-    kept = [0, 1, 2, 3, *([4] if odd else []), *([5] if np.isfinite(holdout.rms) else [])]
-    rows = [[*row, ""][: len(heads)] for row in rows]
+        expected = f"rms {_short(holdout.expected)} expected" if known else ""
+        cells = _cells(holdout.before, holdout.after, holdout.odd)
+        rows.append(["held out", *cells, expected])
+    heads = ["misfit [mm]", "rms before", "rms after", "median", "95 %", "rms without outliers", ""]
+    kept = [
+        k for k in range(len(heads)) if k < 5 or (k == 5 and (misfit.outliers or holdout.odd))
+        or (k == 6 and rows[-1][6])
+    ]  # fmt: skip
     return Table([heads[k] for k in kept], [[row[k] for k in kept] for row in rows], left=1)
 
 
-def _cells(distances: Distances, outliers: Sequence[int]) -> list[str]:
-    without = _short(distances.rms_without_outliers)
+def _cells(before: Distances, after: Distances, outliers: Sequence[int]) -> list[str]:
+    numbers = before.rms, after.rms, after.median, after.quantile95, after.rms_without_outliers
+    cells = [_short(number) for number in numbers]
     if outliers:
-        without += f" ({len(outliers)})"
-    return [
-        _short(distances.rms),
-        _short(distances.median),
-        _short(distances.quantile95),
-        without,
-    ]
+        cells[-1] += f" ({len(outliers)})"
+    return cells
 
 
 def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -> str:

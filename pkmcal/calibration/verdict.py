@@ -15,7 +15,7 @@ from pkmcal.calibration.robust_check import RobustCheck
 from pkmcal.calibration.row_errors import likely_row_errors
 from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.uncertainty import FEW
-from pkmcal.display import decimals, displayed, fixed, printable
+from pkmcal.display import chance_text, decimals, displayed, fixed, printable
 from pkmcal.statistics.distributions import deviation_interval
 
 State = Literal["calibrated", "doubtful", "not calibrated"]
@@ -119,7 +119,7 @@ def _contradicted(found: Parts, moved: tuple[Moved, ...]) -> list[str]:
     if found.holdout_contradicts:
         reasons.append(
             f"the held-out points contradict the fit: {_mm(found.holdout_rms)} rms where"
-            f" {_mm(found.holdout_expected)} is expected (p {found.holdout_chance:.1g})"
+            f" {_mm(found.holdout_expected)} is expected ({chance_text(found.holdout_chance)})"
         )
     elif test is not None and test.few_off and found.holdout_outliers:
         count = len(found.holdout_outliers)

@@ -18,6 +18,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.statistics.clusters import Sandwich, shared_error_score
 from pkmcal.statistics.distributions import chi2_tail
 from pkmcal.statistics.linear_fit import LinearFit
+from pkmcal.statistics.prior_test import LEAST_FREEDOM, data_alone
 from pkmcal.statistics.variance_components import VarianceComponents
 
 CovarianceRule = Literal["auto", "classical", "cluster"]
@@ -122,12 +123,24 @@ def covariance(
     components : VarianceComponents, optional
         Of classes of equations, for the classical covariance.
     """
-    score, freedom = shared_error_score(fit), fit.freedom
+    score, (squares, freedom) = shared_error_score(fit), _spare(fit, robust)
     scale, of_scale = 1.0, np.inf
-    if not stated or robust or chi2_tail(fit.squares, freedom) < REFUTED:
+    if not stated or robust or chi2_tail(squares, freedom) < REFUTED:
         of_scale = max(freedom, 0.0)
-        scale = float(np.sqrt(fit.squares / freedom)) if freedom > 0 else float("nan")
+        scale = float(np.sqrt(squares / freedom)) if freedom > 0 else float("nan")
     chosen: Literal["classical", "cluster"] = "classical"
     if rule == "cluster" or (rule == "auto" and (robust or score > SHARED)):
         chosen = "cluster"
     return Covariance(fit, chosen, score, scale, of_scale, components)
+
+
+def _spare(fit: LinearFit, robust: bool) -> tuple[float, float]:
+    """Sum of squares that shows the noise, and its degrees of freedom.
+
+    With a prior that of the data alone: a prior that they contradict is no noise.
+    """
+    if len(fit.prior) and not robust:
+        squares, freedom = data_alone(fit.design, fit.residual)
+        if freedom >= LEAST_FREEDOM:
+            return squares, freedom
+    return fit.squares, fit.freedom

@@ -46,9 +46,14 @@ class PriorTest:
     factor: float
 
     @property
+    def chance_of_either(self) -> float:
+        """How likely the mean square or the largest pull would be as large."""
+        return min(1.0, 2.0 * min(self.chance, self.pull_chance))
+
+    @property
     def contradicted(self) -> bool:
         """Whether the data contradict the prior."""
-        return min(self.chance, self.pull_chance) < CONTRADICTED
+        return self.chance_of_either < CONTRADICTED
 
 
 def data_alone(jacobian: FloatArray, data: FloatArray) -> tuple[float, float]:

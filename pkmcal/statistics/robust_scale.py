@@ -12,6 +12,8 @@ from pkmcal.arrays import FloatArray, IntArray
 
 _LIMIT = 2.385  # of the Cauchy loss: 95 % as efficient as least squares for Gaussian noise
 _ROUNDS, _SETTLED = 60, 1e-4
+_LEAST_FREEDOM = 5  # below, some rows are always met
+_MET = 1e-6  # share of the first scale below which half of the rows are met exactly
 
 
 def median_ratio(squares: FloatArray, components: IntArray) -> float:
@@ -22,7 +24,7 @@ def median_ratio(squares: FloatArray, components: IntArray) -> float:
 
 
 def robust_ratio(design: FloatArray, residual: FloatArray, components: IntArray) -> float:
-    """Noise of the least-squares fit over that of the robust one; NaN without freedom.
+    """Noise of the least-squares fit over that of the robust one; NaN with few equations.
 
     Parameters
     ----------
@@ -34,16 +36,18 @@ def robust_ratio(design: FloatArray, residual: FloatArray, components: IntArray)
         Equations of each row.
     """
     m, p = design.shape
-    if m - p < 1:
+    if m - p < _LEAST_FREEDOM:
         return float("nan")
     first = np.cumsum(components) - components
     factor = m / (m - p)
     left = residual
-    scale = np.inf
+    scale = first_scale = np.inf
     for _ in range(_ROUNDS):
         squares = np.add.reduceat(left**2, first)
         revised = np.sqrt(median_ratio(squares, components) * factor)
-        if not revised > 0 or abs(revised / scale - 1.0) < _SETTLED:
+        if np.isinf(first_scale):
+            first_scale = revised
+        if not revised > _MET * first_scale or abs(revised / scale - 1.0) < _SETTLED:
             break
         scale = revised
         weights = np.repeat(1.0 / (1.0 + squares / (scale * _LIMIT) ** 2 / components), components)

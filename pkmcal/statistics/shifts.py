@@ -176,7 +176,7 @@ def _together(
     columns = [raw[trial.candidate] for trial, _, _ in taken]
     n = design.shape[1]
     whole = np.hstack([design, *columns])
-    _, singular, rows = np.linalg.svd(triangle(whole))
+    _, singular, rows = np.linalg.svd(triangle(whole), full_matrices=False)
     keep = singular > _ROUNDING * singular[0]
     half = rows[keep].T / singular[keep]
     basis = whole @ half
@@ -205,7 +205,7 @@ def _fit(design: FloatArray, residual: FloatArray, cluster: IntArray) -> LinearF
 
 def _orthonormal(matrix: FloatArray) -> FloatArray:
     """Orthonormal basis (M, r) of the columns."""
-    _, singular, rows = np.linalg.svd(triangle(matrix))
+    _, singular, rows = np.linalg.svd(triangle(matrix), full_matrices=False)
     keep = singular > _ROUNDING * singular[0]
     basis: FloatArray = matrix @ (rows[keep].T / singular[keep])
     return basis
