@@ -106,13 +106,19 @@ class Estimator:
         self._at_start = self.search.jacobian(start, np.ones(len(self.unstated)))
         self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
 
-    def solve(self) -> Estimate:
-        """Estimate the parameters and, where no sigma is stated, the noise of each set."""
+    def solve(self, near: Evaluation | None = None) -> Estimate:
+        """Estimate the parameters and, where no sigma is stated, the noise of each set.
+
+        The search begins at `near`, or else at the start.
+        """
         state = self._state(self._first_noise(), self._first_loss(), None)
         if not state.fitted.rank:
             names = ", ".join(self.equations.parameters.names)
             raise ArgumentError(f"they depend on none of {names}")
         u = np.zeros(len(self.scale))
+        if near is not None:
+            self.equations.warm_start(near)
+            u = (near.theta - self.start.theta) / self.scale
         for _ in range(_ROUNDS):
             # rows that nothing contradicts pin what is not determined
             kept = state.fitted.unidentifiable

@@ -156,7 +156,7 @@ def misfit(estimator: Estimator, estimate: Estimate, uncertainty: Uncertainty) -
         estimate.weights,
         estimator.prior @ fitted,
     )
-    split = [uncertainty.noise(i) for i in range(len(equations.sets))]
+    split = uncertainty.noises
     shown = estimator.unstated & uncertainty.known
     by_component = tuple(
         tuple((sigma * relative / arcs if known else np.full(len(arcs), np.nan)).tolist())

@@ -184,7 +184,7 @@ def _rows_of(named: Labels) -> list[IntArray]:
 
 def _variances(measured: Measurements, uncertainty: Uncertainty, like: int) -> FloatArray:
     """Variance of a length of each row, mm² (N,): that of the fitted set, by sigma where stated."""
-    total = uncertainty.noise(like).total
+    total = uncertainty.noises[like].total
     own, fitted = stated_variances(measured), uncertainty.stated_variances(like)
     if own is None or fitted is None:
         return np.full(len(measured), total)
@@ -195,7 +195,7 @@ def _fitted_lengths(uncertainty: Uncertainty, sets: IntArray) -> tuple[Lengths, 
     """Lengths of some fitted sets, each in units of its own deviation, and how these split."""
     unit = np.zeros(len(uncertainty.fit.residual))
     for i in sets:
-        unit[uncertainty.lengths_of(int(i))] = np.sqrt(uncertainty.noise(int(i)).total)
+        unit[uncertainty.lengths_of(int(i))] = np.sqrt(uncertainty.noises[i].total)
     mine = unit > 0
     named = uncertainty.labels
     residual = uncertainty.adjusted[mine] / unit[mine]

@@ -163,7 +163,7 @@ def identify(
     unlike = unlike_components(estimator, estimate)
     if unlike is not None:
         estimator = Estimator(equations.reweighted(unlike[1]), start, loss)
-        estimate = estimator.solve()
+        estimate = estimator.solve(estimate.evaluation)
     sure = uncertainty(estimator, estimate, covariance, None if unlike is None else unlike[0])
     outside = replace(
         evaluate(held, estimator, estimate, sure), drawn=not isinstance(holdout, Measurements)

@@ -133,7 +133,7 @@ def _noise_factor(fit: Fit, data: FitData, like: int) -> float:
     if not _differs(fit, data, like):
         return float(fit.estimate.state.noise[like])
     stated = data.measured.sigma is not None
-    return 1.0 if stated else float(np.sqrt(fit.uncertainty.noise(like).total))
+    return 1.0 if stated else float(np.sqrt(fit.uncertainty.noises[like].total))
 
 
 def _deviations(fit: Fit, like: Sequence[int]) -> list[FloatArray]:

@@ -161,8 +161,12 @@ class Uncertainty:
         chosen: BoolArray = self.labels.length & (self.labels.set_of == i)
         return chosen
 
-    def noise(self, i: int) -> Noise:
-        """Variances in mm² of a length of set `i`; NaN where nothing shows them."""
+    @cached_property
+    def noises(self) -> tuple[Noise, ...]:
+        """Variances in mm² of a length of each set; NaN where nothing shows them."""
+        return tuple(self._noise(i) for i in range(len(self._equations.sets)))
+
+    def _noise(self, i: int) -> Noise:
         stated = self.stated_variances(i)
         if stated is not None and self.fit.freedom < FEW:
             return Noise(float(stated.mean()), 0.0)
@@ -274,8 +278,8 @@ def unlike_components(
     deviations : list of ndarray (k,)
         Relative deviation of each component of each set.
 
-    None where nothing speaks for it, where sigma is stated and for robust losses, which allow for
-    anything.
+    None where nothing speaks for it; where sigma is stated; for robust losses; and where rows of a
+    pose share errors, which are the model's more than the instrument's and no ground for weights.
     """
     equations = estimator.equations
     several = any(len(m.components) > 1 for m in equations.sets)
@@ -283,17 +287,14 @@ def unlike_components(
         return None
     named = labels(equations)
     fit, _ = _linear_fit(estimator, estimate, named)
-    score = shared_error_score(fit)
-    shared = 0.0
-    if score > SHARED:
-        split = noise(fit.residual, np.ones(len(fit.residual)), fit.key)
-        shared = split.shared / split.total
+    if shared_error_score(fit) > SHARED:
+        return None
     place = np.concatenate([np.tile(np.arange(len(m.components)), len(m)) for m in equations.sets])
     schemes = (np.zeros(6), [0, 0, 0, 1, 1, 1], [0, 0, 1, 2, 2, 2], np.arange(6))
     candidates = [
         numbered(named.set_of, np.asarray(scheme, dtype=np.intp)[place]) for scheme in schemes
     ]
-    found = told_apart(fit, candidates, _prior_residual(estimator, estimate), shared)
+    found = told_apart(fit, candidates, _prior_residual(estimator, estimate))
     if found is None:
         return None
     of_equation = np.sqrt(found.variances)[found.classes]

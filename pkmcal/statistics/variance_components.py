@@ -23,7 +23,7 @@ from pkmcal.statistics.linear_fit import LinearFit
 
 _LEAST_FREEDOM = 15.0  # degrees of freedom for each class that is told apart
 _DIFFERENT = 0.01  # chance of the likelihood ratio below which classes are told apart
-_ROUNDS, _SETTLED = 500, 1e-9
+_ROUNDS, _SETTLED, _STEP = 50, 1e-10, 1.0  # of the logarithms of the variances
 _TINY = 1e-18  # of the mean variance: a class that the fit meets exactly
 
 
@@ -85,24 +85,24 @@ def variance_components(
     floor = _TINY * square.sum() / count.sum()
     theta = np.maximum(square / count, floor)
     for _ in range(_ROUNDS):
-        normal = np.einsum("c,cij->ij", 1.0 / theta, inner) + of_prior
+        normal = np.tensordot(1.0 / theta, inner, 1) + of_prior
         plain = np.linalg.inv(normal)
         shift = plain @ (pulls.T @ (1.0 / theta) + pull)
-        left = square - 2.0 * pulls @ shift + np.einsum("i,cij,j->c", shift, inner, shift)
-        spent = np.einsum("ij,cji->c", plain, inner) / theta
+        left = square - 2.0 * pulls @ shift + (inner @ shift) @ shift
+        slopes = inner / theta[:, None, None] ** 2
+        turned = plain @ slopes
+        spent = np.trace(turned, axis1=1, axis2=2) * theta
         if (count - spent < 1e-6 * count).any():
             return None
-        revised = np.maximum(left / (count - spent), floor)
-        settled = bool((np.abs(revised / theta - 1.0) < _SETTLED).all())
-        theta = revised
-        if settled:
+        information = 0.5 * np.tensordot(turned, turned, ((1, 2), (2, 1)))
+        information[np.arange(k), np.arange(k)] += 0.5 * (count - 2.0 * spent) / theta**2
+        # Fisher scoring of the logarithms
+        slope = 0.5 * (left / theta - (count - spent))
+        step = np.linalg.solve(information * np.outer(theta, theta), slope)
+        theta = np.maximum(theta * np.exp(np.clip(step, -_STEP, _STEP)), floor)
+        if np.abs(step).max() < _SETTLED:
             break
-    slopes = inner / theta[:, None, None] ** 2
-    turned = np.einsum("ij,cjk->cik", plain, slopes)
-    information = 0.5 * np.einsum("aij,bji->ab", turned, turned)
-    diagonal = 0.5 * (count - 2.0 * spent) / theta**2
-    information[np.arange(k), np.arange(k)] += diagonal
-    of_variances = np.linalg.pinv(information, hermitian=True)
+    of_variances = np.asarray(np.linalg.inv(information), dtype=np.float64)
     excess = np.einsum("c,cij->ij", np.diagonal(of_variances) / theta, slopes)
     excess -= np.einsum("ab,aij,jk,bkl->il", of_variances, slopes, plain, slopes, optimize=True)
     rest = prior_residual - fit.prior @ shift
@@ -118,7 +118,7 @@ def variance_components(
 
 
 def told_apart(
-    fit: LinearFit, candidates: Sequence[IntArray], prior_residual: FloatArray, shared: float
+    fit: LinearFit, candidates: Sequence[IntArray], prior_residual: FloatArray
 ) -> VarianceComponents | None:
     """The finest classes that the residuals call for; None where the first will do.
 
@@ -130,12 +130,7 @@ def told_apart(
         Classes, coarse ones first.
     prior_residual : ndarray (q,)
         Residuals of the prior's rows.
-    shared : float
-        Share of the variance that equations of one cluster and component have in common: their
-        squares then say less than as many independent ones.
     """
-    together = len(fit.residual) / (int(fit.key.max()) + 1)
-    inflation = 1.0 + (together - 1.0) * shared**2
     present = variance_components(fit, candidates[0], prior_residual)
     found = None
     for classes in candidates[1:]:
@@ -146,7 +141,7 @@ def told_apart(
         more = many - len(present.variances)
         if other is None or more <= 0:
             continue
-        gained = 2.0 * (other.likelihood - present.likelihood) / inflation
+        gained = 2.0 * (other.likelihood - present.likelihood)
         if chi2_tail(gained, more) < _DIFFERENT:
             present = found = other
     return found

@@ -12,8 +12,8 @@ import pytest
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.repeats import groups
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.repeats import groups
 from pkmcal.statistics.noise import split
 
 from ..simulated import hexapod_poses, tilted_poses, with_errors
