@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from html import escape
 from itertools import islice, zip_longest
 
+_LEAST_CHANCE = 1e-16  # below, digits are rounding's
 _MOST_ROWS = 20  # of a table with a row for each pose
 _LONGEST_NAME = 120  # letters that are shown of one
 _MOST_DECIMALS = 15  # a double has no digits beyond; also what an exact number is given
@@ -91,6 +92,17 @@ def first_rows(rows: Iterable[int], most: int = 5) -> str:
     """
     shown = [str(row) for row in islice(rows, most + 1)]
     return ", ".join(shown[:most]) + (", …" if len(shown) > most else "")
+
+
+def chance_text(chance: float) -> str:
+    """A p-value in words.
+
+    Examples
+    --------
+    >>> chance_text(0.0312), chance_text(0.0)
+    ('p 0.031', 'p < 1e-16')
+    """
+    return f"p {chance:.2g}" if chance >= _LEAST_CHANCE else "p < 1e-16"
 
 
 def visible(text: str) -> str:

@@ -21,9 +21,11 @@ import numpy as np
 from pkmcal import arguments, display
 from pkmcal.arguments import checked_seed, instance, whole
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.equations import Equations, Evaluation
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.labels import labels, poses_of_rows
 from pkmcal.calibration.least_squares import Search
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
@@ -188,19 +190,13 @@ class Replicate:
     def __init__(self, fit: Fit) -> None:
         self._equations, self._estimate = equations, estimate = fit.equations, fit.estimate
         # rows of one pose take one sign
-        edges = np.cumsum([0, *map(len, equations.sets)])
-        self._pose = np.concatenate(equations.pose_of)
-        for k, measured in enumerate(equations.sets):
-            if measured.group is not None:
-                mine = slice(edges[k], edges[k + 1])
-                self._pose[mine] = measured.pose_index + self._pose.max() + 1
-        _, self._pose = np.unique(self._pose, return_inverse=True)
+        self._pose = poses_of_rows(equations)
         self._residuals = equations.unwhiten(self._corrected(), estimate.state.noise)
 
     def _corrected(self) -> FloatArray:
         """Whitened residuals (M,) with the deviation that the noise has."""
         estimate, equations = self._estimate, self._equations
-        every = np.repeat(self._pose, equations.components)
+        every = labels(equations).pose
         root = np.sqrt(np.repeat(estimate.weights, equations.components))
         out = np.empty_like(estimate.residual)
         for pose in range(int(self._pose.max()) + 1):

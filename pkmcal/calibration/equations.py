@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,59 +18,15 @@ from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
 from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_poses
 from pkmcal.calibration.closures import Closures, Commanded, RowStates, closures_of
 from pkmcal.calibration.elimination import Blocks, Shares
+from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.parameters import FitData, Parameters
 from pkmcal.calibration.readings import ROUNDING, Readings, of_read
 from pkmcal.core import instruments
 from pkmcal.core.library import STATUS
 from pkmcal.measurements import orientation
 from pkmcal.measurements.calibratable import Calibratable
-from pkmcal.measurements.observation import (
-    Predicted,
-    by_difference,
-    distance_per_point,
-)
+from pkmcal.measurements.observation import by_difference, distance_per_point
 from pkmcal.result import failed_rows
-
-
-@dataclass(frozen=True, eq=False)
-class Evaluation:
-    """The equations evaluated at one parameter vector.
-
-    Attributes
-    ----------
-    theta : ndarray (n,)
-        The parameters, mm and rad.
-    robot : Calibratable
-        With their geometry.
-    pose : ndarray (K, 6)
-        Where the machine is at each distinct row of actuators; NaN where it cannot be.
-    actuators : ndarray (K, n)
-        Where the actuators are there; what they read unless their noise is stated.
-    status : ndarray of int (K,)
-        Of the forward kinematics.
-    predicted : tuple of Predicted
-        Of each set of measurements.
-    residuals : tuple of ndarray (N, k)
-        Measured less predicted of each set, mm and rad.
-    """
-
-    theta: FloatArray
-    robot: Calibratable
-    pose: FloatArray
-    actuators: FloatArray
-    status: Int32Array
-    predicted: tuple[Predicted, ...]
-    residuals: tuple[FloatArray, ...]
-
-    @property
-    def ok(self) -> bool:
-        """Whether the forward kinematics solved every row."""
-        return not self.status.any()
-
-    @property
-    def states(self) -> RowStates:
-        """Where the machine is at each distinct row of actuators."""
-        return RowStates(self.pose, self.actuators, self.status)
 
 
 class Equations(Readings):
@@ -117,7 +73,7 @@ class Equations(Readings):
                     guess[place[read], 3:] = orientation.shortest(measured.values[read, 3:])
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
-        self._no_sigma = np.array([m.sigma is None for m in self.sets])
+        self._no_sigma = np.array([m.sigma is None and bool(m.components) for m in self.sets])
         sigma = self.actuator_sigma
         self._take(closures_of(parameters.robot, self.actuators, sigma), sigma is None)
 
@@ -161,6 +117,12 @@ class Equations(Readings):
         """Evaluate where the same with commanded poses has been started."""
         self.parameters, self._states = commanded.parameters, start.states
         return start if commanded is self else self.at(start.theta)
+
+    @property
+    def sigma_stated(self) -> bool:
+        """Whether any noise is stated, of what was read or of the actuators."""
+        of_actuators = self.closures.unknowns and not self.unstated[-1]
+        return bool(of_actuators) or any(m.sigma is not None for m in self.sets)
 
     @property
     def family_of_unit(self) -> IntArray:
@@ -220,6 +182,12 @@ class Equations(Readings):
         off, by_unknown = self._system(evaluation.robot, evaluation.states, evaluation.theta, noise)
         return -self._blocks.left(by_unknown, off)
 
+    def squares(self, residual: FloatArray) -> FloatArray:
+        """Squared length of the residuals (M,) of each unit, (U,)."""
+        first = np.cumsum(self.components) - self.components
+        squares: FloatArray = np.add.reduceat(residual**2, first)
+        return squares
+
     def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Derivative (M, n) of what is predicted by the parameters; of what is left likewise."""
         readings = self.whitened(self.jacobian(evaluation), noise)
@@ -246,6 +214,14 @@ class Equations(Readings):
             for measured, given in zip(self.sets, values, strict=True)
         )
         other.parameters = replace(self.parameters, start=prior_centre)
+        return other
+
+    def reweighted(self, deviations: Sequence[FloatArray]) -> Equations:
+        """The same where the components (k,) of each set have other relative deviations."""
+        other = copy.copy(self)
+        pairs = zip(self._whiten, deviations, strict=True)
+        other._whiten = [white / relative for white, relative in pairs]
+        other.deviations = tuple(deviations)
         return other
 
     def start(self) -> Evaluation:

@@ -6,21 +6,23 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, mm_per_unit
+from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
 from pkmcal.calibration.elimination import Shares
-from pkmcal.calibration.equations import Equations, Evaluation
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identifiability import (
+    ROUNDING,
     Decomposed,
     Directions,
     decompose,
     directions,
-    triangle,
 )
 from pkmcal.calibration.least_squares import Search
 from pkmcal.calibration.loss import Loss, LossName
-from pkmcal.calibration.outliers import median_ratio
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.lack_of_fit import SIGNIFICANT, Split, groups, split
+from pkmcal.statistics import prior_test
+from pkmcal.statistics.linear_fit import triangle
+from pkmcal.statistics.robust_scale import median_ratio
 
 _ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
 _LEAST_FALL = 0.1  # of a mean square, which a step of scoring does not go below
@@ -113,7 +115,6 @@ class Estimator:
         self.search = Search(equations, start)
         self.scale, self.prior = self.search.scale, self.search.prior
         self.unstated = equations.unstated
-        self._groups = [groups(measured) for measured in equations.sets]
         self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
 
     @property
@@ -121,14 +122,23 @@ class Estimator:
         """Degrees of freedom from which the noise of a group is estimated."""
         return LEAST_REDUNDANCY if self.equations.closures.unknowns else LEAST_FREEDOM
 
-    def solve(self) -> Estimate:
-        """Estimate the parameters and, where no sigma is stated, the noise of each set."""
-        ones = np.ones(len(self.unstated))
-        state = self._state(ones, self._first_loss(), None)
+    def unknown(self, estimate: Estimate) -> BoolArray:
+        """Groups (G,) whose noise is neither stated nor shown by enough equations."""
+        return self.unstated & (estimate.freedom < self.least_freedom)
+
+    def solve(self, near: Evaluation | None = None) -> Estimate:
+        """Estimate the parameters and, where no sigma is stated, the noise of each group.
+
+        The search begins at `near`, or else at the start.
+        """
+        state = self._state(self._first_noise(), self._first_loss(), None)
         if not state.fitted.rank:
             names = ", ".join(self.equations.parameters.names)
             raise ArgumentError(f"they depend on none of {names}")
         u = np.zeros(len(self.scale))
+        if near is not None:
+            self.equations.warm_start(near)
+            u = (near.theta - self.start.theta) / self.scale
         for _ in range(_ROUNDS):
             # rows that nothing contradicts pin what is not determined
             kept = state.fitted.unidentifiable
@@ -151,6 +161,43 @@ class Estimator:
         of_units = width[self.equations.family_of_unit]
         return Loss(name, self.equations.components, of_units)
 
+    def _first_noise(self) -> FloatArray:
+        """1 mm where it is not stated; with a prior what the data alone show at the start.
+
+        Noise and prior could else excuse each other: much of one leaves little of the other.
+        """
+        ones = np.ones(len(self.unstated))
+        if not len(self.prior) or self.loss != "linear":
+            return ones
+        jacobian = self.search.jacobian(self.start, ones)
+        residual = self.equations.residual(self.start, ones)
+        alone = self._alone(self.start, ones, jacobian, residual)
+        return ones if alone is None else self._kept(ones * self._scored(alone)[0], ones)
+
+    def _alone(
+        self,
+        evaluation: Evaluation,
+        noise: FloatArray,
+        jacobian: FloatArray,
+        residual: FloatArray,
+    ) -> Shares | None:
+        """What no parameters explain in each group, without the prior's help.
+
+        None where too few equations are left to show it.
+        """
+        _, singular, rows = np.linalg.svd(triangle(jacobian), full_matrices=False)
+        told = singular > ROUNDING * singular[0]
+        basis = jacobian @ (rows[told].T / singular[told])
+        left = residual - basis @ (basis.T @ residual)
+        every = np.ones(len(self.equations.components))
+        shares = self.equations.by_groups(evaluation, noise, every, left, basis)
+        few = (shares.freedom[self.unstated] < LEAST_FREEDOM).any()
+        return None if few or shares.freedom.sum() < prior_test.LEAST_FREEDOM else shares
+
+    def _kept(self, noise: FloatArray, stated: FloatArray) -> FloatArray:
+        """Estimated noise of groups where none is stated, else what multiplies the stated one."""
+        return np.where(self.unstated, np.maximum(noise, _LEAST_NOISE), stated)
+
     def _first_loss(self) -> Loss:
         """Limits wide enough for the nominal machine, and no wider than gross errors allow."""
         ones = np.ones(len(self.unstated))
@@ -161,18 +208,12 @@ class Estimator:
 
     def _medians(self, residual: FloatArray) -> FloatArray:
         """Variance (F,) that whitened residuals (M,) of each family show by their median."""
-        squares, components = self._squares(residual), self.equations.components
+        squares, components = self.equations.squares(residual), self.equations.components
         family_of = self.equations.family_of_unit
         return np.array([
             median_ratio(squares[family_of == f], components[family_of == f])
             for f in range(int(family_of.max()) + 1)
         ])  # fmt: skip
-
-    def _squares(self, residual: FloatArray) -> FloatArray:
-        """Squared length of each unit, (U,)."""
-        components = self.equations.components
-        squares: FloatArray = np.add.reduceat(residual**2, np.cumsum(components) - components)
-        return squares
 
     def _state(
         self, noise: FloatArray, loss: Loss, evaluation: Evaluation | None
@@ -203,11 +244,7 @@ class Estimator:
     def _revised(self, estimate: Estimate) -> IterationState:
         """Estimate unstated noise and limits of the loss, and split the directions anew."""
         factor, of_families = self._spread(estimate)
-        noise = np.where(
-            self.unstated,
-            np.maximum(estimate.state.noise * factor, _LEAST_NOISE),
-            estimate.state.noise,
-        )
+        noise = self._kept(estimate.state.noise * factor, estimate.state.noise)
         # while the model is still far off, outliers are units further off than most
         family_of = self.equations.family_of_group
         families = range(len(of_families))
@@ -216,13 +253,26 @@ class Estimator:
         return self._state(noise, self._loss(self.loss, width), estimate.evaluation)
 
     def _spread(self, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
-        """Deviation of the whitened residuals of each group (G,), and of each family (F,).
+        """Deviation of the whitened residuals of each group (G,), and of each family (F,)."""
+        if self.loss != "linear":
+            return self._scored(estimate.shares, self._medians(estimate.residual))
+        alone = None
+        if len(self.prior):
+            alone = self._alone(
+                estimate.evaluation, estimate.state.noise, estimate.jacobian, estimate.residual
+            )
+        return self._scored(estimate.shares if alone is None else alone)
 
-        1 without freedom.
+    def _scored(
+        self, shares: Shares, medians: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Deviation that the shares show of each group (G,), and of each family (F,).
+
+        1 without freedom. `medians` (F,) are the variances of families that medians show, of
+        robust losses.
         """
         family_of = self.equations.family_of_group
-        squares, freedom, information = estimate.shares
-        medians = None if self.loss == "linear" else self._medians(estimate.residual)
+        squares, freedom, information = shares
         factor, of_families = np.ones(len(freedom)), np.ones(int(family_of.max()) + 1)
         for f in range(len(of_families)):
             mine = np.flatnonzero(family_of == f)
@@ -245,42 +295,7 @@ class Estimator:
             common = variance / together if together > 0 else 1.0
             least = _LEAST_FALL * squares[known] / freedom[known]
             factor[known] = np.sqrt(common * np.maximum(1.0 + excess, least))
-            if len(mine) == 1 and self.unstated[f]:
-                factor[f] *= np.sqrt(self._inflation(estimate, f))
         return factor, of_families
-
-    def _inflation(self, estimate: Estimate, i: int) -> float:
-        """Factor on the variance under lack of fit, which the repeats of a pose share."""
-        repeated = self._repeats(estimate, i)
-        if not repeated.chance < SIGNIFICANT:
-            return 1.0
-        of_poses = repeated.missed / repeated.missed_freedom
-        return of_poses / ((repeated.pure + repeated.missed) / float(estimate.freedom[i]))
-
-    def repeats(self, estimate: Estimate, plain: bool = False) -> list[Split]:
-        """Pure error and lack of fit of each set, whitened; `plain`: of their lengths in mm."""
-        return [self._repeats(estimate, i, plain) for i in range(len(self._groups))]
-
-    def _repeats(self, estimate: Estimate, i: int, plain: bool = False) -> Split:
-        if self.equations.closures.unknowns:  # poses of their own take part in what they scatter
-            return Split(0.0, 0.0, 0.0, 0.0, 1.0)
-        group, residual = self._groups[i], estimate.evaluation.residuals[i]
-        k, whole = residual.shape[1], np.isfinite(residual).all(axis=1)
-        leverage = float(self.equations.components[self.equations.set_of == i].sum())
-        leverage -= float(estimate.freedom[i])
-        if plain:
-            lengths = min(k, 3)
-            white = np.tile(np.eye(lengths), (len(residual), 1, 1))
-            leverage *= lengths / k
-            residual = residual[:, :lengths]
-        else:
-            weights = estimate.weights[self.equations.set_of == i]
-            white = self.equations.white(i) * np.sqrt(weights)[:, None, None]
-            white = white / estimate.state.noise[i]
-        if not whole.all():  # repeats of a part of a pose are left out
-            group = np.unique(group[whole], return_inverse=True)[1]
-            residual, white = residual[whole], white[whole]
-        return split(residual, white, group, leverage)
 
     def _settled(self, old: IterationState, new: IterationState) -> bool:
         if old.fitted.rank != new.fitted.rank:
@@ -304,7 +319,7 @@ class Estimator:
         ):
             arcs = mm_per_unit(measured.units, self.start.robot.length)
             parts.append((part * arcs[:, None]).reshape(-1, part.shape[2]))
-        jacobian: FloatArray = np.concatenate(parts) * self.scale
+        jacobian: FloatArray = np.concatenate(parts)[self.equations.present] * self.scale
         return jacobian
 
     def _estimate(self, u: FloatArray, state: IterationState) -> Estimate:

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.equations import Equations, Evaluation
+from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate
+from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identifiability import decompose
 from pkmcal.calibration.parameters import Parameters
+from pkmcal.calibration.uncertainty import Uncertainty
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,16 +29,23 @@ class Fit:
     estimate : Estimate
         What was fitted at the solution, with its statistics. On machines where every row has a
         pose of its own the residual equations there are those that are left of all.
-    covariance : ndarray (n, n)
-        Of the reported parameters along determined combinations, mm and rad; inf where the noise
-        is not known.
+    uncertainty : Uncertainty
+        How sure it is; `Uncertainty.equations` are those that were fitted.
     """
 
     equations: Equations
     start: Evaluation
     end: Evaluation
     estimate: Estimate
-    covariance: FloatArray
+    uncertainty: Uncertainty
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Of the reported parameters (n, n) along determined combinations, mm and rad.
+
+        inf where the noise is not known.
+        """
+        return self.uncertainty.matrix
 
     @property
     def parameters(self) -> Parameters:

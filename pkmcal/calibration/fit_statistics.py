@@ -6,12 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.calibration.equations import Evaluation
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit, rms
+from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identifiability import as_sum, observability, sparse_basis
 from pkmcal.calibration.outliers import outliers
-from pkmcal.measurements.lack_of_fit import joined
+from pkmcal.calibration.uncertainty import Uncertainty
+from pkmcal.statistics.distributions import t_factor
+from pkmcal.statistics.linear_fit import triangle
+from pkmcal.statistics.prior_test import LEAST_FREEDOM, PriorTest, data_alone, prior_test
 
 _INVOLVED = 1e-6  # share of a parameter in unidentifiable combinations from which it is one
 
@@ -25,8 +29,12 @@ class ParameterTable:
     values: FloatArray
     start: FloatArray
     stderr: FloatArray
+    dof: FloatArray
+    interval95: FloatArray
     covariance: FloatArray
+    correlation: FloatArray
     at_bounds: tuple[str, ...]
+    rule: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +61,16 @@ class Misfit:
     chi2_per_dof: float
     dof: float
     noise: tuple[float, ...]
+    component_noise: tuple[tuple[float, ...], ...]
+    components: tuple[tuple[str, ...], ...]
+    told_apart: bool
+    reading_noise: tuple[float, ...]
+    pose_noise: tuple[float, ...]
     residuals: tuple[FloatArray, ...]
     rows: IntArray
     outliers: tuple[int, ...]
+    before: Distances
+    after: Distances
 
 
 @dataclass(frozen=True)
@@ -76,44 +91,45 @@ class SearchRecord:
     history: tuple[float, ...]
 
 
-def reported_covariance(estimator: Estimator, estimate: Estimate) -> FloatArray:
-    """Covariance (n, n) of the reported parameters, mm and rad; inf where noise is not known."""
-    rates = _reported_by_scaled(estimator, estimate)
-    if (estimator.unstated & (estimate.freedom < estimator.least_freedom)).any():
-        return np.full((len(rates), len(rates)), np.inf)
-    covariance: FloatArray = rates @ estimate.covariance @ rates.T
-    return covariance
-
-
-def _reported_by_scaled(estimator: Estimator, estimate: Estimate) -> FloatArray:
-    """Derivative (n, n) of the reported parameters to the scaled ones."""
-    chosen = estimator.equations.parameters
-    rates: FloatArray = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
-    return rates
-
-
 def parameter_table(
-    estimator: Estimator, estimate: Estimate, covariance: FloatArray
+    estimator: Estimator, estimate: Estimate, uncertainty: Uncertainty
 ) -> ParameterTable:
-    """The parameters; `covariance` is `reported_covariance`."""
+    """The parameters with their uncertainty."""
     chosen, theta = estimator.equations.parameters, estimate.evaluation.theta
-    along = _reported_by_scaled(estimator, estimate) @ estimate.state.determined.unidentifiable
+    rates = chosen.reported_rates(theta) * chosen.scale
+    along = rates @ estimate.state.determined.unidentifiable
     unknown = np.linalg.norm(along, axis=1) > _INVOLVED * chosen.scale
-    shown = covariance.copy()
+    shown = uncertainty.matrix.copy()
     shown[unknown] = shown[:, unknown] = np.nan
     shown[unknown, unknown] = np.inf
+    stderr = np.sqrt(np.maximum(np.diagonal(shown), 0.0))
+    freedom = np.where(np.isfinite(stderr), uncertainty.freedom, 0.0)
+    values = chosen.reported(theta)
+    half = t_factor(freedom) * np.where(np.isfinite(stderr), stderr, np.inf)
     at_bound = np.zeros(len(chosen), dtype=bool)
     for bound in chosen.bounds:
         at_bound |= np.isclose(theta, bound, rtol=1e-9, atol=1e-9)
     return ParameterTable(
         free=chosen.names,
         units=chosen.units,
-        values=chosen.reported(theta),
+        values=values,
         start=chosen.reported(estimator.start.theta),
-        stderr=np.sqrt(np.diagonal(shown)),
+        stderr=stderr,
+        dof=freedom,
+        interval95=np.column_stack([values - half, values + half]),
         covariance=shown,
+        correlation=_correlation(rates @ estimate.covariance @ rates.T, np.isfinite(stderr)),
         at_bounds=tuple(name for name, at in zip(chosen.names, at_bound, strict=True) if at),
+        rule=uncertainty.covariance.rule,
     )
+
+
+def _correlation(covariance: FloatArray, known: BoolArray) -> FloatArray:
+    """Correlations (n, n) of a covariance; NaN beside parameters that are not determined."""
+    deviation = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    scale = np.where(known & (deviation > 0), deviation, np.nan)
+    matrix: FloatArray = covariance / np.outer(scale, scale)
+    return matrix
 
 
 def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability:
@@ -130,18 +146,24 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
     )
 
 
-def misfit(estimator: Estimator, estimate: Estimate, start: Evaluation, end: Evaluation) -> Misfit:
+def misfit(
+    estimator: Estimator,
+    estimate: Estimate,
+    uncertainty: Uncertainty,
+    commanded: tuple[Evaluation, Evaluation],
+) -> Misfit:
     """Residuals before and after, χ² per degree of freedom, noise and outliers.
 
-    `start` and `end` are the equations with poses that follow from the actuators.
+    `commanded` are the equations before and after with poses that follow from the actuators.
     """
+    start, end = commanded
     equations, state = estimator.equations, estimate.state
     chosen, fitted = equations.parameters, state.fitted.identifiable
     moved = (estimate.evaluation.theta - chosen.start) / chosen.scale
     prior = estimator.prior @ moved
     dof = float(estimate.weights @ equations.components) + len(prior) - state.fitted.rank
     squares = np.repeat(estimate.weights, equations.components) @ estimate.residual**2
-    no_sigma = bool(estimator.unstated.all()) or dof <= 0
+    stated = equations.sigma_stated and dof > 0
     odd = outliers(
         estimate.residual,
         estimate.jacobian @ fitted,
@@ -149,27 +171,64 @@ def misfit(estimator: Estimator, estimate: Estimate, start: Evaluation, end: Eva
         estimate.weights,
         estimator.prior @ fitted,
     )
-    sets = len(equations.sets)
-    unknown_noise = np.where(estimator.unstated, state.noise, np.nan)
+    split = uncertainty.noises
+    shown = np.where(estimator.unstated & ~uncertainty.unknown, state.noise, np.nan)
+    by_component = tuple(
+        tuple((sigma * relative / mm_per_unit(m.units, estimator.start.robot.length)).tolist())
+        for m, relative, sigma in zip(equations.sets, equations.deviations, shown, strict=False)
+    )
+    named = np.isin(equations.unit_of_row, odd)
     return Misfit(
         rms=equations.rms(end),
         rms_before=equations.rms(start),
         closure_rms=equations.closure_rms(estimate.evaluation),
         closure_rms_before=equations.closure_rms(estimator.start),
-        actuator_noise=float(np.append(unknown_noise, np.nan)[sets]),
+        actuator_noise=float(np.append(shown, np.nan)[len(equations.sets)]),
         redundancy=tuple(estimate.freedom.tolist()),
         idle=equations.idle,
-        chi2_per_dof=float("nan") if no_sigma else float((squares + prior @ prior) / dof),
+        chi2_per_dof=float((squares + prior @ prior) / dof) if stated else float("nan"),
         dof=dof,
-        noise=tuple(unknown_noise[:sets].tolist()),
+        noise=tuple(rms(np.array(each[:3])) for each in by_component),
+        component_noise=by_component,
+        components=tuple(m.components for m in equations.sets),
+        told_apart=any((relative != 1.0).any() for relative in equations.deviations),
+        reading_noise=tuple(float(np.sqrt(part.single)) for part in split),
+        pose_noise=tuple(float(np.sqrt(part.shared)) for part in split),
         residuals=end.residuals,
         rows=equations.rows,
-        outliers=tuple(equations.rows[np.isin(equations.unit_of_row, odd)].tolist()),
+        outliers=tuple(equations.rows[named].tolist()),
+        before=distances(equations.distances(start), named),
+        after=distances(equations.distances(end), named),
     )
 
 
-def repeats(estimator: Estimator, estimate: Estimate) -> Repeats:
+def repeats(uncertainty: Uncertainty) -> Repeats:
     """Scatter of repeated poses and what the model misses beyond it."""
-    whitened = joined(estimator.repeats(estimate))
-    lengths = joined(estimator.repeats(estimate, plain=True))
+    whitened, lengths = uncertainty.repeats(), uncertainty.repeats(plain=True)
     return Repeats(lengths.scatter, lengths.beyond, whitened.chance)
+
+
+def tested_prior(estimator: Estimator, estimate: Estimate) -> PriorTest | None:
+    """Whether the measurements contradict the prior; None without one, or where nothing can tell.
+
+    A robust fit's prior is not tested.
+    """
+    chosen = estimator.equations.parameters
+    stated = np.isfinite(chosen.prior)
+    if not stated.any() or estimator.loss != "linear":
+        return None
+    moved = (estimate.evaluation.theta - chosen.start) / chosen.scale
+    data = estimate.residual + estimate.jacobian @ moved
+    variance, freedom = 1.0, np.inf
+    if estimator.unstated.any():
+        squares, freedom = data_alone(estimate.jacobian, data)
+        if freedom < LEAST_FREEDOM:
+            return None
+        variance = squares / freedom
+    by_prior = estimate.jacobian * (np.where(stated, chosen.prior, 1.0) / np.where(
+        stated, chosen.scale, 1.0
+    ))  # fmt: skip
+    factor = triangle(np.column_stack([by_prior, data]))
+    return prior_test(
+        factor[:, :-1][:, stated], factor[:, :-1][:, ~stated], factor[:, -1], variance, freedom
+    )

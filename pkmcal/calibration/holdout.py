@@ -10,13 +10,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, mm_per_unit, propagate
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
+from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.labels import Labels, labels
 from pkmcal.calibration.mode_slips import in_their_modes
 from pkmcal.calibration.parameters import FitData
+from pkmcal.calibration.uncertainty import Uncertainty, stated_variances
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.statistics.distributions import chi2_tail
+from pkmcal.statistics.holdout_test import HoldoutTest, Lengths, holdout_test
+from pkmcal.statistics.linear_fit import numbered
+from pkmcal.statistics.noise import Noise, noise
+
+_ODD = 0.01  # chance of naming any held-out row that is as far off as expected
 
 
 @dataclass(frozen=True)
@@ -28,11 +38,25 @@ class HeldOut:
     rms_before, rms : float
         Root mean square distances with the start's parameters and with the estimate's.
     expected : float
-        What `rms` should be if noise and covariance are right.
+        What `rms` should be if noise and covariance are right; NaN where the noise is not known.
     failures : str
         Rows that were left out because their forward kinematics failed, in words.
     off_before, off : ndarray (N,)
         The distances themselves.
+    rows : ndarray of int (N,)
+        Their numbers in what was given.
+    odd : tuple of int
+        Rows further off than noise and covariance explain, numbered likewise.
+    before, after : Distances
+        The distances in short.
+    test : HoldoutTest or None
+        Whether they contradict the fit; None where that cannot be said.
+    data : tuple of FitData
+        The sets of measurements.
+    like : tuple of int
+        The fitted set of each.
+    drawn : bool
+        Whether they are of the same measurements as the fitted points, drawn at random.
     """
 
     rms_before: float = float("nan")
@@ -41,6 +65,24 @@ class HeldOut:
     failures: str = ""
     off_before: FloatArray = field(default_factory=lambda: np.empty(0))
     off: FloatArray = field(default_factory=lambda: np.empty(0))
+    rows: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    odd: tuple[int, ...] = ()
+    before: Distances = field(default_factory=Distances)
+    after: Distances = field(default_factory=Distances)
+    test: HoldoutTest | None = None
+    data: tuple[FitData, ...] = ()
+    like: tuple[int, ...] = ()
+    drawn: bool = False
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the points contradict the fit."""
+        return self.test is not None and self.test.contradicts
+
+    @property
+    def chance(self) -> float:
+        """How likely such a rms would be if fit, noise and covariance were right."""
+        return float("nan") if self.test is None else self.test.chance
 
 
 def draw(data: FitData, holdout: float) -> tuple[FitData, FitData]:
@@ -58,64 +100,180 @@ def _rows(data: FitData, chosen: IntArray) -> FitData:
 
 
 def evaluate(
-    held: Sequence[tuple[FitData, int]], estimator: Estimator, estimate: Estimate
+    held: Sequence[tuple[FitData, int]],
+    estimator: Estimator,
+    estimate: Estimate,
+    uncertainty: Uncertainty,
 ) -> HeldOut:
     """Compare points that were not fitted, before and after the calibration.
 
     Parameters
     ----------
     held : sequence of (FitData, int)
-        With each, the fitted set whose noise it has where its own is not stated.
-    estimator, estimate : Estimator, Estimate
+        With each, the fitted set whose noise it has.
+    estimator, estimate, uncertainty : Estimator, Estimate, Uncertainty
         Of the fit.
     """
     if not held:
         return HeldOut()
-    equations = Equations([data for data, _ in held], estimator.equations.parameters).commanded()
-    estimated = estimate.state.noise[len(estimator.equations.sets) :]  # of the actuators, or none
+    parameters = estimator.equations.parameters
+    equations = Equations([data for data, _ in held], parameters).commanded()
     after = in_their_modes(equations, equations.at(estimate.evaluation.theta))
     before = equations.at(estimator.start.theta)
-    scaled = estimate.covariance * np.outer(estimator.scale, estimator.scale)
-    variances = []
-    by_actuators = after.robot.actuator_twists(after.pose, after.actuators)
-    for i, (part, (data, like)) in enumerate(zip(equations.jacobian(after), held, strict=True)):
-        lengths = part[:, :3]  # of a pose its position
-        variance = propagate(lengths, scaled) + _noise(data.measured, estimate.state.noise[like])
-        sigma = _of_actuators(data.measured, after.robot, estimated)
-        if sigma is not None:
-            moved = after.predicted[i].by_twist[:, :3] @ by_actuators[equations.pose_of[i]]
-            variance += ((moved * sigma[:, None]) ** 2).sum(axis=(1, 2))
-        variances.append(variance)
+    named = labels(equations)
+    points = _points(equations, after, named, [like for _, like in held], uncertainty)
+    row = named.row[named.length]
+    count = len(equations.rows)
+    off_before, off = equations.distances(before), equations.distances(after)
+    good = np.isfinite(off)
+    expected = np.bincount(row, points.own + points.by_fit(uncertainty), count)
+    odd = np.array([
+        chi2_tail(k * d**2 / e, k) < _ODD / count if np.isfinite(d) and e > 0 else False
+        for d, e, k in zip(off, expected, np.bincount(row, minlength=count), strict=True)
+    ])  # fmt: skip
+    usable = uncertainty.known and bool(good.any())
     return HeldOut(
         rms_before=equations.rms(before),
         rms=equations.rms(after),
-        expected=float(np.sqrt(np.nanmean(np.concatenate(variances)))),
+        expected=float(np.sqrt(np.mean(expected[good]))) if usable else float("nan"),
         failures=equations.failures(after),
-        off_before=equations.distances(before),
-        off=equations.distances(after),
+        off_before=off_before,
+        off=off,
+        rows=equations.rows,
+        odd=tuple(equations.rows[odd].tolist()),
+        before=distances(off_before, odd),
+        after=distances(off, odd),
+        test=_test(points, named, good[row], uncertainty) if usable else None,
+        data=tuple(data for data, _ in held),
+        like=tuple(like for _, like in held),
     )
 
 
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """Lengths (M,) of the points held out; of a pose its position.
+
+    Residuals and design in mm, the variance of a reading and of what actuators add to it in mm²,
+    and the fitted set that each is like.
+    """
+
+    residual: FloatArray
+    design: FloatArray
+    reading: FloatArray
+    by_actuators: FloatArray
+    like: IntArray
+
+    @property
+    def own(self) -> FloatArray:
+        """Variance of a length whatever the parameters are."""
+        return self.reading + self.by_actuators
+
+    def by_fit(self, uncertainty: Uncertainty) -> FloatArray:
+        """Variance that the parameters' errors add."""
+        added: FloatArray = np.einsum(
+            "ij,jk,ik->i", self.design, uncertainty.by_cluster, self.design
+        )
+        return added
+
+
+def _points(
+    equations: Equations,
+    after: Evaluation,
+    named: Labels,
+    like: Sequence[int],
+    uncertainty: Uncertainty,
+) -> _Points:
+    """The lengths at the solution."""
+    scale = equations.parameters.scale
+    by_actuators = after.robot.actuator_twists(after.pose, after.actuators)
+    variances, added = [], []
+    for i, measured in enumerate(equations.sets):
+        rows, k = after.residuals[i].shape
+        variances.append(np.repeat(_variances(measured, uncertainty, like[i]), k))
+        sigma = _of_actuators(measured, after.robot, uncertainty)
+        moved = after.predicted[i].by_twist @ by_actuators[equations.pose_of[i]]
+        part = np.zeros((rows, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
+        added.append(part.ravel())
+    jacobian = [part.reshape(-1, part.shape[2]) for part in equations.jacobian(after)]
+
+    def lengths(parts: Sequence[FloatArray]) -> FloatArray:
+        return np.concatenate(parts)[equations.present][named.length]
+
+    return _Points(
+        residual=lengths([part.ravel() for part in after.residuals]),
+        design=(lengths(jacobian) * scale) @ uncertainty.fit.back,
+        reading=lengths(variances),
+        by_actuators=lengths(added),
+        like=np.array(like)[named.set_of[named.length]],
+    )
+
+
+def _variances(measured: Measurements, uncertainty: Uncertainty, like: int) -> FloatArray:
+    """Variance of a length of each row, mm² (N,): that of the fitted set, by sigma where stated."""
+    total = uncertainty.noises[like].total
+    own, fitted = stated_variances(measured), uncertainty.stated_variances(like)
+    if own is None or fitted is None:
+        return np.full(len(measured), total)
+    return own * total / float(fitted.mean())
+
+
 def _of_actuators(
-    measured: Measurements, robot: Calibratable, estimated: FloatArray
+    measured: Measurements, robot: Calibratable, uncertainty: Uncertainty
 ) -> FloatArray | None:
     """Deviations (N, n) of what the actuators of held-out rows read; None where they have none."""
-    if measured.actuator_sigma is not None:
-        return measured.actuator_sigma
-    if not len(estimated):
+    if not uncertainty.mixed:  # what fitted actuators add is in the noise of the fit
         return None
-    units = mm_per_unit(robot.actuator_units, robot.length)
-    return np.tile(estimated[0] / units, (len(measured), 1))
-
-
-def _noise(measured: Measurements, estimated: float) -> FloatArray:
-    """Variance of the measured point of each row, mm² (N,)."""
-    sigma = measured.sigma
+    sigma = measured.actuator_sigma
     if sigma is None:
-        lengths = min(len(measured.components), 3)
-        return np.full(len(measured), lengths * estimated**2)
-    if sigma.ndim == 2:
-        squares: FloatArray = (sigma[:, :3] ** 2).sum(axis=1)
-        return squares
-    traces: FloatArray = np.trace(sigma[:, :3, :3], axis1=1, axis2=2)
-    return traces
+        units = mm_per_unit(robot.actuator_units, robot.length)
+        sigma = np.tile(uncertainty.factors[-1] / units, (len(measured), 1))
+    return sigma * float(np.sqrt(uncertainty.excess.total))
+
+
+def _test(
+    points: _Points, named: Labels, good: BoolArray, uncertainty: Uncertainty
+) -> HoldoutTest | None:
+    """Test lengths of the rows that were reached; None where their noise is not known."""
+    own = points.own[good]
+    if not (own > 0).all():
+        return None
+    fitted, split = _fitted_lengths(uncertainty, np.unique(points.like))
+    unit = np.sqrt(own)
+    held = Lengths(
+        points.residual[good] / unit,
+        points.design[good] / unit[:, None],
+        numbered(named.row[named.length][good]),
+        numbered(named.pose[named.length][good]),
+        named.component[named.length][good],
+    )
+    # rows at the same actuators have their errors in common
+    common = split.shared + float(np.mean(points.by_actuators[good] / own)) * split.total
+    of_held = Noise(split.total, min(common, split.total))
+    return holdout_test(fitted, held, split, uncertainty.by_cluster, of_held)
+
+
+def _fitted_lengths(uncertainty: Uncertainty, sets: IntArray) -> tuple[Lengths, Noise]:
+    """Lengths of some fitted sets, each in units of its own deviation, and how these split.
+
+    Of mixtures all equations, which are lengths in part.
+    """
+    sandwich, named = uncertainty.covariance.sandwich, uncertainty.labels
+    unit = np.zeros(len(uncertainty.fit.residual))
+    if uncertainty.mixed:
+        values = sandwich.residual
+        unit[:] = np.sqrt(uncertainty.excess.total)
+    else:
+        values = uncertainty.adjusted
+        for i in sets:
+            unit[uncertainty.lengths_of(int(i))] = np.sqrt(uncertainty.noises[i].total)
+    mine = unit > 0
+    residual = values[mine] / unit[mine]
+    split = noise(residual, sandwich.retained[mine], numbered(uncertainty.fit.key[mine]))
+    lengths = Lengths(
+        residual,
+        uncertainty.fit.design[mine],
+        numbered(named.row[mine]),
+        numbered(named.pose[mine]),
+        named.component[mine],
+    )
+    return lengths, split

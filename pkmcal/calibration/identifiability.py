@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, first_largest
+from pkmcal.statistics.linear_fit import triangle
 
 _KINDS = 4  # kinds of parameters whose combinations are looked for
 _OUTSIDE = 1e-5  # share of a combination outside some parameters that does not count
 _ALIKE = 1e-3  # share by which entries of a combination differ that are not equal
 _SURE = 6  # decimals of a coefficient that are more than rounding
 _SPELLED = 6  # parameters whose coefficients are printed
-_IN_ONE_THREAD = 8192  # numbers
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 CLEAR = 0.01  # share of the machine's size to which a combination must be determined to count
 
@@ -65,21 +65,6 @@ def decompose(jacobian: FloatArray) -> Decomposed:
     square[: len(factor)] = factor
     _, singular, rows = np.linalg.svd(square)
     return singular, rows.T
-
-
-def triangle(matrix: FloatArray) -> FloatArray:
-    """Triangular factor R of a QR factorisation: RᵀR = AᵀA.
-
-    Rows enter in blocks so small that the linear algebra library does not spread them over
-    threads, which on a busy computer takes a hundred times as long as the work itself.
-    """
-    n = matrix.shape[1]
-    block = max(n, _IN_ONE_THREAD // max(n, 1) - n)
-    factor: FloatArray = np.zeros((0, n))
-    for start in range(0, len(matrix), block):
-        stacked = np.vstack([factor, matrix[start : start + block]])
-        factor = np.asarray(np.linalg.qr(stacked, mode="r"))
-    return factor
 
 
 def directions(

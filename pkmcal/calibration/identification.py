@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from os import PathLike
 from pathlib import Path
 
@@ -12,7 +13,11 @@ from numpy.typing import ArrayLike
 from pkmcal import arguments
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
+from pkmcal.calibration.moved import Moved, moved
 from pkmcal.calibration.parts import Parts
+from pkmcal.calibration.robust_check import robust_check
+from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.verdict import Verdict, judge
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentTypeError
 from pkmcal.measurements.calibratable import as_machine
@@ -30,6 +35,31 @@ class Identification(Parts, Result):
     Its parts are those of `Parts`, its numbers the flat names there.
     """
 
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether the result can be believed: state, reasons and remarks.
+
+        A robust fit is made beside a linear one where some rows seem to carry it, and what moved is
+        looked for where held-out points contradict the fit.
+        """
+        robust = robust_check(self.fit) if self.loss == "linear" else None
+        return judge(self, robust, self.moved)
+
+    @cached_property
+    def moved(self) -> tuple[Moved, ...]:
+        """What moved between the fitted measurements and others that were held out.
+
+        Empty where nothing did, or where the points held out were drawn from the same measurements.
+        """
+        if self.holdout.drawn or not self.holdout.data or not self.fit.uncertainty.known:
+            return ()
+        return moved(self.fit, self.holdout.data, self.holdout.like)
+
+    @property
+    def loss(self) -> str:
+        """The loss that was asked for."""
+        return self.fit.estimate.state.loss.name
+
     @property
     def parameters(self) -> dict[str, dict[str, float]]:
         """Value and standard deviation by name; mm and rad."""
@@ -43,11 +73,12 @@ class Identification(Parts, Result):
 
     @property
     def correlation_matrix(self) -> FloatArray:
-        """Correlations (n, n); NaN beside parameters that are not determined."""
-        scale = np.where(np.isfinite(self.stderr) & (self.stderr > 0), self.stderr, np.nan)
-        with np.errstate(invalid="ignore"):
-            matrix: FloatArray = self.covariance / np.outer(scale, scale)
-        return matrix
+        """Correlations (n, n) by the design; NaN beside parameters that are not determined.
+
+        Those of equal independent errors at the poses that were measured: few poses show what
+        each parameter's error is, not how the errors of two go together.
+        """
+        return self.table.correlation
 
     @property
     def correlations(self) -> tuple[tuple[str, str, float], ...]:
@@ -143,7 +174,10 @@ class Identification(Parts, Result):
         return str(self)
 
     def _parts(self) -> Iterator[str | Table]:
-        count = len(self.rows)
+        count, verdict = len(self.rows), self.verdict
+        yield summary.filled("", str(verdict))
+        yield from (summary.filled("  also: ", text) for text in verdict.reasons[1:])
+        yield from (summary.filled("  note: ", text) for text in verdict.remarks)
         what = "row" if np.isnan(self.rms) else "measured point"
         yield (
             f"{self.robot.name}: {len(self.free)} parameters from {count} {what}"
@@ -151,19 +185,18 @@ class Identification(Parts, Result):
         )
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)
+        datasets = self.fit.equations.datasets
         yield from summary.limits(
             self.identifiability,
             len(self.free),
             self.correlations,
+            row_names(datasets, self.outliers),
             self.outliers,
-            self.at_bounds,
-            self.idle,
         )
-        if not self.converged:
-            yield "not converged"
+        if self.at_bounds:
+            yield summary.bounds(self.at_bounds)
         yield ""
-        yield summary.parameter_rows(self.table)
-        yield from (summary.filled("warning: ", text) for text in self.warnings)
+        yield from summary.parameter_rows(self.table)
 
     def __repr__(self) -> str:
         return (

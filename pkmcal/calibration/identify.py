@@ -11,8 +11,9 @@ import numpy as np
 from pkmcal.arguments import instance, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.closures import has_equations
-from pkmcal.calibration.equations import Equations, Evaluation
+from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_statistics import (
     SearchRecord,
@@ -20,7 +21,7 @@ from pkmcal.calibration.fit_statistics import (
     misfit,
     parameter_table,
     repeats,
-    reported_covariance,
+    tested_prior,
 )
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
@@ -29,16 +30,19 @@ from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
 from pkmcal.calibration.parameters import KNOWN, Bounds, FitData, Known, Prior, parameters
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
+    contradicted_prior,
     distant_points,
     implausible_changes,
     insufficient_data,
     likely_unit_errors,
 )
+from pkmcal.calibration.row_errors import likely_row_errors
+from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable, as_given, as_machine
-from pkmcal.measurements.lack_of_fit import joined
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.statistics.covariance import RULES, CovarianceRule
 
 _POOR = 0.1  # share of the misfit that a fit worth its name does not leave
 _NOISY = 9.0  # chi²/dof that a slip in sigma does not explain
@@ -56,6 +60,7 @@ def identify(
     holdout: float | Measurements | None = None,
     bounds: Bounds = None,
     attachment: Known | Sequence[Known] = "known",
+    covariance: CovarianceRule = "auto",
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -94,6 +99,11 @@ def identify(
     attachment : {"known", "unknown"} or a sequence of them
         Whether the points of the platform from which distances are measured are known or to be
         found, from where `Measurements.attachment` puts them: ``attachment1.x`` ….
+    covariance : {"auto", "classical", "cluster"}
+        How uncertain the parameters are. "cluster": rows of one pose may share an error, as
+        several targets and repeats do. "classical": all errors are independent. "auto": cluster
+        where the residuals show a shared error or the loss is robust, else classical. The values
+        are the same.
 
     Returns
     -------
@@ -126,16 +136,18 @@ def identify(
     0.3
     """
     machine = as_machine(robot)
-    datasets = _datasets(machine, measurements, frame, target, attachment)
+    datasets, unread = _telling(
+        machine, _datasets(machine, measurements, frame, target, attachment)
+    )
     held: list[tuple[FitData, int]] = []
     if isinstance(holdout, Measurements):
         held = [_as_fitted(machine, holdout, datasets)]
     elif holdout is not None:
         pairs = [draw(data, holdout) for data in datasets]
         datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
-    datasets, unread = _telling(machine, datasets)
     chosen = parameters(machine, datasets, free, prior, bounds)
     word("loss", loss, LIMITS)
+    word("covariance", covariance, RULES)
     equations = Equations(datasets, chosen, unread)
     commanded = equations.commanded()
     start = commanded.start()
@@ -150,11 +162,22 @@ def identify(
         estimator = Estimator(equations, own, loss)
         estimate = estimator.solve()
     except ValueError as error:
-        hint = likely_unit_errors(datasets, chosen, start)
+        hint = likely_unit_errors(datasets, chosen, start) or likely_row_errors(
+            datasets, chosen, start
+        )
         if not hint and not start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
-    result = _result(estimator, estimate, commanded, start, evaluate(held, estimator, estimate))
+    unlike = unlike_components(estimator, estimate)
+    if unlike is not None:
+        commanded = equations.reweighted(unlike[1])
+        estimator = Estimator(commanded, own, loss)
+        estimate = estimator.solve(estimate.evaluation)
+    sure = uncertainty(estimator, estimate, covariance, None if unlike is None else unlike[0])
+    outside = replace(
+        evaluate(held, estimator, estimate, sure), drawn=not isinstance(holdout, Measurements)
+    )
+    result = _result(estimator, estimate, commanded, start, outside, sure)
     notes = _warnings(result, estimator, estimate, datasets)
     for text in notes:
         warnings.warn(text, CalibrationWarning, stacklevel=2)
@@ -176,13 +199,14 @@ def _warnings(
     if result.chi2_per_dof > _NOISY:
         notes.append(
             f"residuals are {np.sqrt(result.chi2_per_dof):.3g} times what sigma says:"
-            f" {_remedy(result, estimator, estimate)}"
+            f" {_remedy(result)}"
         )
     notes += in_other_modes(equations, fit.end)
+    notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
     notes += beyond_strokes(equations, fit.start, fit.end)
-    unknown = estimator.unstated & (estimate.freedom < estimator.least_freedom)
-    if estimator.equations.closures.unknowns and unknown.any():
+    unknown = fit.uncertainty.unknown
+    if fit.uncertainty.mixed and unknown.any():
         names = [f"of measurements {i + 1}" for i in range(len(equations.sets))]
         names = [n for n, u in zip([*names, "of the actuators"], unknown, strict=True) if u]
         notes.append(
@@ -202,9 +226,9 @@ def _warnings(
     return notes
 
 
-def _remedy(result: Identification, estimator: Estimator, estimate: Estimate) -> str:
+def _remedy(result: Identification) -> str:
     """Advise on residuals far above sigma; repeats decide between its two causes."""
-    scatter = joined(estimator.repeats(estimate)).scatter
+    scatter = result.fit.uncertainty.repeats().scatter
     if scatter**2 > _NOISY:
         return f"repeats of a pose scatter {scatter:.3g} times as much as it, state the true sigma"
     cure = "free more parameters"
@@ -273,10 +297,16 @@ def _telling(machine: Calibratable, datasets: list[FitData]) -> tuple[list[FitDa
 def _as_fitted(
     robot: Calibratable, holdout: Measurements, datasets: Sequence[FitData]
 ) -> tuple[FitData, int]:
-    """Hold other measurements out, with what is unknown of the fitted set of their kind."""
+    """Hold other measurements out, with what is unknown of the fitted set of their kind.
+
+    And with the noise of its actuators, where their own is not stated.
+    """
     _check(robot, holdout, "holdout")
     alike = [i for i, data in enumerate(datasets) if data.measured.kind == holdout.kind]
     i = alike[0] if alike else 0
+    of_actuators = datasets[i].measured.actuator_sigma
+    if holdout.actuator_sigma is None and of_actuators is not None:
+        holdout = replace(holdout, actuator_sigma=np.sqrt(np.mean(of_actuators**2, axis=0)))
     return replace(datasets[i], measured=holdout, rows=np.arange(len(holdout))), i
 
 
@@ -307,9 +337,9 @@ def _result(
     commanded: Equations,
     start: Evaluation,
     held: HeldOut,
+    sure: Uncertainty,
 ) -> Identification:
     chosen, search = estimator.equations.parameters, estimator.search
-    covariance = reported_covariance(estimator, estimate)
     robot = as_given(chosen.robot.replace(chosen.values_at(estimate.evaluation.theta)))
     if isinstance(robot, Robot):
         robot = robot.closing(commanded.actuators, estimate.evaluation.pose)
@@ -319,11 +349,12 @@ def _result(
         end = commanded.at(end.theta)
     return Identification(
         robot=robot,
-        table=parameter_table(estimator, estimate, covariance),
+        prior_test=tested_prior(estimator, estimate),
+        table=parameter_table(estimator, estimate, sure),
         identifiability=identifiability(estimator, estimate),
-        misfit=misfit(estimator, estimate, start, end),
+        misfit=misfit(estimator, estimate, sure, (start, end)),
         holdout=held,
-        repeats=repeats(estimator, estimate),
+        repeats=repeats(sure),
         search=SearchRecord(search.converged, search.evaluations, tuple(search.history)),
-        fit=Fit(commanded, start, end, estimate, covariance),
+        fit=Fit(commanded, start, end, estimate, sure),
     )

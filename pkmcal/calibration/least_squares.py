@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
-from pkmcal.calibration.equations import Equations, Evaluation
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.loss import Loss
 from pkmcal.exceptions import ArgumentError
 

@@ -64,6 +64,16 @@ class Loss:
         ratio = self._lengths(residual) / self._limit
         return 1.0 / np.maximum(ratio, 1.0) if self.name == "huber" else 1.0 / (1.0 + ratio**2)
 
+    def decline(self, residual: FloatArray) -> FloatArray:
+        """How the weights fall: s ∂w/∂s of each row (N,), s the length of its residual (M,)."""
+        ratio = self._lengths(residual) / self._limit
+        if self.name == "linear":
+            return np.zeros(len(self.components))
+        if self.name == "huber":
+            return np.where(ratio > 1.0, -1.0 / np.maximum(ratio, 1.0), 0.0)
+        falling: FloatArray = -2.0 * ratio**2 / (1.0 + ratio**2) ** 2
+        return falling
+
     def residual(self, residual: FloatArray) -> FloatArray:
         """Whitened residuals (M,) scaled so that the square of each row is its ρ."""
         if self.name == "linear":

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
-from pkmcal.calibration.equations import Equations, Evaluation
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.display import first_rows
 from pkmcal.kinematics.robot import Robot
 

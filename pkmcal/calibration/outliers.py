@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, first_largest
-from pkmcal.calibration.identifiability import triangle
+from pkmcal.statistics.linear_fit import triangle
+from pkmcal.statistics.robust_scale import median_ratio
 
 _FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
 _ALIKE = 1e-9  # share by which rows are further off than others that are not equally far off
@@ -85,13 +86,6 @@ def _squares(r: FloatArray, j: FloatArray, covariance: FloatArray, part: FloatAr
     seen = values > 1e-6  # a row that the fit follows wherever it lies says nothing
     squares: FloatArray = np.where(seen, along**2 / np.where(seen, values, 1.0), 0.0).sum(axis=1)
     return squares
-
-
-def median_ratio(squares: FloatArray, components: IntArray) -> float:
-    """Variance that squared lengths of rows show by their median: 1 if they are chi squared."""
-    from scipy.special import gammaincinv
-
-    return float(np.median(squares / (2 * gammaincinv(components / 2, 0.5))))
 
 
 def _chance(squares: FloatArray, components: IntArray) -> FloatArray:

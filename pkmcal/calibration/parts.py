@@ -7,6 +7,7 @@ from typing import Any
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.calibration.distances import Distances
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_statistics import (
     Identifiability,
@@ -17,15 +18,20 @@ from pkmcal.calibration.fit_statistics import (
 )
 from pkmcal.calibration.holdout import HeldOut
 from pkmcal.kinematics.robot import Robot
+from pkmcal.statistics.prior_test import PriorTest
 
 _NAMES = (  # of `to_dict`, in the order in which they are written
+    "verdict",
     "robot",
     "free",
     "units",
     "values",
     "start",
     "stderr",
+    "parameter_dof",
+    "interval95",
     "covariance",
+    "covariance_rule",
     "rank",
     "gap",
     "unidentifiable",
@@ -34,6 +40,9 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "holdout_rms",
     "holdout_rms_before",
     "holdout_expected",
+    "holdout_contradicts",
+    "holdout_chance",
+    "holdout_outliers",
     "holdout_unreached",
     "holdout_off",
     "holdout_off_before",
@@ -42,6 +51,9 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "chi2_per_dof",
     "dof",
     "noise",
+    "component_noise",
+    "reading_noise",
+    "pose_noise",
     "actuator_noise",
     "redundancy",
     "idle",
@@ -52,10 +64,15 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "residuals",
     "rows",
     "outliers",
+    "distances_before",
+    "distances",
+    "holdout_distances_before",
+    "holdout_distances",
     "at_bounds",
     "converged",
     "evaluations",
     "history",
+    "moved",
     "warnings",
 )
 
@@ -84,6 +101,8 @@ class Parts:
         The least-squares problem itself, for reports and the bootstrap.
     warnings : tuple of str
         What looks wrong with measurements or result.
+    prior_test : PriorTest or None
+        Whether the measurements contradict the prior, where there is one.
     """
 
     robot: Robot | SerialArm
@@ -95,6 +114,7 @@ class Parts:
     search: SearchRecord
     fit: Fit
     warnings: tuple[str, ...] = ()
+    prior_test: PriorTest | None = None
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -128,9 +148,29 @@ class Parts:
     def covariance(self) -> FloatArray:
         """Covariance (n, n) with stderr² on its diagonal; NaN beside an infinite variance.
 
-        Scaled by the residual only where no sigma was given.
+        By `covariance_rule`. Where it is "cluster", its rank is at most the number of poses: each
+        number in it is right, its inverse is not.
         """
         return self.table.covariance
+
+    @property
+    def covariance_rule(self) -> str:
+        """How: "classical", or "cluster" where rows of a pose share errors or a loss is robust."""
+        return self.table.rule
+
+    @property
+    def parameter_dof(self) -> FloatArray:
+        """Degrees of freedom (n,) of each `stderr`; inf where sigma says all, 0 where nothing."""
+        return self.table.dof
+
+    @property
+    def interval95(self) -> FloatArray:
+        """Ends (n, 2) of intervals that hold the true value in 95 % of calibrations.
+
+        By Student's t with `parameter_dof`: with few degrees of freedom much wider than twice
+        `stderr`.
+        """
+        return self.table.interval95
 
     @property
     def rank(self) -> int:
@@ -177,8 +217,23 @@ class Parts:
 
     @property
     def holdout_expected(self) -> float:
-        """What `holdout_rms` should be if noise and covariance are right."""
+        """What `holdout_rms` should be if noise and covariance are right; NaN if not known."""
         return self.holdout.expected
+
+    @property
+    def holdout_contradicts(self) -> bool:
+        """Whether the held-out points contradict the fit: by chance, by rms and by median."""
+        return self.holdout.contradicts
+
+    @property
+    def holdout_chance(self) -> float:
+        """p-value of `holdout_rms`: small where fit, noise or covariance are wrong; else NaN."""
+        return self.holdout.chance
+
+    @property
+    def holdout_outliers(self) -> tuple[int, ...]:
+        """Held-out rows further off than expected, numbered in what was given."""
+        return self.holdout.odd
 
     @property
     def holdout_unreached(self) -> str:
@@ -207,8 +262,30 @@ class Parts:
 
     @property
     def noise(self) -> tuple[float, ...]:
-        """Estimated deviation of each set of measurements, mm; NaN where sigma was given."""
+        """Estimated deviation of each set of measurements, mm; NaN where sigma was given.
+
+        That of residuals: what a reading has of its own and what its pose shares, the model's error
+        included. NaN, too, where no equations are left to show it.
+        """
         return self.misfit.noise
+
+    @property
+    def component_noise(self) -> tuple[tuple[float, ...], ...]:
+        """The same of each component, mm and rad.
+
+        Components are told apart where the residuals call for it: lengths and angles, x y and z.
+        """
+        return self.misfit.component_noise
+
+    @property
+    def reading_noise(self) -> tuple[float, ...]:
+        """What a single reading of each set has of its own, mm per coordinate."""
+        return self.misfit.reading_noise
+
+    @property
+    def pose_noise(self) -> tuple[float, ...]:
+        """What rows of one pose share beside it, mm per coordinate: pose and model errors."""
+        return self.misfit.pose_noise
 
     @property
     def repeatability(self) -> float:
@@ -277,6 +354,26 @@ class Parts:
     def outliers(self) -> tuple[int, ...]:
         """Rows that the others contradict, numbered likewise."""
         return self.misfit.outliers
+
+    @property
+    def distances_before(self) -> Distances:
+        """Rms, median and 95 % quantile of the nominal machine's distances to fitted points, mm."""
+        return self.misfit.before
+
+    @property
+    def distances(self) -> Distances:
+        """The same of the calibrated machine, and its rms without `outliers`."""
+        return self.misfit.after
+
+    @property
+    def holdout_distances_before(self) -> Distances:
+        """`distances_before` of the points held out."""
+        return self.holdout.before
+
+    @property
+    def holdout_distances(self) -> Distances:
+        """`distances` of the points held out; outliers are `holdout_outliers`."""
+        return self.holdout.after
 
     @property
     def at_bounds(self) -> tuple[str, ...]:

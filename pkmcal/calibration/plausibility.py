@@ -9,12 +9,14 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit, rms
-from pkmcal.calibration.equations import Equations, Evaluation
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.parameters import FitData, Parameters
-from pkmcal.display import first_rows
+from pkmcal.display import chance_text, first_rows
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.statistics.prior_test import PriorTest
 
 _GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
 FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
@@ -192,6 +194,24 @@ def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
                 " is"
             )
     return found
+
+
+def contradicted_prior(
+    test: PriorTest | None, parameters: Parameters, with_outliers: bool
+) -> list[str]:
+    """Say where the measurements contradict the prior, and how wide one would have to be."""
+    if test is None or not test.contradicted:
+        return []
+    pulls = np.nan_to_num(test.pulls)
+    stated = [i for i, sigma in enumerate(parameters.prior) if np.isfinite(sigma)]
+    worst = [k for k in np.argsort(-np.abs(pulls), kind="stable")[:3] if pulls[k]]
+    shown = ", ".join(f"{parameters.names[stated[k]]} {abs(pulls[k]):.1f}" for k in worst)
+    pulled = f" and pull {shown} times as far as prior and noise let expect" if worst else ""
+    return [
+        f"the measurements contradict the prior ({chance_text(test.chance_of_either)}){pulled}: a"
+        f" prior {test.factor:.2g} times as wide would agree"
+        + (", or leave the outliers out" if with_outliers else "")
+    ]
 
 
 def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: bool) -> list[str]:

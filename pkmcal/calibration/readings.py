@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, mm_per_unit
+from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
 from pkmcal.calibration.parameters import POINTS, FitData, Parameters
 from pkmcal.measurements import orientation
 from pkmcal.measurements.measurements import Measurements
@@ -42,6 +42,10 @@ class Readings:
         Which set each row is of.
     count : ndarray of int (N,)
         How many numbers were read in each row.
+    present : ndarray of bool
+        Which of all numbers of all sets were read, row by row.
+    deviations : tuple of ndarray (k,)
+        Relative deviations of the components of each set; 1 unless they were told apart.
     """
 
     def __init__(self, datasets: Sequence[FitData], parameters: Parameters) -> None:
@@ -76,9 +80,12 @@ class Readings:
         self.actuator_sigma = np.ascontiguousarray(distinct[:, n:]) if stated else None
         edges = np.cumsum([0, *map(len, self.sets)])
         self.pose_of = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
+        self.deviations = tuple(np.ones(len(m.components)) for m in self.sets)
         self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
-        self._present = np.concatenate([np.isfinite(m.values).reshape(-1) for m in self.sets])
-        self._whole = bool(self._present.all())
+        self.present: BoolArray = np.concatenate([
+            np.isfinite(m.values).reshape(-1) for m in self.sets
+        ])  # fmt: skip
+        self._whole = bool(self.present.all())
         self.set_of = np.repeat(np.arange(len(self.sets)), np.diff(edges))
         self.count = np.concatenate([
             np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in self.sets
@@ -137,11 +144,16 @@ class Readings:
                 scaled = white.reshape(*white.shape, *(1,) * (part.ndim - 2)) * part
             stacked.append((scaled / factor).reshape(-1, *part.shape[2:]))
         whole = np.concatenate(stacked)
-        return whole if self._whole else whole[self._present]
+        return whole if self._whole else whole[self.present]
 
     def unwhiten(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:
-        """Invert `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad."""
-        parts, rest = [], whitened
+        """Invert `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad.
+
+        0 where nothing was read.
+        """
+        rest = np.zeros(len(self.present))
+        rest[self.present] = whitened
+        parts = []
         for measured, white, factor in zip(self.sets, self._whiten, noise, strict=True):
             mine, rest = np.split(rest, [len(measured) * white.shape[1]])
             part = factor * mine.reshape(len(measured), -1)
@@ -150,11 +162,6 @@ class Readings:
             else:
                 parts.append(part / white)
         return parts
-
-    def white(self, i: int) -> FloatArray:
-        """Matrices (N, k, k) that make the noise of set `i` one, as its sigma says."""
-        white = self._whiten[i]
-        return white if white.ndim == 3 else white[:, :, None] * np.eye(white.shape[1])
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""

@@ -9,28 +9,46 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal import display
+from pkmcal.calibration.distances import Distances
 from pkmcal.calibration.fit_statistics import Identifiability, Misfit, ParameterTable, Repeats
 from pkmcal.calibration.holdout import HeldOut
 from pkmcal.display import Table, first_rows
-from pkmcal.measurements.lack_of_fit import SIGNIFICANT
+from pkmcal.statistics.noise import SIGNIFICANT
 
 _WIDTH = 100  # letters on a line of the terminal
 _SHORT = 12  # rows of a table that is not set side by side
 _BETWEEN = 3  # letters between tables side by side
+_SHARED = 0.5  # of a reading's own noise, from which what its pose shares is said
+_FEW = 10.0  # degrees of freedom below which a standard deviation says too little
 
 
 def misfit_table(misfit: Misfit, holdout: HeldOut) -> Table:
     """Misfit before and after, of fitted points and of those held out."""
-    rows = [["fitted", _short(misfit.rms_before), _short(misfit.rms), ""]]
-    if np.isnan(misfit.rms):  # nothing but the actuators was read
-        rows = []
+    rows = []
+    if np.isfinite(misfit.rms):
+        rows.append(["fitted", *_cells(misfit.before, misfit.after, misfit.outliers), ""])
     if np.isfinite(misfit.closure_rms):
         pair = _short(misfit.closure_rms_before), _short(misfit.closure_rms)
-        rows.append(["closures", *pair, "of the actuators"])
+        rows.append(["closures", *pair, "", "", "", "of the actuators"])
     if np.isfinite(holdout.rms):
-        pair = _short(holdout.rms_before), _short(holdout.rms)
-        rows.append(["held out", *pair, f"expected {_short(holdout.expected)}"])
-    return Table(["rms [mm]", "before", "after", ""], rows, left=1)
+        known = np.isfinite(holdout.expected)
+        expected = f"rms {_short(holdout.expected)} expected" if known else ""
+        cells = _cells(holdout.before, holdout.after, holdout.odd)
+        rows.append(["held out", *cells, expected])
+    heads = ["misfit [mm]", "rms before", "rms after", "median", "95 %", "rms without outliers", ""]
+    kept = [
+        k for k in range(len(heads)) if k < 5 or (k == 5 and (misfit.outliers or holdout.odd))
+        or (k == 6 and any(row[6] for row in rows))
+    ]  # fmt: skip
+    return Table([heads[k] for k in kept], [[row[k] for k in kept] for row in rows], left=1)
+
+
+def _cells(before: Distances, after: Distances, outliers: Sequence[int]) -> list[str]:
+    numbers = before.rms, after.rms, after.median, after.quantile95, after.rms_without_outliers
+    cells = [_short(number) for number in numbers]
+    if outliers:
+        cells[-1] += f" ({len(outliers)})"
+    return cells
 
 
 def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -> str:
@@ -40,13 +58,8 @@ def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -
     if np.isfinite(chi2):
         shown = f"{chi2:.2f}" if chi2 < 100 else f"{chi2:.2g}"
         facts.append(f"chi²/dof {shown} (1 ± {np.sqrt(2 / misfit.dof):.2f} expected)")
+    facts += _noise(misfit)
     misses = repeats.lack_of_fit_chance < SIGNIFICANT
-    estimated = [_short(noise) for noise in misfit.noise if np.isfinite(noise)]
-    if np.isfinite(misfit.actuator_noise):
-        estimated.append(f"of the actuators {_short(misfit.actuator_noise)}")
-    if estimated:
-        included = ", lack of fit included" if misses else ""
-        facts.append(f"noise {', '.join(estimated)} mm, estimated from the residuals{included}")
     if np.isfinite(repeats.repeatability):
         text = f"repeats scatter by {_short(repeats.repeatability)} mm"
         if misses:
@@ -58,15 +71,38 @@ def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -
     return filled("", "; ".join(facts))
 
 
+def _noise(misfit: Misfit) -> Iterator[str]:
+    """The noise that was estimated, and what of it a pose shares."""
+    estimated = [_short(noise) for noise in misfit.noise if np.isfinite(noise)]
+    if np.isfinite(misfit.actuator_noise):
+        estimated.append(f"of the actuators {_short(misfit.actuator_noise)}")
+    if estimated:
+        yield f"noise {', '.join(estimated)} mm, estimated from the residuals"
+    for names, deviations in zip(misfit.components, misfit.component_noise, strict=True):
+        lengths, angles = deviations[:3], deviations[3:]
+        if np.isfinite(lengths).all() and len(set(lengths)) > 1:
+            each = " ".join(map(_short, lengths))
+            yield f"noise of {' '.join(names[:3])} {each} mm"
+        if angles and misfit.told_apart:
+            each = " ".join(dict.fromkeys(_short(float(np.degrees(a))) for a in angles))
+            yield f"noise of the angles {each} deg"
+    shared = [
+        f"{_short(own)} mm of a reading alone, {_short(pose)} mm that its pose shares"
+        for own, pose in zip(misfit.reading_noise, misfit.pose_noise, strict=True)
+        if pose > _SHARED * own
+    ]
+    if shared:
+        yield f"residuals: {', '.join(shared)}"
+
+
 def limits(
     identifiability: Identifiability,
     parameters: int,
     correlations: Sequence[tuple[str, str, float]],
+    odd: str,
     outliers: Sequence[int],
-    at_bounds: Sequence[str],
-    idle: int,
 ) -> Iterator[str]:
-    """Where the result has limits: rank, correlations, outliers, bounds."""
+    """Where the result has limits: rank, correlations, outliers; `odd` names the last."""
     if identifiability.rank < parameters:
         gap = f", gap {identifiability.gap:.0e}" if np.isfinite(identifiability.gap) else ""
         yield f"rank {identifiability.rank} of {parameters}{gap}; unidentifiable combinations:"
@@ -77,22 +113,33 @@ def limits(
         shown = ", ".join(f"{a} / {b} {value:+.3f}" for a, b, value in correlations[:3])
         more = f" and {len(correlations) - 3} more" if len(correlations) > 3 else ""
         yield filled("correlated: ", shown + more)
-    if idle:
-        yield (
-            f"{idle} {'poses say' if idle > 1 else 'pose says'} nothing: what was read there"
-            " determines the pose at most"
-        )
     if outliers:
-        yield filled("outliers: ", f"rows {first_rows(outliers, 10)}")
-    if at_bounds:
-        yield filled("at a bound, ± as if it were not there: ", ", ".join(at_bounds))
+        where = "" if odd.startswith("row ") else f": {odd}"
+        yield filled("outliers: ", f"rows {first_rows(outliers, 10)}{where}")
 
 
-def parameter_rows(table: ParameterTable) -> Table:
-    """The parameters with their uncertainty, in as many columns as one screen takes."""
+def bounds(names: Sequence[str]) -> str:
+    """Which parameters ended at a bound."""
+    return filled("at a bound, ± as if it were not there: ", ", ".join(names))
+
+
+def parameter_rows(table: ParameterTable) -> Iterator[str | Table]:
+    """The parameters with their uncertainty, in as many columns as one screen takes.
+
+    Where few degrees of freedom are left, half widths of 95 % intervals, and a line that says so.
+    """
+    sure = np.isfinite(table.stderr)
+    least = float(table.dof[sure].min()) if sure.any() else np.inf
+    half = (table.interval95[:, 1] - table.interval95[:, 0]) / 2.0
+    wide = least < _FEW
     rows = []
     for name, unit, value, sigma, start in zip(
-        table.free, table.units, table.values, table.stderr, table.start, strict=True
+        table.free,
+        table.units,
+        table.values,
+        half if wide else table.stderr,
+        table.start,
+        strict=True,
     ):
         number, shown_unit = display.displayed(float(value), unit)
         deviation, _ = display.displayed(float(sigma), unit)
@@ -103,10 +150,16 @@ def parameter_rows(table: ParameterTable) -> Table:
         if not np.isfinite(deviation):
             text = f"{display.fixed(number, places)} ± {deviation:g}"
         rows.append([label, text, display.fixed(change, places)])
-    one = Table(["parameter", "value", "change"], rows, left=1)
+    one = Table(["parameter", "value ± 95 %" if wide else "value", "change"], rows, left=1)
     width = max(map(len, str(one).splitlines())) + _BETWEEN
     columns = min((_WIDTH + _BETWEEN) // width, -(-len(rows) // _SHORT))
-    return replace(one, columns=max(columns, 1))
+    yield replace(one, columns=max(columns, 1))
+    if wide:
+        yield filled(
+            "",
+            "± are half widths of 95 % intervals, by Student's t: as few as"
+            f" {least:.2g} degrees of freedom are left",
+        )
 
 
 def filled(lead: str, text: str) -> str:

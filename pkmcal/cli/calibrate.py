@@ -25,6 +25,7 @@ from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.report.as_json import as_json
 from pkmcal.report.report import FILES as REPORT
+from pkmcal.statistics.covariance import RULES
 
 
 def calibrate(
@@ -61,6 +62,14 @@ def calibrate(
             help="unknown: identify where distances end, too.",
         ),
     ] = "known",
+    covariance: Annotated[
+        str,
+        typer.Option(
+            metavar="WORD",
+            help="How uncertain parameters are: cluster, where rows of one pose share errors;"
+            " classical, where none do; auto: as the residuals show.",
+        ),
+    ] = "auto",
     tracker: Annotated[
         str | None,
         typer.Option(
@@ -85,7 +94,7 @@ def calibrate(
 ) -> int:
     """Identify the geometry of a machine from measurements of it.
 
-    Exit code 1: done, but not to be trusted; the summary says why.
+    Exit code 1: done, but doubtful or not calibrated; the first line says why.
 
     Example: pkmcal calibrate examples/linear-delta/robot.toml examples/linear-delta/probe.csv
     --report out
@@ -112,6 +121,7 @@ def calibrate(
             target=word("--target", target, KNOWN),
             attachment=word("--attachment", attachment, KNOWN),
             holdout=held,
+            covariance=word("--covariance", covariance, RULES),
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:
@@ -129,7 +139,7 @@ def calibrate(
             say(f"residuals: {output.paths[1]}")
         if reported is not None:
             say(f"\nreport: {reported.paths[0]}")
-    return 0 if found.converged and not found.warnings else 1
+    return 0 if found.verdict.state == "calibrated" else 1
 
 
 def read_tracker(text: str) -> Tracker:

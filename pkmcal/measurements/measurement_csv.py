@@ -109,7 +109,7 @@ def read_measurements(path: str | PathLike[str], robot: Actuated | None = None) 
     actuators, units = _read_actuators(table)
     _compare(table, units, robot)
     kind = _kind(table, several)
-    fields: dict[str, Any] = {"sigma": _read_sigma(table, kind)}
+    fields: dict[str, Any] = {"sigma": _read_sigma(table, kind), "lines": np.array(table.lines)}
     fields["actuator_sigma"] = _read_actuator_sigma(table, units)
     if "group" in table.columns:
         fields["group"] = table.integers("group")
@@ -122,7 +122,9 @@ def read_measurements(path: str | PathLike[str], robot: Actuated | None = None) 
             values = columns[0]
         fields |= _read_targets(table, kind)
     try:
-        return Measurements(actuators, values, kind, actuator_units=units, **fields)
+        return Measurements(
+            actuators, values, kind, actuator_units=units, file=table.path.name, **fields
+        )
     except ValueError as error:
         raise FileError(f"{table.path}: {error}") from None
 

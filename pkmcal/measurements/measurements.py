@@ -34,6 +34,10 @@ from pkmcal.result import Result
 
 _LISTED_ROWS = 12  # a longer list of measurements is printed with its middle left out
 
+_PER_ROW = (
+    "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines",
+)  # fmt: skip
+
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Measurements(Result):
@@ -80,6 +84,10 @@ class Measurements(Result):
         Standard deviation of what the actuators read, mm or rad. None: they are where they read on
         a machine with as many closures as free coordinates; on one with more, and with rows that
         contradict each other, it is estimated from them. Kept as (N, n).
+    lines : (N,) array of int, optional
+        The line of each row in the file it was read from, to name it by.
+    file : str
+        The name of that file.
 
     Raises
     ------
@@ -106,6 +114,8 @@ class Measurements(Result):
     actuator_units: tuple[str, ...] | None = None
     attachment: FloatArray | None = None
     actuator_sigma: FloatArray | None = None
+    lines: Int64Array | None = None
+    file: str = ""
 
     # The types above are those of the attributes; anything array-like is taken.
     def __init__(
@@ -122,6 +132,8 @@ class Measurements(Result):
         actuator_units: str | Sequence[str] | None = None,
         attachment: ArrayLike | None = None,
         actuator_sigma: ArrayLike | None = None,
+        lines: ArrayLike | None = None,
+        file: str = "",
     ) -> None:
         word("kind", kind, COMPONENTS)
         q = numbers("actuators", actuators)
@@ -144,6 +156,8 @@ class Measurements(Result):
             "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
             "attachment": attachment_array(attachment, kind, targets, len(q)),
             "actuator_sigma": actuator_sigma_array(actuator_sigma, q.shape),
+            "lines": None if lines is None else integers("lines", lines, len(q)),
+            "file": file,
         }
         self.__setstate__(fields)
 
@@ -219,7 +233,7 @@ class Measurements(Result):
         per_row: dict[str, Any] = {
             name: None if value is None else value[picked]
             for name, value in vars(self).items()
-            if name in ("actuators", "values", "sigma", "group", "target_index", "actuator_sigma")
+            if name in _PER_ROW
         }
         for name in ("target", "attachment"):
             place = getattr(self, name)

@@ -17,11 +17,9 @@ from pkmcal.display import printable
 from pkmcal.kinematics.workspace import reach, sample_poses, workspace
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.iso9283 import performance
-from pkmcal.measurements.lack_of_fit import groups
+from pkmcal.measurements.repeats import groups
 
 _WORST = 10  # rows that are listed
-_SPREAD = 3.0  # deviations by which held-out points may miss what is expected
-_GAIN = 0.9  # of the misfit that must not be left for a calibration to be worth it
 _CELLS, _DRAWN = 30, 500  # of the map of the workspace along an axis; of poses for its quantiles
 _SHARE = 0.9  # of the way from home to the ends of the workspace
 _MOSTLY, _ONLY = 0.5, 0.99  # of the prior's deviation, above which the prior dominates
@@ -65,30 +63,12 @@ class Slice:
     accuracy: FloatArray
 
 
+_COLOURS = {"calibrated": "good", "doubtful": "doubtful", "not calibrated": "bad"}
+
+
 def verdict(found: Identification) -> tuple[str, str]:
     """Rate the calibration: "good", "doubtful" or "bad", and one sentence."""
-    if not found.converged:
-        return "bad", "Not to be trusted: the least squares did not converge."
-    if found.warnings:
-        return "bad", f"Not to be trusted: {printable(found.warnings[0], 1000)}"
-    if not np.isfinite(found.holdout_rms):
-        change = f"the misfit of the {len(found.rows)} fitted points {_falls(found, 'rms')}"
-        if found.rms > _GAIN * found.rms_before:
-            return "doubtful", f"Little gained: {change}."
-        return "good", f"Calibrated: {change}; no points were held out to confirm it."
-    count = int(np.isfinite(found.holdout_off).sum())
-    change = f"the error of {count} points that were not fitted {_falls(found, 'holdout_rms')}"
-    if found.holdout_rms > found.holdout_expected * (1 + _SPREAD / np.sqrt(2 * count)):
-        return "doubtful", f"Doubtful: {change}, but {_mm(found.holdout_expected)} was expected."
-    if found.holdout_rms > _GAIN * found.holdout_rms_before:
-        return "doubtful", f"Little gained: {change}."
-    return "good", f"Calibrated: {change}; {_mm(found.holdout_expected)} was expected."
-
-
-def _falls(found: Identification, name: str) -> str:
-    """Say how a misfit changed."""
-    before, after = getattr(found, f"{name}_before"), getattr(found, name)
-    return f"{'falls' if after < before else 'goes'} from {_mm(before)} to {_mm(after)} rms"
+    return _COLOURS[found.verdict.state], f"{found.verdict}."
 
 
 def instrument_identified(found: Identification) -> bool:
@@ -191,10 +171,7 @@ def _knowledge(found: Identification, i: int, prior: float, share: float) -> str
 
 def correlation(found: Identification) -> FloatArray:
     """Return the correlations (n, n); NaN for parameters that are not identifiable."""
-    with np.errstate(invalid="ignore", divide="ignore"):
-        scale = np.where(np.isfinite(found.stderr) & (found.stderr > 0), found.stderr, np.nan)
-        matrix: FloatArray = found.covariance / np.outer(scale, scale)
-    return matrix
+    return found.correlation_matrix
 
 
 def iso9283(found: Identification) -> list[dict[str, Any]]:
@@ -251,12 +228,11 @@ def as_seen(found: Identification, places: FloatArray) -> FloatArray:
     point = equations.at(found.fit.end.theta)
     jacobian = equations.jacobian(point)[0][:, :3]
     jacobian *= known.parameters.scale
-    covariance = found.fit.estimate.covariance
-    variance = propagate(jacobian, covariance)
+    variance = propagate(jacobian, found.fit.uncertainty.scaled)
     undetermined = jacobian @ found.fit.undetermined()
     sure = np.linalg.norm(undetermined, axis=(1, 2)) < _NEGLIGIBLE
     distance = np.abs(point.pose[equations.pose_of[0]] - at)[:, :3].max(axis=1)
-    sure &= distance < _ELSEWHERE
+    sure &= (distance < _ELSEWHERE) & found.fit.uncertainty.known
     return np.where(sure, np.sqrt(variance), np.inf)
 
 
@@ -286,10 +262,6 @@ def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice 
     accuracy[inside] = expected(found, grid.poses[inside])
     accuracy[~np.isfinite(accuracy)] = np.nan
     return sampled, Slice((axes[0], axes[1]), (grid.values[0], grid.values[1]), accuracy)
-
-
-def _mm(value: float) -> str:
-    return f"{value:.3g} mm"
 
 
 def _largest(values: FloatArray) -> float:

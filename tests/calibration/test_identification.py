@@ -81,7 +81,7 @@ def test_redchi_is_the_weighted_sum_of_squares_per_degree_of_freedom(
 
 def test_json_has_every_name_of_the_result(found: pk.Identification) -> None:
     keys = re.findall(r'^  "(\w+)":', as_json(found, "parameters"), re.MULTILINE)
-    assert keys[:3] == ["robot", "free", "units"] and keys[-1] == "parameters"
+    assert keys[:4] == ["verdict", "robot", "free", "units"] and keys[-1] == "parameters"
     assert {"stderr", "holdout_rms", "lack_of_fit", "observability", "history"} <= set(keys)
     assert all(hasattr(found, key) for key in keys)
 

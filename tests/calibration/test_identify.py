@@ -41,6 +41,7 @@ def test_the_papers_machine_reaches_what_an_optimal_estimator_does(paper: Robot)
     assert 0.92 <= np.mean(inside) <= 0.98
 
 
+@pytest.mark.filterwarnings("ignore:the measurements contradict the prior")  # by chance
 @pytest.mark.filterwarnings("ignore:.*look at the outliers:UserWarning")
 def test_the_papers_machine_with_two_rows_off(paper: Robot) -> None:
     off = []
@@ -61,6 +62,7 @@ def test_the_papers_machine_with_two_rows_off(paper: Robot) -> None:
     assert np.mean(off) <= 0.021
 
 
+@pytest.mark.filterwarnings("ignore:the measurements contradict the prior")  # by chance
 def test_without_errors_no_row_is_an_outlier(paper: Robot) -> None:
     rng = np.random.default_rng(3)
     named = 0
@@ -245,6 +247,7 @@ def test_other_measurements_can_be_held_out(paper: Robot) -> None:
     assert len(found.rows) == 30
 
 
+@pytest.mark.filterwarnings("ignore:the measurements contradict the prior")  # by chance
 def test_predicted_accuracy_is_the_scatter_of_calibrations(paper: Robot) -> None:
     rng = np.random.default_rng(22)
     poses, elsewhere = tilted_poses(paper, 30, rng), tilted_poses(paper, 20, rng)
@@ -339,7 +342,7 @@ def test_result_reads_itself_out(paper: Robot) -> None:
     found = identify(paper, measured, prior=0.5, holdout=0.25)
     text = str(found)
     assert text == found.summary()
-    assert len(text.splitlines()) <= 26  # 28 changes take two columns, not three
+    assert len(text.splitlines()) <= 29  # a verdict of two lines; 28 changes take two columns
     assert max(map(len, text.splitlines())) <= 100
     for word in ("rank 25 of 28", "held out", "expected", "chi²/dof", "  platform3.x"):
         assert word in text

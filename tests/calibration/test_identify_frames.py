@@ -12,6 +12,7 @@ import pkmcal as pk
 from pkmcal.calibration.identify import identify
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose
+from pkmcal.exceptions import CalibrationWarning
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 
@@ -106,7 +107,8 @@ def test_a_prior_of_the_frame_is_around_the_base() -> None:
     options = {"free": "offset*", "frame": "unknown"}
     loose = identify(robot, readings, prior={"frame.x": 1.0}, **options)
     assert loose.parameters["frame.x"]["value"] == pytest.approx(0.3, abs=0.02)
-    tight = identify(robot, readings, prior={"frame.x": 1e-5}, **options)
+    with pytest.warns(CalibrationWarning, match="contradict the prior"):
+        tight = identify(robot, readings, prior={"frame.x": 1e-5}, **options)
     assert tight.parameters["frame.x"]["value"] == pytest.approx(0.0, abs=1e-4)
 
 

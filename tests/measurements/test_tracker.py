@@ -49,6 +49,7 @@ def test_a_tracker_stands_for_sigma_and_for_the_noise_of_a_machine() -> None:
     assert squares.mean() == pytest.approx(3, abs=4 * np.sqrt(6 / 30))
 
 
+@pytest.mark.filterwarnings("ignore:the measurements contradict the prior")  # by chance
 def test_the_trackers_covariances_make_a_better_calibration_than_one_sigma() -> None:
     robot = pk.load("hexapod")
     coarse = pk.Tracker(range=0.005, azimuth=2e-5, elevation=5e-5, position=tuple(PLACE))

@@ -89,15 +89,12 @@ def test_verdict_comes_first_and_names_the_held_out_error(
 @pytest.mark.parametrize(
     ("changes", "state", "words"),
     [
-        ({"converged": False}, "bad", "did not converge"),
-        ({"warnings": ("z looks like metres",)}, "bad", "trusted: z looks like metres"),
-        ({"holdout_rms": 0.4, "holdout_rms_before": 0.41}, "doubtful", "expected"),
-        ({"holdout_rms": 0.0199, "holdout_expected": 0.02, "holdout_rms_before": 0.02},
-         "doubtful", "Little gained"),
-        ({"holdout_rms": np.nan}, "good", "no points were held out"),
-        ({"holdout_rms": np.nan, "rms": 1.0, "rms_before": 1.01}, "doubtful", "Little gained"),
+        ({"converged": False}, "bad", "Not calibrated: the least squares did not converge."),
+        ({"warnings": ("z looks like metres",)}, "doubtful", "Doubtful: z looks like metres."),
+        ({"at_bounds": ("offset1",)}, "doubtful", "Doubtful: offset1 ended at a bound"),
+        ({"holdout_off": np.empty(0)}, "good", "no points were held out"),
     ],
-)  # fmt: skip
+)
 def test_verdict_is_no_better_than_the_calibration(
     found: Identification, changes: dict[str, Any], state: str, words: str
 ) -> None:

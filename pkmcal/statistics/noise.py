@@ -1,8 +1,9 @@
-"""Pure error and lack of fit of repeated measurements, and the F test between them.
+"""What residuals say of the noise: of one reading, shared by a pose, of repeats, and lack of fit.
 
 Residuals of rows that repeat a pose are split into what they scatter about their common mean, the
 pure error, which the model has no part in, and the mean, which is what the model misses there. If
-the model is right the two differ by chance alone: the F test of lack of fit.
+the model is right the two differ by chance alone: the F test of lack of fit (N. R. Draper and H.
+Smith, Applied Regression Analysis, Wiley 1998).
 """
 
 from __future__ import annotations
@@ -13,14 +14,62 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.measurements.measurements import Measurements
+from pkmcal.statistics.distributions import f_tail
+from pkmcal.statistics.linear_fit import sums
 
 SIGNIFICANT = 0.01  # chance below which the model is said to miss more than scatter explains
 
 
 @dataclass(frozen=True)
+class Noise:
+    """Variances of one equation.
+
+    Attributes
+    ----------
+    total : float
+        Mean square of adjusted residuals.
+    shared : float
+        What equations of one pose and component share of it: errors of the pose and of the model.
+    """
+
+    total: float
+    shared: float
+
+    @property
+    def single(self) -> float:
+        """Variance that is a reading's own."""
+        return self.total - self.shared
+
+
+def noise(adjusted: FloatArray, retained: FloatArray, key: IntArray) -> Noise:
+    """Split the variance of residuals; NaN where the fit has used up all of them.
+
+    Parameters
+    ----------
+    adjusted, retained : ndarray (M,)
+        Residuals adjusted for leverage, and the share of their variance that this could restore.
+    key : ndarray of int (M,)
+        Those with the same may share an error.
+
+    Examples
+    --------
+    >>> together = noise(np.array([1.0, 1.0, -1.0, -1.0]), np.ones(4), np.array([0, 0, 1, 1]))
+    >>> together.shared, together.single
+    (1.0, 0.0)
+    """
+    shown = float(retained.sum())
+    total = float((adjusted**2).sum()) / shown if shown > 0 else float("nan")
+    counts = np.bincount(key)
+    pairs = float((counts.astype(np.float64) ** 2 - counts).sum())
+    if not (pairs and shown > 0):
+        return Noise(total, 0.0)
+    cross = float((sums(adjusted, key) ** 2).sum() - (adjusted**2).sum())
+    return Noise(total, min(max(cross / pairs, 0.0), total))
+
+
+@dataclass(frozen=True)
 class Split:
-    """Sums of squares of whitened residuals.
+    """Sums of squares of residuals.
 
     Attributes
     ----------
@@ -55,9 +104,7 @@ class Split:
     @property
     def chance(self) -> float:
         """How likely a ratio as large would be if the model were right; NaN without a ratio."""
-        from scipy.special import fdtrc
-
-        return float(fdtrc(self.missed_freedom, self.pure_freedom, self.ratio))
+        return f_tail(self.ratio, self.missed_freedom, self.pure_freedom)
 
     @property
     def beyond(self) -> float:
@@ -67,46 +114,28 @@ class Split:
         return self.scatter * float(np.sqrt(max(self.ratio - 1.0, 0.0) / self.repeats))
 
 
-def groups(measured: Measurements) -> IntArray:
-    """Which pose and target each row measured, (N,), counted from 0."""
-    target = measured.target_index
-    of = np.zeros(len(measured), dtype=np.intp) if target is None else target
-    return np.unique(np.column_stack([measured.pose_index, of]), axis=0, return_inverse=True)[
-        1
-    ].reshape(-1)
-
-
-def split(residual: FloatArray, white: FloatArray, group: IntArray, leverage: float) -> Split:
+def split(residual: FloatArray, key: IntArray, leverage: float) -> Split:
     """Split the residuals of one set.
 
     Parameters
     ----------
-    residual : ndarray (N, k)
-        Measured less predicted.
-    white : ndarray (N, k, k)
-        What makes the noise of a row one.
-    group : ndarray of int (N,)
-        See `groups`.
+    residual : ndarray (M,)
+        Measured less predicted in units of its deviation; of a robust loss pseudo-residuals.
+    key : ndarray of int (M,)
+        Which pose, target and component each belongs to, from 0.
     leverage : float
         How many parameters went into them.
     """
-    count, k = int(group.max()) + 1, residual.shape[1]
-    if count == len(group):
+    counts = np.bincount(key)
+    if len(counts) == len(key):
         return Split(0.0, 0.0, 0.0, 0.0, 1.0)
-    weight = white.transpose(0, 2, 1) @ white
-    total, pulled = np.zeros((count, k, k)), np.zeros((count, k))
-    np.add.at(total, group, weight)
-    np.add.at(pulled, group, (weight @ residual[:, :, None])[:, :, 0])
-    mean = np.linalg.solve(total, pulled[:, :, None])[:, :, 0]
-    about = (white @ (residual - mean[group])[:, :, None])[:, :, 0]
-    every = (white @ residual[:, :, None])[:, :, 0]
-    pure = float((about**2).sum())
+    mean = np.bincount(key, residual) / counts
     return Split(
-        pure=pure,
-        pure_freedom=float((len(group) - count) * k),
-        missed=float((every**2).sum()) - pure,
-        missed_freedom=count * k - leverage,
-        repeats=len(group) / count,
+        pure=float(((residual - mean[key]) ** 2).sum()),
+        pure_freedom=float(len(key) - len(counts)),
+        missed=float((counts * mean**2).sum()),
+        missed_freedom=len(counts) - leverage,
+        repeats=len(key) / len(counts),
     )
 
 

@@ -1,0 +1,47 @@
+"""Distances of measured from predicted points, in short: rms, median and 95 % quantile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, rms
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Of the points that were reached, mm; NaN without any.
+
+    Attributes
+    ----------
+    rms, median, quantile95 : float
+        Of all.
+    rms_without_outliers : float
+        Of those that are no outliers.
+    """
+
+    rms: float = float("nan")
+    median: float = float("nan")
+    quantile95: float = float("nan")
+    rms_without_outliers: float = float("nan")
+
+
+def distances(off: FloatArray, outliers: BoolArray) -> Distances:
+    """Summarise distances (N,); `outliers` (N,) says which are.
+
+    Examples
+    --------
+    >>> distances(np.array([1.0, 1.0, 7.0]), np.array([False, False, True]))
+    Distances(rms=4.123105625617661, median=1.0, quantile95=6.4, rms_without_outliers=1.0)
+    """
+    reached = np.isfinite(off)
+    if not reached.any():
+        return Distances()
+    here = off[reached]
+    return Distances(
+        rms(here),
+        float(np.median(here)),
+        float(np.quantile(here, 0.95)),
+        rms(off[reached & ~outliers]),
+    )

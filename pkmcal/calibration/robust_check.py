@@ -1,0 +1,103 @@
+"""Whether a few rows carry a least-squares fit: a robust fit beside it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pkmcal.arrays import rms
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.estimator import Estimator
+from pkmcal.calibration.fit import Fit
+from pkmcal.calibration.outliers import outliers
+from pkmcal.calibration.parameters import FitData
+from pkmcal.statistics.robust_scale import median_ratio, robust_ratio
+
+_SUSPECT = 1.25  # ratio of the linear model's noises from which the robust fit is made
+_MOST = 500  # poses of which it is made, drawn at random
+
+
+@dataclass(frozen=True)
+class RobustCheck:
+    """A robust fit beside a least-squares one.
+
+    Attributes
+    ----------
+    ratio : float
+        Noise of the least-squares fit over that of the robust one.
+    rows : tuple of int
+        Rows that disagree with the rest there.
+    rms : float
+        Of the other rows there, mm.
+    """
+
+    ratio: float
+    rows: tuple[int, ...]
+    rms: float
+
+
+def robust_check(fit: Fit) -> RobustCheck | None:
+    """Compare a least-squares fit with a robust one; None where they agree.
+
+    The linear model at the solution says whether the robust fit is worth its time.
+    """
+    equations, estimate = fit.uncertainty.equations, fit.estimate
+    linear = fit.uncertainty.fit
+    ratio = robust_ratio(linear.design, linear.residual, equations.components)
+    if not ratio > _SUSPECT:
+        return None
+    drawn = _drawn(fit)
+    few = Equations([data for data, _ in drawn], fit.parameters).reweighted(
+        [equations.deviations[i] for _, i in drawn]
+    )
+    commanded = few.commanded()
+    try:
+        estimator = Estimator(few, few.begin(commanded, commanded.at(fit.start.theta)), "cauchy")
+        robust = estimator.solve()
+    except ValueError:
+        return None
+    p = robust.state.fitted.rank
+    m, own = int(few.components.sum()), int(equations.components.sum())
+    if m <= p or own <= p:
+        return None
+    # both in units of the same noise
+    noise = estimate.state.noise
+    of_sets = np.concatenate([noise[[i for _, i in drawn]], noise[len(equations.sets) :]])
+    plain = equations.residual(estimate.evaluation, noise)
+    squares = few.squares(few.residual(robust.evaluation, of_sets))
+    scale = median_ratio(squares, few.components) * m / (m - p)
+    odd = outliers(
+        robust.residual,
+        robust.jacobian @ robust.state.fitted.identifiable,
+        few.components,
+        robust.weights,
+        estimator.prior @ robust.state.fitted.identifiable,
+    )
+    named = np.isin(few.unit_of_row, odd)
+    commanded.warm_start(robust.evaluation)
+    off = few.distances(commanded.at(robust.evaluation.theta))[~named]
+    if not scale > 0:
+        return None
+    return RobustCheck(
+        ratio=float(np.sqrt(plain @ plain / (own - p) / scale)),
+        rows=tuple(few.rows[named].tolist()),
+        rms=rms(off[np.isfinite(off)]),
+    )
+
+
+def _drawn(fit: Fit) -> list[tuple[FitData, int]]:
+    """The fitted rows, or those of some poses if there are more than needed; and their sets."""
+    equations = fit.equations
+    pose = fit.uncertainty.poses
+    count = int(pose.max()) + 1
+    if count <= _MOST:
+        return [(data, i) for i, data in enumerate(equations.datasets)]
+    chosen = np.isin(pose, np.random.default_rng(0).permutation(count)[:_MOST])
+    drawn = []
+    for i, data in enumerate(equations.datasets):
+        mine = np.flatnonzero(chosen[equations.set_of == i])
+        if len(mine):
+            few = replace(data, measured=data.measured.select(mine), rows=data.rows[mine])
+            drawn.append((few, i))
+    return drawn

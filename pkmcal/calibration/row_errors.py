@@ -1,0 +1,99 @@
+"""Whether readings stand beside the wrong rows, or targets are exchanged: found by trying."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.parameters import FitData, Parameters
+from pkmcal.calibration.plausibility import MISFIT_RATIO
+from pkmcal.calibration.readings import of_read
+from pkmcal.display import printable
+from pkmcal.measurements.measurements import Measurements
+
+_SHIFTS = (1, -1, 2, -2)  # rows by which readings are tried
+_LEAST_ROWS = 6
+_MOST_TARGETS = 4  # whose orders are tried
+
+
+def likely_row_errors(
+    datasets: Sequence[FitData], parameters: Parameters, evaluation: Evaluation
+) -> list[str]:
+    """Suspect readings beside the wrong rows and exchanged targets, at the nominal machine.
+
+    A reading of the data that fits far better is named.
+    """
+    found = []
+    for i, data in enumerate(datasets):
+        if not data.measured.components:
+            continue
+        present = _median(data, parameters)
+        trials = {
+            words: _median(replace(data, measured=other), parameters)
+            for words, other in _readings(data.measured)
+        }
+        if not trials:
+            continue
+        words = min(trials, key=lambda text: trials[text])
+        if trials[words] < MISFIT_RATIO * present:
+            which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
+            found.append(f"{which}off by {_off(present)} as given, but by {_off(trials[words])} if"
+                         f" {words}")  # fmt: skip
+    return found
+
+
+def _off(value: float) -> str:
+    return f"{value:.3g} mm" if np.isfinite(value) else "more than the machine reaches"
+
+
+def _median(data: FitData, parameters: Parameters) -> float:
+    """Median distance of the readings from the nominal machine, mm; inf where most fail."""
+    try:
+        start = Equations([data], parameters).commanded().start()
+    except ValueError:
+        return float("inf")
+    read = np.isfinite(data.measured.values.reshape(start.residuals[0].shape)).any(axis=1)
+    off = np.linalg.norm(of_read(data.measured, start.residuals[0])[read, :3], axis=1)
+    return float(np.median(np.where(np.isfinite(off), off, np.inf))) if read.any() else np.inf
+
+
+def _readings(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+    """Read measurements with values moved along the rows and with targets exchanged."""
+    names = measured.target_names or ("1",)
+    step, count = len(names), len(measured)
+    what = "row" if step == 1 else "pose"
+    rows = np.arange(count)
+    for shift in _SHIFTS:
+        by = abs(shift) * step
+        if count - by < max(_LEAST_ROWS, count // 2):
+            continue
+        early, late = rows[:-by], rows[by:]
+        kept, read = (early, late) if shift > 0 else (late, early)
+        if (
+            measured.target_index is not None
+            and (measured.target_index[kept] != measured.target_index[read]).any()
+        ):
+            continue
+        values = measured.values[read]
+        sigma = None if measured.sigma is None else measured.sigma[read]
+        where = "before" if shift > 0 else "after"  # where its actuators stand
+        yield (
+            f"each reading belongs to the {what} {abs(shift)} {where} it",
+            replace(measured.select(kept), values=values, sigma=sigma),
+        )
+    if measured.target is None or measured.target_index is None or step > _MOST_TARGETS:
+        return
+    for order in itertools.permutations(range(step)):
+        if order != tuple(range(step)):
+            index = np.array(order)[measured.target_index]
+            shown = ", ".join(
+                f"{printable(names[a])} is {printable(names[b])}"
+                for a, b in enumerate(order)
+                if a != b
+            )
+            yield f"target {shown}", replace(measured, target_index=index)

@@ -1,0 +1,34 @@
+"""Rows as the user knows them: file, line, group and target."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from pkmcal.calibration.parameters import FitData
+from pkmcal.display import printable
+
+_MOST = 6  # places that are listed
+
+
+def row_names(datasets: Sequence[FitData], rows: Iterable[int]) -> str:
+    """Name rows by line of their file, or by number, with the targets that each line has."""
+    where = {int(row): (data, i) for data in datasets for i, row in enumerate(data.rows)}
+    places: dict[str, list[str]] = {}
+    for row in rows:
+        data, i = where[int(row)]
+        measured = data.measured
+        if measured.lines is None:
+            place = f"row {row}"
+        else:
+            file = f"{printable(measured.file)} " if measured.file else ""
+            place = f"{file}line {measured.lines[i]}"
+        if measured.group is not None:
+            place += f", pose {measured.group[i]}"
+        targets = places.setdefault(place, [])
+        if measured.target_names is not None and measured.target_index is not None:
+            targets.append(printable(measured.target_names[measured.target_index[i]]))
+    listed = [
+        f"{place} ({', '.join(targets)})" if targets else place for place, targets in places.items()
+    ]
+    more = f" and {len(listed) - _MOST} more" if len(listed) > _MOST else ""
+    return ", ".join(listed[:_MOST]) + more

@@ -1,0 +1,261 @@
+"""Whether a calibration can be believed, and why not."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pkmcal.calibration.estimator import LEAST_FREEDOM
+from pkmcal.calibration.identifiability import listed
+from pkmcal.calibration.moved import Moved
+from pkmcal.calibration.parts import Parts
+from pkmcal.calibration.robust_check import RobustCheck
+from pkmcal.calibration.row_errors import likely_row_errors
+from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.uncertainty import FEW
+from pkmcal.display import chance_text, decimals, displayed, fixed, printable
+from pkmcal.statistics.distributions import deviation_interval
+
+State = Literal["calibrated", "doubtful", "not calibrated"]
+
+_GAIN = 0.9  # of the misfit that must not be left for a calibration to be worth it
+_ABSURD = 0.02  # share of the spread of the commanded positions that no sound fit leaves
+_DISAGREES, _CARRIED = 1.5, 5.0  # ratio to the robust fit that is said, and that decides
+_LONGEST = 1000  # letters of a reason: names of others may be in it
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether the result can be believed.
+
+    Attributes
+    ----------
+    state : {"calibrated", "doubtful", "not calibrated"}
+        "calibrated": nothing that was looked at speaks against it.
+    reasons : tuple of str
+        Why, the gravest first.
+    remarks : tuple of str
+        What one should know besides.
+
+    Examples
+    --------
+    >>> print(Verdict("doubtful", ("1 spare equation is too few",), ()))
+    Doubtful: 1 spare equation is too few
+    """
+
+    state: State
+    reasons: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    def __str__(self) -> str:
+        return f"{self.state.capitalize()}: {'; '.join(self.reasons[:1])}"
+
+
+def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) -> Verdict:
+    """Judge a calibration.
+
+    Parameters
+    ----------
+    found : Parts
+        The calibration.
+    robust : RobustCheck or None
+        A robust fit beside it, where there is one.
+    moved : tuple of Moved
+        What moved between the fitted points and those held out.
+    """
+    grave = _grave(found, robust)
+    doubts = [*_contradicted(found, moved), *_few(found)]
+    if found.at_bounds:
+        doubts.append(
+            f"{listed(found.at_bounds)} ended at a bound: the fit would go further; widen the"
+            " bound, or see what else is wrong"
+        )
+    doubts += found.warnings
+    if not grave and not doubts and _little_gained(found):
+        doubts.append(f"little gained: {_change(found)}")
+    remarks = _remarks(found, robust)
+    reasons = tuple(printable(text, _LONGEST) for text in grave + doubts)
+    if grave:
+        return Verdict("not calibrated", reasons, remarks)
+    if doubts:
+        return Verdict("doubtful", reasons, remarks)
+    return Verdict("calibrated", (_change(found),), remarks)
+
+
+def _grave(found: Parts, robust: RobustCheck | None) -> list[str]:
+    """What makes a result no calibration."""
+    reasons = []
+    if not found.converged:
+        reasons.append("the least squares did not converge")
+    if robust is not None and robust.ratio > _CARRIED:
+        reasons.append(_disagreement(found, robust))
+    spread = _commanded_spread(found)
+    left = np.nanmax([found.rms, found.closure_rms, 0.0])
+    if left > _ABSURD * spread > 0:
+        other = likely_row_errors(
+            found.fit.equations.datasets, found.fit.parameters, found.fit.start
+        )
+        cause = "; ".join(other) or (
+            "check that robot file and measurements belong together, row by row"
+        )
+        reasons.append(
+            f"{_mm(left)} are left where the machine moved about by {_mm(spread)}: {cause}"
+        )
+    return reasons
+
+
+def _commanded_spread(found: Parts) -> float:
+    """Rms distance of the commanded positions, by the nominal machine, from their mean, mm."""
+    start = found.fit.start
+    places = start.pose[start.status == 0, :3]
+    return float(np.sqrt(((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))
+
+
+def _contradicted(found: Parts, moved: tuple[Moved, ...]) -> list[str]:
+    """What points that were held out say against the fit."""
+    reasons = []
+    test = found.holdout.test
+    if found.holdout_contradicts:
+        reasons.append(
+            f"the held-out points contradict the fit: {_mm(found.holdout_rms)} rms where"
+            f" {_mm(found.holdout_expected)} is expected ({chance_text(found.holdout_chance)})"
+        )
+    elif test is not None and test.few_off and found.holdout_outliers:
+        count = len(found.holdout_outliers)
+        reasons.append(
+            f"{count} held-out point{'s are' if count > 1 else ' is'} off:"
+            f" {row_names(found.holdout.data, found.holdout_outliers)}; without"
+            f" {'them' if count > 1 else 'it'} the rms is"
+            f" {_mm(found.holdout_distances.rms_without_outliers)},"
+            f" {_mm(found.holdout_expected)} is expected"
+        )
+    if moved and (found.holdout_contradicts or _spare(found) < FEW):
+        reasons.append(_moved_text(moved))
+    return reasons
+
+
+def _moved_text(moved: tuple[Moved, ...]) -> str:
+    parts = []
+    for each in moved:
+        sizes = ", ".join(map(_size, each.shift, each.stderr, each.units))
+        also = f" (or as well {', '.join(each.also)})" if each.also else ""
+        parts.append(f"{each} by {sizes}{also}")
+    return (
+        "between the fitted and the held-out points moved, or the model is wrong there:"
+        f" {'; '.join(parts)}"
+    )
+
+
+def _size(shift: float, sigma: float, unit: str) -> str:
+    """A shift with its standard deviation, in the unit people read."""
+    value, shown = displayed(shift, unit)
+    deviation, _ = displayed(sigma, unit)
+    places = decimals(deviation)
+    sign = "+" if value >= 0 else ""
+    return f"{sign}{fixed(value, places)} ± {fixed(deviation, places)} {shown}"
+
+
+def _spare(found: Parts) -> float:
+    return found.fit.uncertainty.fit.freedom
+
+
+def _few(found: Parts) -> list[str]:
+    """Whether enough equations are left to show the noise."""
+    freedom, sure = _spare(found), found.fit.uncertainty
+    if freedom >= FEW or not sure.equations.unstated.any() or (sure.mixed and not sure.known):
+        return []  # a warning names the groups whose noise is not known
+    heights = all(m.kind == "height" for m in found.fit.equations.sets)
+    more = "probe 20 points or more" if heights else "measure more poses"
+    if not sure.known:
+        return (
+            []
+            if found.dof < LEAST_FREEDOM
+            else [
+                f"as many numbers as equations: nothing shows how good the fit is; {more}, or state"
+                " sigma"
+            ]
+        )
+    low, high = deviation_interval(freedom)
+    one = round(freedom, 1) == 1
+    spare = "1 spare equation shows" if one else f"{freedom:.2g} spare equations show"
+    return [
+        f"only {spare} the noise, which may be {low:.2g} to {high:.2g} times what is estimated;"
+        f" {more}, or state sigma"
+    ]
+
+
+def _little_gained(found: Parts) -> bool:
+    if np.isfinite(found.chi2_per_dof):
+        return False  # the residuals are what sigma says
+    held = bool(np.isfinite(found.holdout_rms))
+    before, after = (found.holdout_rms_before, found.holdout_rms) if held else _misfit(found)[:2]
+    return after > _GAIN * before
+
+
+def _misfit(found: Parts) -> tuple[float, float, str]:
+    """Misfit before and after, and of what."""
+    if np.isfinite(found.rms):
+        return found.rms_before, found.rms, f"{len(found.rows)} fitted points"
+    rows = len(found.rows)
+    return found.closure_rms_before, found.closure_rms, f"actuators of {rows} fitted rows"
+
+
+def _change(found: Parts) -> str:
+    """Say how the misfit changed."""
+    held = found.holdout_off[np.isfinite(found.holdout_off)]
+    if held.size:
+        expected = ""
+        if np.isfinite(found.holdout_expected):
+            expected = f"; {_mm(found.holdout_expected)} was expected"
+        return (
+            f"the error of {held.size} points that were not fitted"
+            f" {_falls(found.holdout_rms_before, found.holdout_rms)}{expected}"
+        )
+    before, after, what = _misfit(found)
+    return (
+        f"the misfit of the {what} {_falls(before, after)}; no points were held out to confirm it"
+    )
+
+
+def _falls(before: float, after: float) -> str:
+    return f"{'falls' if after < before else 'goes'} from {_mm(before)} to {_mm(after)} rms"
+
+
+def _disagreement(found: Parts, robust: RobustCheck) -> str:
+    count = len(robust.rows)
+    if not count:
+        return (
+            f"a robust fit has {robust.ratio:.2g} times less noise: many rows disagree with the"
+            " rest; fit with loss='cauchy' and look at the residuals"
+        )
+    rows = "row disagrees" if count == 1 else "rows disagree"
+    return (
+        f"{count} {rows} with the rest: {row_names(found.fit.equations.datasets, robust.rows)};"
+        f" a robust fit leaves {_mm(robust.rms)} in the others, this one {_mm(found.rms)} in all:"
+        " fit with loss='cauchy'"
+    )
+
+
+def _remarks(found: Parts, robust: RobustCheck | None) -> tuple[str, ...]:
+    remarks = []
+    if robust is not None and _DISAGREES < robust.ratio <= _CARRIED:
+        remarks.append(_disagreement(found, robust))
+    scale = found.fit.uncertainty.covariance.scale
+    stated = not found.fit.uncertainty.equations.unstated.any()
+    if stated and found.covariance_rule == "classical" and scale > 1.0:
+        remarks.append(
+            f"± are {scale:.2g} times as wide as sigma alone would make them, since the residuals"
+            " are so much larger"
+        )
+    if found.idle:
+        say = "poses say" if found.idle > 1 else "pose says"
+        remarks.append(
+            f"{found.idle} {say} nothing: what was read there determines the pose at most"
+        )
+    return tuple(printable(text, _LONGEST) for text in remarks)
+
+
+def _mm(value: float) -> str:
+    return f"{value:.3g} mm"

@@ -1,0 +1,159 @@
+"""Whether points that were held out contradict the fit.
+
+Their mean square is compared with what noise and covariance let expect, by an F test whose degrees
+of freedom are Satterthwaite's: equations of one pose share errors, and poses may be unlike (F. E.
+Satterthwaite, An approximate distribution of estimates of variance components, Biometrics Bulletin
+2 (1946)).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.statistics.distributions import f_tail
+from pkmcal.statistics.linear_fit import numbered, sums
+from pkmcal.statistics.noise import Noise
+
+CHANCE = 0.01  # below which points contradict the fit …
+RATIO = 1.2  # … if their rms and their median are also so much larger than expected
+
+
+@dataclass(frozen=True)
+class HoldoutTest:
+    """The comparison.
+
+    Attributes
+    ----------
+    ratio : float
+        Rms of the points held out over what is expected.
+    median_ratio : float
+        The same of their median length.
+    chance : float
+        How likely a ratio as large would be if fit, noise and covariance were right.
+    freedom : (float, float)
+        Degrees of freedom of the F test.
+    """
+
+    ratio: float
+    median_ratio: float
+    chance: float
+    freedom: tuple[float, float]
+
+    @property
+    def contradicts(self) -> bool:
+        """Whether the points contradict the fit: by chance, rms and median."""
+        return self.few_off and self.median_ratio > RATIO
+
+    @property
+    def few_off(self) -> bool:
+        """Whether their rms contradicts it, which a few points can do."""
+        return self.chance < CHANCE and self.ratio > RATIO
+
+
+@dataclass(frozen=True, eq=False)
+class Lengths:
+    """Equations of lengths, in units of the deviation of one.
+
+    Attributes
+    ----------
+    residual : ndarray (M,)
+        Of fitted rows adjusted for leverage.
+    design : ndarray (M, p)
+        Derivative to the parameters in the basis of the fit; of fitted rows as there, whitened.
+    row, pose, component : ndarray of int (M,)
+        Which measured point, pose and component each belongs to.
+    """
+
+    residual: FloatArray
+    design: FloatArray
+    row: IntArray
+    pose: IntArray
+    component: IntArray
+
+    @property
+    def median(self) -> float:
+        """Median length of the residual of a point, per equation."""
+        counts = np.bincount(self.row)
+        return float(np.median(np.sqrt(np.bincount(self.row, self.residual**2) / counts)))
+
+
+def holdout_test(
+    fitted: Lengths,
+    held: Lengths,
+    split: Noise,
+    covariance: FloatArray,
+    of_held: Noise | None = None,
+) -> HoldoutTest:
+    """Compare.
+
+    Parameters
+    ----------
+    fitted, held : Lengths
+        Rows that were fitted, and not.
+    split : Noise
+        Variances of the errors of both.
+    covariance : ndarray (p, p)
+        Of the parameters in the basis of the fit, in the unit of `held`.
+    of_held : Noise, optional
+        Variances of the errors of `held`, where they share another part of the same total.
+    """
+    expected = split.total + float(
+        np.einsum("ij,jk,ik->", held.design, covariance, held.design)
+    ) / len(held.residual)
+    ratio = float(np.sqrt(np.mean(held.residual**2) / expected))
+    first = _of_sum(held, of_held or split, covariance)
+    second = _of_residuals(fitted, split)
+    poses = np.bincount(fitted.pose)
+    squares = np.bincount(fitted.pose, fitted.residual**2)[poses > 0] / poses[poses > 0]
+    if len(squares) > 2 and (spread := float(squares.var(ddof=1))) > 0:
+        each = 2.0 * float(squares.mean()) ** 2 / spread
+        first = min(first, each * len(np.unique(held.pose)))
+        left = 1.0 - fitted.design.shape[1] / len(fitted.residual)
+        second = min(second, each * len(squares) * left)
+    usual = fitted.median * np.sqrt(expected / split.total)
+    return HoldoutTest(ratio, held.median / usual, f_tail(ratio**2, first, second), (first, second))
+
+
+def _of_sum(held: Lengths, split: Noise, covariance: FloatArray) -> float:
+    """Degrees of freedom of the sum of squares of the points held out."""
+    key = numbered(held.pose, held.component)
+    counts = np.bincount(key).astype(np.float64)
+    design, pulls = held.design, sums(held.design, key)
+    inner, m = design.T @ design, len(held.residual)
+    mixed = split.single * inner + split.shared * (pulls.T @ pulls)
+    trace = m * split.total + float(np.trace(covariance @ inner))
+    square = (
+        m * split.single**2
+        + 2.0 * split.single * split.shared * m
+        + split.shared**2 * float((counts**2).sum())
+        + 2.0 * float(np.trace(covariance @ mixed))
+        + float(np.trace(covariance @ inner @ covariance @ inner))
+    )
+    return trace**2 / square
+
+
+def _of_residuals(fitted: Lengths, split: Noise) -> float:
+    """Degrees of freedom of the sum of squares of the residuals of the fit."""
+    key = numbered(fitted.pose, fitted.component)
+    counts = np.bincount(key).astype(np.float64)
+    design, pulls = fitted.design, sums(fitted.design, key)
+    inner, of_keys = design.T @ design, pulls.T @ pulls
+    single, shared, m = split.single, split.shared, len(fitted.residual)
+    once = single * inner + shared * of_keys
+    twice = (
+        single**2 * inner
+        + 2.0 * single * shared * of_keys
+        + shared**2 * ((pulls * counts[:, None]).T @ pulls)
+    )
+    trace = m * split.total - float(np.trace(once))
+    square = (
+        m * single**2
+        + 2.0 * single * shared * m
+        + shared**2 * float((counts**2).sum())
+        - 2.0 * float(np.trace(twice))
+        + float((once**2).sum())
+    )
+    return trace**2 / square if square > 0 else 0.0

@@ -1,0 +1,132 @@
+"""Whether data contradict a prior, and the noise as the data alone show it.
+
+The prior predictive check: what the data say of the parameters, less the prior's centre, is
+compared with what prior and noise let expect (G. E. P. Box, Sampling and Bayes' inference in
+scientific modelling and robustness, Journal of the Royal Statistical Society A 143 (1980)). The
+noise enters as the data alone show it: with the prior's help each would excuse the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.statistics.distributions import f_tail, t_tail
+from pkmcal.statistics.linear_fit import triangle
+
+CONTRADICTED = 0.01  # chance below which the data contradict the prior
+LEAST_FREEDOM = 5.0  # of the data alone, from which they show the noise
+_ROUNDING = 1e-9  # a singular value below this share of the largest is zero
+_INFORMED = 0.1  # share of its deviation by which the data must move a parameter to be judged
+_WIDEST = 1e6  # factor on the prior beyond which none is looked for
+
+
+@dataclass(frozen=True, eq=False)
+class PriorTest:
+    """The comparison.
+
+    Attributes
+    ----------
+    ratio, chance : float
+        Mean square of what the data say over what is expected, and how likely that is.
+    pulls : ndarray (k,)
+        Each parameter's change over its expected deviation; NaN where the data hardly move it.
+    pull_chance : float
+        How likely the largest would be, among so many.
+    factor : float
+        On the prior's deviations, with which the ratio would be 1.
+    """
+
+    ratio: float
+    chance: float
+    pulls: FloatArray
+    pull_chance: float
+    factor: float
+
+    @property
+    def chance_of_either(self) -> float:
+        """How likely the mean square or the largest pull would be as large."""
+        return min(1.0, 2.0 * min(self.chance, self.pull_chance))
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the data contradict the prior."""
+        return self.chance_of_either < CONTRADICTED
+
+
+def data_alone(jacobian: FloatArray, data: FloatArray) -> tuple[float, float]:
+    """Sum of squares that no parameters explain, and its degrees of freedom.
+
+    Parameters
+    ----------
+    jacobian : ndarray (M, n)
+        Of all parameters.
+    data : ndarray (M,)
+        Residuals at the expansion point.
+    """
+    factor = triangle(np.column_stack([jacobian, data]))
+    n = jacobian.shape[1]
+    basis, singular, _ = np.linalg.svd(factor[:, :n], full_matrices=False)
+    basis = basis[:, singular > _ROUNDING * singular[0]]
+    rest = factor[:, n] - basis @ (basis.T @ factor[:, n])
+    return float(rest @ rest), float(len(data) - basis.shape[1])
+
+
+def prior_test(
+    with_prior: FloatArray, without: FloatArray, data: FloatArray, variance: float, freedom: float
+) -> PriorTest:
+    """Test a prior.
+
+    Parameters
+    ----------
+    with_prior : ndarray (M, k)
+        Derivatives to the parameters with a prior, in units of its deviation.
+    without : ndarray (M, n - k)
+        Those to the others.
+    data : ndarray (M,)
+        What is measured less what is predicted at the prior's centre.
+    variance, freedom : float
+        Of the noise; inf degrees of freedom where it is stated.
+    """
+    basis = np.zeros((len(data), 0))
+    if without.shape[1]:
+        basis, singular, _ = np.linalg.svd(without, full_matrices=False)
+        basis = basis[:, singular > _ROUNDING * singular[0]]
+    own = with_prior - basis @ (basis.T @ with_prior)
+    left = data - basis @ (basis.T @ data)
+    turn, singular, rows = np.linalg.svd(own, full_matrices=False)
+    told = singular > _ROUNDING * max(float(singular[0]), 1e-300)
+    singular, rows = singular[told], rows[told]
+    along = turn[:, told].T @ left
+    expected = singular**2 + variance
+    share = variance / expected
+    count = len(singular)
+    ratio = float((along**2 / expected).mean())
+    spread = share.sum()
+    second = freedom * (count / spread) ** 2 if spread > 0 else np.inf
+    moved = rows.T @ (singular * along / expected)
+    allowed = np.sqrt(((rows**2) * (singular**2 / expected)[:, None]).sum(axis=0))
+    judged = allowed > _INFORMED
+    pulls = np.where(judged, moved / np.where(judged, allowed, 1.0), np.nan)
+    largest = float(np.nanmax(np.abs(pulls))) if judged.any() else 0.0
+    return PriorTest(
+        ratio=ratio,
+        chance=f_tail(ratio, count, second),
+        pulls=pulls,
+        pull_chance=min(1.0, int(judged.sum()) * t_tail(largest, freedom)),
+        factor=_fitting(along, singular, variance),
+    )
+
+
+def _fitting(along: FloatArray, singular: FloatArray, variance: float) -> float:
+    """Factor on the prior's deviations that makes the mean ratio one."""
+    low, high = 1.0 / _WIDEST, _WIDEST
+    for _ in range(60):
+        middle = np.sqrt(low * high)
+        if (along**2 / (middle**2 * singular**2 + variance)).mean() > 1.0:
+            low = middle
+        else:
+            high = middle
+    return float(np.sqrt(low * high))

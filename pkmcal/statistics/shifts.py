@@ -1,0 +1,217 @@
+"""Which parameters shifted between the data that were fitted and data that came later.
+
+Both are described by common parameters and, one after the other, a shift of the parameter that
+lowers the sum of squares most, as long as its score test says so (G. C. Chow, Tests of equality
+between sets of coefficients in two linear regressions, Econometrica 28 (1960); tests by cluster as
+in `clusters`). Model errors shift parameters too, where the poses differ: a shift is therefore
+taken only if it is a good part of the disagreement and brings the later data nearer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.statistics.clusters import Sandwich
+from pkmcal.statistics.distributions import f_tail
+from pkmcal.statistics.linear_fit import LinearFit, triangle
+
+_CHANCE = 0.01  # among all candidates, below which one has shifted …
+_SHARE, _FALL = 0.05, 0.03  # … if it is so much of the disagreement, and the rms falls so much
+_ALIKE = 6.63  # drop in units of the variance by which candidates differ that can be told apart
+_FEW = 30  # equations up to which clusters are too few for their own variances
+_ROUNDING = 1e-9
+_SAME = 1e-6  # share of a candidate that must be left beside what is there
+
+
+@dataclass(frozen=True, eq=False)
+class Shift:
+    """One candidate that shifted.
+
+    Attributes
+    ----------
+    candidate : int
+        Which.
+    size, deviation : ndarray (d,)
+        Of the shift along each of its directions, with all shifts taken.
+    chance : float
+        How likely its effect would be without a shift, among so many candidates.
+    also : tuple of int
+        Candidates that would explain the same as well.
+    rms : float
+        Of the later data after it.
+    """
+
+    candidate: int
+    size: FloatArray
+    deviation: FloatArray
+    chance: float
+    also: tuple[int, ...]
+    rms: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    candidate: int
+    drop: float
+    chance: float
+    basis: FloatArray
+
+
+def shifted(
+    first: tuple[FloatArray, FloatArray, IntArray],
+    later: tuple[FloatArray, FloatArray, IntArray],
+    basis: FloatArray,
+    candidates: Sequence[FloatArray],
+    most: int = 8,
+) -> list[Shift]:
+    """Search forward for shifts.
+
+    Parameters
+    ----------
+    first, later : (ndarray (M, n), ndarray (M,), ndarray of int (M,))
+        Whitened Jacobian, residuals at the fit of the first data, and the cluster of each equation.
+    basis : ndarray (n, p)
+        Combinations that are fitted.
+    candidates : sequence of ndarray (n, d)
+        Directions of the parameters that each candidate may shift.
+    most : int
+        Shifts to look for.
+    """
+    (x1, r1, c1), (x2, r2, c2) = first, later
+    y = np.concatenate([r1, r2])
+    late = np.arange(len(y)) >= len(r1)
+    cluster = np.concatenate([c1, c2 + c1.max() + 1])
+    common = _orthonormal(np.vstack([x1, x2]) @ basis)
+    apart = _unexplained(x1 @ basis, r1) + _unexplained(x2 @ basis, r2)
+    raw = [np.vstack([np.zeros((len(r1), d.shape[1])), x2 @ d]) for d in candidates]
+    few = len(y) <= _FEW
+    taken: list[tuple[_Trial, tuple[int, ...], float]] = []
+    disagreement = None
+    while len(taken) < most:
+        left = y - common @ (common.T @ y)
+        now = float(left @ left)
+        disagreement = now - apart if disagreement is None else disagreement
+        done = {trial.candidate for trial, _, _ in taken}
+        trials = [
+            trial
+            for j, columns in enumerate(raw)
+            if j not in done and (trial := _trial(j, columns, common, y, left)) is not None
+        ]
+        if not trials:
+            break
+        best = _best(trials, few, left, common, cluster)
+        share = best.drop / max(disagreement, 1e-300)
+        after = left - best.basis @ (best.basis.T @ left)
+        fall = 1.0 - np.sqrt((after[late] ** 2).sum() / max((left[late] ** 2).sum(), 1e-300))
+        if not best.chance * len(trials) < _CHANCE:
+            break
+        if not few and (share < _SHARE or fall < _FALL):
+            break
+        freedom = max(len(y) - common.shape[1] - best.basis.shape[1], 1)
+        variance = (now - best.drop) / freedom
+        same = best.basis.shape[1]
+        also = tuple(
+            other.candidate
+            for other in sorted(trials, key=lambda trial: -trial.drop)
+            if other.candidate != best.candidate
+            and other.basis.shape[1] <= same
+            and best.drop - other.drop < _ALIKE * variance
+        )
+        common = np.column_stack([common, best.basis])
+        rms = float(np.sqrt((after[late] ** 2).mean()))
+        chance = min(1.0, best.chance * len(trials))
+        taken.append((_Trial(best.candidate, best.drop, chance, best.basis), also, rms))
+    return _together(taken, raw, np.vstack([x1, x2]) @ basis, y, cluster, few)
+
+
+def _trial(
+    j: int, columns: FloatArray, common: FloatArray, y: FloatArray, left: FloatArray
+) -> _Trial | None:
+    """What candidate `j` would take off the sum of squares; None if nothing new."""
+    beside = columns - common @ (common.T @ columns)
+    turn, singular, _ = np.linalg.svd(beside, full_matrices=False)
+    basis = turn[:, singular > _SAME * float(np.linalg.norm(columns))]
+    freedom = len(y) - common.shape[1] - basis.shape[1]
+    if not basis.shape[1] or freedom < 1:
+        return None
+    drop = float(((basis.T @ y) ** 2).sum())
+    rest = max(float(left @ left) - drop, 0.0) / freedom
+    ratio = drop / basis.shape[1] / rest if rest > 0 else np.inf
+    return _Trial(j, drop, f_tail(min(ratio, 1e300), basis.shape[1], freedom), basis)
+
+
+def _best(
+    trials: Sequence[_Trial], few: bool, left: FloatArray, common: FloatArray, cluster: IntArray
+) -> _Trial:
+    """The candidate that explains most, and its chance by cluster where there are enough."""
+    if few:
+        return min(trials, key=lambda trial: (trial.chance, -trial.drop))
+    alone = [trial for trial in trials if trial.basis.shape[1] == 1] or list(trials)
+    best = max(alone, key=lambda trial: trial.drop)
+    design = np.column_stack([common, best.basis])
+    after = left - best.basis @ (best.basis.T @ left)
+    sandwich = Sandwich(_fit(design, after, cluster))
+    contrast = np.eye(design.shape[1])[-1:]
+    freedom = float(sandwich.freedom(contrast)[0])
+    variance = float(sandwich.data[-1, -1])
+    chance = f_tail(best.drop / variance, 1, freedom) if variance > 0 and freedom > 0 else 1.0
+    return _Trial(best.candidate, best.drop, chance, best.basis)
+
+
+def _together(
+    taken: Sequence[tuple[_Trial, tuple[int, ...], float]],
+    raw: Sequence[FloatArray],
+    design: FloatArray,
+    y: FloatArray,
+    cluster: IntArray,
+    few: bool,
+) -> list[Shift]:
+    """Sizes and deviations of the shifts, estimated together with the common parameters."""
+    if not taken:
+        return []
+    columns = [raw[trial.candidate] for trial, _, _ in taken]
+    n = design.shape[1]
+    whole = np.hstack([design, *columns])
+    _, singular, rows = np.linalg.svd(triangle(whole), full_matrices=False)
+    keep = singular > _ROUNDING * singular[0]
+    half = rows[keep].T / singular[keep]
+    basis = whole @ half
+    solution = half @ (basis.T @ y)
+    fit = _fit(basis, y - basis @ (basis.T @ y), cluster)
+    if few:
+        freedom = max(fit.freedom, 1.0)
+        matrix = fit.squares / freedom * half @ half.T
+    else:
+        matrix = half @ Sandwich(fit).data @ half.T
+    deviation = np.sqrt(np.maximum(np.diagonal(matrix), 0.0))
+    found, start = [], n
+    for (trial, also, rms), part in zip(taken, columns, strict=True):
+        mine = slice(start, start + part.shape[1])
+        start = mine.stop
+        found.append(
+            Shift(trial.candidate, solution[mine], deviation[mine], trial.chance, also, rms)
+        )
+    return found
+
+
+def _fit(design: FloatArray, residual: FloatArray, cluster: IntArray) -> LinearFit:
+    p = design.shape[1]
+    return LinearFit(design, residual, np.zeros((0, p)), np.eye(p), cluster, np.zeros_like(cluster))
+
+
+def _orthonormal(matrix: FloatArray) -> FloatArray:
+    """Orthonormal basis (M, r) of the columns."""
+    _, singular, rows = np.linalg.svd(triangle(matrix), full_matrices=False)
+    keep = singular > _ROUNDING * singular[0]
+    basis: FloatArray = matrix @ (rows[keep].T / singular[keep])
+    return basis
+
+
+def _unexplained(design: FloatArray, y: FloatArray) -> float:
+    basis = _orthonormal(design)
+    left = y - basis @ (basis.T @ y)
+    return float(left @ left)

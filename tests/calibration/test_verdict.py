@@ -1,0 +1,287 @@
+"""The verdict: whether a calibration can be believed, and the first reason why not."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.arrays import FloatArray
+from pkmcal.calibration.identification import Identification
+from pkmcal.measurements.measurements import Measurements
+
+from ..simulated import hexapod_poses
+from ..statistics.designs import UNKNOWN, seen_by_tracker, six_joints
+
+PRINTER = Path(__file__).parents[2] / "examples" / "linear-delta"
+
+
+def fitted(robot: Any, measured: Any, **options: Any) -> Identification:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return pk.identify(robot, measured, **options)
+
+
+def session(
+    robot: pk.Robot, true: pk.Robot, count: int, seed: int, noise: float = 0.02
+) -> Measurements:
+    """Positions of a hexapod's platform, without sigma."""
+    rng = np.random.default_rng(seed)
+    q = robot.inverse(hexapod_poses(robot, count, rng))
+    values = true.forward(q).pose[:, :3] + rng.normal(0, noise, (count, 3))
+    return Measurements(q, values, "position")
+
+
+@pytest.fixture(scope="module")
+def true(hexapod: pk.Robot) -> pk.Robot:
+    return hexapod.replace({"offset1": 0.3, "offset4": -0.4})
+
+
+# --- held out ------------------------------------------------------------------------------------
+
+
+def test_a_sound_calibration_is_calibrated(hexapod: pk.Robot, true: pk.Robot) -> None:
+    found = fitted(hexapod, session(hexapod, true, 40, 0), free="offset*", holdout=0.25)
+    assert found.verdict.state == "calibrated" and not found.verdict.remarks
+    assert str(found).startswith("Calibrated: the error of 10 points that were not fitted falls")
+    assert not found.holdout_contradicts and found.moved == ()
+
+
+def test_points_that_contradict_the_fit_are_the_first_line(
+    hexapod: pk.Robot, true: pk.Robot
+) -> None:
+    later = true.replace({"offset5": true.geometry["offset5"] + 0.5})
+    found = fitted(
+        hexapod, session(hexapod, true, 40, 0), free="offset*",
+        holdout=session(hexapod, later, 30, 1),
+    )  # fmt: skip
+    assert found.holdout_contradicts and found.verdict.state == "doubtful"
+    assert str(found).startswith("Doubtful: the held-out points contradict the fit: ")
+    (moved,) = found.moved
+    assert moved.names == ("offset5",) and abs(moved.shift[0] - 0.5) < 3 * moved.stderr[0]
+    assert "moved, or the model is wrong there: offset5 by +0.5" in found.verdict.reasons[1]
+
+
+def test_all_offsets_that_move_alike_are_named_together(hexapod: pk.Robot, true: pk.Robot) -> None:
+    names = [f"offset{i}" for i in range(1, 7)]
+    later = true.replace({name: true.geometry[name] + 0.4 for name in names})
+    found = fitted(
+        hexapod, session(hexapod, true, 40, 0), free="offset*",
+        holdout=session(hexapod, later, 40, 1),
+    )  # fmt: skip
+    assert str(found.moved[0]) == "offset1 … offset6 alike"
+    assert found.moved[0].shift[0] == pytest.approx(0.4, abs=0.05)
+
+
+def test_a_holdout_without_sigma_has_the_noise_of_the_fit(
+    hexapod: pk.Robot, true: pk.Robot
+) -> None:
+    first, other = session(hexapod, true, 40, 0), session(hexapod, true, 30, 1)
+    stated = fitted(hexapod, replace(first, sigma=0.02), free="offset*", holdout=other)
+    assert stated.holdout_expected == pytest.approx(0.02 * np.sqrt(3), rel=0.2)
+    alone = fitted(hexapod, first, free="offset*", holdout=other)
+    assert stated.holdout_expected == pytest.approx(alone.holdout_expected, rel=1e-6)
+    both = replace(first, sigma=0.02), replace(other, sigma=0.02)
+    twice = fitted(hexapod, both[0], free="offset*", holdout=both[1])
+    assert twice.holdout_expected == pytest.approx(alone.holdout_expected, rel=1e-6)
+
+
+def test_a_few_held_out_points_that_are_off_are_named(hexapod: pk.Robot, true: pk.Robot) -> None:
+    other = session(hexapod, true, 60, 1)
+    values = other.values.copy()
+    values[[7, 9]] += 3.0
+    found = fitted(
+        hexapod, session(hexapod, true, 60, 0), free="offset*",
+        holdout=replace(other, values=values),
+    )  # fmt: skip
+    assert found.holdout_outliers == (7, 9) and not found.holdout_contradicts
+    assert found.verdict.reasons[0].startswith("2 held-out points are off: row 7, row 9; without")
+    assert found.holdout_distances.rms_without_outliers < 0.1 < found.holdout_distances.rms
+
+
+# --- what repeats and reflectors share -----------------------------------------------------------
+
+
+@pytest.mark.parametrize("lack", [0.0, 0.05])
+@pytest.mark.parametrize("times", [1, 5, 20])
+def test_what_is_expected_of_a_holdout_does_not_grow_with_repeats(
+    hexapod: pk.Robot, times: int, lack: float
+) -> None:
+    actual, expected = [], []
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        q = hexapod.inverse(pk.sample_poses(hexapod, 60, seed=seed, share=0.5))
+        missed = hexapod.forward(q).pose[:, :3] + rng.normal(0, lack, (60, 3))
+        values = np.repeat(missed, times, axis=0) + rng.normal(0, 0.02, (60 * times, 3))
+        whole = Measurements(np.repeat(q, times, axis=0), values, "position")
+        first = np.arange(60 * times) < 45 * times
+        found = fitted(hexapod, whole.select(first), free="offset*", holdout=whole.select(~first))
+        actual.append(found.holdout_rms**2)
+        expected.append(found.holdout_expected**2)
+    assert np.sqrt(np.mean(actual) / np.mean(expected)) == pytest.approx(1.0, abs=0.12)
+
+
+# --- rows that disagree --------------------------------------------------------------------------
+
+
+def of_arm(
+    count: int, seed: int, noise: float = 0.05
+) -> tuple[pk.SerialArm, FloatArray, Measurements]:
+    rng, arm = np.random.default_rng(seed), six_joints()
+    q = rng.uniform(-1.5, 1.5, (count, 6))
+    return arm, q, seen_by_tracker(arm, q, rng.normal(0, noise, (count, 3, 3)))
+
+
+def test_one_pose_that_is_wrong_by_far_is_found_beside_a_linear_fit() -> None:
+    """It carries least squares off, which then name no outlier at all."""
+    arm, _, measured = of_arm(27, 3)
+    values = measured.values.copy()
+    values[30:33] += [400.0, -350.0, 250.0]
+    found = fitted(arm, replace(measured, values=values), **UNKNOWN)
+    assert found.rms > 20.0
+    assert found.verdict.state == "not calibrated"
+    first = found.verdict.reasons[0]
+    assert first.startswith("3 rows disagree with the rest: row 30 (1), row 31 (2), row 32 (3);")
+    assert first.endswith("fit with loss='cauchy'")
+    robust = fitted(arm, replace(measured, values=values), loss="cauchy", **UNKNOWN)
+    assert robust.outliers == (30, 31, 32)
+    assert robust.distances.rms_without_outliers < 0.15 < robust.rms
+
+
+def test_clean_calibrations_agree_with_a_robust_fit(hexapod: pk.Robot, true: pk.Robot) -> None:
+    for seed in range(12):
+        found = fitted(hexapod, session(hexapod, true, 20, seed), free="offset*")
+        assert not found.verdict.remarks, found.verdict
+
+
+def test_outliers_are_named_by_line_and_target(tmp_path: Path) -> None:
+    arm, q, measured = of_arm(30, 4)
+    values = measured.values.copy()
+    values[3 * 12 + 1] += [0.0, 2.0, 0.0]
+    lines = ["# a log", ",".join([f"q{i + 1} [rad]" for i in range(6)] + [
+        f"{t}.{c} [mm]" for t in "ABC" for c in "xyz"])]  # fmt: skip
+    for row, seen in zip(q, values.reshape(-1, 9), strict=True):
+        lines.append(",".join(f"{number:.17g}" for number in (*row, *seen)))
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = fitted(arm, pk.read_measurements(path), **UNKNOWN)
+    assert found.outliers == (37,)
+    assert "outliers: rows 37: log.csv line 15 (B)" in str(found)
+
+
+@pytest.mark.parametrize("by", [1, -1, 2])
+def test_readings_beside_the_wrong_rows_are_found(
+    hexapod: pk.Robot, true: pk.Robot, by: int
+) -> None:
+    """The machine then fits nothing, or cannot reach what it reads."""
+    measured = session(hexapod, true, 40, 5)
+    wrong = replace(measured, values=np.roll(measured.values, by, axis=0))
+    try:
+        text = "; ".join(fitted(hexapod, wrong, free="offset*", **UNKNOWN).verdict.reasons)
+    except ValueError as error:
+        text = str(error)
+    where = "before" if by > 0 else "after"
+    assert f"each reading belongs to the row {abs(by)} {where} it" in text
+
+
+def test_exchanged_targets_are_found() -> None:
+    arm, _, measured = of_arm(30, 6)
+    assert measured.target_index is not None
+    index = np.array([1, 0, 2])[measured.target_index]
+    found = fitted(arm, replace(measured, target_index=index), frame="unknown")
+    assert found.verdict.state == "not calibrated"
+    assert "if target 1 is 2, 2 is 1" in found.verdict.reasons[0]
+
+
+# --- few degrees of freedom ----------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def printer() -> pk.Robot:
+    return pk.load(PRINTER / "robot.toml")
+
+
+def probed(printer: pk.Robot, count: int) -> Measurements:
+    whole = pk.read_measurements(PRINTER / "probe.csv", printer)
+    return replace(whole, sigma=None).select(np.linspace(0, len(whole) - 1, count).astype(int))
+
+
+def test_one_spare_equation_is_doubtful_and_has_wide_intervals(printer: pk.Robot) -> None:
+    found = fitted(printer, probed(printer, 7))
+    assert found.verdict.state == "doubtful"
+    assert found.verdict.reasons[0].startswith(
+        "only 1 spare equation shows the noise, which may be 0.45 to 32 times what is estimated;"
+        " probe 20 points or more"
+    )
+    assert found.parameter_dof == pytest.approx(np.ones(6))
+    half = (found.interval95[:, 1] - found.interval95[:, 0]) / 2
+    assert half == pytest.approx(12.706 * found.stderr, rel=1e-4)
+    assert "value ± 95 %" in str(found) and "as few as 1 degree" in str(found)
+
+
+def test_no_spare_equation_has_no_noise_and_no_deviations(printer: pk.Robot) -> None:
+    found = fitted(printer, probed(printer, 6), holdout=probed(printer, 12))
+    assert found.verdict.state == "doubtful"
+    assert np.isnan(found.noise[0]) and np.isnan(found.holdout_expected)
+    assert not np.isfinite(found.stderr).any() and not found.parameter_dof.any()
+    assert np.isinf(found.interval95).all()
+    text = str(found)
+    assert "noise" not in text.split("O1")[0].split("\n", 3)[3] and "expected" not in text
+    stated = fitted(printer, replace(probed(printer, 6), sigma=0.03))
+    assert np.isfinite(stated.stderr).all()
+
+
+def test_enough_points_are_calibrated(printer: pk.Robot) -> None:
+    assert fitted(printer, probed(printer, 25)).verdict.state == "calibrated"
+
+
+# --- bounds, warnings, little gained -------------------------------------------------------------
+
+
+def test_a_bound_that_is_reached_is_doubtful(hexapod: pk.Robot, true: pk.Robot) -> None:
+    found = fitted(
+        hexapod, session(hexapod, true, 40, 0), free="offset*", bounds={"offset4": (-0.1, 0.1)}
+    )
+    assert found.verdict.state == "doubtful"
+    assert found.verdict.reasons[0].startswith("offset4 ended at a bound")
+
+
+def test_numbers_that_do_not_help_are_doubtful(hexapod: pk.Robot, true: pk.Robot) -> None:
+    moved = hexapod.replace({"base3.z": 2.0})
+    found = fitted(hexapod, session(hexapod, moved, 40, 0), free="offset1")
+    assert found.verdict.state == "doubtful"
+    assert found.verdict.reasons[0].startswith("little gained: the misfit of the 40 fitted points")
+
+
+def test_a_machine_that_was_right_is_calibrated_where_sigma_says_so(hexapod: pk.Robot) -> None:
+    measured = replace(session(hexapod, hexapod, 40, 0), sigma=0.02)
+    assert fitted(hexapod, measured, free="offset*").verdict.state == "calibrated"
+
+
+# --- a prior that is contradicted ----------------------------------------------------------------
+
+
+def test_a_contradicted_prior_neither_wins_nor_is_silent() -> None:
+    """Noise and prior do not excuse each other: the noise is what the data alone show."""
+    rng, arm = np.random.default_rng(5), six_joints()
+    true = arm.replace(3.4 * rng.normal(size=(6, 6)) * [1, 1, 1, 1e-3, 1e-3, 1e-3])
+    q = rng.uniform(-1.5, 1.5, (60, 6))
+    measured = seen_by_tracker(true, q, rng.normal(0, 0.15, (60, 3, 3)))
+    fit, out = measured.select(np.arange(108)), measured.select(np.arange(108, 180))
+    noises, held = [], []
+    for prior in (0.35, 1.0, 10.0):
+        found = fitted(arm, fit, prior=prior, holdout=out, **UNKNOWN)
+        noises.append(found.noise[0])
+        held.append(found.holdout_rms)
+        contradicted = found.prior_test is not None and found.prior_test.contradicted
+        assert contradicted is (prior < 3)
+        said = any("contradict the prior" in text for text in found.verdict.reasons)
+        assert said is contradicted
+        assert (found.verdict.state == "calibrated") is not contradicted
+    assert noises == pytest.approx([0.155] * 3, rel=0.02)
+    assert held[0] < 0.40

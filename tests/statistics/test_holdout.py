@@ -1,0 +1,142 @@
+"""Points held out: how far off they should be, and when they contradict the fit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.statistics.clusters import Sandwich
+from pkmcal.statistics.holdout_test import HoldoutTest, Lengths, holdout_test
+from pkmcal.statistics.linear_fit import linear_fit, numbered
+from pkmcal.statistics.noise import noise
+
+from .designs import Design, arm, errors, hexapod
+
+
+def parted(design: Design, fitted: int) -> tuple[Design, FloatArray, IntArray]:
+    """A fit to the first poses alone, the design of the others in its basis, and which they are."""
+    whole = design.fit
+    mine = whole.cluster < fitted
+    p = whole.design.shape[1]
+    fit = linear_fit(
+        whole.design[mine], whole.residual[mine], np.zeros((0, p)), np.eye(p),
+        whole.cluster[mine], whole.component[mine],
+    )  # fmt: skip
+    rest = np.flatnonzero(~mine)
+    part = Design(
+        replace(fit, back=whole.back @ fit.back), design.known, numbered(design.row[mine])
+    )
+    return part, whole.design[rest] @ fit.back, rest
+
+
+def drawn(design: Design, shared: float, tails: bool, rng: np.random.Generator) -> FloatArray:
+    """Errors (M,) of unit deviation, normal or with the tails of Student's t of 4."""
+    if not tails:
+        return errors(design, shared, rng)
+    of_key = rng.standard_t(4, size=int(design.fit.key.max()) + 1) / np.sqrt(2.0)
+    own = rng.standard_t(4, size=len(design.fit.key)) / np.sqrt(2.0)
+    total: FloatArray = own + shared * of_key[design.fit.key]
+    return total
+
+
+def compared(
+    design: Design, fitted: int, y: FloatArray, factor: float = 1.0
+) -> tuple[HoldoutTest, float, float]:
+    """The test of points held out, and their mean square, actual and expected."""
+    part, outside, rest = parted(design, fitted)
+    mine = design.fit.cluster < fitted
+    fit, _ = part.fitted(y[mine])
+    sandwich = Sandwich(fit)
+    of_noise = noise(sandwich.residual, sandwich.retained, fit.key)
+    unit = np.sqrt(of_noise.total)
+    left = factor * (y[rest] - outside @ (fit.design.T @ y[mine]))
+    test = holdout_test(
+        Lengths(sandwich.residual / unit, fit.design, part.row, fit.cluster, fit.component),
+        Lengths(
+            left / unit, outside / unit, numbered(design.row[rest]),
+            numbered(design.fit.cluster[rest]), design.fit.component[rest],
+        ),
+        noise(sandwich.residual / unit, sandwich.retained, fit.key),
+        sandwich.data,
+    )  # fmt: skip
+    expected = of_noise.total + np.einsum("ij,jk,ik->", outside, sandwich.data, outside) / len(rest)
+    return test, float(np.mean(left**2)), float(expected)
+
+
+CELLS = [
+    (hexapod(60), 30, 0.0),
+    (arm(40), 25, 0.0),
+    (arm(40), 25, 2.0),
+    (hexapod(40, 5), 25, 2.0),
+]
+
+
+def several(
+    design: Design, fitted: int, shared: float, runs: int, tails: bool = False
+) -> tuple[float, float, float]:
+    """Share of alarms, of chances below 1 %, and rms over what was expected."""
+    rng = np.random.default_rng(11)
+    found = [compared(design, fitted, drawn(design, shared, tails, rng)) for _ in range(runs)]
+    tests = [test for test, _, _ in found]
+    actual, expected = np.mean([(a, e) for _, a, e in found], axis=0)
+    return (
+        float(np.mean([test.contradicts for test in tests])),
+        float(np.mean([test.chance < 0.01 for test in tests])),
+        float(np.sqrt(actual / expected)),
+    )
+
+
+@pytest.mark.parametrize(("design", "fitted", "shared"), CELLS)
+def test_what_is_expected_comes_true_and_sound_fits_raise_no_alarm(
+    design: Design, fitted: int, shared: float
+) -> None:
+    alarms, _, ratio = several(design, fitted, shared, 60)
+    assert alarms <= 4 / 60
+    assert 0.93 < ratio < 1.07
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("design", "fitted", "shared"), CELLS)
+def test_alarms_are_at_most_2_percent_in_500_fits(
+    design: Design, fitted: int, shared: float
+) -> None:
+    alarms, low, ratio = several(design, fitted, shared, 500)
+    assert alarms <= 0.02 and low <= 0.03
+    assert 0.97 < ratio < 1.03
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("design", "fitted", "shared", "tails"),
+    [
+        (hexapod(12), 6, 0.0, False),
+        (hexapod(15, 5), 10, 2.0, False),
+        *((design, fitted, shared, True) for design, fitted, shared in CELLS),
+    ],
+)
+def test_alarms_are_at_most_5_percent_with_few_poses_or_heavy_tails(
+    design: Design, fitted: int, shared: float, tails: bool
+) -> None:
+    assert several(design, fitted, shared, 500, tails)[0] <= 0.05
+
+
+def test_points_twice_as_far_off_contradict_the_fit() -> None:
+    rng = np.random.default_rng(5)
+    for design, fitted, shared in CELLS:
+        found = [compared(design, fitted, errors(design, shared, rng), 2.0)[0] for _ in range(30)]
+        assert np.mean([test.contradicts for test in found]) > 0.8
+
+
+def test_a_few_gross_points_are_named_not_taken_for_a_shift() -> None:
+    rng, design = np.random.default_rng(6), hexapod(60)
+    rest = parted(design, 30)[2]
+    found = []
+    for _ in range(20):
+        y = errors(design, 0.0, rng)
+        y[rest[:3]] += 40.0
+        found.append(compared(design, 30, y)[0])
+    assert all(test.few_off for test in found)
+    assert np.mean([test.contradicts for test in found]) <= 0.15  # by chance of the median

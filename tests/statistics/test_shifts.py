@@ -1,0 +1,83 @@
+"""What moved between two sessions is named, and nothing where nothing did."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.statistics.shifts import Shift, shifted
+
+from .designs import arm, hexapod
+
+Data = tuple[FloatArray, FloatArray, IntArray]
+
+
+def sessions(
+    name: str, shift: FloatArray, shared: float, rng: np.random.Generator
+) -> tuple[Data, Data, FloatArray]:
+    """Two sessions at different poses; the parameters of the second are shifted."""
+    design = arm(40) if name == "arm" else hexapod(60)
+    fit = design.fit
+    jacobian = fit.design * np.sqrt(len(fit.residual) / fit.design.shape[1])
+    half = fit.cluster < fit.clusters // 2
+    of_pose = shared * rng.normal(size=int(fit.key.max()) + 1)[fit.key]
+    y = rng.normal(size=len(half)) + of_pose
+    y[~half] += jacobian[~half] @ shift
+    first = np.linalg.lstsq(jacobian[half], y[half], rcond=None)[0]
+    left = y - jacobian @ first
+    parts = [(jacobian[rows], left[rows], fit.cluster[rows]) for rows in (half, ~half)]
+    p = jacobian.shape[1]
+    return parts[0], parts[1], np.eye(p)
+
+
+def search(name: str, shift: FloatArray, shared: float, rng: np.random.Generator) -> list[Shift]:
+    first, later, axes = sessions(name, shift, shared, rng)
+    return shifted(first, later, axes, [axes[:, [k]] for k in range(6)])
+
+
+@pytest.mark.parametrize(("name", "shared"), [("hexapod", 0.0), ("arm", 2.0)])
+def test_nothing_is_named_where_nothing_moved(name: str, shared: float) -> None:
+    rng = np.random.default_rng(0)
+    none = np.zeros(33 if name == "arm" else 6)
+    named = [bool(search(name, none, shared, rng)) for _ in range(100)]
+    assert np.mean(named) <= 0.04
+
+
+@pytest.mark.parametrize(("name", "shared", "size"), [("hexapod", 0.0, 8.0), ("arm", 2.0, 40.0)])
+def test_what_moved_is_named_with_its_size(name: str, shared: float, size: float) -> None:
+    rng, off, named = np.random.default_rng(1), [], 0
+    for _ in range(30):
+        k = int(rng.integers(6))
+        true = np.zeros(33 if name == "arm" else 6)
+        true[k] = size
+        found = search(name, true, shared, rng)
+        named += bool(found) and (found[0].candidate == k or k in found[0].also)
+        if len(found) == 1 and found[0].candidate == k:
+            off.append((found[0].size[0] - size) / found[0].deviation[0])
+    assert named >= 28 and len(off) > 15
+    assert np.std(off) == pytest.approx(1.0, abs=0.45)
+
+
+def test_seven_heights_each_name_a_height_that_moved() -> None:
+    """One spare equation a session: the joint fit tells what a hold-out cannot."""
+    rng = np.random.default_rng(2)
+    jacobian = np.linalg.qr(rng.normal(size=(7, 6))).Q * np.sqrt(7.0 / 6.0)
+    axes, together = np.eye(6), np.ones((6, 1))
+    named, false = 0, 0
+    for moved in (0.0, 8.0):
+        for _ in range(100):
+            y1, y2 = rng.normal(size=7), rng.normal(size=7) + moved * (jacobian @ together)[:, 0]
+            first = np.linalg.lstsq(jacobian, y1, rcond=None)[0]
+            rows = np.arange(7)
+            candidates = [*(axes[:, [k]] for k in range(6)), together]
+            found = shifted(
+                (jacobian, y1 - jacobian @ first, rows),
+                (jacobian, y2 - jacobian @ first, rows),
+                axes, candidates,
+            )  # fmt: skip
+            if moved:
+                named += any(shift.candidate == 6 or 6 in shift.also for shift in found)
+            else:
+                false += bool(found)
+    assert false <= 4 and named > 80
