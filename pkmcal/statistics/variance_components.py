@@ -23,7 +23,7 @@ from pkmcal.statistics.linear_fit import LinearFit
 
 _LEAST_FREEDOM = 15.0  # degrees of freedom for each class that is told apart
 _DIFFERENT = 0.01  # chance of the likelihood ratio below which classes are told apart
-_ROUNDS, _SETTLED, _STEP = 50, 1e-10, 1.0  # of the logarithms of the variances
+_ROUNDS, _SETTLED, _STEP = 50, 1e-6, 1.0  # of the logarithms of the variances
 _TINY = 1e-18  # of the mean variance: a class that the fit meets exactly
 
 
