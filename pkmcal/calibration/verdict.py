@@ -199,21 +199,21 @@ def _change(found: Parts) -> str:
     """Say how the misfit changed."""
     held = found.holdout_off[np.isfinite(found.holdout_off)]
     if held.size:
-        expected = ""
-        if np.isfinite(found.holdout_expected):
-            expected = f"; {_mm(found.holdout_expected)} was expected"
-        return (
-            f"the error of {held.size} points that were not fitted"
-            f" {_falls(found.holdout_rms_before, found.holdout_rms)}{expected}"
-        )
-    return (
-        f"the misfit of the {len(found.rows)} fitted points"
-        f" {_falls(found.rms_before, found.rms)}; no points were held out to confirm it"
-    )
+        known = np.isfinite(found.holdout_expected)
+        expected = f" ({found.holdout_expected:.3g} expected)" if known else ""
+        change = _falls(found.holdout_rms_before, found.holdout_rms)
+        return f"the error of {_points(held.size, 'held-out')} {change}{expected}"
+    change = _falls(found.rms_before, found.rms)
+    return f"the misfit of {_points(len(found.rows), 'fitted')} {change}; none was held out"
+
+
+def _points(count: int, which: str) -> str:
+    return f"{count} {which} point{'s' if count > 1 else ''}"
 
 
 def _falls(before: float, after: float) -> str:
-    return f"{'falls' if after < before else 'goes'} from {_mm(before)} to {_mm(after)} rms"
+    verb = "falls" if after < before else "goes"
+    return f"{verb} from {before:.3g} to {after:.3g} mm rms"
 
 
 def _disagreement(found: Parts, robust: RobustCheck) -> str:

@@ -3,10 +3,11 @@
 The covariance is the cluster sandwich with residuals adjusted for their leverage (CR2) and its
 degrees of freedom are Satterthwaite's under equal independent errors, parameter by parameter:
 R. M. Bell and D. F. McCaffrey, Bias reduction in standard errors for linear regression with
-multi-stage samples, Survey Methodology 28 (2002); G. W. Imbens and M. Kolesár, Robust standard
-errors in small samples: some practical advice, Review of Economics and Statistics 98 (2016);
-J. E. Pustejovsky and E. Tipton, Small-sample methods for cluster-robust variance estimation and
-hypothesis testing in fixed effects models, Journal of Business and Economic Statistics 36 (2018).
+multi-stage samples, Survey Methodology 28 (2002), no. 2; G. W. Imbens and M. Kolesár, Robust
+standard errors in small samples: some practical advice, Review of Economics and Statistics 98
+(2016); J. E. Pustejovsky and E. Tipton, Small-sample methods for cluster-robust variance estimation
+and hypothesis testing in fixed effects models, Journal of Business and Economic Statistics 36
+(2018), doi:10.1080/07350015.2016.1247004.
 
 statsmodels has CR1 and CR3, neither CR2 nor its degrees of freedom.
 """
