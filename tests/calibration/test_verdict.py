@@ -286,3 +286,14 @@ def test_a_contradicted_prior_neither_wins_nor_is_silent() -> None:
         assert (found.verdict.state == "calibrated") is not contradicted
     assert noises == pytest.approx([0.155] * 3, rel=0.02)
     assert held[0] < 0.40
+
+
+def test_a_deviation_that_nothing_shows_is_infinite_not_small(hexapod: pk.Robot) -> None:
+    """Two poses meet six numbers exactly, however often they are read: clusters show nothing."""
+    rng = np.random.default_rng(0)
+    q = np.repeat(hexapod.inverse(hexapod_poses(hexapod, 2, rng)), 20, axis=0)
+    values = hexapod.forward(q).pose[:, :3] + rng.normal(0, 0.02, (40, 3))
+    measured = Measurements(q, values, "position")
+    found = fitted(hexapod, measured, free="offset*", covariance="cluster")
+    assert np.isinf(found.stderr).all() and np.isinf(found.interval95).all()
+    assert np.isfinite(fitted(hexapod, measured, free="offset*").stderr).all()
