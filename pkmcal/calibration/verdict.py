@@ -51,7 +51,7 @@ class Verdict:
     remarks: tuple[str, ...]
 
     def __str__(self) -> str:
-        return f"{self.state.capitalize()}: {'; '.join(self.reasons[:1])}"
+        return f"{self.state.capitalize()}: {self.reasons[0]}"
 
 
 def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) -> Verdict:
@@ -92,16 +92,14 @@ def _grave(found: Parts, robust: RobustCheck | None) -> list[str]:
         reasons.append("the least squares did not converge")
     if robust is not None and robust.ratio > _CARRIED:
         reasons.append(_disagreement(found, robust))
-    spread = _commanded_spread(found)
-    if found.rms > _ABSURD * spread > 0:
-        other = likely_row_errors(
-            found.fit.equations.datasets, found.fit.parameters, found.fit.start
-        )
+    spread, left = _commanded_spread(found), found.distances.rms_without_outliers
+    if left > _ABSURD * spread > 0:
+        other = likely_row_errors(found.fit.equations.datasets, found.fit.parameters)
         cause = "; ".join(other) or (
             "check that robot file and measurements belong together, row by row"
         )
         reasons.append(
-            f"{_mm(found.rms)} are left where the machine moved about by {_mm(spread)}: {cause}"
+            f"{_mm(left)} rms are left where the machine moved about by {_mm(spread)}: {cause}"
         )
     return reasons
 
@@ -187,7 +185,8 @@ def _few(found: Parts) -> list[str]:
     one = round(freedom, 1) == 1
     spare = "1 spare equation shows" if one else f"{freedom:.2g} spare equations show"
     return [
-        f"only {spare} the noise, which may be {low:.2g} to {high:.2g} times what is estimated;"
+        f"only {spare} the noise, which may be {low:.2g} to {high:.2g} times what is estimated"
+        f"{', and no hold-out can contradict the fit' if found.holdout_off.size else ''};"
         f" {more}, or state sigma"
     ]
 

@@ -152,6 +152,8 @@ def test_one_pose_that_is_wrong_by_far_is_found_beside_a_linear_fit() -> None:
     robust = fitted(arm, replace(measured, values=values), loss="cauchy", **UNKNOWN)
     assert robust.outliers == (30, 31, 32)
     assert robust.distances.rms_without_outliers < 0.15 < robust.rms
+    assert robust.verdict.state == "calibrated"
+    assert "78 fitted points besides 3 outliers falls from" in robust.verdict.reasons[0]
 
 
 def test_clean_calibrations_agree_with_a_robust_fit(hexapod: pk.Robot, true: pk.Robot) -> None:
