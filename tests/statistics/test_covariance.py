@@ -154,9 +154,11 @@ def test_intervals_hold_93_to_97_percent_in_500_fits(name: str, poses: int, shar
     design = cell(name, poses)
     held, half, _ = coverage(design, lambda rng: errors(design, shared, rng), by_rule(design), 500)
     assert 0.93 < held < 0.97
-    if not shared and poses >= 15:  # the width that is paid for what might be shared
+    if not shared and poses >= 15:
+        # what is paid for errors that might be shared: with 15 poses 1.047 (arm) and 1.057
+        # (hexapod) in thousands of runs
         width = (half.mean(axis=0) / 1.96 / exact(design, 0.0)).mean()
-        assert width < (1.065 if (name, poses) == ("hexapod", 15) else 1.05)
+        assert width < (1.035 if poses == 40 else 1.07)
 
 
 @pytest.mark.slow
