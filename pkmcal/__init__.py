@@ -18,10 +18,13 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.arms.inverse import ArmInverse as ArmInverse
     from pkmcal.calibration.bootstrap import Bootstrap as Bootstrap
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
+    from pkmcal.calibration.distances import Distances as Distances
     from pkmcal.calibration.identification import Identification as Identification
     from pkmcal.calibration.identify import identify as identify
+    from pkmcal.calibration.moved import Moved as Moved
     from pkmcal.calibration.plan_poses import Plan as Plan
     from pkmcal.calibration.plan_poses import plan_poses as plan_poses
+    from pkmcal.calibration.verdict import Verdict as Verdict
     from pkmcal.checks.check_geometry import GeometryCheck as GeometryCheck
     from pkmcal.checks.check_geometry import check_geometry as check_geometry
     from pkmcal.checks.finding import Finding as Finding
@@ -72,9 +75,12 @@ _HOMES = {
     "arms.arm": ("SerialArm",),
     "arms.inverse": ("ArmInverse",),
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
+    "calibration.distances": ("Distances",),
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),
+    "calibration.moved": ("Moved",),
     "calibration.plan_poses": ("Plan", "plan_poses"),
+    "calibration.verdict": ("Verdict",),
     "checks.check_geometry": ("GeometryCheck", "check_geometry"),
     "checks.finding": ("Finding",),
     "compensation.compensate": ("Compensation", "compensate"),

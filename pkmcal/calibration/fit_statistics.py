@@ -99,6 +99,7 @@ def parameter_table(
     rates = chosen.reported_rates(theta) * chosen.scale
     along = rates @ estimate.state.determined.unidentifiable
     unknown = np.linalg.norm(along, axis=1) > _INVOLVED * chosen.scale
+    unknown |= uncertainty.freedom <= 0  # nothing shows the deviation
     shown = uncertainty.matrix.copy()
     shown[unknown] = shown[:, unknown] = np.nan
     shown[unknown, unknown] = np.inf

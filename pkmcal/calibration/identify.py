@@ -162,9 +162,7 @@ def identify(
         estimator = Estimator(equations, own, loss)
         estimate = estimator.solve()
     except ValueError as error:
-        hint = likely_unit_errors(datasets, chosen, start) or likely_row_errors(
-            datasets, chosen, start
-        )
+        hint = likely_unit_errors(datasets, chosen, start) or likely_row_errors(datasets, chosen)
         if not hint and not start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None

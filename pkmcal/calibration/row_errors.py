@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.parameters import FitData, Parameters
 from pkmcal.calibration.plausibility import MISFIT_RATIO
 from pkmcal.calibration.readings import of_read
@@ -21,9 +20,7 @@ _LEAST_ROWS = 6
 _MOST_TARGETS = 4  # whose orders are tried
 
 
-def likely_row_errors(
-    datasets: Sequence[FitData], parameters: Parameters, evaluation: Evaluation
-) -> list[str]:
+def likely_row_errors(datasets: Sequence[FitData], parameters: Parameters) -> list[str]:
     """Suspect readings beside the wrong rows and exchanged targets, at the nominal machine.
 
     A reading of the data that fits far better is named.

@@ -72,27 +72,35 @@ def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -
 
 
 def _noise(misfit: Misfit) -> Iterator[str]:
-    """The noise that was estimated, and what of it a pose shares."""
+    """The noise that was estimated, what of it a pose shares, and how components differ."""
+    split = [
+        (own, pose)
+        for own, pose in zip(misfit.reading_noise, misfit.pose_noise, strict=True)
+        if np.isfinite(own)
+    ]
     estimated = [_short(noise) for noise in misfit.noise if np.isfinite(noise)]
     if np.isfinite(misfit.actuator_noise):
         estimated.append(f"of the actuators {_short(misfit.actuator_noise)}")
-    if estimated:
+    if any(pose > _SHARED * own for own, pose in split):
+        parts = [
+            f"{_short(np.hypot(own, pose))} mm a coordinate, {_short(own)} of a reading and"
+            f" {_short(pose)} that rows of a pose share"
+            for own, pose in split
+        ]
+        yield f"noise {', '.join(parts)}"
+    elif estimated:
         yield f"noise {', '.join(estimated)} mm, estimated from the residuals"
+    if not misfit.told_apart:
+        return
     for names, deviations in zip(misfit.components, misfit.component_noise, strict=True):
-        lengths, angles = deviations[:3], deviations[3:]
-        if np.isfinite(lengths).all() and len(set(lengths)) > 1:
-            each = " ".join(map(_short, lengths))
-            yield f"noise of {' '.join(names[:3])} {each} mm"
-        if angles and misfit.told_apart:
-            each = " ".join(dict.fromkeys(_short(float(np.degrees(a))) for a in angles))
-            yield f"noise of the angles {each} deg"
-    shared = [
-        f"{_short(own)} mm of a reading alone, {_short(pose)} mm that its pose shares"
-        for own, pose in zip(misfit.reading_noise, misfit.pose_noise, strict=True)
-        if pose > _SHARED * own
-    ]
-    if shared:
-        yield f"residuals: {', '.join(shared)}"
+        pairs = zip(names, deviations, strict=True)
+        each = [_of_component(*pair, "rad" if k > 2 else "mm") for k, pair in enumerate(pairs)]
+        yield f"noise of {', '.join(each)}"
+
+
+def _of_component(name: str, deviation: float, unit: str) -> str:
+    value, shown = display.displayed(deviation, unit)
+    return f"{name} {_short(value)} {shown}"
 
 
 def limits(

@@ -17,6 +17,7 @@ from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.uncertainty import FEW
 from pkmcal.display import chance_text, decimals, displayed, fixed, printable
 from pkmcal.statistics.distributions import deviation_interval
+from pkmcal.statistics.holdout_test import RATIO
 
 State = Literal["calibrated", "doubtful", "not calibrated"]
 
@@ -50,7 +51,7 @@ class Verdict:
     remarks: tuple[str, ...]
 
     def __str__(self) -> str:
-        return f"{self.state.capitalize()}: {'; '.join(self.reasons[:1])}"
+        return f"{self.state.capitalize()}: {self.reasons[0]}"
 
 
 def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) -> Verdict:
@@ -74,7 +75,7 @@ def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) ->
         )
     doubts += found.warnings
     if not grave and not doubts and _little_gained(found):
-        doubts.append(f"little gained: {_change(found)}")
+        doubts.append(f"little was gained, {_change(found)}")
     remarks = _remarks(found, robust)
     reasons = tuple(printable(text, _LONGEST) for text in grave + doubts)
     if grave:
@@ -92,16 +93,14 @@ def _grave(found: Parts, robust: RobustCheck | None) -> list[str]:
     if robust is not None and robust.ratio > _CARRIED:
         reasons.append(_disagreement(found, robust))
     spread = _commanded_spread(found)
-    left = np.nanmax([found.rms, found.closure_rms, 0.0])
+    left = np.nanmax([found.distances.rms_without_outliers, found.closure_rms, 0.0])
     if left > _ABSURD * spread > 0:
-        other = likely_row_errors(
-            found.fit.equations.datasets, found.fit.parameters, found.fit.start
-        )
+        other = likely_row_errors(found.fit.equations.datasets, found.fit.parameters)
         cause = "; ".join(other) or (
             "check that robot file and measurements belong together, row by row"
         )
         reasons.append(
-            f"{_mm(left)} are left where the machine moved about by {_mm(spread)}: {cause}"
+            f"{_mm(left)} rms are left where the machine moved about by {_mm(spread)}: {cause}"
         )
     return reasons
 
@@ -116,24 +115,30 @@ def _commanded_spread(found: Parts) -> float:
 def _contradicted(found: Parts, moved: tuple[Moved, ...]) -> list[str]:
     """What points that were held out say against the fit."""
     reasons = []
-    test = found.holdout.test
     if found.holdout_contradicts:
         reasons.append(
             f"the held-out points contradict the fit: {_mm(found.holdout_rms)} rms where"
             f" {_mm(found.holdout_expected)} is expected ({chance_text(found.holdout_chance)})"
         )
-    elif test is not None and test.few_off and found.holdout_outliers:
-        count = len(found.holdout_outliers)
-        reasons.append(
-            f"{count} held-out point{'s are' if count > 1 else ' is'} off:"
-            f" {row_names(found.holdout.data, found.holdout_outliers)}; without"
-            f" {'them' if count > 1 else 'it'} the rms is"
-            f" {_mm(found.holdout_distances.rms_without_outliers)},"
-            f" {_mm(found.holdout_expected)} is expected"
-        )
+    elif found.holdout_outliers and _off(found) > RATIO * found.holdout_expected:
+        reasons.append(_few_off(found))
     if moved and (found.holdout_contradicts or _spare(found) < FEW):
         reasons.append(_moved_text(moved))
     return reasons
+
+
+def _off(found: Parts) -> float:
+    """Rms of the held-out points without the outliers among them."""
+    return found.holdout_distances.rms_without_outliers
+
+
+def _few_off(found: Parts) -> str:
+    count = len(found.holdout_outliers)
+    them, are = ("them", "s are") if count > 1 else ("it", " is")
+    return (
+        f"{count} held-out point{are} off: {row_names(found.holdout.data, found.holdout_outliers)};"
+        f" without {them} the rms is {_mm(_off(found))}, {_mm(found.holdout_expected)} is expected"
+    )
 
 
 def _moved_text(moved: tuple[Moved, ...]) -> str:
@@ -181,7 +186,8 @@ def _few(found: Parts) -> list[str]:
     one = round(freedom, 1) == 1
     spare = "1 spare equation shows" if one else f"{freedom:.2g} spare equations show"
     return [
-        f"only {spare} the noise, which may be {low:.2g} to {high:.2g} times what is estimated;"
+        f"only {spare} the noise, which may be {low:.2g} to {high:.2g} times what is estimated"
+        f"{', and no hold-out can contradict the fit' if found.holdout_off.size else ''};"
         f" {more}, or state sigma"
     ]
 
@@ -189,38 +195,43 @@ def _few(found: Parts) -> list[str]:
 def _little_gained(found: Parts) -> bool:
     if np.isfinite(found.chi2_per_dof):
         return False  # the residuals are what sigma says
-    held = bool(np.isfinite(found.holdout_rms))
-    before, after = (found.holdout_rms_before, found.holdout_rms) if held else _misfit(found)[:2]
+    before, after, _ = _misfit(found)
     return after > _GAIN * before
 
 
 def _misfit(found: Parts) -> tuple[float, float, str]:
-    """Misfit before and after, and of what."""
-    if np.isfinite(found.rms):
-        return found.rms_before, found.rms, f"{len(found.rows)} fitted points"
-    rows = len(found.rows)
-    return found.closure_rms_before, found.closure_rms, f"actuators of {rows} fitted rows"
+    """Rms before and after of the points to judge by, without outliers, and their name."""
+    held = int(np.isfinite(found.holdout_off).sum())
+    if held:
+        first, last = found.holdout_distances_before, found.holdout_distances
+        name = _points(held, "held-out", len(found.holdout_outliers))
+    elif np.isnan(found.rms):
+        what = f"actuators of {len(found.rows)} rows"
+        return found.closure_rms_before, found.closure_rms, what
+    else:
+        first, last = found.distances_before, found.distances
+        name = _points(len(found.rows), "fitted", len(found.outliers))
+    return first.rms_without_outliers, last.rms_without_outliers, name
 
 
 def _change(found: Parts) -> str:
     """Say how the misfit changed."""
-    held = found.holdout_off[np.isfinite(found.holdout_off)]
-    if held.size:
-        expected = ""
-        if np.isfinite(found.holdout_expected):
-            expected = f"; {_mm(found.holdout_expected)} was expected"
-        return (
-            f"the error of {held.size} points that were not fitted"
-            f" {_falls(found.holdout_rms_before, found.holdout_rms)}{expected}"
-        )
-    before, after, what = _misfit(found)
-    return (
-        f"the misfit of the {what} {_falls(before, after)}; no points were held out to confirm it"
-    )
+    before, after, name = _misfit(found)
+    change = f"{name} {_falls(before, after)}"
+    if not found.holdout_off.size:
+        return f"the misfit of {change}; none was held out"
+    known = np.isfinite(found.holdout_expected)
+    return f"the error of {change}" + (f" ({found.holdout_expected:.3g} expected)" if known else "")
+
+
+def _points(count: int, which: str, outliers: int) -> str:
+    besides = f" besides {outliers} outlier{'s' if outliers > 1 else ''}" if outliers else ""
+    return f"{count - outliers} {which} point{'s' if count - outliers > 1 else ''}{besides}"
 
 
 def _falls(before: float, after: float) -> str:
-    return f"{'falls' if after < before else 'goes'} from {_mm(before)} to {_mm(after)} rms"
+    verb = "falls" if after < before else "goes"
+    return f"{verb} from {before:.3g} to {after:.3g} mm rms"
 
 
 def _disagreement(found: Parts, robust: RobustCheck) -> str:
@@ -242,6 +253,8 @@ def _remarks(found: Parts, robust: RobustCheck | None) -> tuple[str, ...]:
     remarks = []
     if robust is not None and _DISAGREES < robust.ratio <= _CARRIED:
         remarks.append(_disagreement(found, robust))
+    if found.holdout_outliers and not found.holdout_contradicts:
+        remarks.append(_few_off(found))
     scale = found.fit.uncertainty.covariance.scale
     stated = not found.fit.uncertainty.equations.unstated.any()
     if stated and found.covariance_rule == "classical" and scale > 1.0:

@@ -141,6 +141,8 @@ def parameters(found: Identification) -> list[dict[str, Any]]:
             "before": float(found.start[i]),
             "after": float(found.values[i]),
             "stderr": float(found.stderr[i]),
+            "dof": float(found.parameter_dof[i]),
+            "half95": float(found.interval95[i, 1] - found.values[i]),
             "identifiable": bool(np.isfinite(found.stderr[i])),
             "told": bool(np.isfinite(found.stderr[i])),  # the former name, for readers of JSON
             "prior": prior,

@@ -11,6 +11,7 @@ import numpy as np
 from pkmcal import display
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.row_names import row_names
 from pkmcal.display import printable
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import checksums, comment, version
@@ -61,6 +62,7 @@ def gather(found: Identification, files: Mapping[str, bytes]) -> dict[str, Any]:
         "found": found,
         "points": points,
         "worst": contents.worst(points),
+        "outlier_names": row_names(found.fit.equations.datasets, found.outliers),
         "moved": contents.moved(points),
         "directions": contents.directions(found),
         "parameters": contents.parameters(found),
@@ -106,7 +108,7 @@ def html(facts: Mapping[str, Any]) -> str:
 
 def _as_data(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Select what goes into the JSON file: the facts, and every attribute of the calibration."""
-    left_out = ("found", "worst", "moved", "arm")
+    left_out = ("found", "worst", "outlier_names", "moved", "arm")
     kept = {name: value for name, value in facts.items() if name not in left_out}
     return kept | {"calibration": facts["found"]}
 

@@ -3,10 +3,11 @@
 The covariance is the cluster sandwich with residuals adjusted for their leverage (CR2) and its
 degrees of freedom are Satterthwaite's under equal independent errors, parameter by parameter:
 R. M. Bell and D. F. McCaffrey, Bias reduction in standard errors for linear regression with
-multi-stage samples, Survey Methodology 28 (2002); G. W. Imbens and M. Kolesár, Robust standard
-errors in small samples: some practical advice, Review of Economics and Statistics 98 (2016);
-J. E. Pustejovsky and E. Tipton, Small-sample methods for cluster-robust variance estimation and
-hypothesis testing in fixed effects models, Journal of Business and Economic Statistics 36 (2018).
+multi-stage samples, Survey Methodology 28 (2002), no. 2; G. W. Imbens and M. Kolesár, Robust
+standard errors in small samples: some practical advice, Review of Economics and Statistics 98
+(2016); J. E. Pustejovsky and E. Tipton, Small-sample methods for cluster-robust variance estimation
+and hypothesis testing in fixed effects models, Journal of Business and Economic Statistics 36
+(2018), doi:10.1080/07350015.2016.1247004.
 
 statsmodels has CR1 and CR3, neither CR2 nor its degrees of freedom.
 """
@@ -53,8 +54,8 @@ class Sandwich:
     fit: LinearFit
 
     @cached_property
-    def _blocks(self) -> list[tuple[IntArray, FloatArray]]:
-        """Rows (g, m) of clusters of the same size, and what adjusts them: see `adjusted`."""
+    def _blocks(self) -> list[tuple[IntArray, FloatArray, FloatArray]]:
+        """Rows (g, m) of clusters of the same size, what adjusts and what is retained of them."""
         order = np.argsort(self.fit.cluster, kind="stable")
         sizes = np.bincount(self.fit.cluster)
         first = np.cumsum(sizes) - sizes
@@ -65,14 +66,14 @@ class Sandwich:
             wide = size <= part.shape[2]
             inner = part @ part.transpose(0, 2, 1) if wide else part.transpose(0, 2, 1) @ part
             values, vectors = np.linalg.eigh(inner)
-            root = np.sqrt(np.maximum(1.0 - values, 0.0))
             left = 1.0 - values > _SPENT
-            root = np.where(left, root, 1.0)
+            root = np.where(left, np.sqrt(np.maximum(1.0 - values, 0.0)), 1.0)
             if wide:  # (1 - H)^(-1/2) itself
-                factor = np.where(left, 1.0 / root, 0.0)
+                factor, spent = np.where(left, 1.0 / root, 0.0), vectors
             else:  # 1 + A W Aᵀ, by the smaller AᵀA
-                factor = np.where(left, 1.0 / (root * (1.0 + root)), -1.0)
-            blocks.append((rows, (vectors * factor[:, None, :]) @ vectors.transpose(0, 2, 1)))
+                factor, spent = np.where(left, 1.0 / (root * (1.0 + root)), -1.0), part @ vectors
+            matrix = (vectors * factor[:, None, :]) @ vectors.transpose(0, 2, 1)
+            blocks.append((rows, matrix, 1.0 - (spent**2 @ ~left[:, :, None])[:, :, 0]))
         return blocks
 
     def adjusted(self, values: FloatArray) -> FloatArray:
@@ -81,9 +82,9 @@ class Sandwich:
         H is the cluster's block of the hat matrix. Residuals then have the variance of the errors.
         """
         out = np.empty_like(values)
-        for rows, matrix in self._blocks:
+        for rows, matrix, _ in self._blocks:
             mine = values[rows]
-            if matrix.shape[1] == rows.shape[1] <= self.fit.design.shape[1]:
+            if rows.shape[1] <= self.fit.design.shape[1]:
                 out[rows] = matrix @ mine
             else:
                 part = self.fit.design[rows]
@@ -101,14 +102,9 @@ class Sandwich:
 
         1, or less where the fit has used up what the cluster could show.
         """
-        kept = np.ones(len(self.fit.residual))
-        for rows, _ in self._blocks:
-            part = self.fit.design[rows]
-            inner = part @ part.transpose(0, 2, 1)
-            values, vectors = np.linalg.eigh(inner)
-            spent = 1.0 - values <= _SPENT
-            if spent.any():
-                kept[rows] -= np.einsum("gij,gj->gi", vectors**2, spent)
+        kept = np.empty(len(self.fit.residual))
+        for rows, _, share in self._blocks:
+            kept[rows] = share
         return kept
 
     @cached_property

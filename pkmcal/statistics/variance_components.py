@@ -5,7 +5,7 @@ tell apart is decided by likelihood ratios (D. A. Harville, Maximum likelihood a
 variance component estimation and to related problems, Journal of the American Statistical
 Association 72 (1977)). The covariance of the parameters allows for the variances being estimates,
 and so do its degrees of freedom (M. G. Kenward and J. H. Roger, Small sample inference for fixed
-effects from restricted maximum likelihood, Biometrics 53 (1997)).
+effects from restricted maximum likelihood, Biometrics 53 (1997) 983-997).
 
 statsmodels' mixed models have random effects, but no classes of residual variances.
 """
@@ -23,7 +23,8 @@ from pkmcal.statistics.linear_fit import LinearFit
 
 _LEAST_FREEDOM = 15.0  # degrees of freedom for each class that is told apart
 _DIFFERENT = 0.01  # chance of the likelihood ratio below which classes are told apart
-_ROUNDS, _SETTLED, _STEP = 50, 1e-10, 1.0  # of the logarithms of the variances
+_ROUNDS, _SETTLED, _STEP, _HALVINGS = 50, 1e-6, 1.0, 12  # of the logarithms of the variances
+_SPENT = 1e-6  # share of the equations of a class that must be left
 _TINY = 1e-18  # of the mean variance: a class that the fit meets exactly
 
 
@@ -65,7 +66,7 @@ class VarianceComponents:
 def variance_components(
     fit: LinearFit, classes: IntArray, prior_residual: FloatArray
 ) -> VarianceComponents | None:
-    """Estimate the variances of classes (M,); None where that does not settle.
+    """Estimate the variances of classes (M,); None where the fit meets one of them exactly.
 
     Parameters
     ----------
@@ -76,45 +77,83 @@ def variance_components(
     prior_residual : ndarray (q,)
         Residuals of the prior's rows.
     """
-    count = np.bincount(classes).astype(np.float64)
-    k = len(count)
-    inner = np.array([fit.design[classes == c].T @ fit.design[classes == c] for c in range(k)])
-    pulls = np.array([fit.design[classes == c].T @ fit.residual[classes == c] for c in range(k)])
-    of_prior, pull = fit.prior.T @ fit.prior, fit.prior.T @ prior_residual
-    square = np.bincount(classes, fit.residual**2)
-    floor = _TINY * square.sum() / count.sum()
-    theta = np.maximum(square / count, floor)
+    model = _Model(fit, classes, prior_residual)
+    factor = len(fit.residual) / max(fit.freedom, 1.0)
+    here = model.at(np.maximum(model.square / model.count * factor, model.floor))
     for _ in range(_ROUNDS):
-        normal = np.tensordot(1.0 / theta, inner, 1) + of_prior
-        plain = np.linalg.inv(normal)
-        shift = plain @ (pulls.T @ (1.0 / theta) + pull)
-        left = square - 2.0 * pulls @ shift + (inner @ shift) @ shift
-        slopes = inner / theta[:, None, None] ** 2
-        turned = plain @ slopes
-        spent = np.trace(turned, axis1=1, axis2=2) * theta
-        if (count - spent < 1e-6 * count).any():
+        if here is None:
             return None
-        information = 0.5 * np.tensordot(turned, turned, ((1, 2), (2, 1)))
-        information[np.arange(k), np.arange(k)] += 0.5 * (count - 2.0 * spent) / theta**2
-        # Fisher scoring of the logarithms
-        slope = 0.5 * (left / theta - (count - spent))
-        step = np.linalg.solve(information * np.outer(theta, theta), slope)
-        theta = np.maximum(theta * np.exp(np.clip(step, -_STEP, _STEP)), floor)
+        # Fisher scoring of the logarithms, halved until the likelihood grows
+        matrix = here.information * np.outer(here.theta, here.theta)
+        step = np.clip(np.linalg.solve(matrix, here.slope), -_STEP, _STEP)
         if np.abs(step).max() < _SETTLED:
             break
-    of_variances = np.asarray(np.linalg.inv(information), dtype=np.float64)
-    excess = np.einsum("c,cij->ij", np.diagonal(of_variances) / theta, slopes)
+        further = None
+        for _ in range(_HALVINGS):
+            further = model.at(np.maximum(here.theta * np.exp(step), model.floor))
+            if further is not None and further.likelihood >= here.likelihood:
+                break
+            step, further = step / 2.0, None
+        if further is None:
+            break
+        here = further
+    assert here is not None
+    theta, plain, slopes = here.theta, here.plain, here.slopes
+    of_variances = np.asarray(np.linalg.inv(here.information), dtype=np.float64)
+    excess = np.tensordot(np.diagonal(of_variances) / theta, slopes, 1)
     excess -= np.einsum("ab,aij,jk,bkl->il", of_variances, slopes, plain, slopes, optimize=True)
-    rest = prior_residual - fit.prior @ shift
-    likelihood = -0.5 * (
-        float(count @ np.log(theta))
-        + float(np.linalg.slogdet(normal)[1])
-        + float((left / theta).sum() + rest @ rest)
-    )
     matrix = plain + 2.0 * plain @ excess @ plain
     if not (np.isfinite(matrix).all() and (np.diagonal(matrix) > 0).all()):
         return None
-    return VarianceComponents(classes, theta, matrix, likelihood, plain, slopes, of_variances)
+    return VarianceComponents(classes, theta, matrix, here.likelihood, plain, slopes, of_variances)
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """The restricted likelihood at variances theta, and its derivatives to their logarithms."""
+
+    theta: FloatArray
+    likelihood: float
+    slope: FloatArray
+    information: FloatArray
+    plain: FloatArray
+    slopes: FloatArray
+
+
+class _Model:
+    """The restricted likelihood of a fit whose classes of equations have their own variances."""
+
+    def __init__(self, fit: LinearFit, classes: IntArray, prior_residual: FloatArray) -> None:
+        self.count = np.bincount(classes).astype(np.float64)
+        rows = [classes == c for c in range(len(self.count))]
+        self._inner = np.array([fit.design[mine].T @ fit.design[mine] for mine in rows])
+        self._pulls = np.array([fit.design[mine].T @ fit.residual[mine] for mine in rows])
+        self._prior, self._missed = fit.prior, prior_residual
+        self.square = np.bincount(classes, fit.residual**2)
+        self.floor = _TINY * float(self.square.sum() / self.count.sum())
+
+    def at(self, theta: FloatArray) -> _Point | None:
+        """At variances (c,); None where a class has no freedom left."""
+        normal = np.tensordot(1.0 / theta, self._inner, 1) + self._prior.T @ self._prior
+        plain = np.linalg.inv(normal)
+        shift = plain @ (self._pulls.T @ (1.0 / theta) + self._prior.T @ self._missed)
+        left = self.square - 2.0 * self._pulls @ shift + (self._inner @ shift) @ shift
+        slopes = self._inner / theta[:, None, None] ** 2
+        turned = plain @ slopes
+        spent = np.trace(turned, axis1=1, axis2=2) * theta
+        if (self.count - spent < _SPENT * self.count).any():
+            return None
+        information = 0.5 * np.tensordot(turned, turned, ((1, 2), (2, 1)))
+        every = np.arange(len(theta))
+        information[every, every] += 0.5 * (self.count - 2.0 * spent) / theta**2
+        rest = self._missed - self._prior @ shift
+        likelihood = -0.5 * (
+            float(self.count @ np.log(theta))
+            + float(np.linalg.slogdet(normal)[1])
+            + float((left / theta).sum() + rest @ rest)
+        )
+        slope = 0.5 * (left / theta - (self.count - spent))
+        return _Point(theta, likelihood, slope, information, plain, slopes)
 
 
 def told_apart(

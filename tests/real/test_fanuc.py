@@ -57,12 +57,12 @@ def test_all_joint_errors(arm: pk.SerialArm, log: Measurements) -> None:
     assert found.repeatability == pytest.approx(0.090 / np.sqrt(3), rel=0.02)
 
 
-@pytest.mark.filterwarnings("ignore:the measurements contradict the prior")  # by chance
+@pytest.mark.filterwarnings("ignore:the measurements contradict the prior")  # joint2.dphi
 def test_a_prior_costs_nothing(arm: pk.SerialArm, log: Measurements) -> None:
     assert identify(arm, log, prior=PRIOR, **UNKNOWN).rms < 0.163
 
 
-@pytest.mark.filterwarnings("ignore:the measurements contradict the prior")  # by chance
+@pytest.mark.filterwarnings("ignore:the measurements contradict the prior")  # joint2.dphi
 @pytest.mark.slow
 @pytest.mark.parametrize("prior, limit", [(None, 0.25), (PRIOR, 0.23)])
 def test_every_pose_left_out_in_turn(
@@ -77,3 +77,26 @@ def test_every_pose_left_out_in_turn(
         assert found.converged
         squares.append(found.holdout_rms**2)
     assert np.sqrt(np.mean(squares)) <= limit
+
+
+def test_noise_does_not_grow_with_repeats_and_its_parts_are_told_apart(
+    arm: pk.SerialArm, log: Measurements
+) -> None:
+    found = identify(arm, log, **UNKNOWN)
+    once = identify(arm, log.select(np.arange(720) % 30 < 3), **UNKNOWN)
+    assert len(once.rows) == 72
+    assert found.noise[0] < 1.3 * found.rms / np.sqrt(3)
+    assert found.reading_noise[0] == pytest.approx(found.repeatability, rel=0.1)
+    # what the model misses at a pose is the same, once or ten times
+    assert found.pose_noise[0] == pytest.approx(once.pose_noise[0], rel=0.5)
+    assert found.covariance_rule == once.covariance_rule == "cluster"
+
+
+def test_random_quarters_are_off_by_what_is_expected(arm: pk.SerialArm, log: Measurements) -> None:
+    squares = []
+    for seed in range(12):
+        fitted, held = log.split(0.25, seed=seed)
+        found = identify(arm, fitted, holdout=held, **UNKNOWN)
+        squares.append((found.holdout_rms**2, found.holdout_expected**2))
+    actual, expected = np.mean(squares, axis=0)
+    assert 0.85 < np.sqrt(actual / expected) < 1.15

@@ -92,7 +92,7 @@ def test_verdict_comes_first_and_names_the_held_out_error(
         ({"converged": False}, "bad", "Not calibrated: the least squares did not converge."),
         ({"warnings": ("z looks like metres",)}, "doubtful", "Doubtful: z looks like metres."),
         ({"at_bounds": ("offset1",)}, "doubtful", "Doubtful: offset1 ended at a bound"),
-        ({"holdout_off": np.empty(0)}, "good", "no points were held out"),
+        ({"holdout_off": np.empty(0)}, "good", "none was held out"),
     ],
 )
 def test_verdict_is_no_better_than_the_calibration(

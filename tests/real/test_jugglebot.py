@@ -1,0 +1,86 @@
+"""A real hexapod with spools, two sessions of motion capture: two of its zeros moved between."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import pkmcal as pk
+from pkmcal.arrays import FloatArray
+from pkmcal.calibration.identification import Identification
+from pkmcal.measurements.measurements import Measurements
+
+DATA = Path(__file__).parents[3] / "shared" / "data" / "jugglebot"
+TURNS = np.array([13.21144, 14.0456, 13.8233, 14.124109, 14.16007, 14.03256]) * 1e-3  # per mm
+
+pytestmark = [
+    pytest.mark.skipif(
+        not DATA.exists(), reason="the sessions are not beside this checkout (../shared/data)"
+    ),
+    pytest.mark.filterwarnings("ignore:.*further than errors of a machine"),  # 60 poses tell less
+]
+
+
+def circle(radius: float, angles: FloatArray) -> FloatArray:
+    turned = np.radians(angles)
+    return radius * np.column_stack([np.cos(turned), np.sin(turned), 0 * turned])
+
+
+@pytest.fixture(scope="module")
+def hexapod(tmp_path_factory: pytest.TempPathFactory) -> pk.Robot:
+    """As drawn; 48 free numbers: base, platform, zero and gain of each leg."""
+    n = np.arange(6)
+    base = circle(410.0, 200 + 100 * (n // 2) + 20 * ((n + 1) // 2))
+    platform = circle(219.075, 154.3012223 + 8.6024446 * (n // 2) + 111.3975554 * ((n + 1) // 2))
+    zeros = np.linalg.norm(platform - base + np.array([0.0, 0.0, 565.0]), axis=1)
+    lines = [
+        'name = "hexapod with spools"', 'units = { length = "mm", angle = "deg" }',
+        "[pose]", 'map = "spatial"', "home = { z = 780.0 }",
+        "[calibration]", 'free = ["base*", "platform*", "offset*", "gain*"]',
+    ]  # fmt: skip
+    for b, p, zero in zip(base.tolist(), platform.tolist(), zeros.tolist(), strict=True):
+        lines += ["[[limb]]", 'kind = "UPS"', f"base = {b}", f"platform = {p}", f"offset = {zero}"]
+    path = tmp_path_factory.mktemp("robot") / "robot.toml"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    return pk.load(path)
+
+
+def session(number: int) -> Measurements:
+    log = np.genfromtxt(DATA / f"session{number}.csv", delimiter=",", skip_header=1)
+    motion = np.tile(np.eye(4), (len(log), 1, 1))
+    motion[:, :3, :3] = Rotation.from_quat(log[:, 9:13]).as_matrix()  # x, y, z, w
+    motion[:, :3, 3] = log[:, 6:9]
+    return Measurements(log[:, :6] / TURNS, pk.screw.to_pose(motion), "pose")
+
+
+def compared(hexapod: pk.Robot, first: int, later: int) -> Identification:
+    return pk.identify(hexapod, session(first), holdout=session(later))
+
+
+@pytest.mark.parametrize(("first", "later", "sign"), [(1, 2, 1.0), (2, 1, -1.0)])
+def test_offsets_5_and_3_moved_and_nothing_else(
+    hexapod: pk.Robot, first: int, later: int, sign: float
+) -> None:
+    found = compared(hexapod, first, later)
+    assert [each.names for each in found.moved] == [("offset5",), ("offset3",)]
+    sizes = [sign * each.shift[0] for each in found.moved]
+    # leg by leg, a least squares of its own says 1.89 and 0.98
+    assert 1.4 < sizes[0] < 2.1 and 0.6 < sizes[1] < 1.2
+    assert found.holdout_contradicts and found.verdict.state == "doubtful"
+    assert str(found).startswith("Doubtful: the held-out points contradict the fit")
+    assert "moved, or the model is wrong there: offset5 by" in found.verdict.reasons[1]
+
+
+def test_a_session_against_itself_is_as_expected(hexapod: pk.Robot) -> None:
+    """Random quarters of the first session."""
+    whole, squares = session(1), []
+    for seed in range(12):
+        fitted, held = whole.split(0.25, seed=seed)
+        found = pk.identify(hexapod, fitted, holdout=held)
+        squares.append((found.holdout_rms**2, found.holdout_expected**2))
+        assert not found.holdout_contradicts and found.moved == ()
+    actual, expected = np.mean(squares, axis=0)
+    assert 0.85 < np.sqrt(actual / expected) < 1.15
