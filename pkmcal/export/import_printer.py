@@ -14,6 +14,8 @@ from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
 from pkmcal.export import rotary_delta
 from pkmcal.export.delta_gcode import of_marlin, of_reprap
+from pkmcal.export.hangprinter import as_robot as robot_of_anchors
+from pkmcal.export.hangprinter import of_text, robot_text
 from pkmcal.export.linear_delta import FirmwareDelta, as_robot, text_of
 from pkmcal.export.printer_config import (
     ANGLES,
@@ -46,7 +48,11 @@ _GCODE_HEAD = """\
 # An actuator coordinate is the carriage's way down from its end stop, in mm; `offset` is the height
 # of the carriage there.
 """
-Firmware = Literal["klipper", "reprap", "marlin"]
+_ANCHORS_HEAD = """\
+# Imported from {file} by pkmcal: the anchors of M669.
+# An actuator coordinate is the line let out since the origin, mm; `offset` is its length there.
+"""
+Firmware = Literal["klipper", "reprap", "marlin", "hangprinter"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,8 +80,9 @@ class Printer(Result):
 
     def _parts(self) -> Iterator[str]:
         stored = "no" if self.measurements is None else str(len(self.measurements))
-        kind = "rotary" if rotary_delta.is_rotary_delta(self.robot) else "linear"
-        yield f"{self.robot.name}: a {kind} delta, {stored} stored heights"
+        kinds = {"PUS": "linear delta", "RUS": "rotary delta", "UPS": "Hangprinter"}
+        kind = kinds[self.robot.model.limbs[0].kind]
+        yield f"{self.robot.name}: a {kind}, {stored} stored heights"
         if self.distances:
             yield (
                 f"{self.distances} distances of a printed part are left out: a distance between two"
@@ -91,8 +98,8 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     path : str or path
         A printer.cfg of Klipper or Kalico: the block of SAVE_CONFIG at its end is read too,
         included files are not. Or a file with the M665 and M666 of the other firmwares; actuator
-        coordinates are then mm down from the end stops.
-    firmware : {"klipper", "reprap", "marlin"}
+        coordinates are then mm down from the end stops. Or the M669 of a Hangprinter.
+    firmware : {"klipper", "reprap", "marlin", "hangprinter"}
         Whose file it is.
 
     Raises
@@ -116,6 +123,11 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     <Printer: printer: a linear delta, no stored heights>
     """
     word("firmware", firmware, get_args(Firmware))
+    if firmware == "hangprinter":
+        where = as_path("path", path)
+        anchors = of_text(text_in(path), str(where))
+        text = robot_text(anchors, where.stem, _ANCHORS_HEAD.format(file=where.name))
+        return Printer(robot_of_anchors(anchors, where.stem), None, 0, text)
     if firmware != "klipper":
         where = as_path("path", path)
         parse = of_reprap if firmware == "reprap" else of_marlin
