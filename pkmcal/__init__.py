@@ -29,6 +29,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.compensation.compensate import compensate as compensate
     from pkmcal.compensation.correction_grid import CorrectionGrid as CorrectionGrid
     from pkmcal.compensation.correction_grid import correction_grid as correction_grid
+    from pkmcal.compensation.program import CorrectedProgram as CorrectedProgram
+    from pkmcal.compensation.program import compensate_program as compensate_program
     from pkmcal.compensation.pso import SwarmResult as SwarmResult
     from pkmcal.compensation.pso import pso as pso
     from pkmcal.controllers.import_printer import import_printer as import_printer
@@ -79,6 +81,7 @@ _HOMES = {
     "checks.finding": ("Finding",),
     "compensation.compensate": ("Compensation", "compensate"),
     "compensation.correction_grid": ("CorrectionGrid", "correction_grid"),
+    "compensation.program": ("CorrectedProgram", "compensate_program"),
     "compensation.pso": ("SwarmResult", "pso"),
     "core.swarm": ("CONSTRICTION", "SwarmSettings"),
     "error_model.allocation": ("Allocation", "allocate_tolerance"),

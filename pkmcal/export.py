@@ -2,10 +2,21 @@
 
 from pkmcal.controllers.c_header import c_header
 from pkmcal.controllers.delta_gcode import marlin, reprap
+from pkmcal.controllers.hangprinter import hangprinter
 from pkmcal.controllers.import_printer import Printer
 from pkmcal.controllers.klipper import klipper
 from pkmcal.controllers.linuxcnc import linuxcnc
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.mjcf import mjcf
 
-__all__ = ["Loss", "Printer", "c_header", "klipper", "linuxcnc", "marlin", "mjcf", "reprap"]
+__all__ = [
+    "Loss",
+    "Printer",
+    "c_header",
+    "hangprinter",
+    "klipper",
+    "linuxcnc",
+    "marlin",
+    "mjcf",
+    "reprap",
+]

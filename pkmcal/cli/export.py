@@ -18,7 +18,13 @@ from pkmcal.files.reading import Input
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-TARGETS = ("c", "klipper", "reprap", "marlin", "linuxcnc", "mjcf")
+TARGETS = ("c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf")
+
+_LINES = {
+    "reprap": pk.export.reprap,
+    "marlin": pk.export.marlin,
+    "hangprinter": pk.export.hangprinter,
+}
 
 
 def export(
@@ -53,8 +59,9 @@ def export(
     """Write a robot for a controller.
 
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
-    linear delta for Klipper or Kalico; reprap, marlin: its M665 and M666. linuxcnc: a kinematics
-    component, and a simulation that runs it. mjcf: a model for MuJoCo.
+    linear or rotary delta for Klipper or Kalico; reprap, marlin: M665 and M666 of a linear one;
+    hangprinter: M669. linuxcnc: a kinematics component, and a simulation that runs it. mjcf: a
+    model for MuJoCo.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -63,7 +70,7 @@ def export(
     word("--as", target, TARGETS)
     _only(target, ("c",), number=number)
     _only(target, ("klipper",), config=config)
-    _only(target, ("klipper", "reprap", "marlin"), project=project or None)
+    _only(target, ("klipper", "reprap", "marlin", "hangprinter"), project=project or None)
     read = Inputs()
     machine = load_parallel(read.robot(robot))
     loss = None
@@ -100,8 +107,7 @@ def _write(
     elif target == "klipper":
         return pk.export.klipper(machine, path, config, project)
     else:
-        write = pk.export.reprap if target == "reprap" else pk.export.marlin
-        return write(machine, path, project)
+        return _LINES[target](machine, path, project)
     return None
 
 

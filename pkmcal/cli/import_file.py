@@ -22,14 +22,16 @@ def import_file(
         Path, typer.Option(metavar="DIR", help="Where to write; made if it is not there.")
     ] = Path("."),
     firmware: Annotated[
-        str, typer.Option("--from", metavar="FIRMWARE", help="klipper, reprap or marlin.")
+        str,
+        typer.Option("--from", metavar="FIRMWARE", help="klipper, reprap, marlin or hangprinter."),
     ] = "klipper",
     force: Force = False,
     json: Json = False,
 ) -> int:
     """Make a robot file and measurements out of a printer's configuration.
 
-    Of a linear delta with Klipper or Kalico, or with the M665 and M666 of RepRapFirmware or Marlin.
+    Of a linear or rotary delta with Klipper or Kalico, of a linear one with the M665 and M666 of
+    RepRapFirmware or Marlin, or of a Hangprinter with M669.
     robot.toml has the firmware's numbers; probe.csv the heights that a DELTA_CALIBRATE stored, if
     there are any.
 

@@ -11,15 +11,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pkmcal.arrays import FloatArray
 from pkmcal.controllers.c_header import prepared
+from pkmcal.controllers.loss import Loss, loss, nearest
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.kinematics.workspace import sample_poses
 
+OVER = "over half of its workspace"
 _TOWERS = 3
+_POSES = 200
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,57 @@ class RotaryDelta:
     rods: tuple[float, ...]
     elbows: tuple[float, ...]
     gains: tuple[float, ...]
+
+    @property
+    def endstops(self) -> tuple[float, ...]:
+        """Height of the pose in the middle with each crank at its end stop, q = 0; mm."""
+        found = []
+        for crank, rod, elbow in zip(self.cranks, self.rods, self.elbows, strict=True):
+            across = self.radius + crank * np.cos(elbow)
+            down = crank * np.sin(elbow) + np.sqrt(max(rod**2 - across**2, 0.0))
+            found.append(float(self.height - down))
+        return tuple(found)
+
+
+def elbow_at(endstop: float, radius: float, height: float, crank: float, rod: float) -> float:
+    """Angle of a crank below the horizontal with the pose in the middle, its knee outward; rad."""
+    down = height - endstop
+    way = np.hypot(radius, down)
+    inner = np.arccos((crank**2 + way**2 - rod**2) / (2.0 * crank * way))
+    return float(np.arctan2(down, -radius) - inner)
+
+
+def of_robot(robot: Robot, project: bool) -> tuple[RotaryDelta, Loss]:
+    """The numbers of a robot, and what they lose.
+
+    Raises
+    ------
+    ValueError
+        No rotary delta; or one that the model cannot hold, unless `project`.
+    """
+    require_rotary_delta(robot)
+    home = float(robot.home[2])
+    delta = as_built(robot)
+    poses = sample_poses(robot, _POSES)
+    q = robot.inverse(poses)
+    lost = loss(as_robot(delta, home), q, poses, OVER)
+    if not lost.exact:
+
+        def of(x: FloatArray) -> RotaryDelta:
+            angles, cranks, rods, elbows = map(tuple, x[2:].reshape(4, _TOWERS).tolist())
+            return RotaryDelta(float(x[0]), float(x[1]), angles, cranks, rods, elbows, delta.gains)
+
+        start = [delta.radius, delta.height, *delta.angles, *delta.cranks, *delta.rods]
+        x = np.array([*start, *delta.elbows])
+        delta = of(nearest(lambda x: as_robot(of(x), home), x, q, poses))
+        lost = loss(as_robot(delta, home), q, poses, OVER)
+        if not project:
+            raise ArgumentError(
+                f"robot: {robot.name}: the firmware has one radius and one height, and cranks that"
+                f" turn in radial planes, this robot has not; its numbers can be projected onto"
+                f" that, {lost}"
+            )
+    return delta, lost
 
 
 def require_rotary_delta(robot: Robot) -> None:
@@ -115,13 +171,13 @@ def text_of(delta: RotaryDelta, home: float, name: str, head: str) -> str:
     """
     parameters = {"radius": delta.radius, "height": delta.height}
     parameters |= {f"angle{i}": angle for i, angle in enumerate(delta.angles, 1)}
-    free = ["radius", "angle1", "angle2", "offset1", "offset2", "offset3"]
+    free = ["radius", "height", "offset1", "offset2", "offset3"]
     blocks = [
         head,
         lines({"name": name, "units": {"length": "mm", "angle": "deg"}}),
         "[pose]\n" + lines({"map": "translation", "home": {"z": home}}),
         "[parameters]\n" + lines(parameters),
-        "# Heights do not tell which way x is, so angle3 stays.\n"
+        "# The angles stay: the axes of the cranks would not turn with them.\n"
         "[calibration]\n" + lines({"free": free}),
     ]
     for i in range(_TOWERS):
