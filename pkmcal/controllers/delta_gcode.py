@@ -113,7 +113,7 @@ def of_reprap(text: str, place: str = "M665") -> FirmwareDelta:
     """
     size, ends = _words_of(text, "M665", place), _words_of(text, "M666", place)
     radius = _one(size, "R", place)
-    arms = [float(each) for each in _text(size, "L", place).split(":")]
+    arms = [_number(each, "L", place) for each in _text(size, "L", place).split(":")]
     arms = arms * 3 if len(arms) == 1 else arms
     if len(arms) != 3 or min(arms) <= radius:
         raise FileError(f"{place}: L of M665 must be 1 or 3 rods longer than R, found {size['L']}")
@@ -176,7 +176,10 @@ def _text(words: Mapping[str, str], letter: str, place: str) -> str:
 def _one(words: Mapping[str, str], letter: str, place: str, default: float | None = None) -> float:
     if letter not in words and default is not None:
         return default
-    text = _text(words, letter, place)
+    return _number(_text(words, letter, place), letter, place)
+
+
+def _number(text: str, letter: str, place: str) -> float:
     try:
         return float(text)
     except ValueError:

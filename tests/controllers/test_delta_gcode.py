@@ -110,6 +110,12 @@ def test_lines_are_found_as_firmwares_print_them(tmp_path: Path) -> None:
     assert np.degrees(g["angle1"]) == pytest.approx(210.0)
 
 
+def test_a_rod_among_three_that_is_no_number_is_named(tmp_path: Path) -> None:
+    (tmp_path / "config.g").write_text("M665 L250:25..0:250 R125 H300\nM666 X0\n")
+    with pytest.raises(pk.FileError, match=r"L must be a number, found '25\.\.0'"):
+        pk.import_printer(tmp_path / "config.g", "reprap")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
