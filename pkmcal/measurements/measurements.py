@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import display
-from pkmcal.arguments import checked_seed, shown, word
+from pkmcal.arguments import checked_seed, shown, word, words
 from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
@@ -73,6 +73,8 @@ class Measurements(Result):
         The point in the platform frame, mm, from which distances are measured: of a wire, a ball
         bar, a leg. One for all rows, one per row, or with `target_index` one for each target.
         None: the platform's origin.
+    notes : sequence of str
+        What was assumed when they were read, a line each.
 
     Raises
     ------
@@ -98,6 +100,7 @@ class Measurements(Result):
     target_names: tuple[str, ...] | None = None
     actuator_units: tuple[str, ...] | None = None
     attachment: FloatArray | None = None
+    notes: tuple[str, ...] = ()
 
     # The types above are those of the attributes; anything array-like is taken.
     def __init__(
@@ -113,6 +116,7 @@ class Measurements(Result):
         target_names: Sequence[str] | None = None,
         actuator_units: str | Sequence[str] | None = None,
         attachment: ArrayLike | None = None,
+        notes: Sequence[str] = (),
     ) -> None:
         word("kind", kind, COMPONENTS)
         q = numbers("actuators", actuators)
@@ -140,6 +144,7 @@ class Measurements(Result):
             "target_names": names_of_targets(target_names, index, place),
             "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
             "attachment": attachment_array(attachment, kind, targets, len(q)),
+            "notes": words("notes", notes),
         }
         self.__setstate__(fields)
 
