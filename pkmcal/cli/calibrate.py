@@ -117,7 +117,9 @@ def calibrate(
     reading = Reading(controller, join, ignore or (), rename or (), columns, units, rotation)
     measured = [reading.measurements(path, read, machine) for path in csv]
     held = None if holdout is None else _read_holdout(holdout, read, machine, reading)
-    output = None if out is None else Output(out, ["robot.toml", "residuals.png"], read, force)
+    urdf = isinstance(given, pk.SerialArm) and given.source is not None
+    names = ["robot.toml", "residuals.png", *["robot.urdf"] * urdf]
+    output = None if out is None else Output(out, names, read, force)
     reported = None if report is None else Output(report, REPORT, read, force)
     if tracker is not None:
         seen = read_tracker(tracker)
@@ -140,6 +142,8 @@ def calibrate(
         with progress("picture"), output.draft() as draft:
             found.robot.save(draft / "robot.toml", read.comment())
             found.plot(draft / "residuals.png")
+            if isinstance(found.robot, pk.SerialArm) and urdf:
+                found.robot.save_urdf(draft / "robot.urdf")
     if reported is not None:
         with progress("report"), reported.draft() as draft:
             found.report(draft, read.contents())
@@ -150,6 +154,8 @@ def calibrate(
         if output is not None:
             say(f"\ncalibrated robot: {output.paths[0]}")
             say(f"residuals: {output.paths[1]}")
+            if urdf:
+                say(f"URDF with the joint errors in its origins: {output.paths[2]}")
         if reported is not None:
             say(f"\nreport: {reported.paths[0]}")
     return 0 if found.converged and not found.warnings else 1

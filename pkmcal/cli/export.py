@@ -16,7 +16,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-TARGETS = ("c", "klipper", "reprap", "marlin", "mjcf")
+TARGETS = ("c", "klipper", "reprap", "marlin", "mjcf", "dh", "dh-modified", "ur")
 
 
 def export(
@@ -50,7 +50,8 @@ def export(
 
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
     linear delta for Klipper or Kalico; reprap, marlin: its M665 and M666.
-    mjcf: a model for MuJoCo.
+    mjcf: a model for MuJoCo. Of serial arms: dh and dh-modified, a table of Denavit-Hartenberg
+    numbers; ur, the lists of a calibration.conf of Universal Robots.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -59,6 +60,9 @@ def export(
     word("--as", target, TARGETS)
     if os.path.lexists(out) and not force:
         raise ArgumentError(f"{out}: would be replaced; name another file, or give --force")
+    if target in ("dh", "dh-modified", "ur"):
+        _only(target, number=number, config=config, project=project or None)
+        return _export_arm(robot, target, out, json)
     machine = load_parallel(robot)
     loss = None
     if target == "c":
@@ -78,6 +82,22 @@ def export(
         say(as_json({"robot": machine.name, "as": target, "file": str(out), "loss": loss}))
     else:
         say(f"{out}: {machine.name}" + (f"; {loss}" if loss and not loss.exact else ""))
+    return 0
+
+
+def _export_arm(robot: str, target: str, out: Path, json: bool) -> int:
+    """Write the Denavit–Hartenberg numbers of a serial arm."""
+    arm: object = pk.load(robot)
+    if not isinstance(arm, pk.SerialArm):
+        raise ArgumentError(f"{robot}: --as {target} is for serial arms")
+    if target == "ur":
+        pk.export.universal_robots(arm, out)
+    else:
+        pk.export.dh(arm, out, "standard" if target == "dh" else "modified")
+    if json:
+        say(as_json({"robot": arm.name, "as": target, "file": str(out), "loss": None}))
+    else:
+        say(f"{out}: {arm.name}")
     return 0
 
 

@@ -1,8 +1,8 @@
 """A file that states the SHA-256 of the rest of itself: whether it is as it was written.
 
 What has no seal, or another content than it states, is somebody's work. The seal stands where the
-format has room for a remark: a comment of CSV, TOML, HTML and SVG, the first key of JSON, a text
-chunk before the end of PNG.
+format has room for a remark: a comment of CSV, TOML, HTML, SVG and URDF, the first key of JSON, a
+text chunk before the end of PNG.
 """
 
 from __future__ import annotations
@@ -53,6 +53,7 @@ _FORMS = {
     ".json": _Form(_key, after=len("{\n")),
     ".html": _Form(_remark),
     ".svg": _Form(_remark),
+    ".urdf": _Form(_remark),
     ".png": _Form(_chunk, before=_IEND),
 }
 
@@ -64,7 +65,7 @@ def sealed(content: bytes, kind: str) -> bytes:
     ----------
     content : bytes
         What is written, without a seal; JSON begins with a brace on a line of its own.
-    kind : {".csv", ".toml", ".json", ".html", ".svg", ".png"}
+    kind : {".csv", ".toml", ".json", ".html", ".svg", ".urdf", ".png"}
         The ending of the file's name.
 
     Examples
