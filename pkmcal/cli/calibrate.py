@@ -140,13 +140,14 @@ def calibrate(
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:
-            found.robot.save(draft / "robot.toml", read.comment())
+            _save(found, draft / "robot.toml", read, robot)
             found.plot(draft / "residuals.png")
             if isinstance(found.robot, pk.SerialArm) and urdf:
                 found.robot.save_urdf(draft / "robot.urdf")
     if reported is not None:
         with progress("report"), reported.draft() as draft:
             found.report(draft, read.contents())
+            _save(found, draft / "robot.toml", read, robot)
     if json:
         say(as_json(found, "parameters", "correlations"))
     else:
@@ -159,6 +160,17 @@ def calibrate(
         if reported is not None:
             say(f"\nreport: {reported.paths[0]}")
     return 0 if found.converged and not found.warnings else 1
+
+
+def _save(found: pk.Identification, path: Path, read: Inputs, robot: str) -> None:
+    """Write the calibrated robot; in the words of the user's file, where there is one."""
+    calibrated, source = found.robot, read.robot(robot)
+    if isinstance(calibrated, pk.SerialArm) or isinstance(source, str):
+        calibrated.save(path, read.comment())
+        return
+    sigmas = zip(found.free, found.stderr.tolist(), strict=True)
+    known = {name: sigma for name, sigma in sigmas if name in calibrated.geometry.names}
+    calibrated.save(path, read.comment(), like=source, deviations=known)
 
 
 def read_tracker(text: str) -> Tracker:
