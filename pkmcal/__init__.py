@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal import screw as screw
     from pkmcal import trajectory as trajectory
     from pkmcal.arms.arm import SerialArm as SerialArm
+    from pkmcal.arms.denavit_hartenberg import DHTable as DHTable
     from pkmcal.arms.inverse import ArmInverse as ArmInverse
     from pkmcal.calibration.bootstrap import Bootstrap as Bootstrap
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
@@ -72,6 +73,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
 
 _HOMES = {
     "arms.arm": ("SerialArm",),
+    "arms.denavit_hartenberg": ("DHTable",),
     "arms.inverse": ("ArmInverse",),
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
     "calibration.identification": ("Identification",),

@@ -1,5 +1,6 @@
 """Robots for controllers, and back: `pk.export`."""
 
+from pkmcal.controllers.arm_dh import dh, universal_robots
 from pkmcal.controllers.c_header import c_header
 from pkmcal.controllers.delta_gcode import marlin, reprap
 from pkmcal.controllers.hangprinter import hangprinter
@@ -13,10 +14,12 @@ __all__ = [
     "Loss",
     "Printer",
     "c_header",
+    "dh",
     "hangprinter",
     "klipper",
     "linuxcnc",
     "marlin",
     "mjcf",
     "reprap",
+    "universal_robots",
 ]

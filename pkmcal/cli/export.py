@@ -18,13 +18,16 @@ from pkmcal.files.reading import Input
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-TARGETS = ("c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf")
+TARGETS = (
+    "c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf", "dh", "dh-modified", "ur"
+)  # fmt: skip
 
 _LINES = {
     "reprap": pk.export.reprap,
     "marlin": pk.export.marlin,
     "hangprinter": pk.export.hangprinter,
 }
+_OF_ARMS = ("dh", "dh-modified", "ur")
 
 
 def export(
@@ -61,7 +64,8 @@ def export(
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
     linear or rotary delta for Klipper or Kalico; reprap, marlin: M665 and M666 of a linear one;
     hangprinter: M669. linuxcnc: a kinematics component, and a simulation that runs it. mjcf: a
-    model for MuJoCo.
+    model for MuJoCo. Of serial arms: dh and dh-modified, a table of Denavit-Hartenberg numbers; ur,
+    the lists of a calibration.conf of Universal Robots.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -72,6 +76,8 @@ def export(
     _only(target, ("klipper",), config=config)
     _only(target, ("klipper", "reprap", "marlin", "hangprinter"), project=project or None)
     read = Inputs()
+    if target in _OF_ARMS:
+        return _export_arm(read.robot(robot), target, out, read, force, json)
     machine = load_parallel(read.robot(robot))
     loss = None
     if target == "linuxcnc":
@@ -88,6 +94,23 @@ def export(
     else:
         own = "LinuxCNC's own module for it is " if target == "linuxcnc" else ""
         say(f"{out}: {machine.name}" + (f"; {own}{loss}" if loss and not loss.exact else ""))
+    return 0
+
+
+def _export_arm(robot: Input, target: str, out: Path, read: Inputs, force: bool, json: bool) -> int:
+    """Write the Denavit-Hartenberg numbers of a serial arm."""
+    arm: object = pk.load(robot)
+    if not isinstance(arm, pk.SerialArm):
+        raise ArgumentError(f"{robot}: --as {target} is for serial arms")
+    with Output(out.parent, [out.name], read, force).draft() as draft:
+        if target == "ur":
+            pk.export.universal_robots(arm, draft / out.name)
+        else:
+            pk.export.dh(arm, draft / out.name, "standard" if target == "dh" else "modified")
+    if json:
+        say(as_json({"robot": arm.name, "as": target, "file": str(out), "loss": None}))
+    else:
+        say(f"{out}: {arm.name}")
     return 0
 
 

@@ -11,11 +11,14 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
 from pkmcal.core.machine import Machine
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.atomic import write_whole
+from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
@@ -396,7 +399,14 @@ class Robot(Kinematics, Result):
             return self
         return Robot(replace(self.model, closure_tolerance=2.0 * missed))
 
-    def save(self, path: str | PathLike[str], comment: str = "") -> None:
+    def save(
+        self,
+        path: str | PathLike[str],
+        comment: str = "",
+        *,
+        like: str | PathLike[str] | None = None,
+        deviations: Mapping[str, float] | None = None,
+    ) -> None:
         """Write the robot file; `load` reads it back to the last bit.
 
         Parameters
@@ -405,8 +415,27 @@ class Robot(Kinematics, Result):
             Where to write; an existing file is replaced, whole or not at all.
         comment : str, optional
             Lines for its head, each with its ``#``.
+        like : str or path, optional
+            The file that the robot came from: its units, order, names and comments are kept, and
+            only the values that changed are others. Numbers are then read back to 1e-13 of the
+            machine's size, for its units are not mm and rad.
+        deviations : mapping of str to float, optional
+            With `like`: standard deviations by name, mm and rad, as comments.
+
+        Raises
+        ------
+        ValueError
+            `like` describes another robot.
         """
-        robot_file.write(self.model, path, comment)
+        if like is None:
+            robot_file.write(self.model, path, comment)
+            return
+        from pkmcal.geometry.robot_file_kept import text_like
+
+        content, place, _ = robot_file.located(like)
+        source = Source(content, place)
+        head = arguments.comment(comment)
+        write_whole(path, text_like(source, self.model, deviations, head))
 
 
 def require_parallel(robot: object, name: str = "robot") -> None:

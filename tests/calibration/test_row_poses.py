@@ -1,4 +1,4 @@
-"""Every row has a pose of its own: the estimator against all poses as unknowns, and its statistics."""
+"""Every row has a pose of its own: the estimator against all poses as unknowns."""
 
 from __future__ import annotations
 
@@ -246,7 +246,7 @@ def test_stated_actuator_noise_makes_the_stated_deviations_true() -> None:
     z: dict[bool, list[np.ndarray]] = {True: [], False: []}
     rng = np.random.default_rng(11)
     q = robot.inverse(pk.sample_poses(robot, 30))
-    for seed in range(8):
+    for _ in range(8):
         shifts = {f"offset{i}": float(x) for i, x in enumerate(rng.normal(0, 0.3, 6), 1)}
         true = robot.replace(shifts)
         there = true.forward(q + rng.normal(0, 0.05, q.shape))
