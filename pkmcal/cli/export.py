@@ -97,7 +97,9 @@ def export(
     return 0
 
 
-def _export_arm(robot: Input, target: str, out: Path, read: Inputs, force: bool, json: bool) -> int:
+def _export_arm(
+    robot: str | Input, target: str, out: Path, read: Inputs, force: bool, json: bool
+) -> int:
     """Write the Denavit-Hartenberg numbers of a serial arm."""
     arm: object = pk.load(robot)
     if not isinstance(arm, pk.SerialArm):
