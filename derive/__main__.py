@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from . import calls, elementary, frames, limbs, measured, posemaps, rates, screws, tpr2tps
+from . import calls, chains, elementary, frames, limbs, measured, posemaps, rates, screws, tpr2tps
 from .emit import Function
 
 HERE = Path(__file__).parent
@@ -23,6 +23,7 @@ def headers() -> dict[str, str]:
         "names.h": _header("limbs", _names() + calls.table()),
         "row_calls.h": _header("calls", calls.prototypes()),
         "row_loops.h": _header("calls", calls.loops()),
+        "chains.h": _header("chains", _functions(chains.functions())),
         "elementary.h": _header("elementary", elementary.emit()),
         "frames.h": _header("frames", _functions(frames.functions())),
         "limbs.h": _header("limbs", _functions(limbs.functions())),

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows
+from pkmcal.core.chains import ChainMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
@@ -52,11 +53,17 @@ class Kinematics:
         self.slots = np.ascontiguousarray(model.geometry.slots)
         self.frames = Frames(model.base_frame, model.tool_frame)
         self.own_home = np.ascontiguousarray(model.home, dtype=np.float64)
+        self.machine = self._machine()
+
+    def _machine(self) -> Machine | ChainMachine:
+        model = self.model
+        if model.chains is not None:
+            return ChainMachine(model.chains.layout, model.closure_tolerance)
         limbs = [_limb(limb) for limb in model.limbs]
         if sum(len(limb["weights"]) for limb in limbs) == len(self.coordinates):
             for limb in limbs:  # nothing to weigh: all closures hold
                 limb["weights"] = [1.0] * len(limb["weights"])
-        self.machine = Machine(
+        return Machine(
             model.map, limbs, self.length, self.slots, self.own_home, model.closure_tolerance
         )
 
@@ -83,6 +90,8 @@ class Kinematics:
         The root mean square distance of the platform joints from their centre, or of the base
         points where the platform joints coincide.
         """
+        if self.model.chains is not None:
+            return self.model.chains.length
         for joints in (self.slots[:, 3:6], self.slots[:, 0:3]):
             spread = joints - joints.mean(axis=0)
             radius = float(np.sqrt((spread**2).sum(axis=1).mean()))
