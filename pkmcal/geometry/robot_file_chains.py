@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -85,18 +85,13 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
     listed = table.tables("joints", "a chain")
     joints: list[Joint] = []
     values: dict[str, float] = {}
-    first: set[str] = set()
     for k, each in enumerate(listed):
         share = _share(each)
-        if share in known and share not in first:
-            if set(each.data) - {"share"} and _joint(each, parameters, map, joints) != known[share]:
-                each.fail("share", f"{share!r} is another joint in a limb before")
+        if share in known and set(each.data) == {"share"}:
             joints.append(known[share])
             continue
         joint = _joint(each, parameters, map, joints)
         joints.append(joint)
-        if share:
-            first.add(share)
         for key, standard in (("offset", 0.0), ("gain", 1.0)):
             if key not in each:
                 continue
@@ -109,9 +104,10 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
         if k + 1 > MAX_CHAIN:
             each.fail("", f"a chain has at most {MAX_CHAIN} axes")
     joints = [_with_axes(each, joints, k, map) for k, each in enumerate(listed)]
-    for joint in joints:
-        if joint.share:
-            known.setdefault(joint.share, joint)
+    for k, joint in enumerate(joints):
+        if joint.share and not _alike(known.setdefault(joint.share, joint), joint):
+            listed[k].fail("share", f"{joint.share!r} is another joint in a limb before")
+        joints[k] = known.get(joint.share or "", joint)
     if "errors" in table:
         errors = table.table("errors")
         for name in errors.data:
@@ -122,6 +118,10 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
         table.fail("copies", f"must be 1 or more, found {copies}")
     group = table.text("group") if "group" in table else ""
     return _Limb(table, tuple(joints), values, copies, group, _about(table))
+
+
+def _alike(a: Joint, b: Joint) -> bool:
+    return all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(Joint))
 
 
 def _share(table: Table) -> str | None:
