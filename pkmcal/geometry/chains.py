@@ -126,6 +126,21 @@ class Chains:
                     found.setdefault(joint.actuator, (i, joint))
         return tuple(found[a] for a in sorted(found))
 
+    @property
+    def arms(self) -> tuple[tuple[Joint, float], ...]:
+        """Of each actuator its joint, and how far from its axis the next joint elsewhere is, mm."""
+        found = []
+        for i, joint in self.actuated:
+            limb = self.limbs[i]
+            arm = self.length
+            for other in limb[limb.index(joint) + 1 :]:
+                way = np.cross(other.at - joint.at, joint.axes[0])
+                if np.linalg.norm(way) > 1e-9 * self.size:
+                    arm = float(np.linalg.norm(way))
+                    break
+            found.append((joint, arm))
+        return tuple(found)
+
     @cached_property
     def members(self) -> tuple[tuple[str, ...], ...]:
         """Of each limb the names of its parts, without a last ball."""

@@ -17,6 +17,7 @@ from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Limb, Model
+from pkmcal.kinematics.chain_limits import drives as chain_drives
 from pkmcal.kinematics.complete import complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
@@ -344,8 +345,14 @@ class Kinematics:
         return self.machine.closure(self.slots, own, q).by_step
 
     def drives(self, q: FloatArray) -> FloatArray:
-        """q̃ of each limb (N, limbs) at actuator coordinates (N, n)."""
+        """q̃ of each limb (N, limbs) at actuator coordinates (N, n).
+
+        Of a chain that of its first actuator, 0 where it has none.
+        """
         actuators = [limb.actuator for limb in self.model.limbs]
+        if isinstance(self.machine, ChainMachine):
+            each = np.hstack([chain_drives(self.machine, self.slots, q), np.zeros((len(q), 1))])
+            return np.asarray(each[:, actuators])
         offset, gain = self.slots[:, SLOTS.index("offset")], self.slots[:, SLOTS.index("gain")]
         found: FloatArray = gain * q[:, actuators] + offset
         return found
@@ -359,6 +366,13 @@ class Kinematics:
     def _in_strokes(self, q: FloatArray) -> BoolArray:
         """Which actuators (n,) keep the strokes of all their limbs at coordinates (n,)."""
         kept = np.ones(self.n_actuators, dtype=bool)
+        if isinstance(self.machine, ChainMachine):
+            assert self.model.chains is not None
+            drive = chain_drives(self.machine, self.slots, q[None])[0]
+            for a, (_, joint) in enumerate(self.model.chains.actuated):
+                low, high = joint.stroke or (-np.inf, np.inf)
+                kept[a] = bool(low <= drive[a] <= high)
+            return kept
         for limb, drive in zip(self.model.limbs, self.drives(q[None])[0], strict=True):
             kept[limb.actuator] &= bool(stroke_margin(limb, drive) >= 0.0)
         return kept

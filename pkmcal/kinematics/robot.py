@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
+from pkmcal.core.chains import ChainMachine
 from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Model
-from pkmcal.kinematics import overconstrained
+from pkmcal.kinematics import chain_limits, overconstrained
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
@@ -129,18 +130,19 @@ class Robot(Kinematics):
             ``.ok`` for each pose; reach, stroke and joint cones for each limb.
         """
         rows, shape = self.own_rows(pose)
+        chains = self.model.chains
+        if chains is not None:
+            q = self.machine.inverse(self.slots, rows) if actuators is None else (
+                self._batch(actuators, shape))
+            assert isinstance(self.machine, ChainMachine)
+            found = chain_limits.feasibility(chains, self.machine, self.slots, rows, q)
+            return _shaped(found, shape)
         drive, on_base, on_platform = self.machine.limbs(self.slots, rows)
         if actuators is not None:
             there = self.drives(self._batch(actuators, shape))
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
             drive = np.where(angle, there + wrapped(drive - there), drive)
-        found = feasibility(self.model.limbs, drive, on_base, on_platform)
-        return Feasibility(
-            *(
-                getattr(found, field.name).reshape(*shape, len(self.model.limbs))
-                for field in fields(Feasibility)
-            )
-        )
+        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform), shape)
 
     def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
         """Every assembly mode at given actuator coordinates, with proof.
@@ -367,6 +369,12 @@ class Robot(Kinematics):
             Lines for its head, each with its ``#``.
         """
         robot_file.write(self.model, path, comment)
+
+
+def _shaped(found: Feasibility, shape: tuple[int, ...]) -> Feasibility:
+    """Limits of N rows as those of a batch."""
+    each = (getattr(found, field.name) for field in fields(Feasibility))
+    return Feasibility(*(array.reshape(*shape, array.shape[-1]) for array in each))
 
 
 def require_parallel(robot: object, name: str = "robot") -> None:
