@@ -295,7 +295,7 @@ def singular(robot: Robot) -> Iterator[Finding]:
 
 def _affine_error(robot: Robot) -> float | None:
     """How far the joints of a hexapod's platform are from an affine image of those of its base."""
-    if robot.model.map != "spatial" or len(robot.model.limbs) < 6:
+    if robot.model.map != "spatial" or len(robot.model.limbs) < 6 or robot.model.chains:
         return None
     base, platform = (side.points for side in joints(robot))
     system = np.column_stack([base, np.ones(len(base))])

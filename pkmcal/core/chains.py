@@ -9,6 +9,7 @@ import numpy as np
 
 from pkmcal._core import ffi, lib
 from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.core.chain_rates import actuator_rates, platform_motion
 from pkmcal.core.library import ISA, MAPS, call, in_threads, part, pointer
 from pkmcal.core.machine import CLOSURE_TOLERANCE, Closure
 
@@ -287,6 +288,26 @@ class ChainMachine:
         given = (len(pose), slots, 0, pose, q)
         call("chain_frames", self.struct, *given, passive, frames, isa=self.isa)
         return passive, frames
+
+    def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Velocity and acceleration of the actuators, as `pkmcal.core.machine.Machine.rates`."""
+
+        def inverse(pose: FloatArray) -> FloatArray:
+            return self.inverse(slots, pose)
+
+        return actuator_rates(inverse, self.turns(slots), self.layout.size, motion)
+
+    def motion(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, q1: FloatArray, q2: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The platform's motion, as `pkmcal.core.machine.Machine.motion`."""
+
+        def forward(at: FloatArray) -> FloatArray:
+            return self.forward(slots, at, pose, threads=None)[0]
+
+        scale = np.full(self.actuators, 1.0 / self.layout.size)
+        scale[self._angles] = 1.0
+        return platform_motion(forward, pose, q, q1, q2, scale)
 
     def closure_cost(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
         """Sum of the squared closures over poses (M, 6) and coordinates (M, n), mm².

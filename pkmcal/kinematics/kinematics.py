@@ -16,7 +16,7 @@ from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import Limb, Model
+from pkmcal.geometry.model import CHAIN, Limb, Model
 from pkmcal.kinematics.chain_limits import drives as chain_drives
 from pkmcal.kinematics.complete import complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
@@ -325,12 +325,34 @@ class Kinematics:
         return AssemblyProblem(
             self.machine,
             self.model.map,
-            [KINDS[limb.kind].all_rows(limb.couple > 0) for limb in limbs],
+            [
+                () if limb.kind == CHAIN else KINDS[limb.kind].all_rows(limb.couple > 0)
+                for limb in limbs
+            ],
             [limb.couple for limb in limbs],
             self.length,
             self.slots,
             q,
         )
+
+    @property
+    def passive_names(self) -> tuple[str, ...]:
+        """The passive joints of chains, in the order of `Forward.passive`; none of other limbs."""
+        if self.model.chains is None:
+            return ()
+        names = list(self.model.chains.parts)
+        coordinate = self.model.chains.layout.coordinate
+        order = sorted(range(len(names)), key=lambda k: int(coordinate[k]))
+        return tuple(names[k] for k in order if coordinate[k] >= 0)
+
+    def passive_joints(self, own: FloatArray, q: FloatArray) -> FloatArray:
+        """What the passive joints turn or slide by from home at own poses (N, 6), (N, passive).
+
+        Each chain closed for itself, in the posture that is reached from home.
+        """
+        if not isinstance(self.machine, ChainMachine):
+            raise ArgumentError(f"{self.model.name}: its limbs are no chains of joints")
+        return self.machine.frames(self.slots, np.ascontiguousarray(own), q)[0]
 
     def closure_by_twist(self, own: FloatArray, q: FloatArray | None = None) -> FloatArray:
         """Closure rows by a scaled twist, (N, rows, m), at own poses (N, 6) and q (N, n).
