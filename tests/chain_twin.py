@@ -96,7 +96,9 @@ class Twin:
                 continue
             name = f"limb{i + 1}.platform"
             if f"{name}.{ERRORS[-1]}" not in self.numbers:  # of the limb that ends there too
-                first = next(k for k, other in enumerate(self.chains.limbs) if other[-1] is limb[-1])
+                first = next(
+                    k for k, other in enumerate(self.chains.limbs) if other[-1] is limb[-1]
+                )
                 name = f"limb{first + 1}.platform"
             C = P @ np.linalg.inv(self.error(name, end)) @ self.home
             D = C[:3, :3] @ T[:3, :3].T
@@ -120,7 +122,9 @@ class Twin:
         for share in np.linspace(0, 1, parts + 1)[1:]:
             at = zero + share * (q - zero)
             for _ in range(12 if share == 1 else 4):
-                step = -np.linalg.pinv(self.differences(T, at, theta), rcond=1e-9) @ self.misses(T, at, theta)
+                step = -np.linalg.pinv(self.differences(T, at, theta), rcond=1e-9) @ self.misses(
+                    T, at, theta
+                )
                 T, theta = self.moved(T, step[:m]), theta + step[m:]
                 if np.abs(step).max() < 1e-12:
                     break

@@ -44,7 +44,7 @@ def spinning(robot: Robot) -> Iterator[Finding]:
         yield Finding(
             "limb",
             tuple(i + 1 for i in limbs),
-            f"at home the passive joints of {named(limbs)} can move while the platform stands still",
+            f"at home passive joints of {named(limbs)} can move while the platform stands still",
             "of a rod between two S write one as a U; else home is a dead point of the limb",
         )
 
@@ -63,8 +63,8 @@ def home_values(robot: Robot) -> Iterator[Finding]:
             yield Finding(
                 "home",
                 (i + 1,),
-                f"at home actuator {(joint.actuator or 0) + 1} reads {joint.home_value:.6g} mm, but the"
-                f" joints beside it are {apart:.6g} mm apart",
+                f"at home actuator {(joint.actuator or 0) + 1} reads {joint.home_value:.6g} mm, but"
+                f" the joints beside it are {apart:.6g} mm apart",
                 "check home_value, the joints' points and the home pose",
             )
 

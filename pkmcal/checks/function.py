@@ -151,7 +151,7 @@ def _mended(robot: Robot) -> Iterator[Finding]:
                 home[:, :3] *= factor
             else:
                 stroke = factor
-            drive = robot.machine.limbs(slots, home)[0][0]
+            drive = robot.limb_machine.limbs(slots, home)[0][0]
             if _in_strokes(robot, drive, stroke):
                 mended.append(f"the {name} in {unit}" if name != "home" else f"home in {unit}")
     if mended:

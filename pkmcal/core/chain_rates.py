@@ -1,6 +1,6 @@
 """Motions of machines of chains: actuators by the platform's, and the platform's by theirs.
 
-By central differences of fourth order along a path that has the velocity and acceleration asked for.
+By central differences of fourth order along a path with the velocity and acceleration asked for.
 The kinematics they are taken of is exact to 1e-13 of the size, and the path goes 1e-3 of it to each
 side: velocities are good to 1e-10 of their size and accelerations to 1e-7.
 """
@@ -126,4 +126,5 @@ def _vee(matrix: FloatArray) -> FloatArray:
 def _skew(w: FloatArray) -> FloatArray:
     out = np.zeros((len(w), 3, 3))
     out[:, 2, 1], out[:, 0, 2], out[:, 1, 0] = w.T
-    return out - out.swapaxes(1, 2)
+    skew: FloatArray = out - out.swapaxes(1, 2)
+    return skew

@@ -11,7 +11,7 @@ from pkmcal._core import ffi, lib
 from pkmcal.arrays import FloatArray, Int32Array
 from pkmcal.core.chain_rates import actuator_rates, platform_motion
 from pkmcal.core.library import ISA, MAPS, call, in_threads, part, pointer
-from pkmcal.core.machine import CLOSURE_TOLERANCE, Closure
+from pkmcal.core.machine import CLOSURE_TOLERANCE, Closure, Machine
 
 MAX_CHAIN: int = lib.PKM_MAX_CHAIN
 MAX_JOINTS: int = lib.PKM_MAX_JOINTS
@@ -25,7 +25,7 @@ GROUPS = {"spatial": 6, "planar": 3, "spherical": 3}  # pose maps of chains, and
 class ChainLayout:
     """What of a machine of chains does not change with its numbers.
 
-    Joints count once where chains share them. Places are those of numbers in the geometry (numbers,).
+    Joints count once where chains share them. Places are those of numbers in the geometry.
 
     Attributes
     ----------
@@ -149,7 +149,9 @@ class ChainMachine:
         struct.over = int(self.rows > self.m)
         self.struct, self.isa = struct, isa
         self.actuators: int = struct.actuators
-        turning = {a for a, slides in zip(layout.actuator, layout.prismatic, strict=True) if not slides}
+        turning = {
+            a for a, slides in zip(layout.actuator, layout.prismatic, strict=True) if not slides
+        }
         self._angles = sorted(int(a) for a in turning if a >= 0)
 
     def with_tolerance(self, closure_tolerance: float) -> ChainMachine:
@@ -316,6 +318,9 @@ class ChainMachine:
         """
         costs = [(self.closure(each, pose, q).residual ** 2).sum() for each in slots]
         return np.array(costs)
+
+
+AnyMachine = Machine | ChainMachine
 
 
 def _without_shared(closure: Closure, m: int) -> Closure:

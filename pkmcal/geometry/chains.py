@@ -1,9 +1,9 @@
 """Limbs as chains of joints: what a robot file says of them, and the machine the core makes of it.
 
 A joint of several axes (U, S, C) is listed once and stands for a row of R and P, its parts: the
-second and third have the letters b and c behind their number. A ball, an S without axes of its own,
-has no orientation to be wrong: behind all other joints it closes in a point, elsewhere it is three R
-of which only the place can be wrong.
+second and third have the letters b and c behind their number. A ball, an S without axes of its
+own, has no orientation to be wrong: behind all other joints it closes in a point, elsewhere it is
+three R of which only the place can be wrong.
 """
 
 from __future__ import annotations
@@ -72,6 +72,11 @@ class Joint:
     def ball(self) -> bool:
         """Whether it is an S that has no axes of its own."""
         return self.kind == "S" and not self.axes
+
+    @property
+    def parts(self) -> int:
+        """How many axes it has."""
+        return {"R": 1, "P": 1, "U": 2, "C": 2, "S": 3}[self.kind]
 
     @property
     def unit(self) -> Unit:
@@ -149,7 +154,7 @@ class Chains:
                 (joint.share or f"limb{i + 1}.joint{k}") + suffix
                 for k, joint in enumerate(limb, 1)
                 if not _closes(limb, joint)
-                for suffix in PARTS[: _count(joint)]
+                for suffix in PARTS[: joint.parts]
             )
             for i, limb in enumerate(self.limbs)
         )
@@ -172,7 +177,9 @@ class Chains:
                 for n, (suffix, axis) in enumerate(zip(PARTS, axes, strict=False)):
                     own = errors if n == 0 or not joint.ball else ()
                     slides = joint.kind == "P" or (joint.kind == "C" and n == 1)
-                    found.setdefault(name + suffix, Part(name + suffix, slides, axis, joint, i, own))
+                    found.setdefault(
+                        name + suffix, Part(name + suffix, slides, axis, joint, i, own)
+                    )
         return found
 
     @cached_property
@@ -309,10 +316,6 @@ def _errors(name: str, errors: tuple[str, ...], limb: int, place: int) -> list[L
         at = place + ERRORS.index(error)
         found.append(LimbNumber(f"{name}.{error}", unit, limb, f"{slot}.{error}", None, at))
     return found
-
-
-def _count(joint: Joint) -> int:
-    return {"R": 1, "P": 1, "U": 2, "C": 2, "S": 3}[joint.kind]
 
 
 def _ends_in_ball(limb: tuple[Joint, ...]) -> bool:

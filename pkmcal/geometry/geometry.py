@@ -123,7 +123,7 @@ class Geometry:
             parameters = dict(zip(layout.parameters, values[k:].tolist(), strict=True))
             for i, tie in layout.ties:
                 values[i] = tie.value(parameters)
-        slots = layout.blank.copy()
+        slots: FloatArray = layout.blank.copy()
         slots.flat[layout.slot_index] = values[:k]
         self._layout = layout
         self._values = _frozen(values)

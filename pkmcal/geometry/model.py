@@ -12,7 +12,6 @@ from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 
-
 CHAIN = "chain"  # the kind of a limb that is a chain of joints: see `pkmcal.geometry.chains`
 
 

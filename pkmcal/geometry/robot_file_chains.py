@@ -147,7 +147,7 @@ def _joint(table: Table, parameters: Parameters, map: str, before: Sequence[Join
     actuator = table.integer("actuator") - 1 if "actuator" in table else None
     if actuator is not None and actuator < 0:
         table.fail("actuator", f"actuators count from 1, found {actuator + 1}")
-    if actuator is not None and AXES[kind] > 1 or (actuator is not None and kind == "C"):
+    if (actuator is not None and AXES[kind] > 1) or (actuator is not None and kind == "C"):
         table.fail("actuator", f"a joint {kind} has several axes: list the actuated one as R or P")
     joint = Joint(kind, at, (), actuator, _share(table))
     for key in ("home_value", "offset", "gain"):
@@ -246,13 +246,19 @@ def _copied(listed: Sequence[_Limb]) -> tuple[list[tuple[Joint, ...]], list[Any]
     for i, limb in enumerate(listed):
         if i in done:
             continue
-        mine = [k for k, other in enumerate(listed) if k == i or (limb.group and other.group == limb.group)]
+        mine = [
+            k
+            for k, other in enumerate(listed)
+            if k == i or (limb.group and other.group == limb.group)
+        ]
         done.update(mine)
         copies = max(listed[k].copies for k in mine)
         for k in mine:
             if listed[k].copies not in (1, copies):
                 listed[k].table.fail("copies", f"the group {limb.group!r} has {copies} copies")
-        used = sorted({j.actuator for k in mine for j in listed[k].joints if j.actuator is not None})
+        used = sorted(
+            {j.actuator for k in mine for j in listed[k].joints if j.actuator is not None}
+        )
         shared: dict[tuple[str, int], Joint] = {}
         for copy in range(copies):
             for k in mine:
@@ -262,14 +268,20 @@ def _copied(listed: Sequence[_Limb]) -> tuple[list[tuple[Joint, ...]], list[Any]
                 )
                 limbs.append(made)
                 for name, value in listed[k].values.items():
-                    numbers.append((_named(name, len(limbs), listed[k], copy, copies, len(used)), value, listed[k].table))
+                    numbers.append(
+                        (
+                            _named(name, len(limbs), listed[k], copy, copies, len(used)),
+                            value,
+                            listed[k].table,
+                        )
+                    )
     return limbs, numbers
 
 
 def _named(name: str, limb: int, of: _Limb, copy: int, copies: int, used: int) -> str:
     for key in ("offset", "gain"):
         if name.startswith(key) and name[len(key) :].isdigit():
-            return f"{key}{int(name[len(key):]) + copy * used}"
+            return f"{key}{int(name[len(key) :]) + copy * used}"
     head, _, error = name.partition(".")
     for k, joint in enumerate(of.joints, 1):
         for suffix in ("", "b", "c"):
@@ -323,11 +335,18 @@ def _check(tables: Sequence[Table], chains: Chains) -> None:
     units: dict[int, str] = {}
     for limb in chains.limbs:
         for joint in limb:
-            if joint.actuator is not None and units.setdefault(joint.actuator, joint.unit) != joint.unit:
-                last.fail("joints", f"actuator {joint.actuator + 1} turns one joint and slides another")
+            if (
+                joint.actuator is not None
+                and units.setdefault(joint.actuator, joint.unit) != joint.unit
+            ):
+                last.fail(
+                    "joints", f"actuator {joint.actuator + 1} turns one joint and slides another"
+                )
     for a in range(chains.n_actuators):
         if a not in used:
-            last.fail("joints", f"found {chains.n_actuators} actuators, but no joint has actuator {a + 1}")
+            last.fail(
+                "joints", f"found {chains.n_actuators} actuators, but no joint has actuator {a + 1}"
+            )
     if chains.n_actuators > MAX_LIMBS:
         last.fail("joints", f"a machine has at most {MAX_LIMBS} actuators")
     if len(chains.parts) > MAX_JOINTS or chains.count > MAX_NUMBERS:
@@ -339,7 +358,9 @@ def _check(tables: Sequence[Table], chains: Chains) -> None:
     for i, (names, limb) in enumerate(zip(chains.members, chains.limbs, strict=True)):
         ball = limb[-1].ball
         if not 1 <= len(names) <= MAX_CHAIN:
-            last.fail("joints", f"limb {i + 1} has {len(names)} axes, 1 to {MAX_CHAIN} are possible")
+            last.fail(
+                "joints", f"limb {i + 1} has {len(names)} axes, 1 to {MAX_CHAIN} are possible"
+            )
         if ball and group != 6:
             last.fail("joints", f"limb {i + 1}: a ball is no joint of the map {chains.map}")
         own = sum(layout.coordinate[j] >= layout.shared
@@ -347,11 +368,13 @@ def _check(tables: Sequence[Table], chains: Chains) -> None:
         if own > (3 if ball else group):
             last.fail(
                 "joints",
-                f"limb {i + 1} has {own + 3 * ball} passive axes, more than the platform has ways to "
-                "move: it can spin by itself, so write one of its S as a U",
+                f"limb {i + 1} has {own + 3 * ball} passive axes, more than the platform can"
+                " follow: it can spin by itself, so write one of its S as a U",
             )
     if layout.rows > MAX_CHAIN_ROWS:
-        last.fail("joints", f"the limbs close {layout.rows} rows, at most {MAX_CHAIN_ROWS} are possible")
+        last.fail(
+            "joints", f"the limbs close {layout.rows} rows, at most {MAX_CHAIN_ROWS} are possible"
+        )
     need = len(MAPS[chains.map]) + layout.shared
     if layout.rows < need:
         last.fail(

@@ -9,8 +9,8 @@ from pkmcal.arrays import FloatArray
 from pkmcal.core.library import AXES, MAPS, POSE
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.robot_file_chain_writer import chain_tables
 from pkmcal.geometry.model import Cone, Limb, Model
+from pkmcal.geometry.robot_file_chain_writer import chain_tables
 from pkmcal.geometry.ties import LimbNumber, Term
 
 HEADER = "# A robot for pkmcal: lengths in mm, angles in rad.\n"

@@ -36,7 +36,7 @@ def feasibility(
     for i, limb in enumerate(chains.limbs):
         at = 0
         for k, joint in enumerate(limb):
-            count = len(joint.axes) if joint.axes else 3 * (joint is not limb[-1])
+            count = 0 if joint.ball and joint is limb[-1] else joint.parts
             if joint.stroke is not None:
                 value = _value(chains, machine, i, k, passive, drive)
                 low, high = joint.stroke
@@ -51,8 +51,10 @@ def feasibility(
                 room[row, i] = max(room[row, i], joint.cone)
             at += count
     margins = (stroke, before, last)
-    kept = [margin >= -ROUNDING * size for margin, size in zip(margins, room, strict=True)]
-    reach = np.isfinite(q).all(axis=1) & np.isfinite(frames).all(axis=(1, 2))
+    kept = [
+        np.asarray(margin >= -ROUNDING * size) for margin, size in zip(margins, room, strict=True)
+    ]
+    reach = np.asarray(np.isfinite(q).all(axis=1) & np.isfinite(frames).all(axis=(1, 2)))
     first = np.array([_first_actuator(limb) for limb in chains.limbs])
     shown = np.where(first >= 0, drive[:, np.maximum(first, 0)], 0.0)
     return Feasibility(
@@ -101,16 +103,14 @@ def _platform(machine: ChainMachine, own: FloatArray) -> FloatArray:
     return found
 
 
-def _bend(
-    limb: tuple[Joint, ...], k: int, before: FloatArray, after: FloatArray
-) -> FloatArray:
+def _bend(limb: tuple[Joint, ...], k: int, before: FloatArray, after: FloatArray) -> FloatArray:
     """How far a joint bends from home, rad: a U its normal, an S the limb."""
     joint = limb[k]
     if joint.kind == "U":
-        direction = np.cross(*joint.axes)
+        direction = np.cross(joint.axes[0], joint.axes[1])
         direction /= np.linalg.norm(direction)
     else:
         way = towards(limb, k)
         direction = np.array([0.0, 0.0, 1.0]) if way is None else way
     a, b = before @ direction, after @ direction
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1))
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows
-from pkmcal.core.chains import ChainMachine
+from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
@@ -54,9 +54,22 @@ class Kinematics:
         self.slots = np.ascontiguousarray(model.geometry.slots)
         self.frames = Frames(model.base_frame, model.tool_frame)
         self.own_home = np.ascontiguousarray(model.home, dtype=np.float64)
-        self.machine = self._machine()
+        self.machine: AnyMachine = self._machine()
 
-    def _machine(self) -> Machine | ChainMachine:
+    @property
+    def limb_machine(self) -> Machine:
+        """The compiled machine of limbs in closed form.
+
+        Raises
+        ------
+        ValueError
+            The limbs are chains of joints.
+        """
+        if isinstance(self.machine, ChainMachine):
+            raise ArgumentError(f"robot: {self.model.name} has limbs that are chains of joints")
+        return self.machine
+
+    def _machine(self) -> AnyMachine:
         model = self.model
         if model.chains is not None:
             return ChainMachine(model.chains.layout, model.closure_tolerance)
@@ -353,6 +366,17 @@ class Kinematics:
         if not isinstance(self.machine, ChainMachine):
             raise ArgumentError(f"{self.model.name}: its limbs are no chains of joints")
         return self.machine.frames(self.slots, np.ascontiguousarray(own), q)[0]
+
+    def chain_points(self, own: FloatArray, q: FloatArray) -> list[FloatArray]:
+        """Where the joints of each chain are at own poses (N, 6), in own axes: (N, joints, 3)."""
+        assert isinstance(self.machine, ChainMachine) and self.model.chains is not None
+        frames = self.machine.frames(self.slots, np.ascontiguousarray(own), q)[1]
+        found, start = [], 0
+        for limb, parts in zip(self.model.chains.limbs, self.model.chains.members, strict=True):
+            first = np.cumsum([0, *(joint.parts for joint in limb[:-1])])
+            found.append(frames[:, start + first, 9:])
+            start += len(parts) + 1
+        return found
 
     def closure_by_twist(self, own: FloatArray, q: FloatArray | None = None) -> FloatArray:
         """Closure rows by a scaled twist, (N, rows, m), at own poses (N, 6) and q (N, n).

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
-from pkmcal.core.chains import ChainMachine
-from pkmcal.core.machine import Machine
+from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
@@ -132,12 +131,15 @@ class Robot(Kinematics):
         rows, shape = self.own_rows(pose)
         chains = self.model.chains
         if chains is not None:
-            q = self.machine.inverse(self.slots, rows) if actuators is None else (
-                self._batch(actuators, shape))
+            q = (
+                self.machine.inverse(self.slots, rows)
+                if actuators is None
+                else (self._batch(actuators, shape))
+            )
             assert isinstance(self.machine, ChainMachine)
             found = chain_limits.feasibility(chains, self.machine, self.slots, rows, q)
             return _shaped(found, shape)
-        drive, on_base, on_platform = self.machine.limbs(self.slots, rows)
+        drive, on_base, on_platform = self.limb_machine.limbs(self.slots, rows)
         if actuators is not None:
             there = self.drives(self._batch(actuators, shape))
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
@@ -332,7 +334,7 @@ class Robot(Kinematics):
         return changed
 
     @cached_property
-    def _of_any_misfit(self) -> Machine:
+    def _of_any_misfit(self) -> AnyMachine:
         return self.machine.with_tolerance(np.inf)
 
     @property

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core import screws
+from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.library import SLOTS
-from pkmcal.core.chains import ChainMachine
 from pkmcal.core.machine import Machine
 from pkmcal.modes.assemblies import Assemblies, Signs
 from pkmcal.modes.certificate import Certificate, Closures, certify, newton
@@ -48,7 +48,7 @@ class AssemblyProblem(NamedTuple):
         Geometry (limbs, SLOTS), and coordinates (n,), or (N, n) for `certify_rows`.
     """
 
-    machine: Machine | ChainMachine
+    machine: AnyMachine
     map: str
     rows: list[tuple[str, ...]]
     levers: list[float]
