@@ -5,8 +5,6 @@ Nothing of the core is used but the joints that the file states.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -142,40 +140,3 @@ class Twin:
             ]
             columns.append((ends[0] - ends[1]) / (2 * h))
         return np.array(columns).T
-
-
-def described(machine: dict[str, Any]) -> str:
-    """A robot file of joints given one by one, every axis on its own; q counts from home."""
-    users = [sum(j in limb for limb in machine["limbs"]) for j in range(len(machine["joints"]))]
-    home = np.array(machine["home"])[:3, 3]
-    free = {"spatial": "xyz", "planar": "xy", "spherical": ""}[machine["group"]]
-    place = ", ".join(f"{c} = {float(home['xyz'.index(c)])!r}" for c in free)
-    lines = [f'name = "{machine["name"]}"', 'units = { length = "mm", angle = "rad" }', "[pose]"]
-    lines += [f'map = "{machine["group"]}"', f"home = {{ {place} }}"]
-    for limb in machine["limbs"]:
-        lines += ["[[limb]]", 'kind = "chain"', "joints = ["]
-        for j in limb:
-            joint = machine["joints"][j]
-            said = f'kind = "{joint["kind"]}", at = {joint["point"]}, axis = {joint["axis"]}'
-            if joint["actuator"] >= 0:
-                said += f", actuator = {joint['actuator'] + 1}"
-            if users[j] > 1:
-                said += f', share = "joint{j}"'
-            lines.append(f"  {{ {said} }},")
-        lines.append("]")
-    return "\n".join(lines) + "\n"
-
-
-def all_errors(machine: dict[str, Any], robot: Robot) -> dict[str, float]:
-    """Its errors by their public names."""
-    found = {}
-    for i, limb in enumerate(machine["limbs"]):
-        for k, j in enumerate(limb, 1):
-            for name in (f"limb{i + 1}.joint{k}", f"joint{j}"):
-                for error, value in zip(ERRORS, machine["errors"][j], strict=True):
-                    if f"{name}.{error}" in robot.geometry:
-                        found[f"{name}.{error}"] = value
-        for error, value in zip(ERRORS, machine["platform_errors"][i], strict=True):
-            if f"limb{i + 1}.platform.{error}" in robot.geometry:
-                found[f"limb{i + 1}.platform.{error}"] = value
-    return found
