@@ -112,9 +112,7 @@ class Call:
     def entry(self) -> str:
         """Its line of the table that Python reads."""
         inputs = " ".join(f"{each.name}:{each.width}{MARK[each.given]}" for each in self.inputs)
-        outputs = " ".join(
-            f"{each.name}:{','.join(map(str, each.shape))}" for each in self.outputs
-        )
+        outputs = " ".join(f"{each.name}:{','.join(map(str, each.shape))}" for each in self.outputs)
         return f"{self.name} {inputs} -> {outputs}"
 
 
@@ -133,10 +131,7 @@ def formula(
         Input(own, argument.size or 1, (given or {}).get(own, "each"))
         for own, argument in zip(called, made.inputs, strict=False)
     ]
-    outputs = [
-        Output(own, shape)
-        for own, shape in zip(called[len(inputs) :], shapes, strict=True)
-    ]
+    outputs = [Output(own, shape) for own, shape in zip(called[len(inputs) :], shapes, strict=True)]
     for output, (argument, _) in zip(outputs, made.outputs, strict=True):
         if output.width != (argument.size or 1):
             raise ValueError(f"{name}: {output.name} is no array of {argument.size} numbers")

@@ -71,9 +71,7 @@ def rates() -> Function:
     inverse = inverse.applyfunc(lambda e: sp.expand(e).subs(sb / cb, tangent).subs(1 / cb, secant))
     angles = inverse * spin
     along = -(Ra * skew(arm) * E)
-    matrix = sp.Matrix.vstack(
-        sp.Matrix.hstack(Ra, along), sp.Matrix.hstack(sp.zeros(3, 3), angles)
-    )
+    matrix = sp.Matrix.vstack(sp.Matrix.hstack(Ra, along), sp.Matrix.hstack(sp.zeros(3, 3), angles))
     f.output("rates", matrix, "6 x 6, row by row")
     return f
 

@@ -41,6 +41,7 @@ class PoseMap:
     frame: Callable[[sp.Matrix], tuple[sp.Matrix, sp.Matrix]]
     retract: Callable[[Function, sp.Matrix, sp.Matrix], sp.Matrix]
     angles: Callable[[sp.Matrix, sp.Matrix], list[tuple[sp.Expr, sp.Expr]]]
+    quaternion: int | None = None  # where a unit quaternion of R begins in the state
 
     @property
     def m(self) -> int:
@@ -110,6 +111,7 @@ SPATIAL = PoseMap(
     frame=_spatial_frame,
     retract=_spatial_retract,
     angles=rpy_angles,
+    quaternion=3,
 )
 
 TRANSLATION = PoseMap(
@@ -161,16 +163,37 @@ TPR2TPS = PoseMap(
     free=("y", "z", "alpha", "beta"),
     from_pose=_2tpr2tps_from_pose,
     frame=_2tpr2tps_frame,
-    retract=lambda f, s, delta: sp.Matrix([
-        s[0] + delta[0],
-        s[1] + delta[1],
-        *turned(f, s[2], s[3], delta[2], "a"),
-        *turned(f, s[4], s[5], delta[3], "b"),
-    ]),
+    retract=lambda f, s, delta: sp.Matrix(
+        [
+            s[0] + delta[0],
+            s[1] + delta[1],
+            *turned(f, s[2], s[3], delta[2], "a"),
+            *turned(f, s[4], s[5], delta[3], "b"),
+        ]
+    ),
     angles=lambda R, s: [(s[3], s[2]), (s[5], s[4]), (sp.S.Zero, sp.S.One)],
 )
 
-MAPS = (SPATIAL, TRANSLATION, PLANAR, TPR2TPS)
+
+def _spherical_retract(f: Function, s: sp.Matrix, delta: sp.Matrix) -> sp.Matrix:
+    still = sp.zeros(3, 1)
+    moved = _spatial_retract(f, still.col_join(s), still.col_join(delta))
+    return sp.Matrix(moved[3:])
+
+
+SPHERICAL = PoseMap(
+    name="spherical",
+    title="α β γ about the origin, p = 0; state: the unit quaternion of R; step: ω",
+    state_size=4,
+    free=("alpha", "beta", "gamma"),
+    from_pose=lambda f, pose: sp.Matrix(_spatial_from_pose(f, pose)[3:]),
+    frame=lambda s: (quaternion_matrix(s), sp.zeros(3, 1)),
+    retract=_spherical_retract,
+    angles=rpy_angles,
+    quaternion=0,
+)
+
+MAPS = (SPATIAL, TRANSLATION, PLANAR, TPR2TPS, SPHERICAL)
 
 
 def tangent(pose_map: PoseMap, s: sp.Matrix) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
@@ -193,9 +216,10 @@ def tangent(pose_map: PoseMap, s: sp.Matrix) -> tuple[sp.Matrix, sp.Matrix, sp.M
 
 def on_manifold(pose_map: PoseMap, expr: sp.Expr, s: sp.Matrix) -> sp.Expr:
     """Reduce modulo the state's constraints (unit quaternion, unit circles)."""
-    if pose_map.name == "spatial":
-        unit = [s[3] ** 2 + s[4] ** 2 + s[5] ** 2 + s[6] ** 2]
-        pairs = [(s[3] ** 2, 1 - s[4] ** 2 - s[5] ** 2 - s[6] ** 2)]
+    if pose_map.quaternion is not None:
+        w, x, y, z = (each**2 for each in s[pose_map.quaternion :])
+        unit = [w + x + y + z]
+        pairs = [(w, 1 - x - y - z)]
     else:
         circles = {"planar": [(2, 3)], "2tpr2tps": [(2, 3), (4, 5)]}.get(pose_map.name, [])
         unit = [s[i] ** 2 + s[j] ** 2 for i, j in circles]
@@ -297,7 +321,7 @@ def _pose_rates(
     f: Function, pose_map: PoseMap, s: sp.Matrix, d_p: sp.Matrix, d_omega: sp.Matrix,
     d_state: sp.Matrix, delta: sp.Matrix,
 ) -> sp.Matrix:  # fmt: skip
-    if pose_map.name != "spatial":  # the angles are coordinates of the state
+    if pose_map.quaternion is None:  # the angles are coordinates of the state
         angles = {"alpha": 0, "beta": 0, "gamma": 0}
         angles.update({c: delta[i] for i, c in enumerate(pose_map.free) if c in angles})
         return sp.Matrix([*(d_p * delta), *(angles[c] for c in POSE[3:])])
@@ -308,9 +332,9 @@ def _pose_rates(
 
 
 def _free(f: Function, pose_map: PoseMap, s: sp.Matrix, row: sp.Matrix) -> sp.Matrix:
-    if pose_map.name == "spatial":
+    if pose_map.quaternion is not None:
         E = euler_rate_matrix(*_euler(f, pose_map, s))
-        return sp.Matrix([*row[:3], *(E.T * sp.Matrix(row[3:]))])
+        return sp.Matrix([*row[:-3, 0], *(E.T * row[-3:, 0])])
     if pose_map.name == "2tpr2tps":  # w = z / cos β, so dw = dz / cos β + z sin β / cos² β dβ
         _, w, _, _, cb, sb = s
         z, c, sine = sp.symbols("z c sine", positive=True)

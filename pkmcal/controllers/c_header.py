@@ -73,6 +73,8 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
     """The header whose names begin with `prefix`."""
     word("number", number, ("double", "float"))
     machine = robot.machine
+    if robot.model.chains is not None:
+        raise ArgumentError(f"robot: {robot.name} has chains of joints; a header holds other limbs")
     if machine.rows != machine.m:
         raise ArgumentError(
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
-from pkmcal.core.machine import Machine
+from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
@@ -23,7 +23,7 @@ from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Model
-from pkmcal.kinematics import overconstrained
+from pkmcal.kinematics import chain_limits, overconstrained
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
@@ -135,18 +135,22 @@ class Robot(Kinematics, Result):
             ``.ok`` for each pose; reach, stroke and joint cones for each limb.
         """
         rows, shape = self.own_rows(pose)
-        drive, on_base, on_platform = self.machine.limbs(self.slots, rows)
+        chains = self.model.chains
+        if chains is not None:
+            q = (
+                self.machine.inverse(self.slots, rows)
+                if actuators is None
+                else (self._batch(actuators, shape))
+            )
+            assert isinstance(self.machine, ChainMachine)
+            found = chain_limits.feasibility(chains, self.machine, self.slots, rows, q)
+            return _shaped(found, shape)
+        drive, on_base, on_platform = self.limb_machine.limbs(self.slots, rows)
         if actuators is not None:
             there = self.drives(self._batch(actuators, shape))
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
             drive = np.where(angle, there + wrapped(drive - there), drive)
-        found = feasibility(self.model.limbs, drive, on_base, on_platform)
-        return Feasibility(
-            *(
-                getattr(found, field.name).reshape(*shape, len(self.model.limbs))
-                for field in fields(Feasibility)
-            )
-        )
+        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform), shape)
 
     def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
         """Every assembly mode at given actuator coordinates, with proof.
@@ -373,7 +377,7 @@ class Robot(Kinematics, Result):
         return changed
 
     @cached_property
-    def _of_any_misfit(self) -> Machine:
+    def _of_any_misfit(self) -> AnyMachine:
         return self.machine.with_tolerance(np.inf)
 
     @property
@@ -436,6 +440,12 @@ class Robot(Kinematics, Result):
         source = Source(content, place)
         head = arguments.comment(comment)
         write_whole(path, text_like(source, self.model, deviations, head))
+
+
+def _shaped(found: Feasibility, shape: tuple[int, ...]) -> Feasibility:
+    """Limits of N rows as those of a batch."""
+    each = (getattr(found, field.name) for field in fields(Feasibility))
+    return Feasibility(*(array.reshape(*shape, array.shape[-1]) for array in each))
 
 
 def require_parallel(robot: object, name: str = "robot") -> None:
