@@ -5,7 +5,7 @@
 #include "forward.h"
 #include "inspect.h"
 #include "motion.h"
-#include "poses.h"
+#include "frames.h"
 #include "pso.h"
 #include "readings.h"
 #include "serial.h"

@@ -142,9 +142,9 @@ def calls() -> list[Call]:
     """Every call that is one formula a row."""
     matrix = Input("motion", 16, used=12)
     return [
-        Call("compose", "A followed by B", "compose_row",
-             (Input("a", 6, "either"), Input("b", 6, "either")), (Output("out", (6,)),)),
-        Call("invert", "the inverse of A", "invert_row", (Input("a", 6),), (Output("out", (6,)),)),
+        formula("compose", "A followed by B", frames.compose, "a b out", ((6,),),
+                {"a": "either", "b": "either"}),
+        formula("invert", "the inverse of A", frames.invert, "a out", ((6,),)),
         formula("compose_rates", "rates of A T C by those of T", frames.rates,
                 "a pose c composed rates", ((6, 6),), {"a": "shared", "c": "either"}),
         formula("compose_twists", "twists of A T C by those of T", frames.twists,

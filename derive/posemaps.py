@@ -8,7 +8,7 @@ definition: the state's frame, its retraction, and the pose it reports.
 * ``frame``      state -> R, p
 * ``retract``    state, delta -> state
 * ``tidy``       state, off its manifold by rounding -> state
-* ``angles``     state -> sines and cosines of the reported orientation
+* ``angles``     state -> α β γ, the reported orientation
 * ``pull``       covector of a twist at the state -> covector of delta
 * ``rates``      delta -> rates of the pose x y z α β γ
 * ``twist``      delta -> (ω, v) of the frame
@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from .emit import Function
-from .rotation import quaternion_matrix, quaternion_product, rot_x, rot_y, rot_z, rpy
+from .rotation import quaternion_matrix, quaternion_product, rot_x, rot_y, rot_z, rpy, rpy_angles
 
 POSE = ("x", "y", "z", "alpha", "beta", "gamma")
 
@@ -40,7 +40,7 @@ class PoseMap:
     from_pose: Callable[[Function, sp.Matrix], sp.Matrix]
     frame: Callable[[sp.Matrix], tuple[sp.Matrix, sp.Matrix]]
     retract: Callable[[Function, sp.Matrix, sp.Matrix], sp.Matrix]
-    angles: Callable[[sp.Matrix, sp.Matrix], list[tuple[sp.Expr, sp.Expr]]]
+    angles: Callable[[Function, sp.Matrix], sp.Matrix]
     quaternion: int | None = None  # where a unit quaternion of R begins in the state
 
     @property
@@ -52,12 +52,6 @@ class PoseMap:
     def lengths(self) -> int:
         """How many of them are lengths: they come before the angles."""
         return sum(each in POSE[:3] for each in self.free)
-
-
-def rpy_angles(R: sp.Matrix, state: sp.Matrix) -> list[tuple[sp.Expr, sp.Expr]]:
-    """(sine, cosine) of α, β, γ up to a common positive factor, from R (eq. 1)."""
-    c_beta = sp.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
-    return [(R[2, 1], R[2, 2]), (-R[2, 0], c_beta), (R[1, 0], R[0, 0])]
 
 
 def to_unit(f: Function, square: sp.Expr, name: str) -> sp.Expr:
@@ -110,7 +104,7 @@ SPATIAL = PoseMap(
     from_pose=_spatial_from_pose,
     frame=_spatial_frame,
     retract=_spatial_retract,
-    angles=rpy_angles,
+    angles=lambda f, s: rpy_angles(f, _spatial_frame(s)[0]),
     quaternion=3,
 )
 
@@ -122,7 +116,7 @@ TRANSLATION = PoseMap(
     from_pose=lambda f, pose: sp.Matrix(pose[:3]),
     frame=lambda s: (sp.eye(3), s),
     retract=lambda f, s, delta: s + delta,
-    angles=lambda R, s: [(sp.S.Zero, sp.S.One)] * 3,
+    angles=lambda f, s: sp.zeros(3, 1),
 )
 
 
@@ -141,7 +135,7 @@ PLANAR = PoseMap(
     retract=lambda f, s, delta: sp.Matrix(
         [s[0] + delta[0], s[1] + delta[1], *turned(f, s[2], s[3], delta[2], "g")]
     ),
-    angles=lambda R, s: [(sp.S.Zero, sp.S.One), (sp.S.Zero, sp.S.One), (s[3], s[2])],
+    angles=lambda f, s: sp.Matrix([0, 0, f.angle("gamma", s[3], s[2])]),
 )
 
 
@@ -171,7 +165,7 @@ TPR2TPS = PoseMap(
             *turned(f, s[4], s[5], delta[3], "b"),
         ]
     ),
-    angles=lambda R, s: [(s[3], s[2]), (s[5], s[4]), (sp.S.Zero, sp.S.One)],
+    angles=lambda f, s: sp.Matrix([f.angle("alpha", s[3], s[2]), f.angle("beta", s[5], s[4]), 0]),
 )
 
 
@@ -189,7 +183,7 @@ SPHERICAL = PoseMap(
     from_pose=lambda f, pose: sp.Matrix(_spatial_from_pose(f, pose)[3:]),
     frame=lambda s: (quaternion_matrix(s), sp.zeros(3, 1)),
     retract=_spherical_retract,
-    angles=rpy_angles,
+    angles=lambda f, s: rpy_angles(f, quaternion_matrix(s)),
     quaternion=0,
 )
 
@@ -263,13 +257,9 @@ def _functions(pose_map: PoseMap) -> list[Function]:
     s = tidy.vector("state", size, "of the map, nearly")
     tidy.output("moved", pose_map.retract(tidy, s, sp.zeros(m, 1)), "the state")
 
-    angles = new("angles", "the reported orientation", "sine and cosine up to a positive factor")
+    angles = new("angles", "the reported orientation", "R = Rz(γ) Ry(β) Rx(α) (eq. 1)")
     s = angles.vector("state", size, "of the map")
-    R, _ = pose_map.frame(s)
-    R = angles.let("R", R)
-    pairs = pose_map.angles(R, s)
-    angles.output("sine", sp.Matrix([a for a, _ in pairs]), "of α β γ")
-    angles.output("cosine", sp.Matrix([b for _, b in pairs]), "of α β γ")
+    angles.output("angles", pose_map.angles(angles, s), "α β γ [rad]")
 
     pull = new("pull", "covector of a twist to covector of a step", "λ = ωᵀ ∂ω/∂δ + vᵀ ∂p/∂δ")
     s = pull.vector("state", size, "of the map")

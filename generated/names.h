@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation 763d362d69e78d15
+ * derivation 2b280541b1c38441
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* the numbers of one limb, in the order of the core */

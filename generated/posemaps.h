@@ -1,5 +1,5 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation 55684abcc4b55306
+ * derivation 270b8b70622ead34
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -151,30 +151,39 @@ INLINE void FN(map_spatial_tidy)(const real state[7], real moved[7])
     moved[6] = state[6]*k;
 }
 
+#ifndef NARROW
 /*
  * spatial: the reported orientation
- *     sine and cosine up to a positive factor
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
  * in  state[7]       of the map
- * out sine[3]        of α β γ
- * out cosine[3]      of α β γ
- * operations: 7 +, 18 *, 0 /, 1 sqrt
+ * out angles[3]      α β γ [rad]
+ * operations: 11 +, 25 *, 0 /, 1 sqrt
  */
-INLINE void FN(map_spatial_angles)(const real state[7], real sine[3], real cosine[3])
+INLINE void FN(map_spatial_angles)(const real state[7], real angles[3])
 {
-    const real t0 = 2.0f*state[5]*state[5] - 1.0f;
-    const real R0 = -2.0f*state[6]*state[6] - t0;
+    const real t0 = 2.0f*state[6]*state[6] - 1.0f;
+    const real R0 = -2.0f*state[5]*state[5] - t0;
     const real t1 = 2.0f*state[3];
-    const real R3 = 2.0f*state[4]*state[5] + state[6]*t1;
-    const real R6 = 2.0f*state[4]*state[6] - state[5]*t1;
-    const real R7 = state[4]*t1 + 2.0f*state[5]*state[6];
-    const real R8 = -2.0f*state[4]*state[4] - t0;
-    sine[0] = R7;
-    sine[1] = -R6;
-    sine[2] = R3;
-    cosine[0] = R8;
-    cosine[1] = FN(root)(R0*R0 + R3*R3);
-    cosine[2] = R0;
+    const real t2 = state[6]*t1;
+    const real R1 = 2.0f*state[4]*state[5] - t2;
+    const real t3 = state[5]*t1;
+    const real t4 = 2.0f*state[4];
+    const real R2 = state[6]*t4 + t3;
+    const real R3 = state[5]*t4 + t2;
+    const real R4 = -2.0f*state[4]*state[4] - t0;
+    const real R5 = 2.0f*state[5]*state[6] - state[4]*t1;
+    const real R6 = 2.0f*state[4]*state[6] - t3;
+    const real gamma = arctangent2(R3, R0);
+    /* α from Rz(γ)ᵀ R, which holds whatever γ is near β = ±90° */
+    real sg, cg;
+    FN(sincos)(gamma, &sg, &cg);
+    const real alpha = arctangent2(R2*sg - R5*cg, R4*cg - R1*sg);
+    const real beta = arctangent2(-R6, FN(root)(R0*R0 + R3*R3));
+    angles[0] = alpha;
+    angles[1] = beta;
+    angles[2] = gamma;
 }
+#endif
 
 /*
  * spatial: covector of a twist to covector of a step
@@ -363,20 +372,16 @@ INLINE void FN(map_translation_tidy)(const real state[3], real moved[3])
 
 /*
  * translation: the reported orientation
- *     sine and cosine up to a positive factor
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
  * in  state[3]       of the map
- * out sine[3]        of α β γ
- * out cosine[3]      of α β γ
+ * out angles[3]      α β γ [rad]
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(map_translation_angles)(const real state[3], real sine[3], real cosine[3])
+INLINE void FN(map_translation_angles)(const real state[3], real angles[3])
 {
-    sine[0] = FN(fill)(0.0f);
-    sine[1] = FN(fill)(0.0f);
-    sine[2] = FN(fill)(0.0f);
-    cosine[0] = FN(fill)(1.0f);
-    cosine[1] = FN(fill)(1.0f);
-    cosine[2] = FN(fill)(1.0f);
+    angles[0] = FN(fill)(0.0f);
+    angles[1] = FN(fill)(0.0f);
+    angles[2] = FN(fill)(0.0f);
 }
 
 /*
@@ -544,23 +549,22 @@ INLINE void FN(map_planar_tidy)(const real state[4], real moved[4])
     moved[3] = state[3]*kg;
 }
 
+#ifndef NARROW
 /*
  * planar: the reported orientation
- *     sine and cosine up to a positive factor
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
  * in  state[4]       of the map
- * out sine[3]        of α β γ
- * out cosine[3]      of α β γ
+ * out angles[3]      α β γ [rad]
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(map_planar_angles)(const real state[4], real sine[3], real cosine[3])
+INLINE void FN(map_planar_angles)(const real state[4], real angles[3])
 {
-    sine[0] = FN(fill)(0.0f);
-    sine[1] = FN(fill)(0.0f);
-    sine[2] = state[3];
-    cosine[0] = FN(fill)(1.0f);
-    cosine[1] = FN(fill)(1.0f);
-    cosine[2] = state[2];
+    const real gamma = arctangent2(state[3], state[2]);
+    angles[0] = FN(fill)(0.0f);
+    angles[1] = FN(fill)(0.0f);
+    angles[2] = gamma;
 }
+#endif
 
 /*
  * planar: covector of a twist to covector of a step
@@ -744,23 +748,23 @@ INLINE void FN(map_2tpr2tps_tidy)(const real state[6], real moved[6])
     moved[5] = state[5]*kb;
 }
 
+#ifndef NARROW
 /*
  * 2tpr2tps: the reported orientation
- *     sine and cosine up to a positive factor
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
  * in  state[6]       of the map
- * out sine[3]        of α β γ
- * out cosine[3]      of α β γ
+ * out angles[3]      α β γ [rad]
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(map_2tpr2tps_angles)(const real state[6], real sine[3], real cosine[3])
+INLINE void FN(map_2tpr2tps_angles)(const real state[6], real angles[3])
 {
-    sine[0] = state[3];
-    sine[1] = state[5];
-    sine[2] = FN(fill)(0.0f);
-    cosine[0] = state[2];
-    cosine[1] = state[4];
-    cosine[2] = FN(fill)(1.0f);
+    const real alpha = arctangent2(state[3], state[2]);
+    const real beta = arctangent2(state[5], state[4]);
+    angles[0] = alpha;
+    angles[1] = beta;
+    angles[2] = FN(fill)(0.0f);
 }
+#endif
 
 /*
  * 2tpr2tps: covector of a twist to covector of a step
@@ -959,30 +963,39 @@ INLINE void FN(map_spherical_tidy)(const real state[4], real moved[4])
     moved[3] = state[3]*k;
 }
 
+#ifndef NARROW
 /*
  * spherical: the reported orientation
- *     sine and cosine up to a positive factor
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
  * in  state[4]       of the map
- * out sine[3]        of α β γ
- * out cosine[3]      of α β γ
- * operations: 7 +, 18 *, 0 /, 1 sqrt
+ * out angles[3]      α β γ [rad]
+ * operations: 11 +, 25 *, 0 /, 1 sqrt
  */
-INLINE void FN(map_spherical_angles)(const real state[4], real sine[3], real cosine[3])
+INLINE void FN(map_spherical_angles)(const real state[4], real angles[3])
 {
-    const real t0 = 2.0f*state[2]*state[2] - 1.0f;
-    const real R0 = -2.0f*state[3]*state[3] - t0;
+    const real t0 = 2.0f*state[3]*state[3] - 1.0f;
+    const real R0 = -2.0f*state[2]*state[2] - t0;
     const real t1 = 2.0f*state[0];
-    const real R3 = 2.0f*state[1]*state[2] + state[3]*t1;
-    const real R6 = 2.0f*state[1]*state[3] - state[2]*t1;
-    const real R7 = state[1]*t1 + 2.0f*state[2]*state[3];
-    const real R8 = -2.0f*state[1]*state[1] - t0;
-    sine[0] = R7;
-    sine[1] = -R6;
-    sine[2] = R3;
-    cosine[0] = R8;
-    cosine[1] = FN(root)(R0*R0 + R3*R3);
-    cosine[2] = R0;
+    const real t2 = state[3]*t1;
+    const real R1 = 2.0f*state[1]*state[2] - t2;
+    const real t3 = state[2]*t1;
+    const real t4 = 2.0f*state[1];
+    const real R2 = state[3]*t4 + t3;
+    const real R3 = state[2]*t4 + t2;
+    const real R4 = -2.0f*state[1]*state[1] - t0;
+    const real R5 = 2.0f*state[2]*state[3] - state[1]*t1;
+    const real R6 = 2.0f*state[1]*state[3] - t3;
+    const real gamma = arctangent2(R3, R0);
+    /* α from Rz(γ)ᵀ R, which holds whatever γ is near β = ±90° */
+    real sg, cg;
+    FN(sincos)(gamma, &sg, &cg);
+    const real alpha = arctangent2(R2*sg - R5*cg, R4*cg - R1*sg);
+    const real beta = arctangent2(-R6, FN(root)(R0*R0 + R3*R3));
+    angles[0] = alpha;
+    angles[1] = beta;
+    angles[2] = gamma;
 }
+#endif
 
 /*
  * spherical: covector of a twist to covector of a step

@@ -1,5 +1,5 @@
 /* Generated from derive/rates.py by `python -m derive`; never edited by hand.
- * derivation e51ad75c7c0a4b9b
+ * derivation d08ef53fd1ac55ee
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*
