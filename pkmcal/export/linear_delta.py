@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import SLOTS
@@ -177,6 +176,7 @@ def _projected(
     firmware: FirmwareDelta, robot: Robot, q: FloatArray, poses: FloatArray
 ) -> FirmwareDelta:
     """The numbers whose model is nearest to the robot, by least squares over the poses."""
+    from scipy.optimize import least_squares
 
     def of(x: FloatArray) -> FirmwareDelta:
         angles, arms, carriages = (tuple(part.tolist()) for part in x[1:].reshape(3, _TOWERS))
