@@ -15,8 +15,8 @@ from hypothesis import HealthCheck, given, settings
 from .damage import inputs
 from .doors import DOORS, ROOT, emptied
 
-INPUTS = {"toml": 4000, "csv": 3000, "xlsx": 2000, "sheet": 1500, "urdf": 3000, "printer": 2000}
-LINES = 250
+INPUTS = {"toml": 8000, "csv": 6000, "xlsx": 4000, "sheet": 3000, "urdf": 6000, "printer": 4000}
+LINES = 500
 
 
 @pytest.mark.slow
