@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 import typer
 
 import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.cli.inputs import Inputs
-from pkmcal.cli.options import Force, Json, ParallelRobot
+from pkmcal.cli.options import Force, Json, RobotOrArm
 from pkmcal.cli.output import Output, say
 from pkmcal.exceptions import ArgumentError
 from pkmcal.export.linuxcnc import contents
@@ -18,7 +18,7 @@ from pkmcal.files.reading import Input
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-TARGETS = ("c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf")
+TARGETS = ("c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf", "urdf")
 
 _LINES = {
     "reprap": pk.export.reprap,
@@ -28,7 +28,7 @@ _LINES = {
 
 
 def export(
-    robot: ParallelRobot,
+    robot: RobotOrArm,
     target: Annotated[
         str, typer.Option("--as", metavar="TARGET", help=f"What for: {', '.join(TARGETS)}.")
     ],
@@ -61,7 +61,7 @@ def export(
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
     linear or rotary delta for Klipper or Kalico; reprap, marlin: M665 and M666 of a linear one;
     hangprinter: M669. linuxcnc: a kinematics component, and a simulation that runs it. mjcf: a
-    model for MuJoCo.
+    model for MuJoCo. urdf: a serial arm as a tree of links.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -72,9 +72,13 @@ def export(
     _only(target, ("klipper",), config=config)
     _only(target, ("klipper", "reprap", "marlin", "hangprinter"), project=project or None)
     read = Inputs()
-    machine = load_parallel(read.robot(robot))
+    source = read.robot(robot)
+    machine = pk.load(source) if target == "urdf" else load_parallel(source)
     loss = None
-    if target == "linuxcnc":
+    if target == "urdf":
+        with Output(out.parent, [out.name], read, force).draft() as draft:
+            pk.export.urdf(cast(pk.SerialArm, machine), draft / out.name)
+    elif target == "linuxcnc":
         files, loss = contents(machine, out.resolve().name)
         with Output(out, list(files), read, force).draft() as draft:
             for name, text in files.items():

@@ -9,6 +9,7 @@ from pkmcal.export.klipper import klipper as klipper
 from pkmcal.export.linuxcnc import linuxcnc as linuxcnc
 from pkmcal.export.loss import Loss as Loss
 from pkmcal.export.mjcf import mjcf as mjcf
+from pkmcal.export.urdf import urdf as urdf
 
 __all__ = [
     "Loss",
@@ -20,4 +21,5 @@ __all__ = [
     "marlin",
     "mjcf",
     "reprap",
+    "urdf",
 ]

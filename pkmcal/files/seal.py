@@ -63,6 +63,7 @@ _FORMS = {
     ".html": _Form(_remark),
     ".svg": _Form(_remark),
     ".xml": _Form(_remark),
+    ".urdf": _Form(_remark),
     ".png": _Form(_chunk, before=_IEND),
 }
 
