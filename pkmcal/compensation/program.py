@@ -17,7 +17,7 @@ from pkmcal.compensation.gcode import Move, Program, number
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import MOST_TEXT, content
-from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.kinematics.robot import Robot, commanded, determines_others, require_parallel
 from pkmcal.result import Result
 
 _LETTERS = dict(zip(POSE, "XYZABC", strict=True))
@@ -143,14 +143,14 @@ class _Machine:
     """Commands of the controller for coordinates (N, axes) in mm and deg, and where they lead."""
 
     def __init__(self, controller: Robot, calibrated: Robot, joints: bool) -> None:
-        self.axes = tuple(controller.model.match or controller.coordinates)
+        self.axes = commanded(controller)
         self.letters = "".join(_LETTERS[axis] for axis in self.axes)
         self.joints = joints
         self.written = "XYZABC"[: controller.n_actuators] if joints else self.letters
         self.length = controller.length
         self._places = [POSE.index(axis) for axis in self.axes]
         self._turns = np.array([place >= 3 for place in self._places])
-        self._match = len(self.axes) < len(POSE)
+        self._match = True if determines_others(controller) else None
         self._controller, self._calibrated = controller, calibrated
         self._degrees = np.array(
             [np.degrees(1.0) if unit == "rad" else 1.0 for unit in controller.actuator_units]
@@ -169,7 +169,7 @@ class _Machine:
     def command(self, coordinates: FloatArray) -> FloatArray:
         """What to write so that the calibrated machine goes there; NaN where it cannot."""
         poses = self._poses(coordinates, self._calibrated)
-        q = self._calibrated.inverse(poses, match=self._match or None)
+        q = self._calibrated.inverse(poses, match=self._match)
         if self.joints:
             found: FloatArray = q * self._degrees
             return found
@@ -182,7 +182,7 @@ class _Machine:
             q = command / self._degrees
         else:
             own = self._poses(command, self._controller)
-            q = self._controller.inverse(own, match=self._match or None)
+            q = self._controller.inverse(own, match=self._match)
         return self.shown(self._calibrated.forward(q, guess=poses).pose)
 
     def distance(self, one: FloatArray, other: FloatArray) -> FloatArray:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
+from pkmcal.core.library import POSE
 from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry import robot_file
@@ -367,6 +368,17 @@ class Robot(Kinematics):
             Lines for its head, each with its ``#``.
         """
         robot_file.write(self.model, path, comment)
+
+
+def commanded(robot: Robot) -> tuple[str, ...]:
+    """The coordinates that programs command: those its file matches, or its free ones."""
+    return tuple(robot.model.match or robot.coordinates)
+
+
+def determines_others(robot: Robot) -> bool:
+    """Whether the limbs determine coordinates beside the commanded ones, which are not constant."""
+    constant = robot.model.match is None and robot.model.map in ("translation", "planar")
+    return len(commanded(robot)) < len(POSE) and not constant
 
 
 def require_parallel(robot: object, name: str = "robot") -> None:
