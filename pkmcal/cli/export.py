@@ -59,7 +59,7 @@ def export(
     """Write a robot for a controller.
 
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
-    linear or rotary delta for Klipper or Kalico; reprap, marlin: M665 and M666 of a linear one;
+    linear or rotary delta for Klipper or Kalico; reprap, marlin: its M665 and M666, or M669;
     hangprinter: M669. linuxcnc: a kinematics component, and a simulation that runs it. mjcf: a
     model for MuJoCo. urdf: a serial arm as a tree of links.
 
