@@ -182,9 +182,9 @@ class _Machine:
 
     def continuous(self, commands: FloatArray) -> FloatArray:
         """Commands (..., N, n) of which actuators take the short way from each to the next."""
+        found: FloatArray = commands.copy()
         if not self.joints:
-            return commands
-        found = commands.copy()
+            return found
         turns = self._controller.turns * self._degrees
         for k in np.flatnonzero(np.isfinite(turns)):
             found[..., k] = np.unwrap(found[..., k], period=abs(turns[k]))
