@@ -9,6 +9,7 @@ from pkmcal.controllers.klipper import klipper
 from pkmcal.controllers.linuxcnc import linuxcnc
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.mjcf import mjcf
+from pkmcal.controllers.urdf import urdf
 
 __all__ = [
     "Loss",
@@ -22,4 +23,5 @@ __all__ = [
     "mjcf",
     "reprap",
     "universal_robots",
+    "urdf",
 ]

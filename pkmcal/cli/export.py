@@ -10,7 +10,7 @@ import typer
 import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.cli.inputs import Inputs
-from pkmcal.cli.options import Force, Json, ParallelRobot
+from pkmcal.cli.options import Force, Json, RobotOrArm
 from pkmcal.cli.output import Output, say
 from pkmcal.controllers.linuxcnc import contents
 from pkmcal.exceptions import ArgumentError
@@ -19,7 +19,8 @@ from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
 TARGETS = (
-    "c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf", "dh", "dh-modified", "ur"
+    "c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf",
+    "dh", "dh-modified", "ur", "urdf",
 )  # fmt: skip
 
 _LINES = {
@@ -27,11 +28,11 @@ _LINES = {
     "marlin": pk.export.marlin,
     "hangprinter": pk.export.hangprinter,
 }
-_OF_ARMS = ("dh", "dh-modified", "ur")
+_OF_ARMS = ("dh", "dh-modified", "ur", "urdf")
 
 
 def export(
-    robot: ParallelRobot,
+    robot: RobotOrArm,
     target: Annotated[
         str, typer.Option("--as", metavar="TARGET", help=f"What for: {', '.join(TARGETS)}.")
     ],
@@ -62,10 +63,10 @@ def export(
     """Write a robot for a controller.
 
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
-    linear or rotary delta for Klipper or Kalico; reprap, marlin: M665 and M666 of a linear one;
+    linear or rotary delta for Klipper or Kalico; reprap, marlin: its M665 and M666, or M669;
     hangprinter: M669. linuxcnc: a kinematics component, and a simulation that runs it. mjcf: a
     model for MuJoCo. Of serial arms: dh and dh-modified, a table of Denavit-Hartenberg numbers; ur,
-    the lists of a calibration.conf of Universal Robots.
+    the lists of a calibration.conf of Universal Robots; urdf, a tree of links.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -100,13 +101,15 @@ def export(
 def _export_arm(
     robot: str | Input, target: str, out: Path, read: Inputs, force: bool, json: bool
 ) -> int:
-    """Write the Denavit-Hartenberg numbers of a serial arm."""
+    """Write a serial arm: its Denavit-Hartenberg numbers, or its links."""
     arm: object = pk.load(robot)
     if not isinstance(arm, pk.SerialArm):
         raise ArgumentError(f"{robot}: --as {target} is for serial arms")
     with Output(out.parent, [out.name], read, force).draft() as draft:
         if target == "ur":
             pk.export.universal_robots(arm, draft / out.name)
+        elif target == "urdf":
+            pk.export.urdf(arm, draft / out.name)
         else:
             pk.export.dh(arm, draft / out.name, "standard" if target == "dh" else "modified")
     if json:

@@ -17,7 +17,7 @@ from pkmcal.compensation.gcode import Move, Program, number
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import MOST_TEXT, content
-from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.kinematics.robot import Robot, commanded, determines_others, require_parallel
 from pkmcal.result import Result
 
 _LETTERS = dict(zip(POSE, "XYZABC", strict=True))
@@ -143,14 +143,14 @@ class _Machine:
     """Commands of the controller for coordinates (N, axes) in mm and deg, and where they lead."""
 
     def __init__(self, controller: Robot, calibrated: Robot, joints: bool) -> None:
-        self.axes = tuple(controller.model.match or controller.coordinates)
+        self.axes = commanded(controller)
         self.letters = "".join(_LETTERS[axis] for axis in self.axes)
         self.joints = joints
         self.written = "XYZABC"[: controller.n_actuators] if joints else self.letters
         self.length = controller.length
         self._places = [POSE.index(axis) for axis in self.axes]
         self._turns = np.array([place >= 3 for place in self._places])
-        self._match = len(self.axes) < len(POSE)
+        self._match = True if determines_others(controller) else None
         self._controller, self._calibrated = controller, calibrated
         self._degrees = np.array(
             [np.degrees(1.0) if unit == "rad" else 1.0 for unit in controller.actuator_units]
@@ -167,13 +167,28 @@ class _Machine:
         return poses
 
     def command(self, coordinates: FloatArray) -> FloatArray:
-        """What to write so that the calibrated machine goes there; NaN where it cannot."""
+        """What to write so that the calibrated machine goes there; NaN where it cannot.
+
+        Angles are in the turn of the coordinates; those of actuators in any.
+        """
         poses = self._poses(coordinates, self._calibrated)
-        q = self._calibrated.inverse(poses, match=self._match or None)
+        q = self._calibrated.inverse(poses, match=self._match)
         if self.joints:
             found: FloatArray = q * self._degrees
             return found
-        return self.shown(self._controller.forward(q, guess=poses).pose)
+        found = self.shown(self._controller.forward(q, guess=poses).pose)
+        turned: FloatArray = coordinates + np.degrees(wrapped(np.radians(found - coordinates)))
+        return np.where(self._turns, turned, found)
+
+    def continuous(self, commands: FloatArray) -> FloatArray:
+        """Commands (..., N, n) of which actuators take the short way from each to the next."""
+        found: FloatArray = commands.copy()
+        if not self.joints:
+            return found
+        turns = self._controller.turns * self._degrees
+        for k in np.flatnonzero(np.isfinite(turns)):
+            found[..., k] = np.unwrap(found[..., k], period=abs(turns[k]))
+        return found
 
     def reached(self, command: FloatArray, near: FloatArray) -> FloatArray:
         """Where the calibrated machine goes on a command."""
@@ -182,7 +197,7 @@ class _Machine:
             q = command / self._degrees
         else:
             own = self._poses(command, self._controller)
-            q = self._controller.inverse(own, match=self._match or None)
+            q = self._controller.inverse(own, match=self._match)
         return self.shown(self._calibrated.forward(q, guess=poses).pose)
 
     def distance(self, one: FloatArray, other: FloatArray) -> FloatArray:
@@ -210,6 +225,7 @@ def _corrected(program: Program, machine: _Machine, chord: float) -> CorrectedPr
     points[np.cumsum(parts) - 1] = targets
     commands = machine.command(points)
     _require(program, which, commands)
+    commands = machine.continuous(commands)
     off = points - commands if not machine.joints else np.full((1, 1), np.nan)
     lengths = [k for k, letter in enumerate(machine.letters) if letter in "XYZ"]
     largest = np.nan if machine.joints else float(np.linalg.norm(off[:, lengths], axis=1).max())
@@ -282,6 +298,7 @@ def _chord_errors(
     commands = [machine.command(end) for end in ends]
     for found in commands:
         _require(program, moves[which], found)
+    commands = machine.continuous(np.stack(commands, axis=1)).swapaxes(0, 1)
     worst = np.zeros(len(parts))
     for t in _INSIDE:
         meant = at((first + t) / parts[which])

@@ -12,7 +12,7 @@ import numpy as np
 
 from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
-from pkmcal.controllers import rotary_delta
+from pkmcal.controllers import rotary_delta, rotary_gcode
 from pkmcal.controllers.delta_gcode import of_marlin, of_reprap
 from pkmcal.controllers.hangprinter import as_robot as robot_of_anchors
 from pkmcal.controllers.hangprinter import of_text, robot_text
@@ -42,6 +42,11 @@ _ROTARY_HEAD = """\
 # An actuator coordinate is the motor's steps down from its end stop; `offset` is the angle of the
 # crank there, below the horizontal. Radius and height are those of the shoulders less the
 # effector's.
+"""
+_DEGREES_HEAD = """\
+# Imported from {file} by pkmcal: M669 and M666 of a rotary delta.
+# An actuator coordinate is the crank's way down from its end stop; `offset` is the angle of the
+# crank there, below the horizontal.
 """
 _GCODE_HEAD = """\
 # Imported from {file} by pkmcal: M665 and M666 of a linear delta.
@@ -129,18 +134,17 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
         text = robot_text(anchors, where.stem, _ANCHORS_HEAD.format(file=where.name))
         return Printer(robot_of_anchors(anchors, where.stem), None, 0, text)
     if firmware != "klipper":
-        where = as_path("path", path)
+        where, text = as_path("path", path), text_in(path)
+        if firmware == "reprap" and rotary_gcode.is_rotary(text):
+            crank = rotary_gcode.of_reprap(text, str(where))
+            return _turning(where, crank, _DEGREES_HEAD, None, 0)
         parse = of_reprap if firmware == "reprap" else of_marlin
-        found = parse(text_in(path), str(where))
+        found = parse(text, str(where))
         return _printer(where, found, [-1.0] * 3, _GCODE_HEAD, None, 0)
     printer = read(path)
     where, measured = Path(printer.place), (_heights(printer), _count(printer, "distance"))
     if kinematics(printer) == "rotary_delta":
-        turning = _rotary(printer)
-        home = round(0.5 * max(turning.endstops), 3)
-        text = rotary_delta.text_of(turning, home, where.stem, _ROTARY_HEAD.format(file=where.name))
-        robot = rotary_delta.as_robot(turning, home, where.stem)
-        return Printer(robot, *measured, text)
+        return _turning(where, _rotary(printer), _ROTARY_HEAD, *measured)
     radius = positive(printer, "printer", "delta_radius")
     arms, angles, carriages, steps = [], [], [], []
     for section in STEPPERS:
@@ -154,6 +158,15 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
         steps.append(-step_of(printer, section))
     delta = FirmwareDelta(radius, tuple(angles), tuple(arms), tuple(carriages))
     return _printer(where, delta, steps, _HEAD, *measured)
+
+
+def _turning(
+    file: Path, delta: RotaryDelta, head: str, measurements: Measurements | None, distances: int
+) -> Printer:
+    home = round(0.5 * max(delta.endstops), 3)
+    text = rotary_delta.text_of(delta, home, file.stem, head.format(file=file.name))
+    robot = rotary_delta.as_robot(delta, home, file.stem)
+    return Printer(robot, measurements, distances, text)
 
 
 def _rotary(printer: PrinterConfig) -> RotaryDelta:
@@ -174,7 +187,7 @@ def _rotary(printer: PrinterConfig) -> RotaryDelta:
         angle = printer.number(section, "angle", ANGLES["rotary_delta"][section])
         numbers.append([angle, crank, rod, elbow, step_of(printer, section)])
     parts = [tuple(part) for part in zip(*numbers, strict=True)]
-    return RotaryDelta(radius, height, *parts)
+    return RotaryDelta(radius, (height,) * 3, *parts)
 
 
 def _printer(

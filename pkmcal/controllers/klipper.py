@@ -99,14 +99,9 @@ def _linear(robot: Robot, project: bool) -> tuple[Values, tuple[float, ...], Los
 
 def _rotary(robot: Robot, project: bool) -> tuple[Values, tuple[float, ...], Loss]:
     """The same of a rotary delta, rad a step."""
-    firmware, loss = rotary_delta.of_robot(robot, project)
-    if min(firmware.endstops) <= 0.0:
-        raise ArgumentError(
-            f"robot: {robot.name}: the end stops would be {min(firmware.endstops):.6g} mm over the"
-            " bed; the pose must be that of the nozzle over it, and q 0 at the end stops"
-        )
+    firmware, loss = rotary_delta.of_robot(robot, project, one_height=True)
     values = {("printer", "shoulder_radius"): firmware.radius}
-    values["printer", "shoulder_height"] = firmware.height
+    values["printer", "shoulder_height"] = firmware.heights[0]
     for i, section in enumerate(STEPPERS):
         values[section, "position_endstop"] = firmware.endstops[i]
         values[section, "upper_arm_length"] = firmware.cranks[i]

@@ -144,7 +144,6 @@ def _projected(
     firmware: FirmwareDelta, robot: Robot, q: FloatArray, poses: FloatArray
 ) -> FirmwareDelta:
     """The numbers whose model is nearest to the robot, by least squares over the poses."""
-    from scipy.optimize import least_squares
 
     def of(x: FloatArray) -> FirmwareDelta:
         angles, arms, carriages = (tuple(part.tolist()) for part in x[1:].reshape(3, _TOWERS))

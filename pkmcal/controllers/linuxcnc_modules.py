@@ -104,7 +104,7 @@ def _rotary(robot: Robot) -> Module:
         for joint, limb in enumerate(order):
             angles[limb] = _ROTARY[joint]
         radius, crank, rod, *elbows = x.tolist()
-        numbers = (radius, 0.0, tuple(angles), (crank,) * 3, (rod,) * 3, tuple(elbows))
+        numbers = (radius, (0.0,) * 3, tuple(angles), (crank,) * 3, (rod,) * 3, tuple(elbows))
         return rotary_delta.as_robot(RotaryDelta(*numbers, built.gains), home)
 
     cranks, rods = float(np.mean(built.cranks)), float(np.mean(built.rods))

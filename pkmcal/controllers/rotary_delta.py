@@ -35,8 +35,8 @@ class RotaryDelta:
     ----------
     radius : float
         Distance of each shoulder from the middle, less that of the effector's joints, mm.
-    height : float
-        Of the shoulders over the pose z = 0, less that of the effector's joints, mm.
+    heights : tuple of float
+        Of each shoulder over the pose z = 0, less that of the effector's joints, mm.
     angles : tuple of float
         Of each shoulder, deg from x.
     cranks, rods : tuple of float
@@ -48,7 +48,7 @@ class RotaryDelta:
     """
 
     radius: float
-    height: float
+    heights: tuple[float, ...]
     angles: tuple[float, ...]
     cranks: tuple[float, ...]
     rods: tuple[float, ...]
@@ -59,10 +59,11 @@ class RotaryDelta:
     def endstops(self) -> tuple[float, ...]:
         """Height of the pose in the middle with each crank at its end stop, q = 0; mm."""
         found = []
-        for crank, rod, elbow in zip(self.cranks, self.rods, self.elbows, strict=True):
+        limbs = zip(self.heights, self.cranks, self.rods, self.elbows, strict=True)
+        for height, crank, rod, elbow in limbs:
             across = self.radius + crank * np.cos(elbow)
             down = crank * np.sin(elbow) + np.sqrt(max(rod**2 - across**2, 0.0))
-            found.append(float(self.height - down))
+            found.append(float(height - down))
         return tuple(found)
 
 
@@ -74,8 +75,8 @@ def elbow_at(endstop: float, radius: float, height: float, crank: float, rod: fl
     return float(np.arctan2(down, -radius) - inner)
 
 
-def of_robot(robot: Robot, project: bool) -> tuple[RotaryDelta, Loss]:
-    """The numbers of a robot, and what they lose.
+def of_robot(robot: Robot, project: bool, one_height: bool) -> tuple[RotaryDelta, Loss]:
+    """The numbers of a robot, with one height or three, and what they lose.
 
     Raises
     ------
@@ -84,26 +85,33 @@ def of_robot(robot: Robot, project: bool) -> tuple[RotaryDelta, Loss]:
     """
     require_rotary_delta(robot)
     home = float(robot.home[2])
-    delta = as_built(robot)
+    delta = as_built(robot, one_height)
     poses = sample_poses(robot, _POSES)
     q = robot.inverse(poses)
     lost = loss(as_robot(delta, home), q, poses, OVER)
     if not lost.exact:
 
         def of(x: FloatArray) -> RotaryDelta:
-            angles, cranks, rods, elbows = map(tuple, x[2:].reshape(4, _TOWERS).tolist())
-            return RotaryDelta(float(x[0]), float(x[1]), angles, cranks, rods, elbows, delta.gains)
+            heights = x[13:] if len(x) > 14 else np.repeat(x[13:], _TOWERS)
+            angles, cranks, rods, elbows = map(tuple, x[1:13].reshape(4, _TOWERS).tolist())
+            numbers = (float(x[0]), tuple(heights.tolist()), angles, cranks, rods, elbows)
+            return RotaryDelta(*numbers, delta.gains)
 
-        start = [delta.radius, delta.height, *delta.angles, *delta.cranks, *delta.rods]
-        x = np.array([*start, *delta.elbows])
-        delta = of(nearest(lambda x: as_robot(of(x), home), x, q, poses))
+        heights = delta.heights[: 1 if one_height else _TOWERS]
+        start = [delta.radius, *delta.angles, *delta.cranks, *delta.rods, *delta.elbows, *heights]
+        delta = of(nearest(lambda x: as_robot(of(x), home), np.array(start), q, poses))
         lost = loss(as_robot(delta, home), q, poses, OVER)
         if not project:
             raise ArgumentError(
-                f"robot: {robot.name}: the firmware has one radius and one height, and cranks that"
-                f" turn in radial planes, this robot has not; its numbers can be projected onto"
-                f" that, {lost}"
+                f"robot: {robot.name}: the firmware has one radius{' and one height' * one_height},"
+                f" and cranks that turn in radial planes, this robot has not; its numbers can be"
+                f" projected onto that, {lost}"
             )
+    if min(delta.endstops) <= 0.0:
+        raise ArgumentError(
+            f"robot: {robot.name}: the end stops would be {min(delta.endstops):.6g} mm over the"
+            " bed; the pose must be that of the nozzle over it, and q 0 at the end stops"
+        )
     return delta, lost
 
 
@@ -125,10 +133,11 @@ def is_rotary_delta(robot: Robot) -> bool:
     return robot.model.map == "translation" and cranks and robot.frames.trivial
 
 
-def as_built(robot: Robot) -> RotaryDelta:
+def as_built(robot: Robot, one_height: bool = True) -> RotaryDelta:
     """The same cranks, as if they were alike and turned in radial planes: exact where they do."""
     slots = robot.slots
     shoulders = slots[:, 0:3] - slots[:, 3:6]
+    heights = shoulders[:, 2]
     radius = np.hypot(shoulders[:, 0], shoulders[:, 1])
     first, second, _, _ = prepared(robot)
     drive = slots[:, SLOTS.index("offset")]
@@ -142,7 +151,7 @@ def as_built(robot: Robot) -> RotaryDelta:
         gains.append(sense * float(slots[i, SLOTS.index("gain")]))
     return RotaryDelta(
         float(radius.mean()),
-        float(shoulders[:, 2].mean()),
+        tuple((np.full(_TOWERS, heights.mean()) if one_height else heights).tolist()),
         tuple((np.degrees(np.arctan2(shoulders[:, 1], shoulders[:, 0])) % 360.0).tolist()),
         tuple(slots[:, SLOTS.index("crank")].tolist()),
         tuple(slots[:, SLOTS.index("rod")].tolist()),
@@ -169,9 +178,11 @@ def text_of(delta: RotaryDelta, home: float, name: str, head: str) -> str:
     name, head : str
         The robot's name; lines of comment.
     """
-    parameters = {"radius": delta.radius, "height": delta.height}
+    alike = len(set(delta.heights)) == 1
+    parameters = {"radius": delta.radius} | ({"height": delta.heights[0]} if alike else {})
     parameters |= {f"angle{i}": angle for i, angle in enumerate(delta.angles, 1)}
-    free = ["radius", "height", "offset1", "offset2", "offset3"]
+    heights = ["height"] if alike else ["base*.z"]
+    free = ["radius", *heights, "offset1", "offset2", "offset3"]
     blocks = [
         head,
         lines({"name": name, "units": {"length": "mm", "angle": "deg"}}),
@@ -182,7 +193,9 @@ def text_of(delta: RotaryDelta, home: float, name: str, head: str) -> str:
     ]
     for i in range(_TOWERS):
         angle = np.radians(delta.angles[i])
-        base = {"radius": "radius", "angle": f"angle{i + 1}", "z": "height"}
+        base: dict[str, object] = {"radius": "radius", "angle": f"angle{i + 1}", "z": "height"}
+        if not alike:
+            base["z"] = delta.heights[i]
         limb: dict[str, object] = {"kind": "RUS", "base": base, "platform": [0.0, 0.0, 0.0]}
         limb |= {"axis": _point(-np.sin(angle), np.cos(angle))}
         limb |= {"zero": _point(np.cos(angle), np.sin(angle))}

@@ -15,6 +15,7 @@ from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
 from pkmcal.core.chains import AnyMachine, ChainMachine
+from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
@@ -446,6 +447,17 @@ def _shaped(found: Feasibility, shape: tuple[int, ...]) -> Feasibility:
     """Limits of N rows as those of a batch."""
     each = (getattr(found, field.name) for field in fields(Feasibility))
     return Feasibility(*(array.reshape(*shape, array.shape[-1]) for array in each))
+
+
+def commanded(robot: Robot) -> tuple[str, ...]:
+    """The coordinates that programs command: those its file matches, or its free ones."""
+    return tuple(robot.model.match or robot.coordinates)
+
+
+def determines_others(robot: Robot) -> bool:
+    """Whether the limbs determine coordinates beside the commanded ones, which are not constant."""
+    constant = robot.model.match is None and robot.model.map in ("translation", "planar")
+    return len(commanded(robot)) < len(POSE) and not constant
 
 
 def require_parallel(robot: object, name: str = "robot") -> None:

@@ -157,6 +157,37 @@ def test_a_hexapod_is_given_the_orientations_too(tmp_path: Path) -> None:
     np.testing.assert_allclose(reached[:, 3:], meant[:, 3:], rtol=0, atol=5e-7)
 
 
+def test_angles_stay_in_the_turn_of_the_program(tmp_path: Path) -> None:
+    """A controller told 190° and then -170° would turn all the way back."""
+    robot = robots.made(
+        "planar",
+        {"x": 0.0, "gamma": np.pi - 0.2},
+        [
+            {"kind": "UPS", "base": robots.ring(300, a), "platform": robots.ring(60, a + 150.0)}
+            for a in (0, 120, 240)
+        ],
+    )
+    machine = robot.replace({"base1.x": 301.0})
+    path = tmp_path / "part.ngc"
+    path.write_text("G1 X0 Y0 C170 F600\nG1 X5 C189\nG1 C-175\n")
+    found = pk.compensate_program(robot, machine, path, chord=10.0)
+    turns = followed(found.text, "XYC")[:, 2]
+    np.testing.assert_allclose(turns[[0, 1, -1]], [170, 189, -175], atol=1.0)
+    assert not np.isclose(turns[[0, 1, -1]], [170, 189, -175], atol=1e-3).all()
+
+
+def test_a_crank_goes_on_beyond_half_a_turn(tmp_path: Path) -> None:
+    """As joint moves, the inverse's turn is the one near home; the path goes through the other."""
+    robot = pk.load("rotary-delta")
+    shift = np.radians(175.0) - robot.inverse(robot.home)[0]
+    robot = robot.replace({"offset1": robot.geometry["offset1"] - shift})
+    path = tmp_path / "part.ngc"
+    path.write_text("G0 X0 Y0 Z-900\nG1 Z-1300 F600\n")
+    found = pk.compensate_program(robot, robot, path, joints=True, chord=0.5)
+    crank = followed(found.text, "X")[:, 0]
+    assert crank.min() < 180.0 < crank.max() and np.abs(np.diff(crank)).max() < 30.0
+
+
 def test_a_machine_that_constrains_its_pose_is_given_its_own_coordinates(tmp_path: Path) -> None:
     robot = pk.load("3prs")
     machine = robot.replace({"rod1": 500.4, "base2.x": robot.geometry["base2.x"] + 0.3})

@@ -307,6 +307,24 @@ def pk_rotation(angles: Any) -> Any:
     )
 
 
+def test_the_command_line_writes_the_folder_and_keeps_what_was_changed_in_it(
+    run: Any, refused: Any, tmp_path: Path
+) -> None:
+    folder = tmp_path / "Mill 2"
+    arguments = ("export", "linear-delta", "--as", "linuxcnc", "--out", folder)
+    assert run(*arguments).stdout == f"{folder}: linear delta\n"
+    names = {"mill_2.ini", "mill_2.hal", "pkm_mill_2.c", "lineardeltakins.hal"}
+    assert {path.name for path in folder.iterdir()} == names
+    assert run(*arguments).exit_code == 0  # nobody has touched it
+    ini = folder / "mill_2.ini"
+    ini.write_text(ini.read_text().replace("MAX_VELOCITY = 200", "MAX_VELOCITY = 20"))
+    assert refused(*arguments).startswith(f"{ini}: would be replaced")
+    pk.load("linear-delta").replace({"rod1": 216.0}).save(tmp_path / "robot.toml")
+    arguments = ("export", tmp_path / "robot.toml", *arguments[2:-1], tmp_path / "other")
+    assert re.search(r"; LinuxCNC.s own module for it is off by 0\.\d+ mm", run(*arguments).stdout)
+    assert not (tmp_path / "other" / "lineardeltakins.hal").exists()
+
+
 def test_what_linuxcnc_cannot_hold_is_refused(tmp_path: Path) -> None:
     revolute = {"kind": "UPR", "revolute": [1.0, 0.0, 0.0]}
     framed = robots.made(
