@@ -149,7 +149,7 @@ def calibrate(
             found.report(draft, read.contents())
             _save(found, draft / "robot.toml", read, robot)
     if json:
-        say(as_json(found, "parameters", "correlations"))
+        say(as_json(found, "parameters", "correlations", schema="calibrate"))
     else:
         say(found.summary())
         if output is not None:

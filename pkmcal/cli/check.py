@@ -66,7 +66,7 @@ def check(
         if measured is not None:
             said = {"kind": measured.kind, "rows": len(measured), "without_pose": unsolved}
         parts = {"robot": machine, "findings": found.findings, "ok": found.ok, "measurements": said}
-        say(as_json(parts))
+        say(as_json(parts, schema="check"))
     else:
         say(found)
         if measured is not None:

@@ -79,7 +79,12 @@ def export(
         write = pk.export.reprap if target == "reprap" else pk.export.marlin
         loss = write(machine, out, project)
     if json:
-        say(as_json({"robot": machine.name, "as": target, "file": str(out), "loss": loss}))
+        say(
+            as_json(
+                {"robot": machine.name, "as": target, "file": str(out), "loss": loss},
+                schema="export",
+            )
+        )
     else:
         say(f"{out}: {machine.name}" + (f"; {loss}" if loss and not loss.exact else ""))
     return 0
@@ -95,7 +100,11 @@ def _export_arm(robot: str, target: str, out: Path, json: bool) -> int:
     else:
         pk.export.dh(arm, out, "standard" if target == "dh" else "modified")
     if json:
-        say(as_json({"robot": arm.name, "as": target, "file": str(out), "loss": None}))
+        say(
+            as_json(
+                {"robot": arm.name, "as": target, "file": str(out), "loss": None}, schema="export"
+            )
+        )
     else:
         say(f"{out}: {arm.name}")
     return 0
