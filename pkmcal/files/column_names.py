@@ -47,6 +47,8 @@ _SYNONYMS: dict[str, str] = {
     "|measurement time|meas time",
     "date": "day|measurement date",
     "temperature": "temp|air temperature|t c|temperature c|machine temperature|ambient temperature",
+    "probe": "probed|probed z|z probed|probe z|z probe|trigger z|z trigger|triggered|mesh|mesh z"
+    "|bed mesh|bed z",
     "rx": "rot x|rotx|x rotation|euler x|angle x|actual rx",
     "ry": "rot y|roty|y rotation|euler y|angle y|actual ry",
     "rz": "rot z|rotz|z rotation|euler z|angle z|actual rz",

@@ -20,6 +20,10 @@ SEPARATORS = ("\t", ";", ",", " ")  # the first of those that fit equally well
 _LOOKED_AT = 200  # lines
 _COMMENT = re.compile(r"\s*(?:#|//|%)+")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
+_TRIGGER = re.compile(  # Klipper and Kalico; Marlin
+    r"probe at (-?[0-9.]+),(-?[0-9.]+) is z=(-?[0-9.]+)"
+    r"|Bed X: ?(-?[0-9.]+) Y: ?(-?[0-9.]+) Z: ?(-?[0-9.]+)"
+)
 _GAP = re.compile(r" {2,}")
 _BRACKET = re.compile(r"\s+(?=[\[(])")
 
@@ -63,6 +67,17 @@ def text_rows(path: Path, content: bytes) -> TextRows:
             found.comments.append((number, line[match.end() :].strip()))
         else:
             lines.append((number, line.rstrip("\n")))
+    if triggers := [
+        (n, match)
+        for n, line in enumerate(text.splitlines(), 1)
+        if (match := _TRIGGER.search(line))
+    ]:
+        found.rows = [
+            (n, [part for part in match.groups() if part is not None]) for n, match in triggers
+        ]
+        found.notes.append(f"{len(triggers)} lines in which a firmware reports its probe")
+        found.rows.insert(0, (triggers[0][0], ["x [mm]", "y [mm]", "probe [mm]"]))
+        return found
     found.separator = _separator([line for _, line in lines[:_LOOKED_AT]])
     found.rows = [(number, cells(path, number, line, found.separator)) for number, line in lines]
     if found.separator == " ":
