@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from pkmcal.arrays import IntArray
 from pkmcal.exceptions import FileError
 from pkmcal.files.csv_table import Table
 from pkmcal.measurements.point_names import split
@@ -140,12 +141,25 @@ def _by_time(table: Table, log: Table) -> tuple[Rows, str] | str:
     inside = (rows >= 0) & (mine <= theirs[-1] + max(np.diff(theirs).max(initial=0.0), 1.0))
     if inside.mean() < _ENOUGH:
         return "the time-stamps do not overlap"
+    moving = _moving(log, rows[inside])
     late = (mine - theirs[np.maximum(rows, 0)])[inside]
     said = (
         "each point has the last row at or before it,"
         f" {late.min():.3g} to {late.max():.3g} s earlier"
     )
+    if moving:
+        said += f"; at {moving} of them the actuators change until the next row"
     return [int(r) if ok else None for r, ok in zip(rows, inside, strict=True)], said
+
+
+def _moving(log: Table, rows: IntArray) -> int:
+    """How many rows of a sampled log the next one differs from; 0 of a log of single poses."""
+    used = np.unique(rows)
+    if len(log) < 2 * len(used):
+        return 0
+    cells = [c.cells for n, c in log.columns.items() if re.fullmatch(r"q[0-9]+", n)]
+    here = list(zip(*cells, strict=True))
+    return sum(here[i] != here[min(i + 1, len(here) - 1)] for i in rows)
 
 
 def _relative(table: Table) -> bool:

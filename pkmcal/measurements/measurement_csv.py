@@ -108,7 +108,7 @@ def read_measurements(
         the rows, by time-stamp (the last row at or before it). By default the first that works of
         name, time and row.
     ignore : str or sequence of str
-        Headings of columns to leave out.
+        Headings of columns to leave out, or wildcards.
     rename : mapping of str to str, optional
         Other headings for columns, ``{"Lg": "q1 [mm]"}``.
     header : sequence of str
