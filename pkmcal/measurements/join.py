@@ -98,19 +98,22 @@ def _by_name(table: Table, log: Table) -> tuple[Rows, str] | str:
                 if rows is not None and count and (best is None or count > best[0]):
                     said = f"{what} is {column.name!r}" + (" by its number" if loose else "")
                     best = count, rows, said
-        if best is not None and best[0] >= _ENOUGH * len(table):
-            return best[1], best[2]
+    if best is not None and best[0] >= _ENOUGH * len(table):
+        return best[1], best[2]
     some = next(iter(mine.values()))[0]
     other = next(iter(theirs.values())).cells[0]
     return f"names such as {some!r} and {other!r} are not the same"
 
 
 def _found(names: Sequence[str], logged: Sequence[str], loose: bool) -> Rows | None:
-    """Rows of the log by name; None where one name is of several rows."""
+    """Rows of the log by name; None where names of both do not stand for the same."""
     keys, others = ([_key(each, loose) for each in cells] for cells in (names, logged))
     place = {key: row for row, key in enumerate(others) if key}
     if len(place) < sum(key != "" for key in others) or len(set(keys)) < len(set(names)):
         return None
+    numbered = all(key.isdigit() for key in (*keys, *place))
+    if numbered and set(keys) - set(place) and set(place) - set(keys):
+        return None  # 1 to 20 and 0 to 19 count differently
     return [place.get(key) if key else None for key in keys]
 
 

@@ -310,3 +310,19 @@ def test_a_missing_column_names_what_was_not_known(tmp_path: Path) -> None:
         pk.FileError, match=r"missing column 'q1'; not known: 'Foo', 'Bar'; --rename"
     ):
         read(tmp_path, "Foo [mm],Bar [mm],z [mm]\n1,2,3\n")
+
+
+def test_poses_from_one_and_rows_from_zero_are_not_joined_by_number(tmp_path: Path) -> None:
+    """By number all but the last would be shifted by one; the order of the poses is right."""
+    points = "Point,z [mm]\n" + "".join(f"P{i},{i}\n" for i in (1, 2, 3))
+    m = two(tmp_path, points, "Pose,q1 [mm]\n" + "".join(f"{i},{i + 1}0\n" for i in (0, 1, 2)))
+    assert m.actuators[:, 0].tolist() == [10, 20, 30] and "by row" in m.notes[0]
+    with pytest.raises(pk.FileError, match="names such as 'P1' and '0' are not the same"):
+        two(tmp_path, points, "Pose,q1 [mm]\n0,10\n1,20\n2,30\n", join="name")
+
+
+def test_names_with_and_without_leading_zeros_are_all_joined(tmp_path: Path) -> None:
+    """P10 is spelled alike in both; that is no reason to leave P1 to P9 out."""
+    points = "Point,z [mm]\n" + "".join(f"P{i},{i}\n" for i in range(1, 21))
+    m = two(tmp_path, points, "Pose,q1 [mm]\n" + "".join(f"P{i:02},{i}0\n" for i in range(1, 21)))
+    assert m.actuators[:, 0].tolist() == [10.0 * i for i in range(1, 21)]
