@@ -63,6 +63,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.loading import machines as machines
     from pkmcal.measurements.measurement_csv import read_measurements as read_measurements
     from pkmcal.measurements.measurements import Measurements as Measurements
+    from pkmcal.measurements.probe import probed as probed
     from pkmcal.measurements.tracker import Tracker as Tracker
     from pkmcal.measurements.virtual_machine import VirtualMachine as VirtualMachine
     from pkmcal.modes.assemblies import Assemblies as Assemblies
@@ -107,6 +108,7 @@ _HOMES = {
     "loading": ("load", "machines"),
     "measurements.measurement_csv": ("read_measurements",),
     "measurements.measurements": ("Measurements",),
+    "measurements.probe": ("probed",),
     "measurements.tracker": ("Tracker",),
     "measurements.virtual_machine": ("VirtualMachine",),
     "modes.assemblies": ("Assemblies",),

@@ -22,6 +22,7 @@ from pkmcal.cli.measured import (
     Controller,
     Ignore,
     JoinBy,
+    ProbeOffset,
     Reading,
     Rename,
     Rotation,
@@ -82,6 +83,7 @@ def calibrate(
     columns: Columns = None,
     units: Units = None,
     rotation: Rotation = None,
+    probe_offset: ProbeOffset = None,
     tracker: Annotated[
         str | None,
         typer.Option(
@@ -114,8 +116,14 @@ def calibrate(
     read = Inputs()
     given = pk.load(read.robot(robot))
     machine = as_machine(given)
-    reading = Reading(controller, join, ignore or (), rename or (), columns, units, rotation)
-    measured = [reading.measurements(path, read, machine) for path in csv]
+    reading = Reading(
+        controller, join, ignore or (), rename or (), columns, units, rotation, probe_offset
+    )
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always", pk.CalibrationWarning)
+        measured = [reading.measurements(path, read, machine) for path in csv]
+    for doubt in doubts:
+        say(f"pkmcal: {doubt.message}", err=True)
     held = None if holdout is None else _read_holdout(holdout, read, machine, reading)
     urdf = isinstance(given, pk.SerialArm) and given.source is not None
     names = ["robot.toml", "residuals.png", *["robot.urdf"] * urdf]
@@ -149,7 +157,7 @@ def calibrate(
             found.report(draft, read.contents())
             _save(found, draft / "robot.toml", read, robot)
     if json:
-        say(as_json(found, "parameters", "correlations"))
+        say(as_json(found, "parameters", "correlations", schema="calibrate"))
     else:
         say(found.summary())
         if output is not None:
@@ -159,7 +167,7 @@ def calibrate(
                 say(f"URDF with the joint errors in its origins: {output.paths[2]}")
         if reported is not None:
             say(f"\nreport: {reported.paths[0]}")
-    return 0 if found.converged and not found.warnings else 1
+    return 0 if found.converged and not (found.warnings or doubts) else 1
 
 
 def _save(found: pk.Identification, path: Path, read: Inputs, robot: str) -> None:

@@ -15,6 +15,7 @@ from pkmcal.cli.measured import (
     Controller,
     Ignore,
     JoinBy,
+    ProbeOffset,
     Reading,
     Rename,
     Rotation,
@@ -40,6 +41,7 @@ def check(
     columns: Columns = None,
     units: Units = None,
     rotation: Rotation = None,
+    probe_offset: ProbeOffset = None,
     json: Json = False,
 ) -> int:
     """Look for mistakes in the geometry of a machine.
@@ -55,7 +57,9 @@ def check(
     machine = pk.load(read.robot(robot))
     measured = None
     if measurements is not None:
-        reading = Reading(controller, join, ignore or (), rename or (), columns, units, rotation)
+        reading = Reading(
+            controller, join, ignore or (), rename or (), columns, units, rotation, probe_offset
+        )
         measured = reading.measurements(measurements, read, as_machine(machine))
     found = pk.check_geometry(machine)
     unsolved: list[int] = []
@@ -66,7 +70,7 @@ def check(
         if measured is not None:
             said = {"kind": measured.kind, "rows": len(measured), "without_pose": unsolved}
         parts = {"robot": machine, "findings": found.findings, "ok": found.ok, "measurements": said}
-        say(as_json(parts))
+        say(as_json(parts, schema="check"))
     else:
         say(found)
         if measured is not None:

@@ -135,7 +135,7 @@ def compensate(
         with output.draft() as draft:
             write_poses(draft / "corrected.csv", poses, columns, comment=read.comment())
     if json:
-        say(as_json(found))
+        say(as_json(found, schema="compensate"))
     else:
         say(found)
         if output is not None:

@@ -91,7 +91,12 @@ def export(
         with Output(out.parent, [out.name], read, force).draft() as draft:
             loss = _write(target, machine, draft / out.name, number, given, project)
     if json:
-        say(as_json({"robot": machine.name, "as": target, "file": str(out), "loss": loss}))
+        say(
+            as_json(
+                {"robot": machine.name, "as": target, "file": str(out), "loss": loss},
+                schema="export",
+            )
+        )
     else:
         own = "LinuxCNC's own module for it is " if target == "linuxcnc" else ""
         say(f"{out}: {machine.name}" + (f"; {own}{loss}" if loss and not loss.exact else ""))
@@ -113,7 +118,11 @@ def _export_arm(
         else:
             pk.export.dh(arm, draft / out.name, "standard" if target == "dh" else "modified")
     if json:
-        say(as_json({"robot": arm.name, "as": target, "file": str(out), "loss": None}))
+        say(
+            as_json(
+                {"robot": arm.name, "as": target, "file": str(out), "loss": None}, schema="export"
+            )
+        )
     else:
         say(f"{out}: {arm.name}")
     return 0

@@ -48,7 +48,12 @@ def import_file(
     if json:
         heights = 0 if printer.measurements is None else len(printer.measurements)
         parts = {"files": [str(path) for path in output.paths], "heights": heights}
-        say(as_json({"robot": printer.robot.name, **parts, "distances": printer.distances}))
+        say(
+            as_json(
+                {"robot": printer.robot.name, **parts, "distances": printer.distances},
+                schema="import",
+            )
+        )
     else:
         say(printer)
         say("written: " + ", ".join(map(str, output.paths)))

@@ -62,6 +62,15 @@ Rotation = Annotated[
 ]
 
 
+ProbeOffset = Annotated[
+    str | None,
+    typer.Option(
+        metavar="X,Y,Z",
+        help="Of a column probe: the firmware's offsets of the probe from the nozzle, mm.",
+    ),
+]
+
+
 @dataclass(frozen=True)
 class Reading:
     """The options of reading: what `pkmcal.read_measurements` takes beside file and robot."""
@@ -73,6 +82,7 @@ class Reading:
     columns: Path | None = None
     units: str | None = None
     rotation: str | None = None
+    probe_offset: str | None = None
 
     def measurements(self, path: str | Path, read: Inputs, robot: Calibratable) -> Measurements:
         """The measurements of a file; what was assumed is printed to stderr, a line each."""
@@ -83,12 +93,24 @@ class Reading:
             stated["units"] = [unit.strip() for unit in self.units.split(",")]
         if self.rotation is not None:
             stated["rotation"] = self.rotation
+        if self.probe_offset is not None:
+            stated["probe_offset"] = _offset(self.probe_offset)
         log = None if self.controller is None else read.file(self.controller)
         join: Any = self.join
         measured = pk.read_measurements(read.file(path), robot, controller=log, join=join, **stated)
         for note in measured.notes:
             say(f"pkmcal: {note}", err=True)
         return measured
+
+
+def _offset(text: str) -> list[float]:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3:
+        raise ArgumentError(f"--probe-offset {text}: expected X,Y,Z in mm")
+    return numbers
 
 
 def _renamed(text: str) -> tuple[str, str]:

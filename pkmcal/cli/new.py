@@ -82,7 +82,7 @@ def new(
         raise ArgumentError(f"{path} exists already; name another file")
     write_whole(path, text)
     if json:
-        say(as_json({"machine": machine, "file": str(path)}))
+        say(as_json({"machine": machine, "file": str(path)}, schema="new"))
     else:
         say(f"{path}: {machine}; change what differs on your machine")
     return 0

@@ -39,14 +39,17 @@ _SYNONYMS: dict[str, str] = {
     "group": "pose|pose id|pose no|pose nr|pose number|pose name|configuration|config",
     "target": "reflector|smr|target name|reflector name|marker|prism",
     "name": "point id|point|point name|pointname|point no|pt|pt id|pt name|id|label|object name"
-    "|measurement|measurement name|feature|feature name|element|prog line|program line",
+    "|measurement|measurement name|feature|feature name|element|step|step no|punkt|messpunkt"
+    "|satz|prog line|program line",
     "collection": "collection name",
     "comment": "comments|note|notes|remark|remarks|description",
     "index": "no|nr|frame|sub frame|sample|number|#|line|row|count|item",
     "time": "timestamp|time stamp|datetime|date time|time seconds|time s|time utc|utc|date and time"
-    "|measurement time|meas time",
-    "date": "day|measurement date",
+    "|measurement time|meas time|clock|uhrzeit|zeit|heure",
+    "date": "day|measurement date|datum",
     "temperature": "temp|air temperature|t c|temperature c|machine temperature|ambient temperature",
+    "probe": "probed|probed z|z probed|probe z|z probe|trigger z|z trigger|triggered|mesh|mesh z"
+    "|bed mesh|bed z",
     "rx": "rot x|rotx|x rotation|euler x|angle x|actual rx",
     "ry": "rot y|roty|y rotation|euler y|angle y|actual ry",
     "rz": "rot z|rotz|z rotation|euler z|angle z|actual rz",
@@ -70,7 +73,9 @@ _PARTING = re.compile(r"[\s_\-.:/]+")
 _DRIVEN = re.compile(
     r"(?P<stem>(?:(?:actual|measured|commanded|command|cmd|target|nominal|set|desired|feedback|fbk)"
     r" )?(?:q|j|a|joint|axis|leg|limb|strut|actuator|act|motor|drive|slider|carriage|tower|encoder"
-    r"|length|leg length|strut length|joint angle|joint position|joint pos|axis pos|theta))"
+    r"|length|l|leg length|strut length|joint angle|joint position|joint pos|axis pos|theta"
+    r"|joint states position|joint state position|joint positions|jointpos"
+    r"|bein|achse|gelenk|strebe|antrieb|axe|jambe))"
     r" ?(?P<number>[0-9]{1,2})"
     r"(?P<end>(?: (?:pos|position|length|angle|actual|act|value|fbk|feedback|cmd))*)"
 )

@@ -35,6 +35,8 @@ _LOOSE = re.compile(
     re.IGNORECASE,
 )
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
+_UNSEEN = ("", "-", "--", "---", "n/a", "na", "nan", "null", "none", "#n/a", "?")
+_SHOWN = 8  # names of columns in a message
 _NUMBERED = re.compile(r"(?P<name>.*)\[(?P<number>[0-9]+)\]\s*")
 
 
@@ -51,18 +53,24 @@ class Column:
     cells : tuple of str
     place : str
         The file it stands in.
+    heading : int
+        The line of its heading; 0 where no line has it.
     lines : tuple of int
         The line of each cell.
     decimal_comma : bool
         Whether its numbers may have one.
+    stated : mapping of str to (str, int)
+        Units that its file states for all columns, of "mm" and "rad", with their lines.
     """
 
     name: str
     unit: str | None
     cells: tuple[str, ...]
     place: str
+    heading: int
     lines: tuple[int, ...]
     decimal_comma: bool
+    stated: Mapping[str, tuple[str, int]]
 
     def take(self, rows: Sequence[int]) -> Column:
         """The cells of these rows."""
@@ -119,6 +127,7 @@ class Table:
         self._comma = packed or text.separator != ","
         self._header_line = header.line
         self._units = dict(header.units)
+        self.left_out: tuple[str, ...] = ()  # headings of unknown columns
         self._default_units = dict(default_units or {})
         self.notes = [*text.notes, *header.notes]
         names = header.headings
@@ -128,6 +137,10 @@ class Table:
                 f" {MOST_COLUMNS} columns and {MOST_CELLS} cells are read"
             )
         rows = [(line, cells) for line, cells in header.rows if any(cells)]
+        again = [line for line, cells in rows if _fitted(cells, names, packed) == names]
+        if again and header.line:
+            self.notes.append(f"column names once more in line {again[0]}, left out")
+            rows = [(line, cells) for line, cells in rows if line not in again]
         if not rows:
             raise FileError(f"{self.path}: no rows below the column names of line {header.line}")
         width = len(names)
@@ -166,7 +179,10 @@ class Table:
             first = list(self.columns).index(name) + 1
             raise self.header_error(f"column {name!r} appears twice (columns {first} and {i + 1})")
         lines = tuple(self.lines)
-        self.columns[name] = Column(name, unit, cells, str(self.path), lines, self._comma)
+        place = str(self.path)
+        self.columns[name] = Column(
+            name, unit, cells, place, self._header_line, lines, self._comma, self._units
+        )
 
     def leave_out(self, names: Collection[str]) -> None:
         """Forget columns that are not looked at."""
@@ -185,10 +201,12 @@ class Table:
         """A column that is made of what another says; messages name that one."""
         return replace(self.columns[name], unit=None, cells=tuple(cells))
 
-    def header_error(self, message: str) -> FileError:
-        """An error in the line of column names."""
-        where = f"{self.path}, line {self._header_line}" if self._header_line else f"{self.path}"
-        return FileError(f"{where}: {message}")
+    def header_error(self, message: str, column: Column | None = None) -> FileError:
+        """An error in the line of column names; of a column in that of its own file."""
+        place, line = str(self.path), self._header_line
+        if column is not None:
+            place, line = column.place, column.heading
+        return FileError(f"{place}, line {line}: {message}" if line else f"{place}: {message}")
 
     def cell_error(self, name: str, row: int, message: str) -> FileError:
         """An error in one cell; rows count from 0."""
@@ -211,7 +229,8 @@ class Table:
             other = renamed.setdefault(known_as(name), column)
             if other is not column and known_as(name) not in BESIDE:
                 raise self.header_error(
-                    f"columns {other.name!r} and {column.name!r} are both {known_as(name)!r}"
+                    f"columns {other.name!r} and {column.name!r} are both {known_as(name)!r};"
+                    " ignore one, as with --ignore"
                 )
         self.columns = renamed
 
@@ -225,10 +244,20 @@ class Table:
         """Raise for the first of `names` that is not a column."""
         for name in names:
             if name not in self.columns:
-                raise self.header_error(f"missing column {name!r}")
+                hint = ""
+                if self.left_out:
+                    named = ", ".join(map(repr, self.left_out[:_SHOWN]))
+                    more = ", …" if len(self.left_out) > _SHOWN else ""
+                    hint = f"; not known: {named}{more}; --rename OLD=NEW says what one is"
+                raise self.header_error(f"missing column {name!r}{hint}")
 
     def numbers(
-        self, name: str, *quantities: str, blank: bool = False, like: str | None = None
+        self,
+        name: str,
+        *quantities: str,
+        blank: bool = False,
+        like: str | None = None,
+        expected: str | None = None,
     ) -> tuple[FloatArray, str]:
         """A column of finite numbers in mm or rad.
 
@@ -243,6 +272,8 @@ class Table:
             Whether an empty cell is NaN instead of an error.
         like : str, optional
             The column whose unit counts where this one has none.
+        expected : str, optional
+            Which of `quantities` it is, where that decides between units that are stated for all.
 
         Returns
         -------
@@ -255,10 +286,13 @@ class Table:
             other = self.columns[like].name
             self._note(f"column {column.name!r} has no unit, taken as [{unit}] like {other!r}")
             column = replace(column, unit=unit)
-        quantity, (times, over) = self._conversion(column, quantities)
+        quantity, (times, over) = self._conversion(column, quantities, expected)
         values = np.empty(len(self))
         for row, cell in enumerate(column.cells):
-            values[row] = math.nan if blank and not cell else self._number(name, row, cell)
+            unseen = blank and cell.lower() in _UNSEEN
+            values[row] = math.nan if unseen else self._number(name, row, cell)
+            if unseen and cell:
+                self._note(f"cells with {cell!r} taken as not measured")
         with np.errstate(over="ignore"):
             converted = values * times / over
         if (row := int(np.argmax(np.isinf(converted)))) or np.isinf(converted[0]):
@@ -267,37 +301,38 @@ class Table:
         return converted, quantity
 
     def _conversion(
-        self, column: Column, quantities: tuple[str, ...]
+        self, column: Column, quantities: tuple[str, ...], expected: str | None
     ) -> tuple[str, tuple[float, float]]:
         known = {unit: q for q in reversed(quantities) for unit in units.factors(q)}
         usual = ", ".join(u for q in quantities for u in units.factors(q) if u.isascii())
         if not column.unit and "1" in quantities:
             return "1", (1.0, 1.0)
-        stated = column.unit or self._stated(column, quantities)
+        stated = column.unit or self._stated(column, (expected,) if expected else quantities)
         if not stated:
             raise self.header_error(
                 f"column {column.name!r} has no unit: expected '{column.name} [{quantities[0]}]'"
-                f" (or another of {usual})"
+                f" (or another of {usual})",
+                column,
             )
         unit = units.plain(stated, known)
         if unit not in known:
             raise self.header_error(
-                f"column {column.name!r} has unit [{column.unit}]: expected one of {usual}"
+                f"column {column.name!r} has unit [{column.unit}]: expected one of {usual}",
+                column,
             )
         return known[unit], units.factors(known[unit])[unit]
 
     def _stated(self, column: Column, quantities: tuple[str, ...]) -> str | None:
         """The unit of a column without one, as the file or the caller states it for all."""
-        if column.place != str(self.path):
-            return None
-        of = [q for q in quantities if q in self._default_units or q in self._units]
+        of = [q for q in quantities if q in self._default_units or q in column.stated]
         if len(of) != 1:
             return None
         what = {"mm": "lengths", "rad": "angles"}.get(of[0], of[0])
         if of[0] in self._default_units:
             return self._default_units[of[0]]
-        unit, line = self._units[of[0]]
-        self._note(f"{what} without a unit in {unit}, as line {line} states")
+        unit, line = column.stated[of[0]]
+        where = f"line {line}" if column.place == str(self.path) else f"{column.place}, line {line}"
+        self._note(f"{what} without a unit in {unit}, as {where} states")
         return unit
 
     def _note(self, text: str) -> None:

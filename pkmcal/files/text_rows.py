@@ -20,6 +20,11 @@ SEPARATORS = ("\t", ";", ",", " ")  # the first of those that fit equally well
 _LOOKED_AT = 200  # lines
 _COMMENT = re.compile(r"\s*(?:#|//|%)+")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
+_TRIGGER = re.compile(  # Klipper and Kalico; Marlin
+    r"probe at (-?[0-9.]+),(-?[0-9.]+) is z=(-?[0-9.]+)"
+    r"|Bed X: ?(-?[0-9.]+) Y: ?(-?[0-9.]+) Z: ?(-?[0-9.]+)"
+)
+_REPORTS = ("probe at ", "Bed X:")  # what such lines hold
 _GAP = re.compile(r" {2,}")
 _BRACKET = re.compile(r"\s+(?=[\[(])")
 
@@ -63,11 +68,25 @@ def text_rows(path: Path, content: bytes) -> TextRows:
             found.comments.append((number, line[match.end() :].strip()))
         else:
             lines.append((number, line.rstrip("\n")))
+    if any(words in text for words in _REPORTS):
+        triggers = [
+            (n, m) for n, line in enumerate(text.splitlines(), 1) if (m := _TRIGGER.search(line))
+        ]
+        if triggers:
+            _take_triggers(found, triggers)
+            return found
     found.separator = _separator([line for _, line in lines[:_LOOKED_AT]])
     found.rows = [(number, cells(path, number, line, found.separator)) for number, line in lines]
     if found.separator == " ":
         _widen_headings(found, lines)
     return found
+
+
+def _take_triggers(found: TextRows, triggers: list[tuple[int, re.Match[str]]]) -> None:
+    """Make a table of the lines in which a firmware reports its probe."""
+    found.rows = [(triggers[0][0], ["x [mm]", "y [mm]", "probe [mm]"])]
+    found.rows += [(n, [part for part in m.groups() if part is not None]) for n, m in triggers]
+    found.notes.append(f"{len(triggers)} lines in which a firmware reports its probe")
 
 
 def cells(path: Path, line: int, text: str, separator: str) -> list[str]:

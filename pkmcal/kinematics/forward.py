@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array
-from pkmcal.core.library import STATUS
+from pkmcal.core.library import POSE, STATUS
 from pkmcal.display import POSE_HEADER, Table, long_table, pose_cells
 from pkmcal.modes.certificate import Certificate
 from pkmcal.modes.find import AssemblyProblem, certify_rows
@@ -131,6 +131,12 @@ class Forward(RowResult):
         rows = np.ascontiguousarray(np.broadcast_to(own.reshape(-1, 6), (len(self._q), 6)))
         steps = self._machine.closure_by_twist(rows, self._q)
         return steps.reshape(*self.status.shape, *steps.shape[1:])
+
+    def _columns(self) -> dict[str, Any]:
+        """The six numbers of each pose, its status, iterations and residual."""
+        columns = dict(zip(POSE, self.pose.reshape(-1, 6).T, strict=True))
+        others = {name: getattr(self, name) for name in ("status", "iterations", "residual")}
+        return columns | {name: np.ravel(values) for name, values in others.items()}
 
     def _parts(self) -> Iterator[str | Table]:
         yield self._counts()

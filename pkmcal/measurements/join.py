@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from pkmcal.arrays import IntArray
 from pkmcal.exceptions import FileError
 from pkmcal.files.csv_table import Table
 from pkmcal.measurements.point_names import split
@@ -97,19 +98,22 @@ def _by_name(table: Table, log: Table) -> tuple[Rows, str] | str:
                 if rows is not None and count and (best is None or count > best[0]):
                     said = f"{what} is {column.name!r}" + (" by its number" if loose else "")
                     best = count, rows, said
-        if best is not None and best[0] >= _ENOUGH * len(table):
-            return best[1], best[2]
+    if best is not None and best[0] >= _ENOUGH * len(table):
+        return best[1], best[2]
     some = next(iter(mine.values()))[0]
     other = next(iter(theirs.values())).cells[0]
     return f"names such as {some!r} and {other!r} are not the same"
 
 
 def _found(names: Sequence[str], logged: Sequence[str], loose: bool) -> Rows | None:
-    """Rows of the log by name; None where one name is of several rows."""
+    """Rows of the log by name; None where names of both do not stand for the same."""
     keys, others = ([_key(each, loose) for each in cells] for cells in (names, logged))
     place = {key: row for row, key in enumerate(others) if key}
     if len(place) < sum(key != "" for key in others) or len(set(keys)) < len(set(names)):
         return None
+    numbered = all(key.isdigit() for key in (*keys, *place))
+    if numbered and set(keys) - set(place) and set(place) - set(keys):
+        return None  # 1 to 20 and 0 to 19 count differently
     return [place.get(key) if key else None for key in keys]
 
 
@@ -140,12 +144,25 @@ def _by_time(table: Table, log: Table) -> tuple[Rows, str] | str:
     inside = (rows >= 0) & (mine <= theirs[-1] + max(np.diff(theirs).max(initial=0.0), 1.0))
     if inside.mean() < _ENOUGH:
         return "the time-stamps do not overlap"
+    moving = _moving(log, rows[inside])
     late = (mine - theirs[np.maximum(rows, 0)])[inside]
     said = (
         "each point has the last row at or before it,"
         f" {late.min():.3g} to {late.max():.3g} s earlier"
     )
+    if moving:
+        said += f"; at {moving} of them the actuators change until the next row"
     return [int(r) if ok else None for r, ok in zip(rows, inside, strict=True)], said
+
+
+def _moving(log: Table, rows: IntArray) -> int:
+    """How many rows of a sampled log the next one differs from; 0 of a log of single poses."""
+    used = np.unique(rows)
+    if len(log) < 2 * len(used):
+        return 0
+    cells = [c.cells for n, c in log.columns.items() if re.fullmatch(r"q[0-9]+", n)]
+    here = list(zip(*cells, strict=True))
+    return sum(here[i] != here[min(i + 1, len(here) - 1)] for i in rows)
 
 
 def _relative(table: Table) -> bool:

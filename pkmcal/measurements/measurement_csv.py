@@ -6,6 +6,7 @@ columns                               meaning
 ``q1 [mm]`` … ``qn [mm]``             actuator coordinates, lengths or angles
 ``x [mm], y [mm], z [mm]``            a position; with ``alpha``, ``beta``, ``gamma [deg]`` a pose
 ``z [mm]`` alone                      a height
+``x [mm], y [mm], probe [mm]``        where a printer's probe triggered; or ``q1`` … and ``probe``
 ``distance [mm]``                     from the fixed point ``target`` to the ``attachment``
 ``A.x [mm], A.y [mm], A.z [mm]`` …    positions of several targets A, B, … in one row
 ``sigma [mm]``                        standard deviation of the row, of every component
@@ -39,6 +40,7 @@ from os import PathLike
 from typing import Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pkmcal import arguments
 from pkmcal.arguments import word
@@ -55,6 +57,13 @@ from pkmcal.measurements.join import JOINS, Join
 from pkmcal.measurements.join import join as joined
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.orientation_columns import checked, names_in
+from pkmcal.measurements.probe import (
+    apart_from,
+    is_of_a_flat,
+    is_of_trigger,
+    probed,
+    warn_of_circular,
+)
 from pkmcal.measurements.table_layout import (
     Layout,
     layout,
@@ -81,6 +90,7 @@ def read_measurements(
     header: Sequence[str] = (),
     units: str | Sequence[str] = (),
     rotation: str | None = None,
+    probe_offset: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Measurements:
     r"""Read measurements from a CSV file; its module lists the columns.
 
@@ -103,7 +113,7 @@ def read_measurements(
         the rows, by time-stamp (the last row at or before it). By default the first that works of
         name, time and row.
     ignore : str or sequence of str
-        Headings of columns to leave out.
+        Headings of columns to leave out, or wildcards.
     rename : mapping of str to str, optional
         Other headings for columns, ``{"Lg": "q1 [mm]"}``.
     header : sequence of str
@@ -113,6 +123,8 @@ def read_measurements(
     rotation : str, optional
         How orientations are stated where headings do not say: "ZYX" or another order of axes,
         each about the turned axis; "xyz", about fixed axes; "rotvec"; "wxyz" or "xyzw".
+    probe_offset : (3,) array
+        Of a column ``probe``: the firmware's offsets of the probe, mm, as in `probed`.
 
     Returns
     -------
@@ -148,6 +160,8 @@ def read_measurements(
     number_groups(table)
     several = several_targets(table)
     leave_out_unknown(table, _known(table, several), SYNONYMS)
+    if "probe" in table.columns:
+        return _read_probe(table, robot, probe_offset)
     actuators, actuator_units = read_actuators(table, robot)
     compare(table, actuator_units, robot)
     kind = _kind(table, several)
@@ -161,13 +175,60 @@ def read_measurements(
     else:
         values = _read_values(table, kind, checked(rotation), actuators, robot)
         fields |= read_targets(table, kind)
-    notes = tuple(f"{table.path}: {note}" for note in table.notes)
     try:
-        return Measurements(
-            actuators, values, kind, actuator_units=actuator_units, notes=notes, **fields
+        measured = Measurements(
+            actuators, values, kind, actuator_units=actuator_units, notes=_notes(table), **fields
         )
     except ValueError as error:
         raise FileError(f"{table.path}: {error}") from None
+    if kind == "height" and isinstance(robot, Robot):
+        warn_of_circular(robot, measured, str(table.path))
+        if is_of_a_flat(robot, measured):
+            table.notes.append(
+                "z taken as the measured height of the nozzle, up; what a firmware reported when"
+                " its probe triggered has the opposite sign and is called probe"
+            )
+            measured = replace(measured, notes=_notes(table))
+    return measured
+
+
+def _notes(table: Table) -> tuple[str, ...]:
+    return tuple(f"{table.path}: {note}" for note in table.notes)
+
+
+def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Measurements:
+    """Heights of a probe's tip where it triggered: 0, on the bed."""
+    if not isinstance(robot, Robot):
+        raise table.header_error(
+            f"column {table.columns['probe'].name!r}: give the robot, as the firmware had it when"
+            " it probed"
+        )
+    z = _read(table, "probe", "mm")[0]
+    sigma = _read_sigma(table, "height")
+    if any(ACTUATOR.fullmatch(name) for name in table.columns):
+        actuators, units = read_actuators(table, robot)
+        compare(table, units, robot)
+        if not is_of_trigger(robot, actuators, z):
+            row = int(np.argmax(apart_from(robot, actuators, z)))
+            at = robot.forward(actuators[row]).pose[2]
+            raise table.cell_error(
+                "probe",
+                row,
+                f"the robot file gives z = {at:.4g} mm at the actuators of this row, found"
+                f" {z[row]:.4g}: they have to be those at which the probe triggered",
+            )
+        poses = robot.forward(actuators).pose[:, :3]
+    else:
+        poses = np.column_stack([*(_read(table, axis, "mm")[0] for axis in "xy"), z])
+    try:
+        measured = probed(robot, poses, offset=offset, sigma=sigma)
+    except ValueError as error:
+        raise FileError(f"{table.path}: {error}") from None
+    table.notes.append(
+        f"{table.columns['probe'].name!r} taken as the firmware's z when the probe triggered: the"
+        " actuators are those that the robot file has there, and the probe's tip is at 0"
+    )
+    return replace(measured, notes=_notes(table))
 
 
 def _table(
@@ -203,7 +264,7 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     components = _AXES + _ANGLES
     names = {f"q{i + 1}" for i in range(len(table.columns))}
     names |= {name for name in table.columns if ACTUATOR.fullmatch(name)}
-    names |= {*components, "distance", "sigma", "group", "target", "actuator_sigma"}
+    names |= {*components, "distance", "sigma", "group", "target", "probe", "actuator_sigma"}
     names |= {f"actuator_sigma.{name}" for name in names if ACTUATOR.fullmatch(name)}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}

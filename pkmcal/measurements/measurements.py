@@ -283,6 +283,21 @@ class Measurements(Result):
         """
         write_measurements(self, path, comment)
 
+    def _columns(self) -> dict[str, Any]:
+        """As the columns of a file, but for the units, which are mm and rad."""
+        columns: dict[str, Any] = {f"q{i + 1}": q for i, q in enumerate(self.actuators.T)}
+        values = self.values.reshape(len(self), -1)
+        columns |= dict(zip(self.components, values.T, strict=True))
+        deviations = self._deviations()
+        if deviations is not None:
+            names = (f"sigma.{name}" for name in self.components)
+            columns |= dict(zip(names, deviations.T, strict=True))
+        if self.target_index is not None and self.target_names is not None:
+            columns["target"] = [self.target_names[i] for i in self.target_index]
+        if self.group is not None:
+            columns["group"] = self.group
+        return columns
+
     def _parts(self) -> Iterator[str | Table]:
         yield self._title()
         yield self._table()

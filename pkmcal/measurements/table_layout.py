@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import fnmatch
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -28,7 +29,7 @@ class Layout:
     Attributes
     ----------
     ignore : tuple of str
-        Headings of columns to leave out.
+        Headings of columns to leave out, or wildcards.
     rename : mapping of str to str
         Headings here, by those of the file; with a unit in brackets where the file has none.
     header : tuple of str
@@ -99,11 +100,13 @@ def open_table(
     """
     table = Table(path, how.header or None, how.units)
     for name in (*how.ignore, *how.rename):
-        if name not in table.columns and name not in also:
+        if not fnmatch.filter(table.columns, name) and name not in also:
             raise table.header_error(
                 f"no column {name!r} to ignore or rename{did_you_mean(name, table.columns)}"
             )
-    table.leave_out(how.ignore)
+    table.leave_out(
+        [n for n in table.columns if any(fnmatch.fnmatchcase(n, i) for i in how.ignore)]
+    )
     for old, new in how.rename.items():
         if old in table.columns:
             name, unit = parted(new)
@@ -188,6 +191,7 @@ def leave_out_unknown(table: Table, known: Collection[str], also: Collection[str
         more = f" and {len(named) - _SHOWN} more" if len(named) > _SHOWN else ""
         many = "s" if len(named) > 1 else ""
         table.notes.append(f"unknown column{many} left out: {', '.join(named[:_SHOWN])}{more}")
+        table.left_out = tuple(table.columns[name].name for name in unknown)
         table.leave_out(unknown)
 
 

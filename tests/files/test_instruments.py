@@ -239,3 +239,90 @@ def test_times_that_count_from_different_starts_are_not_joined_unasked(tmp_path:
     with pytest.raises(pk.FileError, match="by time: seconds may count from different starts"):
         two(tmp_path, points, log)
     assert two(tmp_path, points, log, join="time").actuators[:, 0].tolist() == [10, 10, 20]
+
+
+# --- met in files that nobody had seen -----------------------------------------------------------
+
+
+def test_a_spreadsheet_in_german_with_titles_and_units_below(tmp_path: Path) -> None:
+    rows = "".join(
+        f"{i};" + ";".join(f"{v:.5f}" for v in (*q, *pose[:3])).replace(".", ",") + ";\n"
+        for i, (q, pose) in enumerate(zip(TRUTH.actuators, TRUTH.poses, strict=True), 1)
+    )
+    heads = "Nr.;" + ";".join(f"Bein {i}" for i in range(1, 7)) + ";X;Y;Z;Bemerkung\n"
+    text = (
+        "Messprotokoll;;;;;;;;;;\nPrüfer: M;;;;;;;;;;\n" + heads + ";" + "(mm);" * 9 + "\n" + rows
+    )
+    m = pk.read_measurements(written(tmp_path, "m.csv", text.encode("cp1252")), ROBOT)
+    np.testing.assert_allclose(m.values, TRUTH.poses[:, :3], atol=1e-5)
+    np.testing.assert_array_equal(m.actuators, TRUTH.actuators)
+
+
+def test_a_heading_that_comes_once_more_is_left_out_and_said(tmp_path: Path) -> None:
+    m = read(tmp_path, "q1 [mm],z [mm]\n1,2\nq1 [mm],z [mm]\n3,4\n")
+    assert len(m) == 2 and "once more in line 3, left out" in m.notes[0]
+
+
+def test_a_target_that_was_not_seen_may_be_dashes(tmp_path: Path) -> None:
+    heads = ",".join(f"{name} {axis} [mm]" for name in "AB" for axis in "XYZ")
+    m = read(tmp_path, f"q1 [mm],{heads}\n1,1,2,3,---,---,---\n2,1,2,3,4,5,6\n")
+    assert len(m) == 3 and "cells with '---' taken as not measured" in m.notes[0]
+    with pytest.raises(pk.FileError, match="expected a number, found '---'"):
+        read(tmp_path, "q1 [mm],z [mm]\n1,---\n")
+
+
+def test_actual_and_target_actuators_are_not_mixed(tmp_path: Path) -> None:
+    text = "actual_q_0 [mm],target_q_0 [mm],z [mm]\n1,2,3\n"
+    with pytest.raises(pk.FileError, match="are both 'q1'; ignore one"):
+        read(tmp_path, text)
+    assert read(tmp_path, text, ignore="target_q_*").actuators.tolist() == [[1.0]]
+
+
+def test_units_for_all_are_those_that_the_machine_has(tmp_path: Path) -> None:
+    """--units mm,deg: a leg is a length, a crank an angle; without a machine it is not known."""
+    text = "J1,J2,J3,z\n1,2,3,4\n"
+    legs = read(tmp_path, text, pk.load("linear-delta"), units=("cm", "deg"))
+    cranks = read(tmp_path, text, pk.load("rotary-delta"), units=("cm", "deg"))
+    assert legs.actuators.tolist() == [[10, 20, 30]] and legs.values.tolist() == [40]
+    np.testing.assert_allclose(cranks.actuators, np.radians([[1, 2, 3]]))
+    with pytest.raises(pk.FileError, match="'J1' has no unit"):
+        read(tmp_path, text, units=("cm", "deg"))
+
+
+def test_what_is_wrong_in_a_log_is_named_in_the_log(tmp_path: Path) -> None:
+    with pytest.raises(pk.FileError, match=r"log\.csv, line 1: column 'q1' has no unit"):
+        two(tmp_path, "z [mm]\n1\n", "q1\n10\n")
+    with pytest.raises(pk.FileError, match=r"log\.csv, line 3, column 'q1': expected a number"):
+        two(tmp_path, "z [mm]\n1\n2\n", "q1 [mm]\n10\nten\n")
+
+
+def test_a_sampled_log_says_at_how_many_points_the_machine_moved(tmp_path: Path) -> None:
+    points = "Time,z [mm]\n10:00:03,1\n10:00:12,2\n"
+    log = "Clock,q1 [mm]\n" + "".join(f"10:00:{s:02},{min(s, 10)}\n" for s in range(0, 20, 2))
+    assert (
+        "at 1 of them the actuators change until the next row"
+        in two(tmp_path, points, log).notes[0]
+    )
+
+
+def test_a_missing_column_names_what_was_not_known(tmp_path: Path) -> None:
+    with pytest.raises(
+        pk.FileError, match=r"missing column 'q1'; not known: 'Foo', 'Bar'; --rename"
+    ):
+        read(tmp_path, "Foo [mm],Bar [mm],z [mm]\n1,2,3\n")
+
+
+def test_poses_from_one_and_rows_from_zero_are_not_joined_by_number(tmp_path: Path) -> None:
+    """By number all but the last would be shifted by one; the order of the poses is right."""
+    points = "Point,z [mm]\n" + "".join(f"P{i},{i}\n" for i in (1, 2, 3))
+    m = two(tmp_path, points, "Pose,q1 [mm]\n" + "".join(f"{i},{i + 1}0\n" for i in (0, 1, 2)))
+    assert m.actuators[:, 0].tolist() == [10, 20, 30] and "by row" in m.notes[0]
+    with pytest.raises(pk.FileError, match="names such as 'P1' and '0' are not the same"):
+        two(tmp_path, points, "Pose,q1 [mm]\n0,10\n1,20\n2,30\n", join="name")
+
+
+def test_names_with_and_without_leading_zeros_are_all_joined(tmp_path: Path) -> None:
+    """P10 is spelled alike in both; that is no reason to leave P1 to P9 out."""
+    points = "Point,z [mm]\n" + "".join(f"P{i},{i}\n" for i in range(1, 21))
+    m = two(tmp_path, points, "Pose,q1 [mm]\n" + "".join(f"P{i:02},{i}0\n" for i in range(1, 21)))
+    assert m.actuators[:, 0].tolist() == [10.0 * i for i in range(1, 21)]
