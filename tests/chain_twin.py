@@ -135,7 +135,9 @@ class Twin:
         c is 1 along, and 1/length² about, every axis.
         """
         names = list(self.chains.parts)
-        names += [f"limb{i + 1}.joint{len(b)}" for i, b in enumerate(self.chains.limbs) if b[-1].ball]
+        names += [
+            f"limb{i + 1}.joint{len(b)}" for i, b in enumerate(self.chains.limbs) if b[-1].ball
+        ]
         given = [f"{name}.{error}" for name in names for error in ERRORS]
         start = np.array([self.numbers.get(name, 0.0) for name in given])
         stiff = np.tile([1.0] * 3 + [self.length**2] * 3, len(names))

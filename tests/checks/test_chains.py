@@ -100,8 +100,14 @@ def test_a_home_value_that_is_nearly_the_distance_is_doubted() -> None:
 
 def test_home_beyond_a_stroke_is_found() -> None:
     text = robot_file.located("tricept")[0].decode()
-    found = pk.check_geometry(_read(text.replace("stroke = [-300.0, 300.0] },\n  { kind = \"S\"",
-                                                 "stroke = [10.0, 300.0] },\n  { kind = \"S\"")))
+    found = pk.check_geometry(
+        _read(
+            text.replace(
+                'stroke = [-300.0, 300.0] },\n  { kind = "S"',
+                'stroke = [10.0, 300.0] },\n  { kind = "S"',
+            )
+        )
+    )
     assert found.kinds == ("stroke",)
     assert found.findings[0].limbs == (1, 2, 3)
 
