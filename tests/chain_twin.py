@@ -120,16 +120,15 @@ class Twin:
         for share in np.linspace(0, 1, parts + 1)[1:]:
             at = zero + share * (q - zero)
             for _ in range(12 if share == 1 else 4):
-                step = -np.linalg.pinv(self.differences(T, at, theta), rcond=1e-9) @ self.misses(
-                    T, at, theta
-                )
+                slope = self.differences(T, at, theta)
+                step = -np.linalg.pinv(slope, rcond=1e-9) @ self.misses(T, at, theta)
                 T, theta = self.moved(T, step[:m]), theta + step[m:]
                 if np.abs(step).max() < 1e-12:
                     break
         return T, theta, float(np.abs(self.misses(T, q, theta)).max())
 
     def settled(self, q: FloatArray) -> FloatArray:
-        """Where the platform comes to rest if every joint is elastic: all closures hold by its give.
+        """Where the platform comes to rest if joints are elastic: all closures hold by their give.
 
         Least energy Σ eᵀ c⁻¹ e of what joints give way, by Lagrange and Newton with differences;
         c is 1 along, and 1/length² about, every axis.

@@ -178,7 +178,8 @@ def test_every_isa_gives_the_same_bits(name: str) -> None:
             continue  # this processor has it not
         columns = robot.geometry.slot_index.astype(np.int32)
         by = machine.error_jacobian(robot.slots, poses, q, columns)
-        found.append((poses, machine.inverse(robot.slots, poses), by))
+        looked = (*machine.closure(robot.slots, poses, q), *machine.frames(robot.slots, poses, q))
+        found.append((poses, machine.inverse(robot.slots, poses), by, *looked))
     assert len(found) > 1
     for other in found[1:]:
         for a, b in zip(found[0], other, strict=True):
