@@ -120,13 +120,52 @@ class Twin:
         for share in np.linspace(0, 1, parts + 1)[1:]:
             at = zero + share * (q - zero)
             for _ in range(12 if share == 1 else 4):
-                step = -np.linalg.pinv(self.differences(T, at, theta), rcond=1e-9) @ self.misses(
-                    T, at, theta
-                )
+                slope = self.differences(T, at, theta)
+                step = -np.linalg.pinv(slope, rcond=1e-9) @ self.misses(T, at, theta)
                 T, theta = self.moved(T, step[:m]), theta + step[m:]
                 if np.abs(step).max() < 1e-12:
                     break
         return T, theta, float(np.abs(self.misses(T, q, theta)).max())
+
+    def settled(self, q: FloatArray) -> FloatArray:
+        """Where the platform comes to rest if joints are elastic: all closures hold by their give.
+
+        Least energy Σ eᵀ c⁻¹ e of what joints give way, by Lagrange and Newton with differences;
+        c is 1 along, and 1/length² about, every axis.
+        """
+        names = list(self.chains.parts)
+        names += [
+            f"limb{i + 1}.joint{len(b)}" for i, b in enumerate(self.chains.limbs) if b[-1].ball
+        ]
+        given = [f"{name}.{error}" for name in names for error in ERRORS]
+        start = np.array([self.numbers.get(name, 0.0) for name in given])
+        stiff = np.tile([1.0] * 3 + [self.length**2] * 3, len(names))
+        T, theta, m = self.home.copy(), np.zeros(len(self.passive)), len(self.rows)
+        give, h = np.zeros(len(given)), 1e-5
+        for _ in range(12):
+            self.numbers.update(zip(given, start + give, strict=True))
+            r, A = self.misses(T, q, theta), self.differences(T, q, theta)
+            B = np.empty((len(r), len(given)))
+            for k, name in enumerate(given):
+                ends = []
+                for sign in (1, -1):
+                    self.numbers[name] = start[k] + give[k] + sign * h
+                    ends.append(self.misses(T, q, theta))
+                self.numbers[name] = start[k] + give[k]
+                B[:, k] = (ends[0] - ends[1]) / (2 * h)
+            x, n, c = A.shape[1], len(given), len(r)
+            K = np.zeros((x + n + c, x + n + c))
+            K[x : x + n, x : x + n] = np.diag(stiff)
+            K[x + n :, :x], K[x + n :, x : x + n] = A, B
+            K[:x, x + n :], K[x : x + n, x + n :] = A.T, B.T
+            right = np.concatenate([np.zeros(x), -stiff * give, -r])
+            step = np.linalg.lstsq(K, right, rcond=1e-13)[0]
+            T, theta = self.moved(T, step[:m]), theta + step[m:x]
+            give = give + step[x : x + n]
+            if np.abs(step[: x + n]).max() < 1e-8:
+                break
+        self.numbers.update(zip(given, start, strict=True))
+        return T
 
     def differences(self, T: FloatArray, q: FloatArray, theta: FloatArray) -> FloatArray:
         columns, h = [], 1e-5

@@ -1,4 +1,4 @@
-"""Mistakes in files of chains: too few actuators, limbs that move by themselves, home values."""
+"""Mistakes in files of chains: too few actuators, home values, limits."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.checks.finding import Finding, named
 from pkmcal.checks.function import singular
-from pkmcal.geometry.chains import Chains
 from pkmcal.kinematics.robot import Robot
 
 _NONE = 1e-7  # of the largest: a singular value that is none
@@ -33,20 +32,6 @@ def mobility(robot: Robot) -> Iterator[Finding]:
         f" {' and '.join(_named_motion(robot, twist) for twist in free)}",
         "give an actuator to one more joint, or take a passive joint out of a limb",
     )
-
-
-def spinning(robot: Robot) -> Iterator[Finding]:
-    """Limbs whose passive joints move with the platform held: between two S a rod spins."""
-    assert robot.model.chains is not None
-    chains = robot.model.chains
-    limbs = [i for i in range(len(chains.limbs)) if _dependent(chains, i)]
-    if limbs:
-        yield Finding(
-            "limb",
-            tuple(i + 1 for i in limbs),
-            f"at home passive joints of {named(limbs)} can move while the platform stands still",
-            "of a rod between two S write one as a U; else home is a dead point of the limb",
-        )
 
 
 def home_values(robot: Robot) -> Iterator[Finding]:
@@ -83,7 +68,7 @@ def strokes(robot: Robot) -> Iterator[Finding]:
             )
 
 
-CHAIN_CHECKS = (spinning, mobility, home_values, strokes, singular)
+CHAIN_CHECKS = (mobility, home_values, strokes, singular)
 
 
 def surplus(robot: Robot) -> str:
@@ -131,9 +116,9 @@ def _named_motion(robot: Robot, step: FloatArray) -> str:
     if turns < _AXIS * slides:
         return f"slides along {_direction(v / slides)}"
     w, v = w / turns, v / turns * robot.length
-    point = robot.own_home[:3] + np.cross(w, v)
+    point = (robot.own_home[:3] + np.cross(w, v)).round(6) + 0.0
     pitch = float(w @ v)
-    said = f"turns about {_direction(w)} through ({', '.join(f'{x:.4g}' for x in point + 0.0)}) mm"
+    said = f"turns about {_direction(w)} through ({', '.join(f'{x:.4g}' for x in point)}) mm"
     return said if abs(pitch) < _AXIS * robot.length else f"{said}, sliding along it"
 
 
@@ -143,23 +128,3 @@ def _direction(axis: FloatArray) -> str:
         if np.count_nonzero(shown) == 1 and shown[k]:
             return name
     return f"({', '.join(f'{x:.2f}' for x in shown)})"
-
-
-def _dependent(chains: Chains, limb: int) -> bool:
-    """Whether the passive joints of a limb are dependent at home, by their screws."""
-    joints = chains.limbs[limb]
-    end = joints[-1].at if joints[-1].ball else chains.home[:3]
-    columns = []
-    for name in chains.members[limb]:
-        part = chains.parts[name]
-        if part.joint.actuator is not None:
-            continue
-        w = np.zeros(3) if part.slides else part.axis
-        v = part.axis if part.slides else np.cross(part.axis, end - part.joint.at) / chains.length
-        columns.append(np.concatenate([w, v]))
-    if not columns:
-        return False
-    closing = {"planar": slice(2, 5), "spherical": slice(0, 3)}.get(chains.map, slice(0, 6))
-    J = np.array(columns).T[slice(3, 6) if joints[-1].ball else closing]
-    sigma = np.linalg.svd(J, compute_uv=False)
-    return bool(len(sigma) < J.shape[1] or sigma[-1] < _NONE * max(float(sigma[0]), 1.0))

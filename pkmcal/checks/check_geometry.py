@@ -126,9 +126,9 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
     remarks on its size, since all of its lengths may be in another unit.
 
     Of a machine of chains it is checked that the platform stands still while its actuators do
-    (mobility: what it can still do is named), that no limb moves by itself (limb), that home values
-    are the distances they seem to be (home), limits and singularities. Where the limbs close more
-    than they need to, ``print`` remarks on that.
+    (mobility: what it can still do is named), that home values are the distances they seem to be
+    (home), limits and singularities. Where the limbs close more than they need to, ``print``
+    remarks on that.
 
     Of a serial arm fewer things can be checked: lengths, joint errors and Denavit–Hartenberg twists
     in another unit (unit, angle), and neighbouring joints on one axis (double), where

@@ -27,6 +27,7 @@ BY_MAP: dict[str, tuple[str, ...]] = {  # what can be wrong in a group
     "spherical": ("dphi", "dtheta", "dpsi"),
 }
 PARTS = ("", "b", "c")
+_DEPENDENT = 1e-7  # of the largest singular value: the least is none
 JointKind = Literal["R", "P", "U", "S", "C"]
 KINDS: dict[str, str] = {
     "R": "revolute", "P": "prismatic", "U": "universal", "S": "spherical", "C": "cylindrical",
@@ -273,6 +274,26 @@ class Chains:
         """What rounding is measured against, mm."""
         every = np.array([joint.at for limb in self.limbs for joint in limb])
         return float(max(np.abs(every).sum(axis=1).max(), np.abs(self.home[:3]).sum(), self.length))
+
+    def dependent(self, limb: int) -> bool:
+        """Whether passive joints of a limb can move at home while the platform stands still."""
+        joints = self.limbs[limb]
+        end = joints[-1].at if joints[-1].ball else self.home[:3]
+        columns = []
+        for name in self.members[limb]:
+            part = self.parts[name]
+            if part.joint.actuator is not None:
+                continue
+            turns = np.zeros(3) if part.slides else part.axis
+            arm = (end - part.joint.at) / self.length
+            moves = part.axis if part.slides else np.cross(part.axis, arm)
+            columns.append(np.concatenate([turns, moves]))
+        if not columns:
+            return False
+        closing = {"planar": slice(2, 5), "spherical": slice(0, 3)}.get(self.map, slice(0, 6))
+        J = np.array(columns).T[slice(3, 6) if joints[-1].ball else closing]
+        sigma = np.linalg.svd(J, compute_uv=False)
+        return bool(len(sigma) < J.shape[1] or sigma[-1] < _DEPENDENT * max(sigma[0], 1.0))
 
     @cached_property
     def layout(self) -> ChainLayout:

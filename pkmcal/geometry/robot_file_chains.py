@@ -363,13 +363,11 @@ def _check(tables: Sequence[Table], chains: Chains) -> None:
             )
         if ball and group != 6:
             last.fail("joints", f"limb {i + 1}: a ball is no joint of the map {chains.map}")
-        own = sum(layout.coordinate[j] >= layout.shared
-                  for j in layout.member[layout.first[i] : layout.first[i + 1]])  # fmt: skip
-        if own > (3 if ball else group):
+        if chains.dependent(i):
             last.fail(
                 "joints",
-                f"limb {i + 1} has {own + 3 * ball} passive axes, more than the platform can"
-                " follow: it can spin by itself, so write one of its S as a U",
+                f"at home passive joints of limb {i + 1} can move while the platform stands still:"
+                " write one S of a rod as a U, or take home away from a dead point of the limb",
             )
     if layout.rows > MAX_CHAIN_ROWS:
         last.fail(
@@ -377,8 +375,9 @@ def _check(tables: Sequence[Table], chains: Chains) -> None:
         )
     need = len(MAPS[chains.map]) + layout.shared
     if layout.rows < need:
+        n = chains.n_actuators
         last.fail(
             "joints",
-            f"with its actuators held the platform has {need - layout.rows} ways to move: "
-            f"the limbs leave {layout.rows} closures for {need} unknowns",
+            f"{n} actuator{'s' * (n > 1)}, {n + need - layout.rows} ways to move: the limbs leave"
+            f" {layout.rows} closures for {need} unknowns with the actuators held",
         )

@@ -178,7 +178,8 @@ def test_every_isa_gives_the_same_bits(name: str) -> None:
             continue  # this processor has it not
         columns = robot.geometry.slot_index.astype(np.int32)
         by = machine.error_jacobian(robot.slots, poses, q, columns)
-        found.append((poses, machine.inverse(robot.slots, poses), by))
+        looked = (*machine.closure(robot.slots, poses, q), *machine.frames(robot.slots, poses, q))
+        found.append((poses, machine.inverse(robot.slots, poses), by, *looked))
     assert len(found) > 1
     for other in found[1:]:
         for a, b in zip(found[0], other, strict=True):
@@ -229,3 +230,32 @@ def test_moves_follow_the_platform() -> None:
     back, bent = robot.rates(motion)
     assert np.abs(back - q1).max() < 1e-7
     assert np.abs(bent - q2).max() < 1e-4
+
+
+@pytest.mark.parametrize("name", OVER)
+def test_surplus_closures_settle_where_elastic_joints_would(name: str) -> None:
+    robot = pk.load(name)
+    assert robot.machine.rows - robot.machine.m == OVER[name]
+    wrong = disturbed(robot, 1 / 3)
+    q = commands(robot, 1)[0]
+    rest, found = Twin(wrong).settled(q), wrong.forward(q)
+    assert found.residual > 0.05
+    off = np.abs(from_pose(found.pose) - rest)
+    assert off[:3, 3].max() < max(1e-4, 3e-3 * found.residual)
+    assert off[:3, :3].max() < 3e-6
+
+
+def test_a_soft_joint_takes_more_of_what_is_missed(tmp_path: Path) -> None:
+    robot = pk.load("tripteron")
+    wrong = {"limb1.joint1.dpsi": 1e-3}
+    stiff = robot.replace(wrong).forward(robot.inverse(robot.home)).pose
+    robot.save(tmp_path / "saved.toml")
+    saved = (tmp_path / "saved.toml").read_text(encoding="utf-8")
+    head, one, two, three = saved.split("[[limb]]")
+    one = one.replace("gain = 1.0", "gain = 1.0, soft = 1000.0")
+    soft = loaded("[[limb]]".join([head, one, two, three]), tmp_path)
+    found = soft.replace(wrong).forward(soft.inverse(soft.home)).pose
+    assert 0.0 < found[5] < 0.1 * stiff[5]
+    again = tmp_path / "again.toml"
+    soft.save(again)
+    assert "soft = 1000.0" in again.read_text(encoding="utf-8")
