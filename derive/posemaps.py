@@ -170,7 +170,18 @@ TPR2TPS = PoseMap(
     angles=lambda R, s: [(s[3], s[2]), (s[5], s[4]), (sp.S.Zero, sp.S.One)],
 )
 
-MAPS = (SPATIAL, TRANSLATION, PLANAR, TPR2TPS)
+XY = PoseMap(
+    name="xy",
+    title="x y in the plane z = 0, R = 1; state: x, y; step: (vx, vy)",
+    state_size=2,
+    free=("x", "y"),
+    from_pose=lambda f, pose: sp.Matrix(pose[:2]),
+    frame=lambda s: (sp.eye(3), sp.Matrix([s[0], s[1], 0])),
+    retract=lambda f, s, delta: s + delta,
+    angles=lambda R, s: [(sp.S.Zero, sp.S.One)] * 3,
+)
+
+MAPS = (SPATIAL, TRANSLATION, PLANAR, TPR2TPS, XY)
 
 
 def tangent(pose_map: PoseMap, s: sp.Matrix) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:

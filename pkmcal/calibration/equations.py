@@ -117,7 +117,9 @@ class Equations(Readings):
                     guess[place[read], 3:] = orientation.shortest(measured.values[read, 3:])
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
-        self._no_sigma = np.array([m.sigma is None for m in self.sets])
+        self._no_sigma = np.array([
+            m.sigma is None and bool(np.isfinite(m.values).any()) for m in self.sets
+        ])  # fmt: skip
         sigma = self.actuator_sigma
         self._take(closures_of(parameters.robot, self.actuators, sigma), sigma is None)
 
@@ -160,6 +162,8 @@ class Equations(Readings):
     def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
         """Evaluate where the same with commanded poses has been started."""
         self.parameters, self._states = commanded.parameters, start.states
+        if self.closures.unknowns:  # closures that contradict each other may still have a best pose
+            self.start_from(np.flatnonzero(start.status), self.parameters.robot.home)
         return start if commanded is self else self.at(start.theta)
 
     @property
