@@ -85,7 +85,8 @@ def locate_anchors(robot: Robot, actuators: ArrayLike) -> LocatedAnchors:
     >>> path = os.path.join(tempfile.mkdtemp(), "sled.toml")
     >>> belts = [(0, 0), (3000, 0), (1500, 2000)]
     >>> with open(path, "w") as file:
-    ...     _ = file.write('name = "sled"\nunits = {length = "mm", angle = "deg"}\n[pose]\nmap = "xy"\n')
+    ...     _ = file.write('name = "sled"\nunits = {length = "mm", angle = "deg"}\n')
+    ...     _ = file.write('[pose]\nmap = "xy"\nhome = {x = 1500, y = 700}\n')
     ...     for x, y in belts:
     ...         _ = file.write(f'[[limb]]\nkind = "UPS"\nbase = [{x}, {y}, 0]\n')
     ...         _ = file.write("platform = [0, 0, 0]\n")

@@ -226,8 +226,8 @@ class FreePoses:
         self, robot: Calibratable, states: RowStates, places: IntArray
     ) -> tuple[FloatArray, FloatArray]:
         """The equations by the numbers; poses are held."""
-        by_all = pose_steps.readings_by_numbers(_machine(robot), states.pose, self.read)
-        by_free = by_all[:, :, places] * self._white[:, :, None]
+        by_free = pose_steps.readings_by_numbers(_machine(robot), states.pose, self.read, places)
+        by_free *= self._white[:, :, None]
         return by_free, np.zeros((len(by_free), 6, len(places)))
 
 
