@@ -395,14 +395,23 @@ class Equations(Readings):
         off = self.distances(evaluation)
         return rms(off[np.isfinite(off)])
 
+    def progress(self, evaluation: Evaluation) -> float:
+        """`rms`, or `closure_rms` where nothing but the actuators was read."""
+        return self.rms(evaluation) if self.count.any() else self.closure_rms(evaluation)
+
     def closure_rms(self, evaluation: Evaluation) -> float:
         """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
-        sigma = self.closures.sigma
-        if sigma is None:
-            return float("nan")
-        robot, sure = evaluation.robot, evaluation.status == 0
-        off = self.closures.residual(robot, evaluation.states)[0] * sigma
-        return rms((off * self.closures.lengths(robot))[sure])
+        return rms(self._closures_off(evaluation)[evaluation.status == 0])
+
+    def worst_closures(self, evaluation: Evaluation) -> FloatArray:
+        """The largest of them at each pose (K,); NaN where they hold."""
+        off = np.abs(self._closures_off(evaluation))
+        return off.max(axis=1) if off.shape[1] else np.full(len(off), np.nan)
+
+    def _closures_off(self, evaluation: Evaluation) -> FloatArray:
+        sigma, robot = self.closures.sigma, evaluation.robot
+        off, _ = self.closures.residual(robot, evaluation.states)
+        return off if sigma is None else off * sigma * self.closures.lengths(robot)
 
     def status(self, evaluation: Evaluation) -> Int32Array:
         """Of the forward kinematics, for each row."""

@@ -49,6 +49,7 @@ class Misfit:
     rms_before: float
     closure_rms: float
     closure_rms_before: float
+    closures: FloatArray
     actuator_noise: float
     redundancy: tuple[float, ...]
     idle: int
@@ -149,7 +150,8 @@ def misfit(estimator: Estimator, estimate: Estimate, start: Evaluation, end: Eva
     prior = estimator.prior @ moved
     dof = float(estimate.weights @ equations.components) + len(prior) - state.fitted.rank
     squares = np.repeat(estimate.weights, equations.components) @ estimate.residual**2
-    no_sigma = bool(estimator.unstated.all()) or dof <= 0
+    involved = estimate.freedom != 0.0  # sets of which nothing was read are not
+    no_sigma = bool(estimator.unstated[involved].all()) or dof <= 0
     odd = outliers(
         estimate.residual,
         estimate.jacobian @ fitted,
@@ -164,6 +166,7 @@ def misfit(estimator: Estimator, estimate: Estimate, start: Evaluation, end: Eva
         rms_before=equations.rms(start),
         closure_rms=equations.closure_rms(estimate.evaluation),
         closure_rms_before=equations.closure_rms(estimator.start),
+        closures=equations.worst_closures(estimate.evaluation),
         actuator_noise=float(np.append(unknown_noise, np.nan)[sets]),
         redundancy=tuple(estimate.freedom.tolist()),
         idle=equations.idle,

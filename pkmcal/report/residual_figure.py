@@ -73,14 +73,17 @@ def _over_the_workspace(panel: Axes, found: Identification) -> None:
     at, along, other = [], [], []
     for place, residual in zip(equations.pose_of, found.residuals, strict=True):
         at.append(pose[place, :2])
-        flat = residual.shape[1] == 1  # a height or a distance has no direction across
+        flat = residual.shape[1] <= 1  # a height or a distance has no direction across
         along.append(np.zeros((len(residual), 2)) if flat else residual[:, :2])
-        other.append(residual[:, 0] if flat else residual[:, 2])
-    (x, y), (dx, dy) = np.concatenate(at).T, np.concatenate(along).T
-    colour = np.concatenate(other)
-    most = max(float(np.abs(colour).max()), 1e-12)
+        worst = found.misfit.closures[place]  # where nothing was read
+        last = residual[:, -1 if flat else 2] if residual.shape[1] else worst
+        other.append(last)
+    read = np.isfinite(np.concatenate(other)) & np.isfinite(np.concatenate(along)).all(axis=1)
+    (x, y), (dx, dy) = np.concatenate(at)[read].T, np.concatenate(along)[read].T
+    colour = np.concatenate(other)[read]
+    most = max(float(np.abs(colour).max(initial=0.0)), 1e-12)
     marks = panel.scatter(x, y, c=colour, cmap="coolwarm", vmin=-most, vmax=most, s=26, zorder=3)
-    long = float(np.quantile(np.hypot(dx, dy), 0.9))
+    long = float(np.quantile(np.hypot(dx, dy), 0.9)) if len(dx) else 0.0
     if long > 0:
         arrows = panel.quiver(
             *(x, y, dx, dy),
