@@ -202,6 +202,10 @@ class Equations(Readings):
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
         off, by_unknown = self.closures.residual(robot, states)
+        u = self.closures.unknowns
+        equation, by_unknown = off.reshape(-1) / noise[-1], by_unknown.reshape(-1, u) / noise[-1]
+        if not self.count.any():
+            return equation, by_unknown
         twists = self.closures.twists(robot, states)
         predicted = self.predicted(states.pose, theta)
         residuals = self.residuals(predicted)
@@ -211,10 +215,9 @@ class Equations(Readings):
                 self.sets, predicted, self.pose_of, residuals, strict=True
             )
         ]
-        u, factor = self.closures.unknowns, noise[-1]
         return (
-            np.concatenate([off.reshape(-1) / factor, -self.whitened(residuals, noise)]),
-            np.concatenate([by_unknown.reshape(-1, u) / factor, self.whitened(by_pose, noise)]),
+            np.concatenate([equation, -self.whitened(residuals, noise)]),
+            np.concatenate([by_unknown, self.whitened(by_pose, noise)]),
         )
 
     def residual(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
@@ -230,11 +233,12 @@ class Equations(Readings):
         if not self.closures.unknowns:
             return readings
         p, robot, states = self.parameters, evaluation.robot, evaluation.states
-        of_closures, _ = self.closures.by_numbers(robot, states, p.places)
-        by_all = np.zeros((of_closures.shape[0] * of_closures.shape[1], len(p)))
-        by_all[:, : len(p.places)] = of_closures.reshape(len(by_all), -1) / noise[-1]
         _, by_unknown = self._system(robot, states, evaluation.theta, noise)
-        return self._blocks.left(by_unknown, np.concatenate([by_all, readings]))
+        by_all, own = np.zeros((len(by_unknown), len(p))), len(by_unknown) - len(readings)
+        of_closures = self.closures.by_numbers(robot, states, p.places)
+        np.divide(of_closures.reshape(own, -1), noise[-1], out=by_all[:own, : len(p.places)])
+        by_all[own:] = readings
+        return self._blocks.left(by_unknown, by_all)
 
     def start_from(self, rows: IntArray, poses: FloatArray) -> None:
         """Start the forward kinematics of some distinct rows of actuators from poses (s, 6)."""
@@ -322,13 +326,14 @@ class Equations(Readings):
 
         With the opposite sign that of the residuals.
         """
-        p = self.parameters
-        _, by_geometry = self.closures.by_numbers(evaluation.robot, evaluation.states, p.places)
+        p, robot = self.parameters, evaluation.robot
+        by_geometry = self.closures.twists_by_numbers(robot, evaluation.states, p.places)
         parts = []
         for i, seen in enumerate(evaluation.predicted):
             rows, k = seen.values.shape
             part = np.zeros((rows, k, len(p)))
-            part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
+            if by_geometry is not None:
+                part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
             if seen.by_frame is not None and p.frame is not None:
                 part[:, :, p.frame : p.frame + 6] = seen.by_frame
             for name, columns in self._columns[i].items():
