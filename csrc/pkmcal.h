@@ -12,7 +12,7 @@
 #include "names.h"
 
 /* cffi begin */
-enum { PKM_MAX_LIMBS = 12, PKM_MAX_ROWS = 24 };
+enum { PKM_MAX_LIMBS = 24, PKM_MAX_ROWS = 48 };
 enum { PKM_OK, PKM_NOT_CONVERGED, PKM_SINGULAR, PKM_INFEASIBLE, PKM_INVALID,
        PKM_NOT_CLOSED };
 enum { PKM_BAD_MACHINE = -1, PKM_BAD_COLUMN = -2, PKM_BAD_SWARM = -3 };
@@ -25,17 +25,17 @@ typedef struct {
     double size;                    /* [mm] what rounding is measured against */
     double length;                  /* characteristic length [mm]: rotations times it are mm */
     double closure_tolerance;       /* [mm]: what more rows than coordinates may miss */
-    int driver[12];                 /* DRIVER_... of each limb */
-    int rows[12];                   /* set of ROW_... beside the sphere */
-    int actuator[12];               /* which actuator drives the limb */
-    double branch[12];              /* +1 or -1 for slider and crank */
-    int angle[12];                  /* is q̃ an angle, the same after a whole turn? */
-    double near[12];                /* q̃ an angle is given nearest to: see pkm_prepare */
-    double frame[12 * AXES * 9];    /* of each axis of each limb, 3 x 3 row by row */
-    double lever[12];               /* of the couple row [mm] */
-    double weight[24];              /* of each row, limb by limb, the sphere first */
-    int order[24];                  /* place of each row in the elimination: see pkm_prepare */
-    double sharing[12];             /* how many limbs each actuator drives: see pkm_prepare */
+    int driver[24];                 /* DRIVER_... of each limb */
+    int rows[24];                   /* set of ROW_... beside the sphere */
+    int actuator[24];               /* which actuator drives the limb */
+    double branch[24];              /* +1 or -1 for slider and crank */
+    int angle[24];                  /* is q̃ an angle, the same after a whole turn? */
+    double near[24];                /* q̃ an angle is given nearest to: see pkm_prepare */
+    double frame[24 * AXES * 9];    /* of each axis of each limb, 3 x 3 row by row */
+    double lever[24];               /* of the couple row [mm] */
+    double weight[48];              /* of each row, limb by limb, the sphere first */
+    int order[48];                  /* place of each row in the elimination: see pkm_prepare */
+    double sharing[24];             /* how many limbs each actuator drives: see pkm_prepare */
 } pkm_machine;
 
 /* A swarm in `dims` dimensions and the factors of eq. 19. Its state, pkm_swarm_size numbers, begins

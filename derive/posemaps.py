@@ -187,7 +187,18 @@ SPHERICAL = PoseMap(
     quaternion=0,
 )
 
-MAPS = (SPATIAL, TRANSLATION, PLANAR, TPR2TPS, SPHERICAL)
+XY = PoseMap(
+    name="xy",
+    title="x y in the plane z = 0, R = 1; state: x, y; step: (vx, vy)",
+    state_size=2,
+    free=("x", "y"),
+    from_pose=lambda f, pose: sp.Matrix(pose[:2]),
+    frame=lambda s: (sp.eye(3), sp.Matrix([s[0], s[1], 0])),
+    retract=lambda f, s, delta: s + delta,
+    angles=lambda f, s: sp.zeros(3, 1),
+)
+
+MAPS = (SPATIAL, TRANSLATION, PLANAR, TPR2TPS, SPHERICAL, XY)
 
 
 def tangent(pose_map: PoseMap, s: sp.Matrix) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:

@@ -1,5 +1,5 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation 270b8b70622ead34
+ * derivation c82604cd594b497c
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -1104,4 +1104,161 @@ INLINE void FN(map_spherical_free)(const real state[4], const real row[3], real 
     out[0] = row[0]*cb*cg + row[1]*cb*sg - row[2]*sb;
     out[1] = row[1]*cg - row[0]*sg;
     out[2] = row[2];
+}
+
+/*
+ * xy: the state of a pose
+ *     x y in the plane z = 0, R = 1; state: x, y; step: (vx, vy)
+ * in  pose[6]        x y z [mm], α β γ [rad]
+ * out state[2]       of the map
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_from_pose)(const real pose[6], real state[2])
+{
+    state[0] = pose[0];
+    state[1] = pose[1];
+}
+
+/*
+ * xy: the frame of a state
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
+ * in  state[2]       of the map
+ * out R[9]           platform to base, row by row
+ * out p[3]           platform origin [mm]
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_frame)(const real state[2], real R[9], real p[3])
+{
+    R[0] = FN(fill)(1.0f);
+    R[1] = FN(fill)(0.0f);
+    R[2] = FN(fill)(0.0f);
+    R[3] = FN(fill)(0.0f);
+    R[4] = FN(fill)(1.0f);
+    R[5] = FN(fill)(0.0f);
+    R[6] = FN(fill)(0.0f);
+    R[7] = FN(fill)(0.0f);
+    R[8] = FN(fill)(1.0f);
+    p[0] = state[0];
+    p[1] = state[1];
+    p[2] = FN(fill)(0.0f);
+}
+
+/*
+ * xy: the state moved by a step
+ *     state ⊕ delta
+ * in  state[2]       of the map
+ * in  delta[2]       step [mm, rad]
+ * out moved[2]       the new state
+ * operations: 2 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_retract)(const real state[2], const real delta[2], real moved[2])
+{
+    moved[0] = state[0] + delta[0];
+    moved[1] = state[1] + delta[1];
+}
+
+/*
+ * xy: the state without what rounding added
+ *     state ⊕ 0
+ * in  state[2]       of the map, nearly
+ * out moved[2]       the state
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_tidy)(const real state[2], real moved[2])
+{
+    moved[0] = state[0];
+    moved[1] = state[1];
+}
+
+/*
+ * xy: the reported orientation
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
+ * in  state[2]       of the map
+ * out angles[3]      α β γ [rad]
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_angles)(const real state[2], real angles[3])
+{
+    angles[0] = FN(fill)(0.0f);
+    angles[1] = FN(fill)(0.0f);
+    angles[2] = FN(fill)(0.0f);
+}
+
+/*
+ * xy: covector of a twist to covector of a step
+ *     λ = ωᵀ ∂ω/∂δ + vᵀ ∂p/∂δ
+ * in  state[2]       of the map
+ * in  omega[3]       rotation part of the covector
+ * in  v[3]           translation part of the covector
+ * out row[2]         covector of the step
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_pull)(const real state[2], const real omega[3], const real v[3], real row[2])
+{
+    row[0] = v[0];
+    row[1] = v[1];
+}
+
+/*
+ * xy: rates of the pose for a step
+ *     d(x y z α β γ) = M delta
+ * in  state[2]       of the map
+ * in  delta[2]       step [mm, rad]
+ * out pose[6]        rates
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_rates)(const real state[2], const real delta[2], real pose[6])
+{
+    pose[0] = delta[0];
+    pose[1] = delta[1];
+    pose[2] = FN(fill)(0.0f);
+    pose[3] = FN(fill)(0.0f);
+    pose[4] = FN(fill)(0.0f);
+    pose[5] = FN(fill)(0.0f);
+}
+
+/*
+ * xy: twist of the frame for a step
+ *     ω = ∂ω/∂δ δ, v = ∂p/∂δ δ
+ * in  state[2]       of the map
+ * in  delta[2]       step [mm, rad]
+ * out twist[6]       (ω, v), base axes
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_twist)(const real state[2], const real delta[2], real twist[6])
+{
+    twist[0] = FN(fill)(0.0f);
+    twist[1] = FN(fill)(0.0f);
+    twist[2] = FN(fill)(0.0f);
+    twist[3] = delta[0];
+    twist[4] = delta[1];
+    twist[5] = FN(fill)(0.0f);
+}
+
+/*
+ * xy: rates of the state for a step
+ *     ∂state/∂delta delta
+ * in  state[2]       of the map
+ * in  delta[2]       step [mm, rad]
+ * out rate[2]        rates of the state
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_velocity)(const real state[2], const real delta[2], real rate[2])
+{
+    rate[0] = delta[0];
+    rate[1] = delta[1];
+}
+
+/*
+ * xy: covector of a step to one of the free coordinates
+ *     ∂/∂free
+ * in  state[2]       of the map
+ * in  row[2]         covector of the step
+ * out out[2]         by x y
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_free)(const real state[2], const real row[2], real out[2])
+{
+    out[0] = row[0];
+    out[1] = row[1];
 }

@@ -494,6 +494,24 @@ INLINE void FN(map_spherical_bend)(const real state[4], const real delta[3], rea
 }
 
 /*
+ * xy: rate of the twist on the path state ⊕ δ t
+ *     (ω̇, v̇) at t = 0
+ * in  state[2]       of the map
+ * in  delta[2]       step a second [mm/s, rad/s]
+ * out twist_rate[6]  (ω̇, v̇), base axes
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_bend)(const real state[2], const real delta[2], real twist_rate[6])
+{
+    twist_rate[0] = FN(fill)(0.0f);
+    twist_rate[1] = FN(fill)(0.0f);
+    twist_rate[2] = FN(fill)(0.0f);
+    twist_rate[3] = FN(fill)(0.0f);
+    twist_rate[4] = FN(fill)(0.0f);
+    twist_rate[5] = FN(fill)(0.0f);
+}
+
+/*
  * a frame's first three rows with their first and second derivative by time
  *     dR/dt = [ω] R,  d²R/dt² = ([ω̇] + [ω]²) R
  * in  R[9]           platform to base, row by row

@@ -17,6 +17,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.arms.arm import SerialArm as SerialArm
     from pkmcal.arms.denavit_hartenberg import DHTable as DHTable
     from pkmcal.arms.inverse import ArmInverse as ArmInverse
+    from pkmcal.calibration.anchors import LocatedAnchors as LocatedAnchors
+    from pkmcal.calibration.anchors import locate_anchors as locate_anchors
     from pkmcal.calibration.bootstrap import Bootstrap as Bootstrap
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
     from pkmcal.calibration.identification import Identification as Identification
@@ -79,6 +81,7 @@ _HOMES = {
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),
+    "calibration.anchors": ("LocatedAnchors", "locate_anchors"),
     "calibration.plan_poses": ("Plan", "plan_poses"),
     "checks.check_geometry": ("GeometryCheck", "check_geometry"),
     "checks.finding": ("Finding",),

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.calibration.equations import Evaluation
 from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.gauges import MIRROR, Gauges, gauges, mirror_fits
 from pkmcal.calibration.identifiability import as_sum, observability, sparse_basis
 from pkmcal.calibration.outliers import outliers
 from pkmcal.measurements.lack_of_fit import joined
@@ -36,6 +37,7 @@ class Identifiability:
     rank: int
     gap: float
     unidentifiable: tuple[str, ...]
+    gauges: tuple[str, ...]
     observability: dict[str, float]
 
 
@@ -47,6 +49,7 @@ class Misfit:
     rms_before: float
     closure_rms: float
     closure_rms_before: float
+    closures: FloatArray
     actuator_noise: float
     redundancy: tuple[float, ...]
     idle: int
@@ -120,12 +123,18 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
     """What the measurements alone determine."""
     equations, measured = estimator.equations, estimate.state.measured
     names = equations.parameters.names
-    open_ones = sparse_basis(measured.unidentifiable, names).T
+    told = Gauges((), measured.unidentifiable)
+    if equations.closures.unknowns:
+        told = gauges(equations.parameters, measured.unidentifiable)
+    if mirror_fits(equations, estimate.evaluation, estimate.state.noise):
+        told = replace(told, texts=(*told.texts, MIRROR))
+    open_ones = sparse_basis(told.rest, names).T
     jacobian = estimator.scaled_jacobian(estimate.evaluation)
     return Identifiability(
         rank=measured.rank,
         gap=measured.gap,
         unidentifiable=tuple(as_sum(combination, names) for combination in open_ones),
+        gauges=told.texts,
         observability=observability(jacobian, len(equations.actuators), measured.rank),
     )
 
@@ -141,7 +150,8 @@ def misfit(estimator: Estimator, estimate: Estimate, start: Evaluation, end: Eva
     prior = estimator.prior @ moved
     dof = float(estimate.weights @ equations.components) + len(prior) - state.fitted.rank
     squares = np.repeat(estimate.weights, equations.components) @ estimate.residual**2
-    no_sigma = bool(estimator.unstated.all()) or dof <= 0
+    involved = estimate.freedom != 0.0  # sets of which nothing was read are not
+    no_sigma = bool(estimator.unstated[involved].all()) or dof <= 0
     odd = outliers(
         estimate.residual,
         estimate.jacobian @ fitted,
@@ -156,6 +166,7 @@ def misfit(estimator: Estimator, estimate: Estimate, start: Evaluation, end: Eva
         rms_before=equations.rms(start),
         closure_rms=equations.closure_rms(estimate.evaluation),
         closure_rms_before=equations.closure_rms(estimator.start),
+        closures=equations.worst_closures(estimate.evaluation),
         actuator_noise=float(np.append(unknown_noise, np.nan)[sets]),
         redundancy=tuple(estimate.freedom.tolist()),
         idle=equations.idle,

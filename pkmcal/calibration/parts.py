@@ -29,6 +29,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "rank",
     "gap",
     "unidentifiable",
+    "gauges",
     "rms",
     "rms_before",
     "holdout_rms",
@@ -150,6 +151,14 @@ class Parts:
         angle counts as its arc.
         """
         return self.identifiability.unidentifiable
+
+    @property
+    def gauges(self) -> tuple[str, ...]:
+        """What readings of actuators alone leave open by their nature, in words.
+
+        Where the base stands, the common scale; these combinations are not in `unidentifiable`.
+        """
+        return self.identifiability.gauges
 
     @property
     def rms(self) -> float:

@@ -94,7 +94,7 @@ class Model:
     name : str
         The robot's name.
     map : str
-        Pose map: "spatial", "translation", "planar", "2tpr2tps" or "spherical".
+        Pose map: "spatial", "translation", "planar", "2tpr2tps", "spherical" or "xy".
     home : ndarray (6,)
         x y z α β γ; what the map does not leave free is 0.
     match : tuple of str or None

@@ -385,7 +385,7 @@ class Kinematics:
         """
         if q is None:
             on_map = own.copy()
-            if self.model.map in ("translation", "planar"):  # what these do not move is 0
+            if self.model.map in ("translation", "planar", "xy"):  # what these do not move is 0
                 on_map[:, [i for i, name in enumerate(POSE) if name not in self.coordinates]] = 0.0
             q = self.machine.inverse(self.slots, on_map)
         return self.machine.closure(self.slots, own, q).by_step

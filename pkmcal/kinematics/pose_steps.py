@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.machine import Machine
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
@@ -47,13 +47,18 @@ def readings(robot: Robot, pose: FloatArray, q: FloatArray) -> tuple[FloatArray,
     return residual, by_step
 
 
-def readings_by_numbers(robot: Robot, pose: FloatArray, q: FloatArray) -> FloatArray:
-    """Derivative of `readings` by each number of the geometry, (N, rows, p)."""
+def readings_by_numbers(
+    robot: Robot, pose: FloatArray, q: FloatArray, places: IntArray
+) -> FloatArray:
+    """Derivative of `readings` by numbers of the geometry at `places` (k,), (N, rows, k)."""
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    columns = robot.geometry.slot_index.astype(np.int32)
+    chain = robot.geometry.chain[:, places]  # of the limbs' numbers, through their ties
+    moving = np.flatnonzero(chain.any(axis=1))
+    columns = robot.geometry.slot_index[moving].astype(np.int32)
     by_number = _of_limbs(robot).readings(robot.slots, own, q, columns)[2]
     assert by_number is not None
-    return robot.through_ties(by_number)
+    by_places: FloatArray = by_number @ chain[moving]
+    return by_places
 
 
 def sphere_actuators(robot: Robot) -> list[int]:

@@ -238,7 +238,7 @@ class Robot(Kinematics, Result):
         """
         given, own, q, shape = self._commanded(pose, actuators)
         errors = self._by_numbers(own, q, twists=False)
-        errors = self.through_ties(self.frames.rates_outward(own, given, errors))
+        errors = self._through_ties(self.frames.rates_outward(own, given, errors))
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def error_twists(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
@@ -266,7 +266,7 @@ class Robot(Kinematics, Result):
         """
         _, own, q, shape = self._commanded(pose, actuators)
         errors = self._by_numbers(own, q, twists=True)
-        errors = self.through_ties(self.frames.twists_outward(own, errors))
+        errors = self._through_ties(self.frames.twists_outward(own, errors))
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
@@ -328,7 +328,7 @@ class Robot(Kinematics, Result):
             )
         return self.machine.error_jacobian(self.slots, own, q, columns, twists)
 
-    def through_ties(self, errors: FloatArray) -> FloatArray:
+    def _through_ties(self, errors: FloatArray) -> FloatArray:
         """The same (N, 6, p) with the columns of named parameters after those of the numbers."""
         count = len(self.geometry) - errors.shape[2]
         if not count:

@@ -295,7 +295,7 @@ def mirror_images(problem: AssemblyProblem, poses: FloatArray) -> Int32Array:
         return none
     spheres, frames = problem.spheres(), frames_of(poses)
     b, c = spheres[:, 0:3], spheres[:, 3:6]
-    if problem.map == "planar" or not len(poses):
+    if problem.map in ("planar", "xy") or not len(poses):
         return none
     if problem.map == "translation":
         b, c = np.zeros_like(b), c - b

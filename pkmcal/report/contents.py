@@ -71,6 +71,12 @@ def verdict(found: Identification) -> tuple[str, str]:
         return "bad", "Not to be trusted: the least squares did not converge."
     if found.warnings:
         return "bad", f"Not to be trusted: {printable(found.warnings[0], 1000)}"
+    if np.isnan(found.rms):  # nothing was read but the actuators
+        change = f"the misfit of the closures of {len(found.rows)} rows"
+        change = f"{change} {_falls(found, 'closure_rms')}"
+        if found.closure_rms > _GAIN * found.closure_rms_before:
+            return "doubtful", f"Little gained: {change}."
+        return "good", f"Calibrated: {change}; no pose was measured to confirm it."
     if not np.isfinite(found.holdout_rms):
         change = f"the misfit of the {len(found.rows)} fitted points {_falls(found, 'rms')}"
         if found.rms > _GAIN * found.rms_before:

@@ -124,8 +124,12 @@ def _figures(facts: Mapping[str, Any]) -> dict[str, str]:
     if held:
         pair = (found.holdout_off_before, found.holdout_off)
         groups = {f"held out, {held} points": pair} | groups
+    groups = {title: pair for title, pair in groups.items() if np.isfinite(pair[1]).any()}
     wanted: dict[str, tuple[Callable[[], Figure | None], str]] = {
-        "points": (lambda: figures.before_after(groups), "Distances before and after"),
+        "points": (
+            lambda: figures.before_after(groups) if groups else None,
+            "Distances before and after",
+        ),
         "residuals": (lambda: residuals(found), "Residuals by row and direction"),
         "machine": (lambda: figures.machine(found), "The nominal and the calibrated machine"),
         "correlation": (
