@@ -30,8 +30,11 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.compensation.compensate import compensate as compensate
     from pkmcal.compensation.correction_grid import CorrectionGrid as CorrectionGrid
     from pkmcal.compensation.correction_grid import correction_grid as correction_grid
+    from pkmcal.compensation.program import CorrectedProgram as CorrectedProgram
+    from pkmcal.compensation.program import compensate_program as compensate_program
     from pkmcal.compensation.pso import SwarmResult as SwarmResult
     from pkmcal.compensation.pso import pso as pso
+    from pkmcal.controllers.import_printer import import_printer as import_printer
     from pkmcal.core.swarm import CONSTRICTION as CONSTRICTION
     from pkmcal.core.swarm import SwarmSettings as SwarmSettings
     from pkmcal.error_model.allocation import Allocation as Allocation
@@ -46,7 +49,6 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.exceptions import CalibrationWarning as CalibrationWarning
     from pkmcal.exceptions import Error as Error
     from pkmcal.exceptions import FileError as FileError
-    from pkmcal.export.import_printer import import_printer as import_printer
     from pkmcal.geometry.geometry import Geometry as Geometry
     from pkmcal.kinematics.dexterity import Dexterity as Dexterity
     from pkmcal.kinematics.dexterity import dexterity as dexterity
@@ -82,6 +84,7 @@ _HOMES = {
     "checks.finding": ("Finding",),
     "compensation.compensate": ("Compensation", "compensate"),
     "compensation.correction_grid": ("CorrectionGrid", "correction_grid"),
+    "compensation.program": ("CorrectedProgram", "compensate_program"),
     "compensation.pso": ("SwarmResult", "pso"),
     "core.swarm": ("CONSTRICTION", "SwarmSettings"),
     "error_model.allocation": ("Allocation", "allocate_tolerance"),
@@ -94,7 +97,7 @@ _HOMES = {
         "Error",
         "FileError",
     ),
-    "export.import_printer": ("import_printer",),
+    "controllers.import_printer": ("import_printer",),
     "geometry.geometry": ("Geometry",),
     "kinematics.dexterity": ("Dexterity", "dexterity"),
     "kinematics.forward": ("Forward",),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from os import PathLike
 from typing import Literal, overload
 
@@ -11,6 +12,7 @@ from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.reading import Input
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
+from pkmcal.kinematics.independent import independent_numbers
 from pkmcal.kinematics.robot import Robot
 
 _URDF = (".urdf", ".xml")
@@ -58,7 +60,10 @@ def load(robot: str | PathLike[str]) -> Robot | SerialArm:
             return SerialArm(**arguments)
         except ArgumentError as error:  # numbers that are each right, and too large together
             raise FileError(f"{source.place}: {error}") from None
-    return Robot(robot_file.parse(source, file))
+    machine = Robot(robot_file.parse(source, file))
+    if machine.model.chains is None or machine.model.free:
+        return machine
+    return Robot(replace(machine.model, free=independent_numbers(machine)))
 
 
 def urdf_chain(

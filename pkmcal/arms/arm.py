@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from os import PathLike
 from typing import Any
@@ -12,17 +12,19 @@ from numpy.typing import ArrayLike
 
 from pkmcal import screw
 from pkmcal.arms import arm_file
-from pkmcal.arms.chain import Chain
 from pkmcal.arms.denavit_hartenberg import Convention, DHTable, screws_of, table_of
 from pkmcal.arms.inputs import motion
+from pkmcal.arms.serial_chain import SerialChain
 from pkmcal.arrays import FloatArray
+from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.reading import Input
+from pkmcal.result import Result
 
 _SAME = 1e-9  # mm, and mm per rad: by so much the arm of a source may differ
 
 
-class SerialArm(Chain):
+class SerialArm(SerialChain, Result):
     """A serial arm: immutable; `replace` gives one with other joint errors.
 
     The product of exponentials T = E₁ e^[θ₁S₁] … Eₙ e^[θₙSₙ] T₀ (eq. 5, with errors eq. 19 of the
@@ -141,8 +143,14 @@ class SerialArm(Chain):
     def __reduce__(self) -> tuple[object, ...]:
         return partial(SerialArm, **self.arguments), ()
 
-    def __repr__(self) -> str:
-        return f"<SerialArm {self.name}: {' '.join(self.kinds)}>"
+    def _parts(self) -> Iterator[str | Table]:
+        yield f"{self.name}: {' '.join(self.kinds)}"
+        heads = ["axis x", "y", "z", "point x [mm]", "y [mm]", "z [mm]"]
+        rows = [
+            [f"joint{i}", *(fixed(float(value), 3) for value in (*axis, *point))]
+            for i, (axis, point) in enumerate(zip(self.axes, self.points, strict=True), 1)
+        ]
+        yield Table(["joint", *heads], rows, left=1)
 
     # errors -------------------------------------------------------------------------------------
 

@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 from os import PathLike
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pkmcal import arguments
 from pkmcal.arguments import did_you_mean
+from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.exceptions import FileError
 from pkmcal.files import reading, units
 from pkmcal.files.column_names import BESIDE, is_known
@@ -35,7 +35,7 @@ _LOOSE = re.compile(
     re.IGNORECASE,
 )
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
-_UNSEEN = ("", "-", "--", "---", "n/a", "na", "nan", "null", "none", "#n/a", "?")
+_UNSEEN = ("-", "--", "---", "n/a", "na", "nan", "null", "none", "#n/a", "?")
 _SHOWN = 8  # names of columns in a message
 _NUMBERED = re.compile(r"(?P<name>.*)\[(?P<number>[0-9]+)\]\s*")
 
@@ -256,9 +256,10 @@ class Table:
         name: str,
         *quantities: str,
         blank: bool = False,
+        unseen: bool = False,
         like: str | None = None,
         expected: str | None = None,
-    ) -> tuple[NDArray[np.float64], str]:
+    ) -> tuple[FloatArray, str]:
         """A column of finite numbers in mm or rad.
 
         Parameters
@@ -270,6 +271,8 @@ class Table:
             "count" for steps and revolutions, "1" for a number without unit.
         blank : bool
             Whether an empty cell is NaN instead of an error.
+        unseen : bool
+            Whether ``---``, ``n/a`` and the like are, too.
         like : str, optional
             The column whose unit counts where this one has none.
         expected : str, optional
@@ -289,10 +292,11 @@ class Table:
         quantity, (times, over) = self._conversion(column, quantities, expected)
         values = np.empty(len(self))
         for row, cell in enumerate(column.cells):
-            unseen = blank and cell.lower() in _UNSEEN
-            values[row] = math.nan if unseen else self._number(name, row, cell)
-            if unseen and cell:
+            if unseen and cell.lower() in _UNSEEN:
+                values[row] = math.nan
                 self._note(f"cells with {cell!r} taken as not measured")
+                continue
+            values[row] = math.nan if blank and not cell else self._number(name, row, cell)
         with np.errstate(over="ignore"):
             converted = values * times / over
         if (row := int(np.argmax(np.isinf(converted)))) or np.isinf(converted[0]):
@@ -362,7 +366,7 @@ class Table:
                 raise self.cell_error(name, row, "found an empty cell")
         return column.cells
 
-    def integers(self, name: str) -> NDArray[np.int64]:
+    def integers(self, name: str) -> Int64Array:
         """A column of whole numbers, without unit."""
         cells = self.texts(name)
         for row, cell in enumerate(cells):

@@ -11,13 +11,14 @@ from os import PathLike
 from pathlib import Path
 
 from pkmcal import arguments
-from pkmcal.exceptions import FileError
+from pkmcal.exceptions import FileError, MissingFileError
 
 MB = 1_000_000
 MOST_TABLE = 500 * MB  # bytes of a CSV file
 MOST_WORKBOOK = 50 * MB  # bytes of an Excel workbook, packed and unpacked
 MOST_ROBOT = 1 * MB  # bytes of a TOML file
 MOST_URDF = 10 * MB
+MOST_TEXT = 100 * MB  # G-code, and configurations of controllers
 MOST_CELLS = 20_000_000  # of a table
 MOST_COLUMNS = 1_000
 LONGEST_NAME = 200  # characters of a name, a heading or a key
@@ -55,6 +56,8 @@ class Input(PathLike[str]):
         ------
         ValueError
             More than `most` bytes.
+        FileNotFoundError
+            No such file; which is an `Error` of the package, too.
         OSError
             The file cannot be read.
         """
@@ -77,6 +80,8 @@ def content(path: str | PathLike[str], most: int) -> bytes:
     ------
     ValueError
         It has more.
+    FileNotFoundError
+        No such file.
     OSError
         It cannot be read.
     """
@@ -86,6 +91,11 @@ def content(path: str | PathLike[str], most: int) -> bytes:
 
 def _read(path: Path, most: int) -> bytes:
     """All of a file; of one without end no more than the limit."""
+    if not path.exists():
+        near = (each.name for each in path.parent.glob(f"*{path.suffix}"))
+        raise MissingFileError(
+            f"{path}: no such file{arguments.did_you_mean(path.name, near, listed=0)}"
+        )
     found = bytearray()
     with open(path, "rb", buffering=0) as file:
         expected = os.fstat(file.fileno()).st_size

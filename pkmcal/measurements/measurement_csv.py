@@ -12,11 +12,16 @@ columns                               meaning
 ``sigma [mm]``                        standard deviation of the row, of every component
 ``sigma.x [mm]``, ``sigma.alpha``…    … or of each component
 ``cov.x.y [mm*mm]`` …                 … or their covariances, all on and above the diagonal
+``actuator_sigma [mm]``               standard deviation of what every actuator read
+``actuator_sigma.q1 [mm]`` …          … or of each of them
 ``group``                             a whole number, the same for repeats of one pose
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
 ====================================  =============================================================
+
+An empty cell of what was measured says that it was not read there; without any measured column the
+actuators are all that is known.
 
 A pose may also be stated by ``qw qx qy qz``, by a matrix ``r11`` … ``r33``, by ``Rx Ry Rz``, ``A B
 C`` or ``W P R`` where the order of the angles is stated. ``group`` may hold names of poses, and a
@@ -161,8 +166,10 @@ def read_measurements(
     compare(table, actuator_units, robot)
     kind = _kind(table, several)
     fields: dict[str, Any] = {"sigma": _read_sigma(table, kind)}
+    fields["actuator_sigma"] = _read_actuator_sigma(table, actuator_units)
     if "group" in table.columns:
         fields["group"] = table.integers("group")
+    values: FloatArray | None
     if several:
         actuators, values, fields = read_several(table, several, actuators, fields)
     else:
@@ -258,7 +265,8 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     components = _AXES + _ANGLES
     names = {f"q{i + 1}" for i in range(len(table.columns))}
     names |= {name for name in table.columns if ACTUATOR.fullmatch(name)}
-    names |= {*components, "distance", "sigma", "group", "target", "probe"}
+    names |= {*components, "distance", "sigma", "group", "target", "probe", "actuator_sigma"}
+    names |= {f"actuator_sigma.{name}" for name in names if ACTUATOR.fullmatch(name)}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
     names |= {f"sigma.{name}" for name in components}
@@ -279,9 +287,7 @@ def _kind(table: Table, several: tuple[str, ...]) -> Kind:
     if len(there) > 1:
         raise table.header_error(f"more than one thing measured: {' and '.join(there)}")
     if not there:
-        raise table.header_error(
-            "nothing measured: expected columns x, y, z, or z alone, or distance, or A.x, A.y, A.z"
-        )
+        return "closure"
     if "distance" in names:
         return "distance"
     if several:
@@ -297,13 +303,15 @@ def _read_values(
     rotation: str | None,
     actuators: FloatArray,
     robot: Actuated | None,
-) -> FloatArray:
-    """What was measured, (N, k) or (N,)."""
+) -> FloatArray | None:
+    """What was measured, (N, k) or (N,); None without columns of it."""
     if kind == "pose" and names_in(table) not in ((), _ANGLES):
         places = [_read(table, axis, "mm")[0] for axis in _AXES]
         nominal = _nominal(robot, actuators)
         return np.column_stack([*places, orientation_columns.read(table, rotation, nominal)])
-    columns = [_read(table, *component)[0] for component in COMPONENTS[kind]]
+    columns = [_read(table, *component, blank=True)[0] for component in COMPONENTS[kind]]
+    if not columns:
+        return None
     return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
 
 
@@ -355,6 +363,27 @@ def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
         if not (column > 0).all():
             row = int(np.argmin(column > 0))
             raise table.cell_error(name, row, f"must be positive, found {column[row]:g}")
+    return np.stack(columns, axis=1)
+
+
+def _read_actuator_sigma(table: Table, units: tuple[str, ...]) -> FloatArray | None:
+    """Deviations (rows, n) of what the actuators read."""
+    each = [f"actuator_sigma.q{i + 1}" for i in range(len(units))]
+    given = [name for name in table.columns if name.startswith("actuator_sigma")]
+    if not given:
+        return None
+    if given == ["actuator_sigma"]:
+        if len(set(units)) > 1:
+            raise table.header_error(
+                "column 'actuator_sigma' for lengths and angles: expected"
+                f" {each[0]!r} to {each[-1]!r}"
+            )
+        columns = [table.numbers("actuator_sigma", units[0])[0]] * len(units)
+    else:
+        table.require(each)
+        if len(given) > len(each):
+            raise table.header_error("column 'actuator_sigma' does not go with those of actuators")
+        columns = [table.numbers(name, unit)[0] for name, unit in zip(each, units, strict=True)]
     return np.stack(columns, axis=1)
 
 

@@ -156,11 +156,6 @@ def test_mistakes_are_named(
         pk.SerialArm.from_urdf(source, **arguments)
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match="no such file"):
-        pk.SerialArm.from_urdf(tmp_path / "arm.urdf")
-
-
 def test_errors_do_not_go_into_another_arms_file(source: Path, tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"source: .* holds another arm"):
         pk.load("3r").save_urdf(tmp_path / "new.urdf", source, tip="tool0")
