@@ -35,7 +35,7 @@ _LOOSE = re.compile(
     re.IGNORECASE,
 )
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
-_UNSEEN = ("", "-", "--", "---", "n/a", "na", "nan", "null", "none", "#n/a", "?")
+_UNSEEN = ("-", "--", "---", "n/a", "na", "nan", "null", "none", "#n/a", "?")
 _SHOWN = 8  # names of columns in a message
 _NUMBERED = re.compile(r"(?P<name>.*)\[(?P<number>[0-9]+)\]\s*")
 
@@ -256,6 +256,7 @@ class Table:
         name: str,
         *quantities: str,
         blank: bool = False,
+        unseen: bool = False,
         like: str | None = None,
         expected: str | None = None,
     ) -> tuple[FloatArray, str]:
@@ -270,6 +271,8 @@ class Table:
             "count" for steps and revolutions, "1" for a number without unit.
         blank : bool
             Whether an empty cell is NaN instead of an error.
+        unseen : bool
+            Whether ``---``, ``n/a`` and the like are, too.
         like : str, optional
             The column whose unit counts where this one has none.
         expected : str, optional
@@ -289,10 +292,11 @@ class Table:
         quantity, (times, over) = self._conversion(column, quantities, expected)
         values = np.empty(len(self))
         for row, cell in enumerate(column.cells):
-            unseen = blank and cell.lower() in _UNSEEN
-            values[row] = math.nan if unseen else self._number(name, row, cell)
-            if unseen and cell:
+            if unseen and cell.lower() in _UNSEEN:
+                values[row] = math.nan
                 self._note(f"cells with {cell!r} taken as not measured")
+                continue
+            values[row] = math.nan if blank and not cell else self._number(name, row, cell)
         with np.errstate(over="ignore"):
             converted = values * times / over
         if (row := int(np.argmax(np.isinf(converted)))) or np.isinf(converted[0]):

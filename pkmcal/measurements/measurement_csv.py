@@ -58,11 +58,11 @@ from pkmcal.measurements.join import join as joined
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.orientation_columns import checked, names_in
 from pkmcal.measurements.probe import (
+    agreement,
     apart_from,
     is_of_a_flat,
     is_of_trigger,
     probed,
-    warn_of_circular,
 )
 from pkmcal.measurements.table_layout import (
     Layout,
@@ -182,13 +182,14 @@ def read_measurements(
     except ValueError as error:
         raise FileError(f"{table.path}: {error}") from None
     if kind == "height" and isinstance(robot, Robot):
-        warn_of_circular(robot, measured, str(table.path))
+        if said := agreement(robot, measured, str(table.path)):
+            table.notes.append(said)
         if is_of_a_flat(robot, measured):
             table.notes.append(
                 "z taken as the measured height of the nozzle, up; what a firmware reported when"
                 " its probe triggered has the opposite sign and is called probe"
             )
-            measured = replace(measured, notes=_notes(table))
+        measured = replace(measured, notes=_notes(table))
     return measured
 
 

@@ -7,7 +7,6 @@ found by the machine: turned by its frame and its tool, no wrong convention fits
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -203,8 +202,3 @@ def misfit(turns: Rotation, nominal: FloatArray) -> float:
 
 def _deg(angle: float) -> str:
     return f"{np.degrees(angle):.2g} deg"
-
-
-def spelled(text: str) -> str:
-    """The word of --rotation without blanks and hyphens."""
-    return re.sub(r"[\s\-]+", "", text)

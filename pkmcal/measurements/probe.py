@@ -22,6 +22,7 @@ from pkmcal.measurements.measurements import Measurements
 _SAME = 0.05  # mm: of the z that the robot file gives at the actuators of a trigger
 _CIRCULAR = 0.1  # of the scatter of heights that a machine's errors leave more than
 _LEVEL = 2e-3  # mm: of commanded heights that are the same
+_ROUNDING = 2e-3  # mm: no probe repeats so well
 _FLAT = 0.02  # of the machine's size within which heights are of a bed
 
 
@@ -112,15 +113,21 @@ def is_of_a_flat(robot: Robot, measured: Measurements) -> bool:
     return small and len(measured) > 2 and bool(np.ptp(nominal) < _LEVEL)
 
 
-def warn_of_circular(robot: Robot, measured: Measurements, place: str) -> None:
-    """Warn of heights of a bed that the robot file itself gives at their actuators."""
+def agreement(robot: Robot, measured: Measurements, place: str) -> str:
+    """What it means that heights of a bed are those that the robot file gives; "" where not.
+
+    To rounding they are the file's own, and that is warned of. Within what a probe repeats to
+    they may as well be those that the file was calibrated with.
+    """
     z = measured.values - (0.0 if measured.target is None else measured.targets[:, 2])
     scatter = float(np.std(z))
     if len(z) < 3 or np.ptp(z) > _FLAT * robot.length or scatter == 0.0:
-        return
+        return ""
     nominal = robot.forward(measured.actuators).pose[:, 2]
     off = nominal - z
-    if np.isfinite(off).all() and rms(off - off.mean()) < _CIRCULAR * scatter:
+    if not np.isfinite(off).all() or rms(off - off.mean()) >= _CIRCULAR * scatter:
+        return ""
+    if rms(off - off.mean()) < _ROUNDING:
         warnings.warn(
             f"{place}: the heights are those that the robot file itself gives at these actuators,"
             " and say nothing of the machine; where a firmware reported them when its probe"
@@ -128,3 +135,9 @@ def warn_of_circular(robot: Robot, measured: Measurements, place: str) -> None:
             CalibrationWarning,
             stacklevel=3,
         )
+        return ""
+    return (
+        "the heights are those that the robot file gives at these actuators, within"
+        f" {rms(off - off.mean()):.2g} mm; unless it was calibrated with them, they are a"
+        " firmware's own, and the column is called probe"
+    )

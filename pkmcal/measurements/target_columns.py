@@ -36,7 +36,7 @@ def read_several(
         names = [f"{target}.{axis}" for axis in _AXES]
         table.require(names)
         for axis, name in enumerate(names):
-            values[:, t, axis] = table.numbers(name, "mm", blank=True)[0]
+            values[:, t, axis] = table.numbers(name, "mm", blank=True, unseen=True)[0]
         part = np.isnan(values[:, t]).any(axis=1) & ~np.isnan(values[:, t]).all(axis=1)
         if part.any():
             row = int(np.argmax(part))

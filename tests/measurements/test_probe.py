@@ -114,3 +114,11 @@ def test_a_probe_without_its_machine_is_refused(tmp_path: Path) -> None:
         pk.probed(FIRMWARE, [[0, 0, 0], [1000, 0, 0]])
     with pytest.raises(pk.ArgumentError, match="offset must"):
         pk.probed(FIRMWARE, [[0, 0, 0]], offset=[1, 2])
+
+
+def test_heights_that_a_file_was_calibrated_with_are_not_warned_of(tmp_path: Path) -> None:
+    """They agree with it as well as the probe repeats; carriages of a firmware, to its steps."""
+    measured = pk.read_measurements(EXAMPLE.parent / "probe.csv", FIRMWARE)
+    calibrated = pk.identify(FIRMWARE, measured).robot
+    again = pk.read_measurements(EXAMPLE.parent / "probe.csv", calibrated)  # no warning
+    assert "unless it was calibrated with them" in again.notes[0] and not measured.notes
