@@ -57,28 +57,32 @@ SHARED void chain_guess(const pkm_chains *machine, const chain_numbers *numbers,
 /* One block of forward kinematics: Newton from the guess, then, for what that does not solve, the
  * same in parts of the way there. */
 SHARED void chain_solve(const pkm_chains *machine, const chain_numbers *numbers,
-                        const chain_state *guess, const real *from, const real *to, mask usable,
-                        chain_state *at, mask *status, real *iterations, real *residual)
+                        const chain_state *guess, const chain_prediction *start, const real *from,
+                        const real *to, mask usable, chain_state *at, mask *status, real *iterations,
+                        real *residual)
 {
     mask known = fill_mask(0), solved;
     *at = *guess;
-    *iterations = fill(0.0);
-    solved = chain_iterate(machine, numbers, from, to, MAX_ITERATIONS / 2, usable, at, &known,
-                           iterations);
+    *iterations = fill(1.0);
+    chain_begin(machine, start, from, to, usable, at);
+    solved = chain_iterate(machine, numbers, to, MAX_ITERATIONS / 2, usable, at, &known, iterations);
     const mask again = usable & ~solved;
     if (any(again)) {
         chain_state path = *guess;
-        real start[PKM_MAX_LIMBS], end[PKM_MAX_LIMBS];
+        chain_prediction next = *start;
+        real begin[PKM_MAX_LIMBS], end[PKM_MAX_LIMBS];
         mask there = fill_mask(0), sure = fill_mask(0);
-        memcpy(start, from, sizeof start);
+        memcpy(begin, from, sizeof begin);
         for (int part = 1; part <= PATH_PARTS; part++) {
             const double share = (double)part / PATH_PARTS;
             for (int a = 0; a < machine->actuators; a++)
                 end[a] = part == PATH_PARTS ? to[a] : from[a] + share * (to[a] - from[a]);
-            there = chain_iterate(machine, numbers, start, end,
+            if (part > 1) chain_predict(machine, numbers, &path, begin, &next);
+            chain_begin(machine, &next, begin, end, again, &path);
+            there = chain_iterate(machine, numbers, end,
                                   part == PATH_PARTS ? MAX_ITERATIONS / 2 : PATH_STEPS, again, &path,
                                   &sure, iterations);
-            memcpy(start, end, sizeof start);
+            memcpy(begin, end, sizeof begin);
         }
         for (int s = 0; s < MAX_STATE; s++) at->state[s] = select(there, path.state[s], at->state[s]);
         for (int c = 0; c < machine->passive; c++)
@@ -86,14 +90,12 @@ SHARED void chain_solve(const pkm_chains *machine, const chain_numbers *numbers,
         known = select_mask(there, sure, known);
         solved |= there;
     }
-    chain_step step;
-    chain_newton_step(machine, numbers, at, to, NULL, &step);
-    *residual = step.worst;
-    const mask flat = ~known | (step.worst <= fill(CHAIN_CLOSED * machine->size));
+    *residual = chain_worst(machine, numbers, at, to);
+    const mask flat = ~known | (*residual <= fill(CHAIN_CLOSED * machine->size));
     *status = select_mask(flat, fill_mask(PKM_SINGULAR), fill_mask(PKM_NOT_CONVERGED));
     *status = select_mask(solved, fill_mask(PKM_OK), *status);
     if (machine->over) {
-        const mask open = solved & ~(step.worst <= fill(machine->closure_tolerance));
+        const mask open = solved & ~(*residual <= fill(machine->closure_tolerance));
         *status = select_mask(open, fill_mask(PKM_NOT_CLOSED), *status);
     }
 }
@@ -106,7 +108,8 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
     if (!chains_fit(machine)) return PKM_BAD_MACHINE;
     const chain_geometry of = {machine, geometry, geometry_stride};
     chain_numbers numbers;
-    chain_state start;
+    chain_state start = {{{0}}, {{0}}};
+    chain_prediction predicted;
     real from[PKM_MAX_LIMBS];
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
@@ -117,14 +120,16 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
         chain_prepare(&of, first, row, &numbers);
         gather_row(q, machine->actuators, machine->actuators, row, lane_q);
         gather_row(guess, guess_stride, 6, row, begin);
-        if (first == 0 || geometry_stride || guess_stride)
+        if (first == 0 || geometry_stride || guess_stride) {
             chain_guess(machine, &numbers, begin, &start, from);
+            chain_predict(machine, &numbers, &start, from, &predicted);
+        }
         chain_drives(machine, &numbers, lane_q, drive);
         for (int a = 0; a < machine->actuators; a++) valid &= finite(drive[a]) & finite(lane_q[a]);
         for (int k = 0; k < 6; k++) valid &= finite(begin[k]);
         for (int k = 0; geometry_stride && k < machine->numbers; k++)
             valid &= finite(gather(geometry + k, geometry_stride, row));
-        chain_solve(machine, &numbers, &start, from, drive, valid, &at, &how, &steps, &worst);
+        chain_solve(machine, &numbers, &start, &predicted, from, drive, valid, &at, &how, &steps, &worst);
         how = select_mask(valid, how, fill_mask(PKM_INVALID));
         const mask good = how == fill_mask(PKM_OK), closest = good | (how == fill_mask(PKM_NOT_CLOSED));
         map_to_pose(machine->map, at.state, found);

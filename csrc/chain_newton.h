@@ -116,35 +116,102 @@ SHARED void chain_newton_step(const pkm_chains *machine, const chain_numbers *nu
     }
 }
 
-/* Newton from the drives `from` to `to`, at most `steps`; lanes that are not `running` stay. Returns
- * the lanes that settled. */
-INLINE mask chain_iterate(const pkm_chains *machine, const chain_numbers *numbers, const real *from,
-                          const real *to, int steps, mask running, chain_state *at, mask *known,
-                          real *iterations)
+/* The part of a step that turns nothing by more than MAX_TURN. */
+SHARED void chain_move(const pkm_chains *machine, const chain_step *step, mask usable,
+                       chain_state *at)
+{
+    const real share = 1.0 / larger(step->turn * (1.0 / MAX_TURN), fill(1.0));
+    real moved[MAX_STATE] = {0}, partial[6];
+    for (int j = 0; j < map_m(machine->map); j++) partial[j] = share * step->step[j];
+    FN(map_retract)(machine->map, at->state, partial, moved);
+    for (int s = 0; s < MAX_STATE; s++) at->state[s] = select(usable, moved[s], at->state[s]);
+    for (int c = 0; c < machine->passive; c++)
+        at->theta[c] = select(usable, at->theta[c] + share * step->turns[c], at->theta[c]);
+}
+
+/* Newton at the drives `to`, at most `steps`; lanes that are not `running` stay. Returns the lanes
+ * that settled. */
+SHARED mask chain_iterate(const pkm_chains *machine, const chain_numbers *numbers, const real *to,
+                          int steps, mask running, chain_state *at, mask *known, real *iterations)
 {
     const real closed = fill(CHAIN_CLOSED * machine->size), settled = fill(SETTLED * machine->size);
-    real ahead[PKM_MAX_LIMBS];
     mask solved = fill_mask(0);
-    for (int a = 0; a < machine->actuators; a++) ahead[a] = to[a] - from[a];
     for (int k = 0; k < steps && any(running); k++) {
         chain_step step;
-        real moved[MAX_STATE], partial[6];
-        chain_newton_step(machine, numbers, at, k ? to : from, k ? NULL : ahead, &step);
+        chain_newton_step(machine, numbers, at, to, NULL, &step);
         const mask usable = finite(step.longest) & running;
         const mask holds = machine->over ? usable : step.worst <= closed;
-        const mask done = usable & holds & step.known & (step.longest <= settled) & fill_mask(-(k > 0));
-        const real share = 1.0 / larger(step.turn * (1.0 / MAX_TURN), fill(1.0));
-        for (int j = 0; j < map_m(machine->map); j++) partial[j] = share * step.step[j];
-        FN(map_retract)(machine->map, at->state, partial, moved);
-        for (int s = 0; s < MAX_STATE; s++) at->state[s] = select(usable, moved[s], at->state[s]);
-        for (int c = 0; c < machine->passive; c++)
-            at->theta[c] = select(usable, at->theta[c] + share * step.turns[c], at->theta[c]);
+        const mask done = usable & holds & step.known & (step.longest <= settled);
+        chain_move(machine, &step, usable, at);
         *iterations = select(running, *iterations + 1.0, *iterations);
         *known = select_mask(running, step.known, *known);
         solved |= done;
         running = usable & ~done;
     }
     return solved;
+}
+
+/* How a machine goes from a state, where the drives are `from`, as these change: the step without a
+ * change, and by a unit of each. */
+typedef struct {
+    chain_step still, by[PKM_MAX_LIMBS];
+} chain_prediction;
+
+SHARED void chain_predict(const pkm_chains *machine, const chain_numbers *numbers,
+                          const chain_state *at, const real *from, chain_prediction *start)
+{
+    real ahead[PKM_MAX_LIMBS];
+    chain_newton_step(machine, numbers, at, from, NULL, &start->still);
+    for (int a = 0; a < machine->actuators; a++) {
+        chain_step *by = &start->by[a];
+        for (int b = 0; b < machine->actuators; b++) ahead[b] = fill(a == b ? 1.0 : 0.0);
+        chain_newton_step(machine, numbers, at, from, ahead, by);
+        for (int j = 0; j < map_m(machine->map); j++) by->step[j] -= start->still.step[j];
+        for (int c = 0; c < machine->passive; c++) by->turns[c] -= start->still.turns[c];
+    }
+}
+
+/* The first step to the drives `to`. */
+SHARED void chain_begin(const pkm_chains *machine, const chain_prediction *start, const real *from,
+                        const real *to, mask running, chain_state *at)
+{
+    const int m = map_m(machine->map);
+    chain_step step = start->still;
+    for (int a = 0; a < machine->actuators; a++) {
+        const real ahead = to[a] - from[a];
+        for (int j = 0; j < m; j++) step.step[j] += start->by[a].step[j] * ahead;
+        for (int c = 0; c < machine->passive; c++) step.turns[c] += start->by[a].turns[c] * ahead;
+    }
+    step.turn = step.longest = fill(0.0);
+    for (int j = 0; j < m; j++) {
+        if (map_is_angle(machine->map, j)) step.turn = larger(step.turn, absolute(step.step[j]));
+        step.longest = larger(step.longest, absolute(step.step[j]));
+    }
+    for (int i = 0; i < machine->joints; i++) {
+        const int c = machine->coordinate[i];
+        if (c < 0) continue;
+        step.longest = larger(step.longest, absolute(step.turns[c]));
+        if (!machine->prismatic[i]) step.turn = larger(step.turn, absolute(step.turns[c]));
+    }
+    chain_move(machine, &step, running & finite(step.longest), at);
+}
+
+/* What closures miss at a state. */
+SHARED real chain_worst(const pkm_chains *machine, const chain_numbers *numbers,
+                        const chain_state *at, const real *drive)
+{
+    real R[9], p[3], worst = fill(0.0);
+    FN(map_frame)(machine->map, at->state, R, p);
+    for (int l = 0; l < machine->chains; l++) {
+        const int k = machine->first[l + 1] - machine->first[l];
+        const int *which, rows = machine->ball[l] ? 3 : group_rows(machine->map, &which);
+        motion frame[PKM_MAX_CHAIN + 1];
+        real r[6], lever[3];
+        chain_walk(machine, l, numbers, at->theta, drive, frame);
+        chain_misses(machine, l, numbers, &frame[k], R, p, r, lever);
+        for (int i = 0; i < rows; i++) worst = larger(worst, absolute(r[i]));
+    }
+    return worst;
 }
 
 /* A chain alone: its joints to a frame of the platform, by Gauss and Newton. With `drive` the
