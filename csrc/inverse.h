@@ -8,13 +8,14 @@
  * that squares overflow. */
 INLINE real limb_drive_at(const pkm_machine *machine, int i, const limb_numbers *limb, const real *h)
 {
-    real qt = fill(NAN);
+    real qt;
     switch (machine->driver[i]) {
 #define CASE(NAME, name, ...)                                                                     \
     case DRIVER_##NAME:                                                                           \
         FN(name##_inverse)(limb->g, h, limb->first, limb->second, fill(machine->branch[i]), &qt); \
         break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     return qt;
@@ -74,7 +75,7 @@ int CALL(inverse)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
                   ptrdiff_t geometry_stride, const double *pose, const double *near,
                   ptrdiff_t near_stride, double *q)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     enum { BLOCKS_INVERSE = 2 }; /* side by side: the processor overlaps them */
     limb_numbers limb[PKM_MAX_LIMBS];
     for (ptrdiff_t first = 0; first < n; first += BLOCKS_INVERSE * LANES) {

@@ -32,6 +32,7 @@ INLINE void limb_rates(const pkm_machine *machine, int i, const limb_numbers *li
         FN(name##_rates)(qt, h[0], h[1], h[2], limb->first, limb->second, &qt1, &qt2);            \
         break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     *rate = qt1 * limb->per_gain;
@@ -42,7 +43,7 @@ INLINE void limb_rates(const pkm_machine *machine, int i, const limb_numbers *li
 int CALL(rates)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                 const double *motion, double *q1, double *q2)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     const int actuators = machine->actuators;
     limb_numbers limb[PKM_MAX_LIMBS];
     for (ptrdiff_t first = 0; first < n; first += LANES) {
@@ -93,6 +94,7 @@ SHARED int limb_bends(const pkm_machine *machine, int i, const limb_numbers *lim
             memcpy(d, h, sizeof d);                                                               \
         break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     bend[r] *= rough_reciprocal(sphere->rho) * weight[r];
@@ -111,6 +113,7 @@ SHARED int limb_bends(const pkm_machine *machine, int i, const limb_numbers *lim
                             fill(machine->lever[i]), &bend[r]);                                   \
             break;
             EACH_ROW(CASE)
+            NO_OTHER_CASE;
 #undef CASE
         }
         bend[r] *= weight[r];
@@ -211,7 +214,7 @@ int CALL(motion)(const pkm_machine *machine, ptrdiff_t n, const double *geometry
                  const double *pose, const double *q, const double *q1, const double *q2,
                  double *motion, double *pose_rates)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
 #define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME:                                                                              \

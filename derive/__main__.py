@@ -9,7 +9,19 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from . import calls, elementary, frames, limbs, measured, posemaps, rates, screws, tpr2tps
+from . import (
+    calls,
+    chains,
+    elementary,
+    frames,
+    limb_functions,
+    limbs,
+    measured,
+    posemaps,
+    rates,
+    screws,
+    tpr2tps,
+)
 from .emit import Function
 
 HERE = Path(__file__).parent
@@ -23,12 +35,13 @@ def headers() -> dict[str, str]:
         "names.h": _header("limbs", _names() + calls.table()),
         "row_calls.h": _header("calls", calls.prototypes()),
         "row_loops.h": _header("calls", calls.loops()),
+        "chains.h": _header("chains", _functions(chains.functions())),
         "elementary.h": _header("elementary", elementary.emit()),
         "frames.h": _header("frames", _functions(frames.functions())),
-        "limbs.h": _header("limbs", _functions(limbs.functions())),
+        "limbs.h": _header("limb_functions", _functions(limb_functions.functions()), "limbs"),
         "measured.h": _header("measured", _functions(measured.functions())),
         "posemaps.h": _header("posemaps", _functions(posemaps.functions())),
-        "rates.h": _header("rates", _functions(rates.functions())),
+        "rates.h": _header("rates", _functions(rates.functions()), "limbs"),
         "screws.h": _header("screws", screws.constants() + _functions(screws.functions())),
         "tpr2tps.h": _header("tpr2tps", _functions(tpr2tps.functions())),
     }
@@ -36,6 +49,7 @@ def headers() -> dict[str, str]:
 
 def _names() -> str:
     """What C and Python call the numbers of a limb, its drivers and rows, and the pose maps."""
+
     def enum(prefix: str, names: Iterable[str]) -> str:
         return "enum { " + ", ".join(prefix + name.upper() for name in names) + " };"
 
@@ -59,9 +73,9 @@ def _functions(functions: list[Function]) -> str:
     return "\n".join(function.emit() for function in functions)
 
 
-def _header(module: str, body: str) -> str:
+def _header(module: str, body: str, *also: str) -> str:
     """The file's first lines: where it comes from, and the hash of the derivation behind it."""
-    sources = sorted({HERE / "emit.py", HERE / "rotation.py", HERE / f"{module}.py"})
+    sources = sorted({HERE / f"{name}.py" for name in ("emit", "rotation", module, *also)})
     text = "".join(path.read_text(encoding="utf-8") for path in sources)
     digest = hashlib.sha256(text.encode()).hexdigest()[:16]
     return (

@@ -1,5 +1,5 @@
-/* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation af6972725e77e58e
+/* Generated from derive/limb_functions.py by `python -m derive`; never edited by hand.
+ * derivation a8596fa83ad0682d
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*

@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal import screw as screw
     from pkmcal import trajectory as trajectory
     from pkmcal.arms.arm import SerialArm as SerialArm
+    from pkmcal.arms.denavit_hartenberg import DHTable as DHTable
     from pkmcal.arms.inverse import ArmInverse as ArmInverse
     from pkmcal.calibration.bootstrap import Bootstrap as Bootstrap
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
@@ -33,6 +34,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.compensation.program import compensate_program as compensate_program
     from pkmcal.compensation.pso import SwarmResult as SwarmResult
     from pkmcal.compensation.pso import pso as pso
+    from pkmcal.controllers.import_printer import import_printer as import_printer
     from pkmcal.core.swarm import CONSTRICTION as CONSTRICTION
     from pkmcal.core.swarm import SwarmSettings as SwarmSettings
     from pkmcal.error_model.allocation import Allocation as Allocation
@@ -47,7 +49,6 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.exceptions import CalibrationWarning as CalibrationWarning
     from pkmcal.exceptions import Error as Error
     from pkmcal.exceptions import FileError as FileError
-    from pkmcal.export.import_printer import import_printer as import_printer
     from pkmcal.geometry.geometry import Geometry as Geometry
     from pkmcal.kinematics.dexterity import Dexterity as Dexterity
     from pkmcal.kinematics.dexterity import dexterity as dexterity
@@ -72,6 +73,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
 
 _HOMES = {
     "arms.arm": ("SerialArm",),
+    "arms.denavit_hartenberg": ("DHTable",),
     "arms.inverse": ("ArmInverse",),
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
     "calibration.identification": ("Identification",),
@@ -94,7 +96,7 @@ _HOMES = {
         "Error",
         "FileError",
     ),
-    "export.import_printer": ("import_printer",),
+    "controllers.import_printer": ("import_printer",),
     "geometry.geometry": ("Geometry",),
     "kinematics.dexterity": ("Dexterity", "dexterity"),
     "kinematics.forward": ("Forward",),

@@ -19,5 +19,9 @@ class FileError(ArgumentError):
     """What a file says makes no sense; the message names the file and, where it can, the line."""
 
 
+class MissingFileError(FileNotFoundError, FileError):
+    """There is no such file, or no folder to write it to."""
+
+
 class CalibrationWarning(UserWarning):
     """What `identify` has to say about a fit that succeeded."""

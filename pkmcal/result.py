@@ -17,7 +17,8 @@ class Result:
     """A result that says itself: ``repr`` in one line, ``str`` and ``_repr_html_`` as tables.
 
     A subclass gives its parts once, text and tables in the order they are read; the first is its
-    title, on one line. An empty text is a blank line on a terminal.
+    title, on one line. An empty text is a blank line on a terminal; breaks and indents of lines are
+    a terminal's too.
     """
 
     @abstractmethod
@@ -33,7 +34,7 @@ class Result:
 
     def _repr_html_(self) -> str:
         return "\n".join(
-            part.html() if isinstance(part, Table) else f"<p>{escape(part)}</p>"
+            part.html() if isinstance(part, Table) else f"<p>{escape(' '.join(part.split()))}</p>"
             for part in self._parts()
             if part != ""
         )

@@ -27,7 +27,7 @@ _OK, _NOT_CONVERGED, _INVALID = 0, 1, 4
 
 
 class Solvable(Protocol):
-    """What the search asks an arm for; `Chain` describes each."""
+    """What the search asks an arm for; `SerialChain` describes each."""
 
     @property
     def n_joints(self) -> int:

@@ -15,7 +15,7 @@ from os import PathLike
 
 import numpy as np
 
-from pkmcal import arguments, screw
+from pkmcal import screw
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import FileError
 from pkmcal.files import reading
@@ -77,11 +77,10 @@ def read(path: str | PathLike[str]) -> File:
 
 def tree(path: str | PathLike[str]) -> ElementTree.Element:
     """The root element of the file, with its comments."""
-    if not arguments.path("path", path).exists():
-        raise FileNotFoundError(f"{path}: no such file")
+    content = reading.content(path, reading.MOST_URDF)
     parser = ElementTree.XMLParser(target=_Builder(f"{path}"))
     try:
-        parser.feed(reading.content(path, reading.MOST_URDF))
+        parser.feed(content)
         root: ElementTree.Element = parser.close()
     except FileError:
         raise

@@ -15,7 +15,7 @@ from pkmcal.core import screws
 
 _ROUNDS = 60  # of turning and shifting in turn
 _ALIKE = 1e-12  # share of squares by which turnings differ that are not equally good
-_TILT = 1e-3  # rad; with tilts below it the poses do not tell where a target is
+_TILT = 1e-3  # rad; with tilts below it the poses do not determine where a target is
 _FLAT = 0.05  # share of the largest spread of points below which they lie in a plane, or a line
 
 
@@ -105,7 +105,7 @@ def of_heights(values: FloatArray, point: FloatArray) -> FloatArray:
     up /= np.linalg.norm(up)
     frame = np.zeros(6)
     frame[2] = (values - point @ up).mean()
-    frame[3:5] = np.arctan2(up[1], up[2]), -np.arcsin(np.clip(up[0], -1.0, 1.0))
+    frame[3:5] = np.arctan2(up[1], up[2]), np.arctan2(-up[0], np.hypot(up[1], up[2]))
     return frame
 
 

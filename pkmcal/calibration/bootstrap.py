@@ -63,14 +63,19 @@ class Bootstrap(Result):
     linear: FloatArray
 
     @property
-    def failed(self) -> int:
+    def n_failed(self) -> int:
         """How many replicates did not converge."""
         return int(np.isnan(self.values).any(axis=1).sum())
 
+    @property
+    def failed(self) -> int:
+        """The former name of `n_failed`."""
+        return self.n_failed
+
     def failures(self) -> str:
         """Say how many replicates failed; empty where none did."""
-        count = f"{self.failed} of {len(self.values)}"
-        return f"{count} replicates did not converge" if self.failed else ""
+        count = f"{self.n_failed} of {len(self.values)}"
+        return f"{count} replicates did not converge" if self.n_failed else ""
 
     def _parts(self) -> Iterator[str | Table]:
         rows = []
@@ -85,7 +90,7 @@ class Bootstrap(Result):
                 name if shown == "mm" else f"{name} [{shown}]",
                 *(display.fixed(number, places) for number in (sigma, linear, bias, low, high)),
             ])  # fmt: skip
-        failed = f", {self.failed} did not converge" if self.failed else ""
+        failed = f", {self.n_failed} did not converge" if self.n_failed else ""
         heads = ["parameter", "stderr", "linear", "bias", "2.5 %", "97.5 %"]
         yield f"{len(self.values)} bootstrap replicates{failed}"
         yield Table(heads, rows, left=1)
@@ -138,7 +143,15 @@ def bootstrap(
     """
     instance("found", found, Identification)
     whole("replicates", replicates, 2)
-    if not (found.fit.estimate.freedom > 0).all() or not np.isfinite(found.fit.covariance).all():
+    if len(found.redundancy) > len(found.noise):
+        raise ArgumentError(
+            "found: its rows have poses of their own, from which no residuals are drawn yet;"
+            " stderr and covariance have the poses' part in them"
+        )
+    if (
+        not (found.fit.estimate.freedom > _LEFT).all()
+        or not np.isfinite(found.fit.covariance).all()
+    ):
         raise ArgumentError("found: no degrees of freedom are left, so no residuals to draw from")
     seeds = np.random.SeedSequence(checked_seed(seed)).spawn(replicates)
     parts = [seeds[k : k + _TOGETHER] for k in range(0, replicates, _TOGETHER)]
@@ -217,7 +230,7 @@ class Replicate:
             corrected(kind, seen.values, residual)
             for kind, seen, residual in zip(kinds, at.predicted, drawn, strict=True)
         ]
-        return self._solved(equations.with_values(values, centre), replace(at, residuals=drawn))
+        return self._solved(equations.with_readings(values, centre), replace(at, residuals=drawn))
 
     def _solved(self, equations: Equations, at: Evaluation) -> FloatArray:
         state = self._estimate.state

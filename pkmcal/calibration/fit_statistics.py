@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
+from pkmcal.calibration.equations import Evaluation
+from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.identifiability import as_sum, observability, sparse_basis
 from pkmcal.calibration.outliers import outliers
 from pkmcal.measurements.lack_of_fit import joined
@@ -44,6 +45,11 @@ class Misfit:
 
     rms: float
     rms_before: float
+    closure_rms: float
+    closure_rms_before: float
+    actuator_noise: float
+    redundancy: tuple[float, ...]
+    idle: int
     chi2_per_dof: float
     dof: float
     noise: tuple[float, ...]
@@ -73,7 +79,7 @@ class SearchRecord:
 def reported_covariance(estimator: Estimator, estimate: Estimate) -> FloatArray:
     """Covariance (n, n) of the reported parameters, mm and rad; inf where noise is not known."""
     rates = _reported_by_scaled(estimator, estimate)
-    if (estimator.unstated & (estimate.freedom < LEAST_FREEDOM)).any():
+    if (estimator.unstated & (estimate.freedom < estimator.least_freedom)).any():
         return np.full((len(rates), len(rates)), np.inf)
     covariance: FloatArray = rates @ estimate.covariance @ rates.T
     return covariance
@@ -124,8 +130,11 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
     )
 
 
-def misfit(estimator: Estimator, estimate: Estimate) -> Misfit:
-    """Residuals before and after, χ² per degree of freedom, noise and outliers."""
+def misfit(estimator: Estimator, estimate: Estimate, start: Evaluation, end: Evaluation) -> Misfit:
+    """Residuals before and after, χ² per degree of freedom, noise and outliers.
+
+    `start` and `end` are the equations with poses that follow from the actuators.
+    """
     equations, state = estimator.equations, estimate.state
     chosen, fitted = equations.parameters, state.fitted.identifiable
     moved = (estimate.evaluation.theta - chosen.start) / chosen.scale
@@ -140,15 +149,22 @@ def misfit(estimator: Estimator, estimate: Estimate) -> Misfit:
         estimate.weights,
         estimator.prior @ fitted,
     )
+    sets = len(equations.sets)
+    unknown_noise = np.where(estimator.unstated, state.noise, np.nan)
     return Misfit(
-        rms=equations.rms(estimate.evaluation),
-        rms_before=equations.rms(estimator.start),
+        rms=equations.rms(end),
+        rms_before=equations.rms(start),
+        closure_rms=equations.closure_rms(estimate.evaluation),
+        closure_rms_before=equations.closure_rms(estimator.start),
+        actuator_noise=float(np.append(unknown_noise, np.nan)[sets]),
+        redundancy=tuple(estimate.freedom.tolist()),
+        idle=equations.idle,
         chi2_per_dof=float("nan") if no_sigma else float((squares + prior @ prior) / dof),
         dof=dof,
-        noise=tuple(np.where(estimator.unstated, state.noise, np.nan).tolist()),
-        residuals=estimate.evaluation.residuals,
+        noise=tuple(unknown_noise[:sets].tolist()),
+        residuals=end.residuals,
         rows=equations.rows,
-        outliers=tuple(equations.rows[odd].tolist()),
+        outliers=tuple(equations.rows[np.isin(equations.unit_of_row, odd)].tolist()),
     )
 
 

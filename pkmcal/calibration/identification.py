@@ -144,14 +144,20 @@ class Identification(Parts, Result):
 
     def _parts(self) -> Iterator[str | Table]:
         count = len(self.rows)
+        what = "row" if np.isnan(self.rms) else "measured point"
         yield (
-            f"{self.robot.name}: {len(self.free)} parameters from {count} measured"
-            f" point{'s' if count > 1 else ''}"
+            f"{self.robot.name}: {len(self.free)} parameters from {count} {what}"
+            f"{'s' if count > 1 else ''}"
         )
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)
         yield from summary.limits(
-            self.identifiability, len(self.free), self.correlations, self.outliers, self.at_bounds
+            self.identifiability,
+            len(self.free),
+            self.correlations,
+            self.outliers,
+            self.at_bounds,
+            self.idle,
         )
         if not self.converged:
             yield "not converged"

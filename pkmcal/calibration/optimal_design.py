@@ -31,7 +31,7 @@ _NOTHING = 1e-12  # share of the information of all candidates that is none
 
 
 class Design:
-    """Candidates, what each would tell, and what for.
+    """Candidates with their information, and the points to predict with it.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Design:
     prior : ndarray (p, n)
         Rows that are there whatever is chosen.
     aims : ndarray (T, 3, n)
-        Derivative of the points that are to be known, mm.
+        Derivative of the points to predict, mm.
     criterion : str
         One of `CRITERIA`.
     worst : float

@@ -20,7 +20,7 @@ def outliers(
     weights: FloatArray,
     prior: FloatArray,
 ) -> IntArray:
-    """Rows further off than noise explains, judged by the fit without them.
+    """Rows further off than noise explains, by their residuals in a fit without them.
 
     The row that the rest contradicts most is set aside, the fit is corrected to first order, and
     so on until what is left agrees; then rows that fit the corrected fit after all return.

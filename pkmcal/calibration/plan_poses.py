@@ -226,9 +226,9 @@ def _commanded(name: str, robot: Calibratable, places: ArrayLike) -> tuple[Float
 
 def _aims(robot: Calibratable, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
     there, q = _commanded("targets", robot, targets)
-    lost = np.flatnonzero(~np.isfinite(there).all(axis=1))
-    if len(lost):
-        raise ArgumentError(f"targets: {robot.name} has no such pose (row {lost[0]})")
+    unreached = np.flatnonzero(~np.isfinite(there).all(axis=1))
+    if len(unreached):
+        raise ArgumentError(f"targets: {robot.name} has no such pose (row {unreached[0]})")
     return there, q
 
 
@@ -259,7 +259,7 @@ def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:
     for _ in range(_MACHINES):
         erroneous = values.copy()
         erroneous[chosen.places] += _TIMES * sigma * random.standard_normal(k)
-        machine = chosen.robot._with_values(erroneous)
+        machine = chosen.robot.with_values(erroneous)
         safe[safe] = machine.forward(q[safe], guess=poses[safe]).ok
     if not safe.any():
         raise ArgumentError(
@@ -295,7 +295,7 @@ def _equations(
         index = np.tile(np.arange(count), len(q))
         measured = replace(measured, target=several, target_index=index)
     data = FitData(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
-    return Equations([data], parameters(robot, [data], free, prior, None))
+    return Equations([data], parameters(robot, [data], free, prior, None)).commanded()
 
 
 def _design(

@@ -44,14 +44,22 @@ def likely_unit_errors(
     size = parameters.robot.length
     found = []
     for i, data in enumerate(datasets):
-        present = _misfit(evaluation.residuals[i], data.measured.units, size)
+        read = np.isfinite(data.measured.values.reshape(evaluation.residuals[i].shape))
+        if not read.any():
+            continue
+        residual = np.where(read, evaluation.residuals[i], 0.0)
+        present = _misfit(residual, data.measured.units, size)
         if present <= _GROSS * size:
             continue
         trials = {
-            words: _misfit(_alone(replace(data, measured=other), parameters), other.units, size)
+            words: _misfit(
+                np.where(read, _alone(replace(data, measured=other), parameters), 0.0),
+                other.units,
+                size,
+            )
             for words, other in _readings(data.measured, parameters.robot.actuator_units)
         }
-        # exchanges that a symmetric machine cannot tell apart misfit alike
+        # exchanges that are equivalent on a symmetric machine misfit alike
         least = min(trials.values())
         words = next(text for text in trials if trials[text] <= least * (1.0 + _ALIKE))
         if trials[words] < MISFIT_RATIO * present:
@@ -64,7 +72,7 @@ def likely_unit_errors(
 
 
 def _alone(data: FitData, parameters: Parameters) -> FloatArray:
-    (residual,) = Equations([data], parameters).start().residuals
+    (residual,) = Equations([data], parameters).commanded().start().residuals
     return residual
 
 
@@ -166,7 +174,7 @@ def implausible_changes(start: Evaluation, end: Evaluation, parameters: Paramete
 def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
     """Find points of the platform that were sought near it and found far away.
 
-    Poses that hardly turn do not tell where a target is; noise may then carry it anywhere.
+    Poses that hardly turn do not determine where a target is; noise may then carry it anywhere.
     """
     reach = float(np.linalg.norm(end.pose[:, :3], axis=1).max())
     geometry = parameters.robot.geometry

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,12 +14,19 @@ from pkmcal.calibration.holdout import HeldOut
 from pkmcal.display import Table, first_rows
 from pkmcal.measurements.lack_of_fit import SIGNIFICANT
 
-_WIDTH = 100  # columns of the terminal
+_WIDTH = 100  # letters on a line of the terminal
+_SHORT = 12  # rows of a table that is not set side by side
+_BETWEEN = 3  # letters between tables side by side
 
 
 def misfit_table(misfit: Misfit, holdout: HeldOut) -> Table:
     """Misfit before and after, of fitted points and of those held out."""
     rows = [["fitted", _short(misfit.rms_before), _short(misfit.rms), ""]]
+    if np.isnan(misfit.rms):  # nothing but the actuators was read
+        rows = []
+    if np.isfinite(misfit.closure_rms):
+        pair = _short(misfit.closure_rms_before), _short(misfit.closure_rms)
+        rows.append(["closures", *pair, "of the actuators"])
     if np.isfinite(holdout.rms):
         pair = _short(holdout.rms_before), _short(holdout.rms)
         rows.append(["held out", *pair, f"expected {_short(holdout.expected)}"])
@@ -34,6 +42,8 @@ def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -
         facts.append(f"chi²/dof {shown} (1 ± {np.sqrt(2 / misfit.dof):.2f} expected)")
     misses = repeats.lack_of_fit_chance < SIGNIFICANT
     estimated = [_short(noise) for noise in misfit.noise if np.isfinite(noise)]
+    if np.isfinite(misfit.actuator_noise):
+        estimated.append(f"of the actuators {_short(misfit.actuator_noise)}")
     if estimated:
         included = ", lack of fit included" if misses else ""
         facts.append(f"noise {', '.join(estimated)} mm, estimated from the residuals{included}")
@@ -54,6 +64,7 @@ def limits(
     correlations: Sequence[tuple[str, str, float]],
     outliers: Sequence[int],
     at_bounds: Sequence[str],
+    idle: int,
 ) -> Iterator[str]:
     """Where the result has limits: rank, correlations, outliers, bounds."""
     if identifiability.rank < parameters:
@@ -66,6 +77,11 @@ def limits(
         shown = ", ".join(f"{a} / {b} {value:+.3f}" for a, b, value in correlations[:3])
         more = f" and {len(correlations) - 3} more" if len(correlations) > 3 else ""
         yield filled("correlated: ", shown + more)
+    if idle:
+        yield (
+            f"{idle} {'poses say' if idle > 1 else 'pose says'} nothing: what was read there"
+            " determines the pose at most"
+        )
     if outliers:
         yield filled("outliers: ", f"rows {first_rows(outliers, 10)}")
     if at_bounds:
@@ -74,8 +90,6 @@ def limits(
 
 def parameter_rows(table: ParameterTable) -> Table:
     """The parameters with their uncertainty, in as many columns as one screen takes."""
-    columns = 1 if len(table.free) <= 12 else 2 if len(table.free) <= 24 else 3
-    heads = ["parameter", "value", "change"] if columns < 3 else ["parameter", "value"]
     rows = []
     for name, unit, value, sigma, start in zip(
         table.free, table.units, table.values, table.stderr, table.start, strict=True
@@ -88,8 +102,11 @@ def parameter_rows(table: ParameterTable) -> Table:
         text = display.with_uncertainty(number, deviation)
         if not np.isfinite(deviation):
             text = f"{display.fixed(number, places)} ± {deviation:g}"
-        rows.append([label, text, display.fixed(change, places)][: len(heads)])
-    return Table(heads, rows, left=1, columns=columns)
+        rows.append([label, text, display.fixed(change, places)])
+    one = Table(["parameter", "value", "change"], rows, left=1)
+    width = max(map(len, str(one).splitlines())) + _BETWEEN
+    columns = min((_WIDTH + _BETWEEN) // width, -(-len(rows) // _SHORT))
+    return replace(one, columns=max(columns, 1))
 
 
 def filled(lead: str, text: str) -> str:

@@ -6,10 +6,9 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pkmcal import screw
-from pkmcal.arrays import FloatArray, wrapped
+from pkmcal.arrays import BoolArray, FloatArray, wrapped
 from pkmcal.core.library import DRIVERS, SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
@@ -59,7 +58,7 @@ class Joints:
                 found.add(way)
         return frozenset(found)
 
-    def circle(self, room: float) -> tuple[FloatArray, float, NDArray[np.bool_]] | None:
+    def circle(self, room: float) -> tuple[FloatArray, float, BoolArray] | None:
         """The circle that most joints lie on: centre (2,), radius, and which lie on it.
 
         About the z axis where more than half lie on one; otherwise through any three joints, if
@@ -69,7 +68,7 @@ class Joints:
         count = len(self.points)
         if 2 * on.sum() > count and radius > room:
             return np.zeros(2), radius, on
-        best: tuple[FloatArray, float, NDArray[np.bool_]] | None = None
+        best: tuple[FloatArray, float, BoolArray] | None = None
         for three in combinations(range(count), 3) if count >= 5 else ():
             corners = self.points[list(three), :2]
             system = np.column_stack([2 * corners, np.ones(3)])
@@ -149,7 +148,7 @@ def size(robot: Robot) -> float:
     return arm if found <= _POINT * arm else found
 
 
-def majority(values: FloatArray, room: float) -> tuple[NDArray[np.bool_], float]:
+def majority(values: FloatArray, room: float) -> tuple[BoolArray, float]:
     """The largest group of values within `room` of one of them, and its median."""
     near = np.abs(values[:, None] - values) <= room
     best = int(near.sum(axis=1).argmax())

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, cast
+from typing import Annotated, Literal
 
 import typer
 
 import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.cli.inputs import Inputs
-from pkmcal.cli.options import Force, Json, RobotOrArm
+from pkmcal.cli.options import Force, Json, ParallelRobot
 from pkmcal.cli.output import Output, say
+from pkmcal.controllers.linuxcnc import contents
 from pkmcal.exceptions import ArgumentError
-from pkmcal.export.linuxcnc import contents
 from pkmcal.files.reading import Input
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-TARGETS = ("c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf", "urdf")
-
+_OF_ARMS = ("urdf", "dh", "dh-modified", "ur")
+TARGETS = ("c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf", *_OF_ARMS)
 _LINES = {
     "reprap": pk.export.reprap,
     "marlin": pk.export.marlin,
@@ -28,7 +28,7 @@ _LINES = {
 
 
 def export(
-    robot: RobotOrArm,
+    robot: ParallelRobot,
     target: Annotated[
         str, typer.Option("--as", metavar="TARGET", help=f"What for: {', '.join(TARGETS)}.")
     ],
@@ -61,7 +61,8 @@ def export(
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
     linear or rotary delta for Klipper or Kalico; reprap, marlin: its M665 and M666, or M669;
     hangprinter: M669. linuxcnc: a kinematics component, and a simulation that runs it. mjcf: a
-    model for MuJoCo. urdf: a serial arm as a tree of links.
+    model for MuJoCo. Of serial arms: urdf, a tree of links; dh and dh-modified, a table of
+    Denavit-Hartenberg numbers; ur, the lists of a calibration.conf of Universal Robots.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -72,13 +73,11 @@ def export(
     _only(target, ("klipper",), config=config)
     _only(target, ("klipper", "reprap", "marlin", "hangprinter"), project=project or None)
     read = Inputs()
-    source = read.robot(robot)
-    machine = pk.load(source) if target == "urdf" else load_parallel(source)
+    if target in _OF_ARMS:
+        return _export_arm(read.robot(robot), target, out, read, force, json)
+    machine = load_parallel(read.robot(robot))
     loss = None
-    if target == "urdf":
-        with Output(out.parent, [out.name], read, force).draft() as draft:
-            pk.export.urdf(cast(pk.SerialArm, machine), draft / out.name)
-    elif target == "linuxcnc":
+    if target == "linuxcnc":
         files, loss = contents(machine, out.resolve().name)
         with Output(out, list(files), read, force).draft() as draft:
             for name, text in files.items():
@@ -92,6 +91,27 @@ def export(
     else:
         own = "LinuxCNC's own module for it is " if target == "linuxcnc" else ""
         say(f"{out}: {machine.name}" + (f"; {own}{loss}" if loss and not loss.exact else ""))
+    return 0
+
+
+def _export_arm(
+    robot: str | Input, target: str, out: Path, read: Inputs, force: bool, json: bool
+) -> int:
+    """Write a serial arm."""
+    arm: object = pk.load(robot)
+    if not isinstance(arm, pk.SerialArm):
+        raise ArgumentError(f"{robot}: --as {target} is for serial arms")
+    with Output(out.parent, [out.name], read, force).draft() as draft:
+        if target == "urdf":
+            pk.export.urdf(arm, draft / out.name)
+        elif target == "ur":
+            pk.export.universal_robots(arm, draft / out.name)
+        else:
+            pk.export.dh(arm, draft / out.name, "standard" if target == "dh" else "modified")
+    if json:
+        say(as_json({"robot": arm.name, "as": target, "file": str(out), "loss": None}))
+    else:
+        say(f"{out}: {arm.name}")
     return 0
 
 

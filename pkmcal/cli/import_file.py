@@ -12,7 +12,7 @@ from pkmcal.arguments import word
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json
 from pkmcal.cli.output import Output, say
-from pkmcal.export.import_printer import Firmware
+from pkmcal.controllers.import_printer import Firmware
 from pkmcal.report.as_json import as_json
 
 

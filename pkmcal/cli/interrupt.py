@@ -18,9 +18,15 @@ def ends_at_once() -> None:
     _handle(_end)
 
 
-def is_raised() -> None:
-    """As KeyboardInterrupt, so that what was begun is tidied up."""
-    _handle(signal.default_int_handler)
+class IsRaised:
+    """While in this context: as KeyboardInterrupt, so that what was begun is tidied up."""
+
+    def __enter__(self) -> None:
+        self._before = signal.getsignal(signal.SIGINT)
+        _handle(signal.default_int_handler)
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
 
 
 def _handle(handler: signal._HANDLER) -> None:

@@ -24,8 +24,4 @@ def main() -> None:
     except Exception as error:
         sys.exit(ending.code(error))
     warnings.showwarning = ending.warned
-    interrupt.is_raised()
-    try:
-        app(prog_name="pkmcal")
-    finally:
-        interrupt.ends_at_once()
+    app(prog_name="pkmcal")

@@ -81,7 +81,7 @@ def sensitivity(
         for name, result in found.items():
             say(f"{_TITLES[name]}\n{result}\n")
         say("\n".join(str(path) for path in output.paths))
-    return 0 if not any(result.failed.any() for result in found.values()) else 1
+    return 0 if not any(result.n_failed.any() for result in found.values()) else 1
 
 
 def _as_mapping(found: Sensitivity) -> dict[str, object]:

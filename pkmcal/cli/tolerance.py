@@ -111,7 +111,7 @@ def tolerance(
                 if map is not None and deviations is not None:
                     _draw_map(machine, map, deviations, seed, executor, draft)
     say(text)
-    return 1 if found.failed.any() else 0
+    return 1 if found.n_failed.any() else 0
 
 
 def _columns(found: Tolerance) -> dict[str, FloatArray]:

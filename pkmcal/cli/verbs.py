@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from pkmcal.cli import ending
+from pkmcal.cli import ending, interrupt
 from pkmcal.cli.calibrate import calibrate
 from pkmcal.cli.check import check
 from pkmcal.cli.compensate import compensate
@@ -32,15 +32,14 @@ class _Verbs(TyperGroup):
         settings["standalone_mode"] = False  # hands over return values and errors
         try:
             code = super().main(*args, **settings)
-        except typer.Abort:
-            code = ending.code(KeyboardInterrupt())
         except Exception as error:
             code = ending.code(error)
         sys.exit(code)
 
     def invoke(self, ctx: Any) -> Any:
         try:
-            return super().invoke(ctx)
+            with interrupt.IsRaised():
+                return super().invoke(ctx)
         except KeyboardInterrupt as stop:
             return ending.code(stop)
 

@@ -57,7 +57,7 @@ class Stream:
         k = len(bins.low)
         self.bins = bins
         self.count = 0
-        self.failed = 0
+        self.n_failed = 0
         self._mean = np.zeros(k)
         self._squares = np.zeros(k)  # sum of squares about the mean
         self._least, self._most = np.full(k, np.inf), np.full(k, -np.inf)
@@ -67,7 +67,7 @@ class Stream:
         """Take a batch (k, n); columns with NaN count as failed and no more."""
         good = np.isfinite(values).all(axis=0)
         if not good.all():
-            self.failed += int((~good).sum())
+            self.n_failed += int((~good).sum())
             values = values[:, good]
         k, n = values.shape
         if not n:
@@ -82,7 +82,7 @@ class Stream:
 
     def merge(self, other: Stream) -> None:
         """Take what another stream with the same bins has taken."""
-        self.failed += other.failed
+        self.n_failed += other.n_failed
         self._in_bin += other._in_bin
         if other.count:
             self._combine(other.count, other._mean, other._squares, other._least, other._most)
@@ -125,8 +125,8 @@ class Stream:
         statistic: off by less than a bin's width, which is 1/128 of the standard deviation that
         made the bins; beyond the bins, between their end and the extreme value.
         """
-        rank = share * (self.count + self.failed - 1) - failed_below * self.failed
-        if not self.count and not self.failed:
+        rank = share * (self.count + self.n_failed - 1) - failed_below * self.n_failed
+        if not self.count and not self.n_failed:
             return np.full(len(self._mean), np.nan)
         if rank < 0 or rank > self.count - 1:
             return np.full(len(self._mean), -np.inf if rank < 0 else np.inf)

@@ -1,8 +1,7 @@
 """Tolerance of each joint that keeps the pose error below a limit.
 
-SciPy's SLSQP finds the shares of least cost; around it stands own code that hands over only those
-limits that some trial broke, since there is one for each pose, and that scales the shares until the
-exact machines keep them.
+Linear propagation shares the limit out among the joints; all shares are then scaled together until
+the exact machines keep it.
 """
 
 from __future__ import annotations
@@ -19,6 +18,7 @@ from pkmcal.arguments import checked_seed, did_you_mean, flag, number, whole, wo
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, displayed
+from pkmcal.error_model import shares
 from pkmcal.error_model.monte_carlo import QUANTITIES, Draw, farthest
 from pkmcal.error_model.tolerance import Tolerance, tolerance
 from pkmcal.exceptions import ArgumentError
@@ -27,7 +27,6 @@ from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
 
 DISTANCE = "distance"
-_SLACK = 1e-6  # of a limit, by which shares may overdraw it before they are scaled to it
 _SHARE = 0.997  # of the machines
 _TAIL = 3.0  # standard deviations: about this share of the machines is within
 _SURE = 1.645  # standard deviations: so that 99.7 % keep the limits with 95 % confidence
@@ -184,9 +183,9 @@ def allocate_tolerance(
     felt = use.max(axis=0) > 1e-18 * use.max()
     sigma = np.full(len(groups), np.inf)
     sigma[felt] = (
-        _equal(use[:, felt])
+        shares.equal(use[:, felt])
         if weights is None
-        else _cheapest(use[:, felt], (weights * [len(p) for p in groups.values()])[felt])
+        else shares.cheapest(use[:, felt], (weights * [len(p) for p in groups.values()])[felt])
     )
     flag("per_pose", per_pose)
     trial = _Trial(robot, at, groups, limits, samples, executor)
@@ -229,52 +228,6 @@ def _used(variance: FloatArray, name: str) -> FloatArray:
     return variance[:, POSE.index(name)]
 
 
-def _equal(use: FloatArray) -> FloatArray:
-    """The same share of the budget where each joint matters most; then all as wide as they may."""
-    sigma = 1 / np.sqrt(use.max(axis=0))
-    return np.asarray(sigma / np.sqrt((use @ sigma**2).max()))
-
-
-def _cheapest(use: FloatArray, cost: FloatArray) -> FloatArray:
-    """Least sum of cost/sigma with use @ sigma² ≤ 1 in every row.
-
-    Convex in log sigma. Only rows that some trial broke are taken as conditions.
-    """
-    from scipy.optimize import NonlinearConstraint, minimize
-
-    logs = np.log(_equal(use))
-    cost = cost / (cost * np.exp(-logs)).sum()
-    rows: list[int] = []
-
-    def price(s: FloatArray) -> float:
-        return float((cost * np.exp(-s)).sum())
-
-    def price_by_logs(s: FloatArray) -> FloatArray:
-        return -cost * np.exp(-s)
-
-    def spent(s: FloatArray) -> FloatArray:
-        return np.asarray(np.log(use[rows] @ np.exp(2 * s)))
-
-    def spent_by_logs(s: FloatArray) -> FloatArray:
-        each = use[rows] * np.exp(2 * s)
-        return np.asarray(2 * each / each.sum(axis=1, keepdims=True))
-
-    for _ in range(len(use)):
-        total = use @ np.exp(2 * logs)
-        if rows and total.max() <= 1 + _SLACK:
-            break
-        rows.append(int(np.argmax(total)))
-        logs = minimize(
-            price,
-            logs,
-            jac=price_by_logs,
-            method="SLSQP",
-            constraints=NonlinearConstraint(spent, -np.inf, 0.0, jac=spent_by_logs),
-            options={"maxiter": 500, "ftol": 1e-13},
-        ).x
-    return np.asarray(np.exp(logs) / np.sqrt((use @ np.exp(2 * logs)).max()))
-
-
 @dataclass(frozen=True, eq=False)
 class _Trial:
     """Machines with errors, and how much of the limits they use up: 1 is all of it."""
@@ -305,7 +258,7 @@ class _Trial:
             else:
                 most = np.abs(found.interval997[..., POSE.index(name), :]).max()
             used[name] = float(most) / limit
-        self._refuse(int(found.failed.max()), *used.values())
+        self._refuse(int(found.n_failed.max()), *used.values())
         return used
 
     def together(self, sigma: FloatArray, seed: int) -> FloatArray:

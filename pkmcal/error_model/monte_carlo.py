@@ -14,10 +14,9 @@ from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pkmcal import arguments
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.random import Normals
 from pkmcal.core.statistics import Bins, Stream
 from pkmcal.geometry.model import Model
@@ -58,7 +57,7 @@ class Draw:
     """
 
     model: Model
-    places: NDArray[np.intp]
+    places: IntArray
     sigma: FloatArray
     poses: FloatArray
     actuators: FloatArray

@@ -64,11 +64,16 @@ class Sensitivity(Result):
         return _mean_size(self.linear)
 
     @property
-    def failed(self) -> IntArray:
+    def n_failed(self) -> IntArray:
         """How many poses were not solved, (c,)."""
         missing = np.isnan(self.exact).any(axis=-1)
         counted: IntArray = missing.reshape(len(self.cases), -1).sum(axis=1)
         return counted
+
+    @property
+    def failed(self) -> IntArray:
+        """The former name of `n_failed`."""
+        return self.n_failed
 
     def __getitem__(self, case: str) -> FloatArray:
         """`exact` of one case (..., 6)."""
@@ -82,7 +87,7 @@ class Sensitivity(Result):
         count = self.poses.size // 6
         return "; ".join(
             f"{bad} of {count} poses not solved with an error of {case}"
-            for case, bad in zip(self.cases, self.failed, strict=True)
+            for case, bad in zip(self.cases, self.n_failed, strict=True)
             if bad
         )
 
@@ -100,7 +105,7 @@ class Sensitivity(Result):
         ]
         heading = [f"{name} [{'mm' if name in 'xyz' else 'deg'}]" for name in POSE]
         yield Table(["error of", *heading], rows, left=1)
-        if self.failed.any():
+        if self.n_failed.any():
             yield self.failures()
 
 

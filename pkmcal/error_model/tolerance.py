@@ -45,7 +45,7 @@ class Tolerance(Result):
     poses : ndarray (..., 6)
         Ideal poses.
     mean, std : ndarray (..., 6)
-        Of the pose error (eq. 16) of the machines, solved exactly: of those `samples` - `failed`
+        Of the pose error (eq. 16) of the machines, solved exactly: of those `samples` - `n_failed`
         that have a pose.
     interval95, interval997 : ndarray (..., 6, 2)
         Between these lie 95 % and 99.7 % of the machines, as many below as above. A machine
@@ -63,7 +63,7 @@ class Tolerance(Result):
     contribution : ndarray (..., 6, k)
         Share of each number in the linear variance, percent; 0 where there is no variance.
     failed : ndarray of int (...)
-        Machines that have no pose there.
+        `n_failed` under its key in JSON.
     """
 
     robot: Robot
@@ -85,6 +85,11 @@ class Tolerance(Result):
     failed: IntArray
 
     @property
+    def n_failed(self) -> IntArray:
+        """How many machines have no pose there, (...)."""
+        return self.failed
+
+    @property
     def position_share(self) -> FloatArray:
         """Share of each number in the variance of the position, over all poses, percent (k,)."""
         variance = (self.linear_std[..., :3, None] ** 2 * self.contribution[..., :3, :]).reshape(
@@ -96,7 +101,7 @@ class Tolerance(Result):
 
     def failures(self) -> str:
         """Say how many machines have no pose; empty where all have one."""
-        failed, count = int(np.sum(self.failed)), self.poses.size // 6
+        failed, count = int(np.sum(self.n_failed)), self.poses.size // 6
         if not failed:
             return ""
         where = "" if count == 1 else f" at {count} poses"
@@ -240,10 +245,10 @@ def tolerance(
             np.sqrt(stream.mean_square[6]),
             stream.quantile(0.95)[6],
             stream.quantile(0.997)[6],
-            stream.failed,
+            stream.n_failed,
         ])  # fmt: skip
-    lost = np.isnan(at.poses).any(axis=1)
-    for k in np.flatnonzero(lost).tolist():  # no pose to be far from
+    unsolved = np.isnan(at.poses).any(axis=1)
+    for k in np.flatnonzero(unsolved).tolist():  # no pose to be far from
         columns[k][:-1] = [np.full_like(column, np.nan) for column in columns[k][:-1]]
     mean, std, within95, within997, distance_rms, far95, far997, failed = (
         np.array(column).reshape((*at.shape, *np.shape(column[0])))

@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 
 from pkmcal import arguments
+from pkmcal.exceptions import MissingFileError
 
 _PART = ".pkmcal-{}.part"  # short: a name may be as long as the file system allows
 _GONE = 3600.0  # seconds after which whoever wrote a part was killed
@@ -37,7 +38,7 @@ def write_whole(path: str | PathLike[str], content: str | bytes) -> None:
     path = arguments.path("path", path)
     place = Path(os.path.realpath(path))
     if not place.parent.is_dir():
-        raise FileNotFoundError(f"{path}: the folder {place.parent} does not exist")
+        raise MissingFileError(f"{path}: the folder {place.parent} does not exist")
     if place.is_dir():
         raise IsADirectoryError(f"{path}: this is a folder")
     _sweep(place.parent)

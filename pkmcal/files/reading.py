@@ -11,7 +11,7 @@ from os import PathLike
 from pathlib import Path
 
 from pkmcal import arguments
-from pkmcal.exceptions import FileError
+from pkmcal.exceptions import FileError, MissingFileError
 
 MB = 1_000_000
 MOST_TABLE = 500 * MB  # bytes of a CSV file
@@ -34,10 +34,13 @@ class Input(PathLike[str]):
     ----------
     path : str or path
         A file, a pipe, or a device such as ``/dev/stdin``.
+    called : str, optional
+        What the user called it, where that also says which part of it is meant.
     """
 
-    def __init__(self, path: str | PathLike[str]) -> None:
+    def __init__(self, path: str | PathLike[str], called: str | None = None) -> None:
         self._path = arguments.path("path", path)
+        self.called = str(self._path) if called is None else called
         self._content: bytes | None = None
 
     def __fspath__(self) -> str:
@@ -53,6 +56,8 @@ class Input(PathLike[str]):
         ------
         ValueError
             More than `most` bytes.
+        FileNotFoundError
+            No such file; which is an `Error` of the package, too.
         OSError
             The file cannot be read.
         """
@@ -75,6 +80,8 @@ def content(path: str | PathLike[str], most: int) -> bytes:
     ------
     ValueError
         It has more.
+    FileNotFoundError
+        No such file.
     OSError
         It cannot be read.
     """
@@ -84,6 +91,11 @@ def content(path: str | PathLike[str], most: int) -> bytes:
 
 def _read(path: Path, most: int) -> bytes:
     """All of a file; of one without end no more than the limit."""
+    if not path.exists():
+        near = (each.name for each in path.parent.glob(f"*{path.suffix}"))
+        raise MissingFileError(
+            f"{path}: no such file{arguments.did_you_mean(path.name, near, listed=0)}"
+        )
     found = bytearray()
     with open(path, "rb", buffering=0) as file:
         expected = os.fstat(file.fileno()).st_size

@@ -12,8 +12,9 @@ import numpy as np
 
 from pkmcal.arguments import did_you_mean, words
 from pkmcal.arrays import BoolArray, FloatArray, wrapped
+from pkmcal.core.chains import AnyMachine
 from pkmcal.core.library import MAPS, POSE
-from pkmcal.core.machine import Closure, Machine
+from pkmcal.core.machine import Closure
 from pkmcal.exceptions import ArgumentError
 
 ITERATIONS = 30
@@ -46,7 +47,7 @@ def matched_coordinates(
 
 
 def complete(
-    machine: Machine,
+    machine: AnyMachine,
     map: str,
     slots: FloatArray,
     pose: FloatArray,
@@ -60,7 +61,7 @@ def complete(
 
     Parameters
     ----------
-    machine : Machine
+    machine : Machine or ChainMachine
         The machine.
     map : str
         Its pose map.
@@ -116,8 +117,8 @@ def complete(
     if map == "spatial":
         own = _as_wanted(own, matched, wanted)
     kept = _missing(own, matched, wanted) <= KEPT * np.where(np.array(matched) < 3, size, 1.0)
-    lost = ~kept.all(axis=1)  # a stationary point of least squares that is no solution, or no pose
-    own[lost], q[lost] = np.nan, np.nan
+    unsolved = ~kept.all(axis=1)  # at a stationary point that is no solution, or without a pose
+    own[unsolved], q[unsolved] = np.nan, np.nan
     return own, q
 
 
@@ -155,7 +156,7 @@ def _system(closure: Closure, free: list[int], matched: Sequence[int]) -> FloatA
 
 
 def completed_rates(
-    machine: Machine,
+    machine: AnyMachine,
     map: str,
     slots: FloatArray,
     pose: FloatArray,
@@ -186,7 +187,7 @@ def completed_rates(
 
 
 def _correct_actuators(
-    machine: Machine,
+    machine: AnyMachine,
     slots: FloatArray,
     own: FloatArray,
     q: FloatArray,

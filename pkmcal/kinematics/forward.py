@@ -26,6 +26,9 @@ class Solved(Protocol):
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (N, n)."""
 
+    def passive_joints(self, own: FloatArray, q: FloatArray) -> FloatArray:
+        """What the passive joints turn or slide by from home at own poses (N, 6), (N, passive)."""
+
 
 @dataclass(eq=False, repr=False)  # a frozen one takes a microsecond more to make
 class Forward(RowResult):
@@ -99,6 +102,20 @@ class Forward(RowResult):
         """
         problem = self._machine.assembly_problem(self._q)
         return certify_rows(problem, self._own.reshape(-1, 6)).reshape(self.status.shape)
+
+    @cached_property
+    def passive(self) -> FloatArray:
+        """What passive joints turn or slide by from home (..., passive), computed when asked for.
+
+        rad or mm, in the order of ``robot.passive_names``. NaN where the row was not solved.
+
+        Raises
+        ------
+        ValueError
+            The machine's limbs are no chains of joints.
+        """
+        found = self._machine.passive_joints(self._own.reshape(-1, 6), self._q)
+        return found.reshape(*self.status.shape, found.shape[-1])
 
     def failures(self) -> str:
         """What failed and where, in one line; empty where nothing did."""

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from pkmcal.arrays import FloatArray, as_rows, wrapped
+from pkmcal.arrays import FloatArray, IntArray, as_rows, wrapped
 from pkmcal.core.machine import with_errors
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.geometry import Geometry
@@ -83,7 +83,7 @@ class Geometries:
         How many geometries a batch has at most.
     """
 
-    def __init__(self, geometry: Geometry, places: NDArray[np.intp], rows: int) -> None:
+    def __init__(self, geometry: Geometry, places: IntArray, rows: int) -> None:
         self._geometry = geometry
         self._slots = np.repeat(geometry.slots.reshape(1, -1), rows, axis=0)
         own = int(np.searchsorted(places, len(geometry.numbers)))  # parameters come after

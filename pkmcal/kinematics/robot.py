@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from copy import copy
 from dataclasses import fields, replace
 from functools import cached_property
@@ -11,23 +11,28 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
+from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.library import POSE
-from pkmcal.core.machine import Machine
+from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.atomic import write_whole
+from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Model
-from pkmcal.kinematics import overconstrained
+from pkmcal.kinematics import chain_limits, overconstrained
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
 from pkmcal.modes.find import assemblies, continue_path, find_modes, nearest_first, pose_distance
+from pkmcal.result import Result
 
 
-class Robot(Kinematics):
+class Robot(Kinematics, Result):
     """A parallel machine: immutable; `replace` gives a changed one.
 
     Made by `load`. Poses are x y z in mm and α β γ in rad with R = Rz(γ) Ry(β) Rx(α), platform to
@@ -63,8 +68,9 @@ class Robot(Kinematics):
     def __reduce__(self) -> tuple[type[Robot], tuple[Model]]:
         return Robot, (self.model,)
 
-    def __repr__(self) -> str:
-        return f"<Robot {self.name}: {len(self.model.limbs)} limbs, {' '.join(self.coordinates)}>"
+    def _parts(self) -> Iterator[str | Table]:
+        yield f"{self.name}: {len(self.model.limbs)} limbs, {' '.join(self.coordinates)}"
+        yield self.model.table()
 
     # poses the machine can take -------------------------------------------------------------------
 
@@ -130,18 +136,22 @@ class Robot(Kinematics):
             ``.ok`` for each pose; reach, stroke and joint cones for each limb.
         """
         rows, shape = self.own_rows(pose)
-        drive, on_base, on_platform = self.machine.limbs(self.slots, rows)
+        chains = self.model.chains
+        if chains is not None:
+            q = (
+                self.machine.inverse(self.slots, rows)
+                if actuators is None
+                else (self._batch(actuators, shape))
+            )
+            assert isinstance(self.machine, ChainMachine)
+            found = chain_limits.feasibility(chains, self.machine, self.slots, rows, q)
+            return _shaped(found, shape)
+        drive, on_base, on_platform = self.limb_machine.limbs(self.slots, rows)
         if actuators is not None:
             there = self.drives(self._batch(actuators, shape))
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
             drive = np.where(angle, there + wrapped(drive - there), drive)
-        found = feasibility(self.model.limbs, drive, on_base, on_platform)
-        return Feasibility(
-            *(
-                getattr(found, field.name).reshape(*shape, len(self.model.limbs))
-                for field in fields(Feasibility)
-            )
-        )
+        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform), shape)
 
     def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
         """Every assembly mode at given actuator coordinates, with proof.
@@ -228,7 +238,7 @@ class Robot(Kinematics):
         """
         given, own, q, shape = self._commanded(pose, actuators)
         errors = self._by_numbers(own, q, twists=False)
-        errors = self._through_ties(self.frames.rates_outward(own, given, errors))
+        errors = self.through_ties(self.frames.rates_outward(own, given, errors))
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def error_twists(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
@@ -256,8 +266,33 @@ class Robot(Kinematics):
         """
         _, own, q, shape = self._commanded(pose, actuators)
         errors = self._by_numbers(own, q, twists=True)
-        errors = self._through_ties(self.frames.twists_outward(own, errors))
+        errors = self.through_ties(self.frames.twists_outward(own, errors))
         return errors.reshape(*shape, 6, len(self.geometry))
+
+    def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
+        """How the platform turns and moves by each actuator coordinate.
+
+        Parameters
+        ----------
+        pose, actuators : array_like
+            As for `error_jacobian`.
+
+        Returns
+        -------
+        ndarray (..., 6, n)
+            Twists as by `error_twists`, rad and mm per mm or rad.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")
+        >>> twists = robot.actuator_twists(robot.home, robot.inverse(robot.home))
+        >>> bool(np.allclose(twists[5], twists[5, 0]))  # all legs lift it alike
+        True
+        """
+        _, own, q, shape = self._commanded(pose, actuators)
+        by_q = self.machine.forward_jacobian(self.slots, own, q, twists=True)
+        return self.frames.twists_outward(own, by_q).reshape(*shape, 6, self.n_actuators)
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Pose, actuator coordinates and batch shape of poses (..., 6)."""
@@ -293,7 +328,7 @@ class Robot(Kinematics):
             )
         return self.machine.error_jacobian(self.slots, own, q, columns, twists)
 
-    def _through_ties(self, errors: FloatArray) -> FloatArray:
+    def through_ties(self, errors: FloatArray) -> FloatArray:
         """The same (N, 6, p) with the columns of named parameters after those of the numbers."""
         count = len(self.geometry) - errors.shape[2]
         if not count:
@@ -318,11 +353,23 @@ class Robot(Kinematics):
         """
         return Robot(replace(self.model, geometry=self.geometry.replace(changes)))
 
-    def _with_values(self, values: FloatArray) -> Robot:
-        """`replace` for numbers (p,) near the present ones, without ordering the elimination anew.
+    def with_values(self, values: FloatArray) -> Robot:
+        """`replace` for the steps of a search: three times as fast, for numbers near these.
 
-        Three times as fast, for machines that live as long as one step of a search; closures may
-        miss by any length on its way.
+        The order of elimination stays, and closures may miss by any length.
+
+        Parameters
+        ----------
+        values : array (p,)
+            All numbers of the geometry, mm and rad.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")
+        >>> step = robot.with_values(robot.geometry.values + 1e-3)
+        >>> bool(step.forward(robot.inverse(robot.home)).ok)
+        True
         """
         changed = copy(self)
         changed.machine = self._of_any_misfit
@@ -331,7 +378,7 @@ class Robot(Kinematics):
         return changed
 
     @cached_property
-    def _of_any_misfit(self) -> Machine:
+    def _of_any_misfit(self) -> AnyMachine:
         return self.machine.with_tolerance(np.inf)
 
     @property
@@ -351,13 +398,20 @@ class Robot(Kinematics):
         """
         if self.machine.rows <= self.machine.m:
             return self
-        found = self._with_values(self.geometry.values).forward(q, guess)
+        found = self.with_values(self.geometry.values).forward(q, guess)
         missed = float(np.nanmax(found.residual, initial=0.0))
         if 2.0 * missed <= self.closure_tolerance:
             return self
         return Robot(replace(self.model, closure_tolerance=2.0 * missed))
 
-    def save(self, path: str | PathLike[str], comment: str = "") -> None:
+    def save(
+        self,
+        path: str | PathLike[str],
+        comment: str = "",
+        *,
+        like: str | PathLike[str] | None = None,
+        deviations: Mapping[str, float] | None = None,
+    ) -> None:
         """Write the robot file; `load` reads it back to the last bit.
 
         Parameters
@@ -366,8 +420,33 @@ class Robot(Kinematics):
             Where to write; an existing file is replaced, whole or not at all.
         comment : str, optional
             Lines for its head, each with its ``#``.
+        like : str or path, optional
+            The file that the robot came from: its units, order, names and comments are kept, and
+            only the values that changed are others. Numbers are then read back to 1e-13 of the
+            machine's size, for its units are not mm and rad.
+        deviations : mapping of str to float, optional
+            With `like`: standard deviations by name, mm and rad, as comments.
+
+        Raises
+        ------
+        ValueError
+            `like` describes another robot.
         """
-        robot_file.write(self.model, path, comment)
+        if like is None:
+            robot_file.write(self.model, path, comment)
+            return
+        from pkmcal.geometry.robot_file_kept import text_like
+
+        content, place, _ = robot_file.located(like)
+        source = Source(content, place)
+        head = arguments.comment(comment)
+        write_whole(path, text_like(source, self.model, deviations, head))
+
+
+def _shaped(found: Feasibility, shape: tuple[int, ...]) -> Feasibility:
+    """Limits of N rows as those of a batch."""
+    each = (getattr(found, field.name) for field in fields(Feasibility))
+    return Feasibility(*(array.reshape(*shape, array.shape[-1]) for array in each))
 
 
 def commanded(robot: Robot) -> tuple[str, ...]:

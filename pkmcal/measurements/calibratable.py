@@ -109,14 +109,17 @@ class Calibratable(Protocol):
     def replace(self, changes: FloatArray) -> Calibratable:
         """A machine with other numbers (p,), checked as those of a file are."""
 
-    def _with_values(self, values: FloatArray) -> Calibratable:
-        """The same, quickly, for numbers near the present ones."""
+    def with_values(self, values: FloatArray) -> Calibratable:
+        """The same for the steps of a search: quickly, for numbers near the present ones."""
 
     def forward(self, q: FloatArray, guess: FloatArray | None = None) -> SolvedRows:
         """Poses at actuator coordinates (N, n)."""
 
     def error_twists(self, pose: FloatArray, actuators: FloatArray) -> FloatArray:
         """Derivative (N, 6, p) of the platform's twist to each number."""
+
+    def actuator_twists(self, pose: FloatArray, actuators: FloatArray) -> FloatArray:
+        """Derivative (N, 6, n) of the platform's twist to each actuator coordinate."""
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Poses (N, 6), actuator coordinates (N, n) and batch shape of what a user commands."""
@@ -189,6 +192,7 @@ class ArmMachine:
         self.arm = arm
         self.name, self.length = arm.name, arm.length
         self.n_actuators, self.actuator_units = arm.n_joints, arm.actuator_units
+        self.joint_names = arm.joint_names
         joints = range(1, arm.n_joints + 1)
         names = tuple(f"joint{i}.{error}" for i in joints for error in ERRORS)
         units = ("mm", "mm", "mm", "rad", "rad", "rad") * arm.n_joints
@@ -200,7 +204,8 @@ class ArmMachine:
         """With other joint errors (6 n,), mm and rad."""
         return ArmMachine(self.arm.replace(changes.reshape(-1, 6)))
 
-    def _with_values(self, values: FloatArray) -> ArmMachine:
+    def with_values(self, values: FloatArray) -> ArmMachine:
+        """The same as `replace`, which is quick here."""
         return self.replace(values)
 
     def forward(self, q: ArrayLike, guess: ArrayLike | None = None) -> ArmPoses:
@@ -216,6 +221,10 @@ class ArmMachine:
         In base axes, at joint coordinates `actuators` (N, n); an arm needs no pose.
         """
         return self.arm.error_jacobian(actuators, frame="tip")
+
+    def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
+        """The same by each joint coordinate, (N, 6, n)."""
+        return self.arm.jacobian(actuators, frame="tip")
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Pose, coordinates and batch shape of joint coordinates (..., n)."""

@@ -70,6 +70,10 @@ class VirtualMachine:
         self.angle_noise = number("angle_noise", angle_noise, least=0)
         self._random = np.random.default_rng(checked_seed(seed))
 
+    def __repr__(self) -> str:
+        noise = f"{self.noise:g} mm" if isinstance(self.noise, float) else repr(self.noise)
+        return f"<VirtualMachine: {self.true_robot!r}, noise {noise}, {self.angle_noise:g} rad>"
+
     def measure(
         self,
         q: ArrayLike,

@@ -353,11 +353,11 @@ def _followed(made: Move) -> Move:
         names = " ".join(moved_coordinates(made.robot))
         t = np.linspace(0.0, made.duration, 101)
         pose = made.sample(t).pose
-        lost = np.flatnonzero(~np.isfinite(pose).all(axis=1))
-        if lost.size:
+        unreached = np.flatnonzero(~np.isfinite(pose).all(axis=1))
+        if unreached.size:
             raise ArgumentError(
                 f"{made.robot.name} cannot follow the path: no pose has its {names}"
-                f" {t[lost[0]]:.4g} s after the start"
+                f" {t[unreached[0]]:.4g} s after the start"
             )
         off = np.abs(from_pose(pose[[0, -1]]) - from_pose(np.stack([made.start, made.end]))).max()
         if off > ON_THE_MANIFOLD:

@@ -42,7 +42,7 @@ def test_same_seed_gives_the_same_numbers_on_any_number_of_workers(
 
 def test_standard_errors_are_those_of_the_covariance(offsets: Identification) -> None:
     found = pk.bootstrap(offsets)
-    assert found.failed == 0 and found.values.shape == (1000, 6)
+    assert found.n_failed == found.failed == 0 and found.values.shape == (1000, 6)
     np.testing.assert_allclose(found.stderr, offsets.stderr, rtol=0.35)
     assert np.mean(found.stderr / offsets.stderr) == pytest.approx(1.0, abs=0.12)
     assert np.abs(found.bias / found.stderr).max() < 0.15

@@ -27,6 +27,8 @@ def found(hexapod: pk.Robot) -> pk.Identification:
 
 def results(found: pk.Identification) -> Iterator[Result]:
     hexapod = pk.load("hexapod")
+    yield hexapod
+    yield pk.load("3r")
     yield found
     yield pk.bootstrap(found, 20)
     yield found.fit.equations.sets[0]
@@ -41,6 +43,22 @@ def test_every_result_has_one_line_and_one_table_for_terminal_and_notebook(
         assert "\n" not in line and line.startswith(f"<{type(result).__name__}: ")
         cells = re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", page)
         assert cells and all(cell.strip() in str(result) for cell in cells)
+        assert not re.search(r"<p>\s|\n\s", page)  # lines are broken for the terminal alone
+
+
+def test_the_change_of_every_parameter_is_shown_and_the_table_fits_the_terminal() -> None:
+    robot = pk.load("2tpr2tps")
+    q = robot.inverse(pk.sample_poses(robot, 20))
+    measured = pk.VirtualMachine(robot, noise=0.02).measure(q, kind="pose")
+    found = pk.identify(robot, measured, free="*")
+    lines = found.summary().splitlines()
+    assert max(map(len, lines)) <= 100
+    shown = re.findall(r"(\S+\d\S*)(?: \[1\])? +(\S+ ± \S+) +(-?\d\S*)", "\n".join(lines))
+    change = {name: number for name, _, number in shown}
+    assert len(found.free) == 32 and set(change) == set(found.free)
+    for name, value in zip(found.free, found.values, strict=True):
+        last = 10.0 ** -len(change[name].partition(".")[2])  # digit that is shown
+        assert abs(float(change[name]) - (value - robot.geometry[name])) <= 0.501 * last
 
 
 def test_names_of_lmfit_and_scipy_stand_for_the_same(found: pk.Identification) -> None:

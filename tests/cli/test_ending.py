@@ -109,6 +109,28 @@ def test_ctrl_c_while_the_verbs_are_loaded_is_130_and_one_line(tmp_path: Path) -
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a POSIX signal")
+@pytest.mark.parametrize(
+    "step", ["make_context", "parse_args", "invoke", "get_command", "__exit__"]
+)
+def test_ctrl_c_while_the_command_line_is_read_is_130_and_one_line(step: str) -> None:
+    """Typer's own handling of it would end with the code alone."""
+    owner = "interrupt.IsRaised" if step == "__exit__" else "TyperGroup"
+    program = (
+        "import os, signal\nfrom typer.core import TyperGroup\nfrom pkmcal.cli import interrupt\n"
+        f"real = {owner}.{step}\n"
+        "def stopped(*a, **k):\n    os.kill(os.getpid(), signal.SIGINT)\n    return real(*a, **k)\n"
+        f"{owner}.{step} = stopped\n" + PROGRAM[2]
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program, "machines"],
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    assert (done.returncode, done.stderr) == (130, "pkmcal: stopped by Ctrl-C\n")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends a POSIX signal")
 def test_ctrl_c_at_any_moment_leaves_no_traceback(tmp_path: Path) -> None:
     """From when the program has begun to its end; before that the interpreter is alone."""
     program = (

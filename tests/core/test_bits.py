@@ -95,7 +95,7 @@ def spheres(isa: int, part: slice) -> list[np.ndarray]:
 
 def arm(isa: int, part: slice, call: str) -> list[np.ndarray]:
     """With links that all rows share, and with links of each row."""
-    made = Arm(*ARM._arm.arrays, isa)
+    made = Arm(*ARM.core.arrays, isa)
     found = []
     for errors in (ERRORS[0], ERRORS[part]):
         links, theta = made.links(errors), THETA[part]

@@ -69,7 +69,7 @@ def test_columns_with_nan_fail_and_count_in_nothing() -> None:
     holed = values.copy()
     holed[1, 10:30] = np.nan
     stream = streamed(holed, [15], Bins.around(values))
-    assert (stream.count, stream.failed) == (80, 20)
+    assert (stream.count, stream.n_failed) == (80, 20)
     np.testing.assert_allclose(stream.mean, np.delete(values, range(10, 30), axis=1).mean(axis=1))
 
 
@@ -88,7 +88,7 @@ def test_merged_streams_are_one_stream() -> None:
 
 def test_without_values_nothing_is_known() -> None:
     stream = streamed(np.full((2, 5), np.nan), [], Bins.around(np.empty((2, 0))))
-    assert stream.failed == 5
+    assert stream.n_failed == 5
     assert np.isnan(stream.std).all()
     assert (stream.quantile(0.5) == np.inf).all()  # a machine without a pose is beyond all limits
     assert np.isnan(stream.mean_square).all()

@@ -14,11 +14,11 @@ from pathlib import Path
 import mpmath as mp
 import pytest
 import sympy as sp
-from pkmcal.derive import elementary, limbs, posemaps, rates, screws, tpr2tps
+from pkmcal.derive import elementary, limb_functions, limbs, posemaps, rates, screws, tpr2tps
 from pkmcal.derive.__main__ import GENERATED, differences
 from pkmcal.derive.emit import Function
 
-MODULES = (limbs, posemaps, rates, screws, tpr2tps)
+MODULES = (limb_functions, posemaps, rates, screws, tpr2tps)
 FUNCTIONS = {f.name: f for module in MODULES for f in module.functions()}
 
 
@@ -47,8 +47,8 @@ def test_a_header_that_was_edited_or_is_left_over_is_shown(
 
 def test_the_text_is_the_same_in_another_process_with_another_hash_seed() -> None:
     program = (
-        "import sys; from pkmcal.derive import limbs, screws, tpr2tps;"
-        "made = limbs.functions() + screws.functions() + tpr2tps.functions();"
+        "import sys; from pkmcal.derive import limb_functions, screws, tpr2tps;"
+        "made = limb_functions.functions() + screws.functions() + tpr2tps.functions();"
         "sys.stdout.buffer.write(''.join(f.emit() for f in made).encode())"
     )
     seed = "1" if os.environ.get("PYTHONHASHSEED") != "1" else "2"
@@ -58,7 +58,7 @@ def test_the_text_is_the_same_in_another_process_with_another_hash_seed() -> Non
         stdout=subprocess.PIPE,
         check=True,
     )
-    here = [f.emit() for module in (limbs, screws, tpr2tps) for f in module.functions()]
+    here = [f.emit() for module in (limb_functions, screws, tpr2tps) for f in module.functions()]
     assert there.stdout.decode() == "".join(here)
 
 

@@ -12,11 +12,11 @@ from functools import cache
 
 import pytest
 import sympy as sp
-from pkmcal.derive import limbs, rates
+from pkmcal.derive import limb_functions, limbs, rates
 
 DRIVERS = [driver.name for driver in limbs.DRIVERS]
 ROWS = [row.name for row in limbs.CONSTRAINTS]
-FUNCTIONS = {f.name: f for module in (limbs, rates) for f in module.functions()}
+FUNCTIONS = {f.name: f for module in (limb_functions, rates) for f in module.functions()}
 
 
 def symbols(name: str, size: int) -> sp.Matrix:

@@ -123,7 +123,8 @@ def test_a_pose_out_of_reach_is_nan_and_not_in_the_mean() -> None:
     far = np.concatenate([at, [[5000.0, 0, 0, 0, 0, 0]]])
     found = pk.sensitivity(robot, far, cases=["rod1"])
     assert np.isnan(found.exact[:, 3]).all() and np.isfinite(found.exact[:, :3]).all()
-    np.testing.assert_array_equal(found.failed, [1])
+    np.testing.assert_array_equal(found.n_failed, [1])
+    np.testing.assert_array_equal(found.failed, found.n_failed)  # the former name
     np.testing.assert_allclose(found.mean, pk.sensitivity(robot, at, cases=["rod1"]).mean)
     assert "not solved" in str(found)
 

@@ -284,7 +284,7 @@ def test_more_poses_than_a_task_takes_come_back_in_their_order() -> None:
     at = poses("2tpr2tps", 2 * monte_carlo.POSES + 3)
     found = pk.tolerance(robot, at.reshape(5, 7, 6), 1e-3, samples=5_000)
     assert found.std.shape == (5, 7, 6) and found.interval95.shape == (5, 7, 6, 2)
-    assert found.distance95.shape == found.failed.shape == (5, 7)
+    assert found.distance95.shape == found.n_failed.shape == (5, 7)
     np.testing.assert_allclose(found.std[..., 1:5], found.linear_std[..., 1:5], rtol=0.05)
 
 
@@ -346,7 +346,7 @@ def test_machines_without_a_pose_are_beyond_every_limit(
     found = pk.tolerance(robot, robot.home, {"rod*": sigma}, samples=5_000)
     drawn = np.concatenate(kept, axis=1)
     lost = np.isnan(drawn[0])
-    assert found.failed == lost.sum() > 0
+    assert found.n_failed == lost.sum() > 0
     solved = drawn[:, ~lost]
     np.testing.assert_allclose(found.mean, solved[:6].mean(axis=1), atol=1e-9)
     np.testing.assert_allclose(found.std, solved[:6].std(axis=1, ddof=1), rtol=1e-9, atol=1e-12)
@@ -363,7 +363,7 @@ def test_machines_without_a_pose_are_beyond_every_limit(
             method: Any = "higher" if k else "lower"
             exact = np.quantile(drawn[:6], share, axis=1, method=method)
             assert_beyond(ends[:, k], exact, width[:6])
-    assert f"{int(found.failed)} of 5000 machines have no pose" in str(found)
+    assert f"{int(found.n_failed)} of 5000 machines have no pose" in str(found)
 
 
 def assert_beyond(found: Any, exact: Any, width: Any) -> None:
@@ -375,19 +375,19 @@ def test_no_share_of_machines_is_said_to_be_within_what_fewer_reach() -> None:
     """Near Fichter's singularity nearly half of these hexapods have no pose."""
     robot = pk.load("hexapod")
     found = pk.tolerance(robot, robot.home + NEARLY_SINGULAR, 0.5, samples=5_000)
-    assert found.failed > 0.3 * 5_000
+    assert found.n_failed > 0.3 * 5_000
     assert found.distance95 == found.distance997 == np.inf
     assert (found.interval95 == [-np.inf, np.inf]).all()
     assert "95 % of the machines within no limit, 99.7 % within no limit" in str(found)
     both = pk.tolerance(robot, [robot.home, robot.home + NEARLY_SINGULAR], 0.5, samples=5_000)
     assert "95 % of the machines within no limit" in str(both)  # a rms over poses is no less
-    assert f"{int(both.failed.sum())} of 10000 machines at 2 poses have no pose" in str(both)
+    assert f"{int(both.n_failed.sum())} of 10000 machines at 2 poses have no pose" in str(both)
 
 
 def test_a_pose_out_of_reach_is_nan() -> None:
     robot = pk.load("linear-delta")
     found = pk.tolerance(robot, [robot.home, [5000.0, 0, 0, 0, 0, 0]], 0.1, samples=1_000)
-    assert found.failed.tolist() == [0, 1_000]
+    assert found.n_failed.tolist() == [0, 1_000]
     for name in ARRAYS[:-1]:
         assert np.isnan(getattr(found, name)[1]).all(), name
         assert np.isfinite(getattr(found, name)[0]).all(), name

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ import pytest
 import pkmcal as pk
 from pkmcal.files import reading
 from pkmcal.files.reading import Input, content
+from pkmcal.measurements.pose_csv import read_poses
 
 POSES = "q1 [mm],q2 [mm],q3 [mm],q4 [mm],x [mm],y [mm],z [mm]\n450,452,400,405,6,-6,400\n"
 
@@ -25,6 +27,32 @@ def test_what_changes_after_the_first_reading_does_not_count(tmp_path: Path) -> 
     path.write_bytes(b"second")
     assert content(read, 10) == b"first"
     assert (os.fspath(read), str(read)) == (str(path), str(path))
+
+
+@pytest.mark.parametrize(
+    ("name", "read"),
+    [
+        ("robot.toml", pk.load),
+        ("m.csv", pk.read_measurements),
+        ("m.xlsx", pk.read_measurements),
+        ("poses.csv", lambda path: read_poses(path, pk.load("hexapod"))),
+        ("arm.urdf", pk.SerialArm.from_urdf),
+        ("printer.cfg", pk.import_printer),
+    ],
+)
+def test_a_missing_file_is_named_in_the_same_words_by_all_who_read(
+    name: str, read: Callable[[Path], object], tmp_path: Path
+) -> None:
+    path = tmp_path / name
+    for kind in (pk.Error, FileNotFoundError, ValueError):
+        with pytest.raises(kind) as raised:
+            read(path)
+        assert str(raised.value) == f"{path}: no such file"
+    near = path.with_stem(path.stem + "2")
+    near.touch()
+    with pytest.raises(pk.FileError) as raised:
+        read(path)
+    assert str(raised.value) == f"{path}: no such file; did you mean {near.name!r}?"
 
 
 def test_a_pipe_is_a_file(tmp_path: Path) -> None:

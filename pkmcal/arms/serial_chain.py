@@ -1,0 +1,286 @@
+"""`SerialChain`: what an open chain of joints computes from its screws and joint errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal.arguments import instance
+from pkmcal.arms.inputs import (
+    ArmArguments,
+    Frame,
+    JointKind,
+    Source,
+    axes_and_points,
+    checked_errors,
+    frame_number,
+    joint_frames,
+    kinds_of,
+    motion,
+    names_of,
+)
+from pkmcal.arms.inverse import ArmInverse, Part, damped_least_squares
+from pkmcal.arrays import FloatArray, Unit, as_rows
+from pkmcal.core.screws import Arm, Links
+from pkmcal.exceptions import ArgumentError
+
+
+class SerialChain:
+    """What a `SerialArm` computes: where its tool is, twists by joints and errors, the inverse.
+
+    Its parameters are those of `SerialArm`.
+
+    Attributes
+    ----------
+    core : pkmcal.core.screws.Arm
+        The arm as the core has it.
+    """
+
+    def __init__(
+        self,
+        axes: ArrayLike,
+        points: ArrayLike,
+        home: ArrayLike,
+        *,
+        kinds: str | Sequence[str] | None = None,
+        name: str = "serial arm",
+        joint_errors: ArrayLike | None = None,
+        joint_names: Sequence[str] | None = None,
+        source: Source | None = None,
+    ) -> None:
+        self._name = instance("name", name, str)
+        self._axes, self._points = axes_and_points(axes, points)
+        self._kinds = kinds_of(kinds, len(self._axes))
+        self._joint_names = names_of(joint_names, len(self._axes))
+        self._source = source
+        self._home = motion("home", home)
+        prismatic = np.array([kind == "prismatic" for kind in self._kinds], dtype=np.int32)
+        self.core = Arm(prismatic, joint_frames(self._axes), self._points, self._home)
+        self._errors = np.zeros((self.n_joints, 6))
+        if joint_errors is not None:
+            self._errors += checked_errors(joint_errors, self.n_joints, ())
+        self._links = self.core.links(self._errors)
+        if not np.isfinite(self._links.numbers).all():
+            raise ArgumentError("points, home or joint_errors are too large to be computed with")
+
+    @property
+    def name(self) -> str:
+        """The arm's name."""
+        return self._name
+
+    @property
+    def kinds(self) -> tuple[JointKind, ...]:
+        """Kind of each joint, "revolute" or "prismatic"."""
+        return self._kinds
+
+    @property
+    def joint_names(self) -> tuple[str, ...] | None:
+        """What the joints are called, as in a URDF file and in logs of controllers."""
+        return self._joint_names
+
+    @property
+    def source(self) -> Source | None:
+        """The URDF file it was read from (path, tip, base), for `save_urdf`."""
+        return self._source
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints, n."""
+        return len(self.kinds)
+
+    @property
+    def axes(self) -> FloatArray:
+        """Unit directions of the joints' axes at zero, (n, 3)."""
+        axes: FloatArray = self._axes.copy()
+        return axes
+
+    @property
+    def points(self) -> FloatArray:
+        """The points the joints' errors act at, (n, 3), mm."""
+        points: FloatArray = self._points.copy()
+        return points
+
+    @property
+    def home(self) -> FloatArray:
+        """The tool at zero, (4, 4), mm."""
+        home: FloatArray = self._home.copy()
+        return home
+
+    @property
+    def joint_errors(self) -> FloatArray:
+        """Δx Δy Δz [mm], Δφ Δθ Δψ [rad] of each joint, (n, 6)."""
+        errors: FloatArray = self._errors.copy()
+        return errors
+
+    @property
+    def actuator_units(self) -> tuple[Unit, ...]:
+        """Unit of each joint coordinate, "rad" or "mm"."""
+        return tuple("rad" if kind == "revolute" else "mm" for kind in self.kinds)
+
+    @property
+    def length(self) -> float:
+        """Characteristic length, mm: at this radius a rotation counts as its arc.
+
+        The root mean square distance of the joints' points from the tool at zero.
+        """
+        reach = self._points - self._home[:3, 3]
+        return float(np.hypot.reduce(reach, axis=None) / np.sqrt(self.n_joints)) or 1.0
+
+    @property
+    def screws(self) -> FloatArray:
+        """Nominal unit screws (ω, v) at zero, (n, 6): (ω, r × ω), or (0, v) (eq. 1)."""
+        none = np.zeros((self.n_joints, 6))
+        screws: FloatArray = self.jacobian(np.zeros(self.n_joints), none).T.copy()
+        return screws
+
+    @property
+    def arguments(self) -> ArmArguments:
+        """Its arguments: ``SerialArm(**arm.arguments)`` is the same arm."""
+        return {
+            "axes": self.axes,
+            "points": self.points,
+            "home": self.home,
+            "kinds": self.kinds,
+            "name": self.name,
+            "joint_errors": self.joint_errors,
+            "joint_names": self.joint_names,
+            "source": self.source,
+        }
+
+    # kinematics ---------------------------------------------------------------------------------
+
+    def forward(
+        self,
+        theta: ArrayLike,
+        joint_errors: ArrayLike | None = None,
+        threads: int | None = None,
+    ) -> FloatArray:
+        """Where the tool is (eq. 5; with errors eq. 19).
+
+        Parameters
+        ----------
+        theta : array_like (..., n)
+            Joint coordinates, rad and mm.
+        joint_errors : array_like (n, 6) or (..., n, 6), optional
+            Δx Δy Δz [mm], Δφ Δθ Δψ [rad] of each joint, for all rows or of each row; in place of
+            the arm's own.
+        threads : int, optional
+            As many as pay by default.
+
+        Returns
+        -------
+        ndarray (..., 4, 4)
+            From the tool to the base, mm. A row with a coordinate that is not finite, or beyond
+            1e5 rad, is NaN.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A wrong shape, no numbers, or errors that are not finite.
+        """
+        rows, shape, links = self._given(theta, joint_errors)
+        return self.core.forward(rows, links, threads).reshape(*shape, 4, 4)
+
+    def jacobian(
+        self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: Frame = "space"
+    ) -> FloatArray:
+        """The tool's twist by each joint coordinate.
+
+        Parameters
+        ----------
+        theta : array_like (..., n)
+            Joint coordinates, rad and mm.
+        joint_errors : array_like (n, 6) or (..., n, 6), optional
+            As in `forward`.
+        frame : {"space", "body", "tip"}
+            Twists (ω, v) seen in the base, v that of the point at the base's origin; seen in the
+            tool; or ω in base axes and v the velocity of the tool's origin.
+
+        Returns
+        -------
+        ndarray (..., 6, n)
+            ω first, rad and mm per rad or mm.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A wrong shape, no numbers, or an unknown frame.
+        """
+        seen = frame_number(frame)
+        rows, shape, links = self._given(theta, joint_errors)
+        return self.core.jacobian(rows, links, seen).reshape(*shape, 6, self.n_joints)
+
+    def error_jacobian(
+        self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: Frame = "space"
+    ) -> FloatArray:
+        """The tool's twist by each joint error, the coordinates held.
+
+        Parameters
+        ----------
+        theta : array_like (..., n)
+            Joint coordinates, rad and mm.
+        joint_errors : array_like (n, 6) or (..., n, 6), optional
+            The errors at which the derivative is taken, as in `forward`.
+        frame : {"space", "body", "tip"}
+            As in `jacobian`.
+
+        Returns
+        -------
+        ndarray (..., 6, 6 n)
+            Columns Δx Δy Δz Δφ Δθ Δψ of joint 1, then of joint 2, ...
+
+        Raises
+        ------
+        ValueError, TypeError
+            A wrong shape, no numbers, or an unknown frame.
+        """
+        seen = frame_number(frame)
+        rows, shape, links = self._given(theta, joint_errors)
+        return self.core.error_jacobian(rows, links, seen).reshape(*shape, 6, 6 * self.n_joints)
+
+    def inverse(
+        self,
+        target: ArrayLike,
+        guess: ArrayLike | None = None,
+        joint_errors: ArrayLike | None = None,
+        *,
+        parts: Part = "pose",
+    ) -> ArmInverse:
+        """Joint coordinates that bring the tool to a target, by damped least squares.
+
+        Parameters
+        ----------
+        target : array_like (..., 4, 4)
+            Where the tool shall be, mm.
+        guess : array_like (n,) or (..., n), optional
+            Where to start, which decides between several solutions; 0 by default.
+        joint_errors : array_like (n, 6) or (..., n, 6), optional
+            As in `forward`: coordinates that undo these errors.
+        parts : {"pose", "position"}
+            What shall be met: position and orientation, or the position alone.
+
+        Returns
+        -------
+        ArmInverse
+            Coordinates, status and residual of each row. A row that was not reached is NaN
+            and does not raise.
+
+        Raises
+        ------
+        ValueError, TypeError
+            A wrong shape, no numbers, or no rigid motions.
+        """
+        return damped_least_squares(self, target, guess, joint_errors, parts)
+
+    # --------------------------------------------------------------------------------------------
+
+    def _given(
+        self, theta: ArrayLike, joint_errors: ArrayLike | None
+    ) -> tuple[FloatArray, tuple[int, ...], Links]:
+        rows, shape = as_rows("theta", theta, self.n_joints)
+        if joint_errors is None:
+            return rows, shape, self._links
+        errors = checked_errors(joint_errors, self.n_joints, shape)
+        return rows, shape, self.core.links(errors)
