@@ -10,7 +10,7 @@ import typer
 import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.cli.inputs import Inputs
-from pkmcal.cli.options import Force, Json, RobotOrArm
+from pkmcal.cli.options import Force, Json, ParallelRobot
 from pkmcal.cli.output import Output, say
 from pkmcal.controllers.linuxcnc import contents
 from pkmcal.exceptions import ArgumentError
@@ -18,21 +18,17 @@ from pkmcal.files.reading import Input
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-TARGETS = (
-    "c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf",
-    "dh", "dh-modified", "ur", "urdf",
-)  # fmt: skip
-
+_OF_ARMS = ("urdf", "dh", "dh-modified", "ur")
+TARGETS = ("c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf", *_OF_ARMS)
 _LINES = {
     "reprap": pk.export.reprap,
     "marlin": pk.export.marlin,
     "hangprinter": pk.export.hangprinter,
 }
-_OF_ARMS = ("dh", "dh-modified", "ur", "urdf")
 
 
 def export(
-    robot: RobotOrArm,
+    robot: ParallelRobot,
     target: Annotated[
         str, typer.Option("--as", metavar="TARGET", help=f"What for: {', '.join(TARGETS)}.")
     ],
@@ -65,8 +61,8 @@ def export(
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
     linear or rotary delta for Klipper or Kalico; reprap, marlin: its M665 and M666, or M669;
     hangprinter: M669. linuxcnc: a kinematics component, and a simulation that runs it. mjcf: a
-    model for MuJoCo. Of serial arms: dh and dh-modified, a table of Denavit-Hartenberg numbers; ur,
-    the lists of a calibration.conf of Universal Robots; urdf, a tree of links.
+    model for MuJoCo. Of serial arms: urdf, a tree of links; dh and dh-modified, a table of
+    Denavit-Hartenberg numbers; ur, the lists of a calibration.conf of Universal Robots.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -106,15 +102,15 @@ def export(
 def _export_arm(
     robot: str | Input, target: str, out: Path, read: Inputs, force: bool, json: bool
 ) -> int:
-    """Write a serial arm: its Denavit-Hartenberg numbers, or its links."""
+    """Write a serial arm."""
     arm: object = pk.load(robot)
     if not isinstance(arm, pk.SerialArm):
         raise ArgumentError(f"{robot}: --as {target} is for serial arms")
     with Output(out.parent, [out.name], read, force).draft() as draft:
-        if target == "ur":
-            pk.export.universal_robots(arm, draft / out.name)
-        elif target == "urdf":
+        if target == "urdf":
             pk.export.urdf(arm, draft / out.name)
+        elif target == "ur":
+            pk.export.universal_robots(arm, draft / out.name)
         else:
             pk.export.dh(arm, draft / out.name, "standard" if target == "dh" else "modified")
     if json:

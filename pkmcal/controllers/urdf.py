@@ -25,10 +25,10 @@ _METRE = 1e-3
 def urdf(arm: SerialArm, path: str | PathLike[str]) -> None:
     """Write a serial arm, its joint errors included, as a URDF file.
 
-    Links are ``base``, ``link1`` and so on and ``tool``; joints ``q1`` and so on, in metres and
-    radians. Masses are 1 kg, inertias 0.01 kg m² and sliding limits ±1 km throughout: an arm's
-    file has none. An arm that was read from a URDF is better written by ``save_urdf``, which
-    keeps all else of its source.
+    Links are ``base``, ``link1`` and so on and ``tool``; joints have the arm's names, or ``q1`` and
+    so on; metres and radians. Masses are 1 kg, inertias 0.01 kg m² and sliding limits ±1 km
+    throughout: an arm's file has none. An arm that was read from a URDF is better written by
+    ``save_urdf``, which keeps all else of its source.
 
     Parameters
     ----------
@@ -68,13 +68,18 @@ def text_of(arm: SerialArm) -> str:
     Xml.SubElement(top, "link", name="base")
     before = np.eye(4)
     links = ["base"]
+    names = arm.joint_names or [f"q{i}" for i, _ in enumerate(arm.kinds, 1)]
     numbers = zip(arm.axes, arm.points, arm.kinds, arm.error_motions(), strict=True)
     for i, (axis, point, kind, error) in enumerate(numbers, 1):
         at = np.eye(4)
         at[:3, 3] = point
         sliding = kind == "prismatic"
         joint = _joint(
-            top, links[-1], f"link{i}", f"q{i}", "prismatic" if sliding else "continuous"
+            top,
+            links[-1],
+            f"link{i}",
+            names[i - 1],
+            "prismatic" if sliding else "continuous",
         )
         _origin(joint, np.linalg.inv(before) @ error @ at)
         Xml.SubElement(joint, "axis", xyz=_text(axis))

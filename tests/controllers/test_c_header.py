@@ -145,6 +145,12 @@ def test_machine_with_more_closures_than_coordinates_is_refused(tmp_path: Path) 
     assert not (tmp_path / "robot.h").exists()
 
 
+def test_machine_of_chains_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(pk.ArgumentError, match="chains of joints; a header holds other limbs"):
+        pk.export.c_header(pk.load("trivariant"), tmp_path / "robot.h")
+    assert not (tmp_path / "robot.h").exists()
+
+
 def test_names_come_from_the_file(tmp_path: Path) -> None:
     needed("gcc")
     pk.export.c_header(pk.load("2tpr2tps"), tmp_path / "2tpr-2tps.h")

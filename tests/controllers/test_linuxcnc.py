@@ -21,6 +21,7 @@ import pytest
 import pkmcal as pk
 
 from .. import robots
+from .c_headers import PARALLEL
 
 MODULES = Path("/usr/lib/linuxcnc/modules")
 SESSION = Path(__file__).with_name("linuxcnc_session.py")
@@ -36,11 +37,7 @@ FRAMES = {
     "base": {"x": 10.0, "y": -20.0, "z": 30.0, "alpha": 0.1, "beta": -0.2, "gamma": 0.5},
     "tool": {"x": 1.0, "y": 2.0, "z": -40.0, "alpha": -0.3, "beta": 0.1, "gamma": 0.2},
 }
-CASES = {
-    name: lambda name=name: pk.load(name)
-    for name in pk.machines()
-    if name != "rbt-6t03p-printed" and isinstance(pk.load(name), pk.Robot)
-}
+CASES = {name: lambda name=name: pk.load(name) for name in PARALLEL if name != "rbt-6t03p-printed"}
 CASES["framed"] = lambda: robots.hexapod({"offset": 12.0, "gain": -1.01}, frames=FRAMES)
 
 
@@ -339,6 +336,7 @@ def test_what_linuxcnc_cannot_hold_is_refused(tmp_path: Path) -> None:
     for robot, folder, reason in (
         (robots.hexapod(revolute, revolute), "x", "8 closures for 6 free coordinates"),
         (framed, "x", "base or tool frames"),
+        (pk.load("trivariant"), "x", "chains of joints"),
         (pk.load("hexapod"), "a" * 30, "folder must have a name"),
         (pk.load("rbt-6t03p-printed"), "x", "cannot reach its home pose"),
     ):
