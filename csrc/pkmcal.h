@@ -60,6 +60,33 @@ typedef struct {
     const double *link;
 } pkm_links;
 
+/* A machine of limbs that are chains of joints: see chains.h. Joints are counted once where chains
+ * share them; a joint is turned or slid by an actuator, or passive. What chains share comes first among
+ * the passive ones. Places are those of numbers in the geometry. */
+enum { PKM_MAX_CHAIN = 8, PKM_MAX_JOINTS = 72, PKM_MAX_SHARED = 6, PKM_MAX_CHAIN_ROWS = 36,
+       PKM_MAX_NUMBERS = 1024 };
+typedef struct {
+    int map, chains, joints, actuators, passive, shared, numbers;
+    double size, length, closure_tolerance; /* [mm], as of pkm_machine */
+    int over;                       /* more rows than unknowns: weigh them by compliance */
+    double home[12];                /* the platform's frame at home, the first rows of its matrix */
+    const int32_t *first;           /* (chains + 1) where the joints of each begin in `member` */
+    const int32_t *member;          /* joints from base to platform, chain after chain */
+    const int32_t *ball;            /* (chains) does the chain end in a ball, after its joints? */
+    const int32_t *end_place;       /* (chains) of the six errors on the platform's side */
+    const int32_t *ball_place;      /* (chains) of the three errors of the ball */
+    const double *end;              /* (chains, 3) the point on the platform, at home */
+    const int32_t *prismatic;       /* (joints) */
+    const int32_t *actuator;        /* (joints) or -1 */
+    const int32_t *coordinate;      /* (joints) which of the passive ones, or -1 */
+    const int32_t *place;           /* (joints) of the six errors */
+    const double *axes;             /* (joints, 9), the joint's own the third column, at home */
+    const double *point;            /* (joints, 3), at home */
+    const double *soft;             /* (joints) compliance [mm per unit force], others relative */
+    const int32_t *drive_place;     /* (actuators) of the offset; the gain follows */
+    const double *zero;             /* (actuators) the reading at home */
+} pkm_chains;
+
 enum { PKM_SPACE, PKM_BODY, PKM_TIP }; /* tip: velocity of the tool's origin, in base axes */
 
 const char *pkm_slot_names(void);
@@ -75,6 +102,9 @@ int pkm_best_isa(void);
 
 /* The number of closure rows, or 0 for a machine the core cannot take. */
 int pkm_closure_count(const pkm_machine *machine);
+
+/* The same number, or 0 also where `order` is not one that pkm_prepare sets: what every call asks. */
+int pkm_prepared(const pkm_machine *machine);
 
 /* Before every other call of a machine: count how many limbs are `sharing` an actuator, and set
  * `order` from an elimination with exchanges at the home pose: later ones run in that order.

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers.loss import Loss, loss, nearest
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_lines import Source
@@ -21,7 +21,6 @@ from pkmcal.geometry import robot_file
 from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot, require_parallel
 
-EXACT = 1e-6  # mm: firmware numbers have six decimals
 _TOWERS = 3
 _POSES = 300
 
@@ -55,31 +54,6 @@ class FirmwareDelta:
         return tuple(at - float(np.sqrt(arm**2 - self.radius**2)) for at, arm in pairs)
 
 
-@dataclass(frozen=True)
-class Loss:
-    """How far a firmware's model is from the robot at the same actuators, over a workspace.
-
-    Attributes
-    ----------
-    rms, worst : float
-        Mm.
-    over : str
-        Over which workspace.
-    """
-
-    rms: float
-    worst: float
-    over: str
-
-    @property
-    def exact(self) -> bool:
-        """Whether the firmware holds the robot."""
-        return self.worst <= EXACT
-
-    def __str__(self) -> str:
-        return f"off by {self.rms:.2g} mm rms, {self.worst:.2g} mm at most, {self.over}"
-
-
 def of_robot(robot: Robot, project: bool) -> tuple[FirmwareDelta, Loss]:
     """The firmware's numbers of a robot, and what they lose.
 
@@ -89,43 +63,51 @@ def of_robot(robot: Robot, project: bool) -> tuple[FirmwareDelta, Loss]:
         No linear delta; or one that the firmware cannot hold, unless `project`.
     """
     require_delta(robot)
-    firmware = _as_built(robot)
+    firmware = as_built(robot)
     poses, over = _workspace(firmware)
     q = robot.inverse(poses)
     if not np.isfinite(q).all():
         raise ArgumentError(f"robot: {robot.name} does not reach its bed: no pose for some {over}")
-    loss = _loss(firmware, robot, q, poses, over)
-    if not loss.exact:
+    lost = loss(as_robot(firmware, gains(robot)), q, poses, over)
+    if not lost.exact:
         firmware = _projected(firmware, robot, q, poses)
-        loss = _loss(firmware, robot, q, poses, over)
+        lost = loss(as_robot(firmware, gains(robot)), q, poses, over)
         if not project:
             raise ArgumentError(
                 f"robot: {robot.name}: the firmware has one radius and vertical towers, this robot"
-                f" has not; its numbers can be projected onto that, {loss}"
+                f" has not; its numbers can be projected onto that, {lost}"
             )
     if min(firmware.endstops) <= 0.0:
         raise ArgumentError(
             f"robot: {robot.name}: the end stops would be {min(firmware.endstops):.6g} mm over the"
             " bed; q must be 0 at the end stops, so that `offset` is their height"
         )
-    return firmware, loss
+    return firmware, lost
 
 
 def require_delta(robot: Robot) -> None:
     """Refuse what is no linear delta with three carriages of its own."""
     require_parallel(robot)
-    limbs = robot.model.limbs
-    kinds = [limb.kind for limb in limbs]
-    own = [limb.actuator for limb in limbs] == list(range(_TOWERS))
-    if robot.model.map != "translation" or kinds != ["PUS"] * _TOWERS or not own:
+    if not _is_linear(robot):
         raise ArgumentError(
             f"robot: {robot.name} is no linear delta of three PUS limbs that only translates"
         )
-    if not robot.frames.trivial or any(limb.branch > 0 for limb in limbs):
+    if not is_delta(robot):
         raise ArgumentError(
             f"robot: {robot.name}: a firmware has no base and tool frames, and its carriages are"
             " above the nozzle"
         )
+
+
+def is_delta(robot: Robot) -> bool:
+    """Whether three carriages of their own, above it, move a platform that only translates."""
+    above = all(limb.branch <= 0 for limb in robot.model.limbs)
+    return _is_linear(robot) and robot.frames.trivial and above
+
+
+def _is_linear(robot: Robot) -> bool:
+    kinds = [(limb.kind, limb.actuator) for limb in robot.model.limbs]
+    return robot.model.map == "translation" and kinds == [("PUS", i) for i in range(_TOWERS)]
 
 
 def gains(robot: Robot) -> tuple[float, ...]:
@@ -133,7 +115,7 @@ def gains(robot: Robot) -> tuple[float, ...]:
     return tuple(robot.slots[:, SLOTS.index("gain")].tolist())
 
 
-def _as_built(robot: Robot) -> FirmwareDelta:
+def as_built(robot: Robot) -> FirmwareDelta:
     """The same towers, as if they were vertical and equally far: exact where they are."""
     slots = robot.slots
     towers = slots[:, 0:3] - slots[:, 3:6]
@@ -158,21 +140,6 @@ def _workspace(firmware: FirmwareDelta) -> tuple[FloatArray, str]:
     return poses, f"within {across:.0f} mm of the middle and {high:.0f} mm of the bed"
 
 
-def _residuals(
-    firmware: FirmwareDelta, robot: Robot, q: FloatArray, poses: FloatArray
-) -> FloatArray:
-    model = as_robot(firmware, gains(robot))
-    found: FloatArray = model.forward(q, guess=poses).pose[:, :3] - poses[:, :3]
-    return found
-
-
-def _loss(
-    firmware: FirmwareDelta, robot: Robot, q: FloatArray, poses: FloatArray, over: str
-) -> Loss:
-    off = np.linalg.norm(_residuals(firmware, robot, q, poses), axis=1)
-    return Loss(float(np.sqrt((off**2).mean())), float(off.max()), over)
-
-
 def _projected(
     firmware: FirmwareDelta, robot: Robot, q: FloatArray, poses: FloatArray
 ) -> FirmwareDelta:
@@ -185,10 +152,7 @@ def _projected(
     start = np.array(
         [firmware.radius, *firmware.angles, *firmware.arms, *firmware.carriages], dtype=float
     )
-    found = least_squares(
-        lambda x: _residuals(of(x), robot, q, poses).ravel(), start, x_scale="jac", xtol=1e-12
-    )
-    return of(found.x)
+    return of(nearest(lambda x: as_robot(of(x), gains(robot)), start, q, poses))
 
 
 def as_robot(

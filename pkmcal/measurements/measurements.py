@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import display
-from pkmcal.arguments import checked_seed, shown, word
+from pkmcal.arguments import checked_seed, shown, word, words
 from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
@@ -80,6 +80,8 @@ class Measurements(Result):
         Standard deviation of what the actuators read, mm or rad. None: they are where they read on
         a machine with as many closures as free coordinates; on one with more, and with rows that
         contradict each other, it is estimated from them. Kept as (N, n).
+    notes : sequence of str
+        What was assumed when they were read, a line each.
 
     Raises
     ------
@@ -106,6 +108,7 @@ class Measurements(Result):
     actuator_units: tuple[str, ...] | None = None
     attachment: FloatArray | None = None
     actuator_sigma: FloatArray | None = None
+    notes: tuple[str, ...] = ()
 
     # The types above are those of the attributes; anything array-like is taken.
     def __init__(
@@ -122,6 +125,7 @@ class Measurements(Result):
         actuator_units: str | Sequence[str] | None = None,
         attachment: ArrayLike | None = None,
         actuator_sigma: ArrayLike | None = None,
+        notes: Sequence[str] = (),
     ) -> None:
         word("kind", kind, COMPONENTS)
         q = numbers("actuators", actuators)
@@ -144,6 +148,7 @@ class Measurements(Result):
             "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
             "attachment": attachment_array(attachment, kind, targets, len(q)),
             "actuator_sigma": actuator_sigma_array(actuator_sigma, q.shape),
+            "notes": words("notes", notes),
         }
         self.__setstate__(fields)
 
@@ -277,6 +282,21 @@ class Measurements(Result):
             The file cannot be written; one that was there before is untouched.
         """
         write_measurements(self, path, comment)
+
+    def _columns(self) -> dict[str, Any]:
+        """As the columns of a file, but for the units, which are mm and rad."""
+        columns: dict[str, Any] = {f"q{i + 1}": q for i, q in enumerate(self.actuators.T)}
+        values = self.values.reshape(len(self), -1)
+        columns |= dict(zip(self.components, values.T, strict=True))
+        deviations = self._deviations()
+        if deviations is not None:
+            names = (f"sigma.{name}" for name in self.components)
+            columns |= dict(zip(names, deviations.T, strict=True))
+        if self.target_index is not None and self.target_names is not None:
+            columns["target"] = [self.target_names[i] for i in self.target_index]
+        if self.group is not None:
+            columns["group"] = self.group
+        return columns
 
     def _parts(self) -> Iterator[str | Table]:
         yield self._title()

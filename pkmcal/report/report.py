@@ -45,7 +45,7 @@ def write(found: Identification, folder: Path, files: Mapping[str, bytes]) -> li
     facts = gather(found, files)
     page, numbers, robot = (folder / name for name in FILES)
     found.robot.save(robot, comment(files))
-    write_whole(numbers, as_json(_as_data(facts)) + "\n")
+    write_whole(numbers, as_json(_as_data(facts), schema="report") + "\n")
     write_whole(page, html(facts))
     return [page, numbers, robot]
 

@@ -30,6 +30,7 @@ ELSEWHERE = {
     *("inverse", "forward", "jacobian", "forward_jacobian", "error_jacobian", "closure", "limbs"),
     *("rates", "motion", "compose", "invert", "compose_rates", "compose_twists", "normals"),
     *("swarm_start", "swarm_update_best", "swarm_move", "swarm_eq18"),
+    *("chain_forward", "chain_inverse", "chain_closure", "chain_response", "chain_frames"),
 }
 
 rng = np.random.default_rng(20)

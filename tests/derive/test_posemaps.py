@@ -61,8 +61,7 @@ def twist(name: str, state_at: Callable[[mp.mpf], mp.matrix]) -> tuple[mp.matrix
 
 def reported(name: str, state: mp.matrix) -> mp.matrix:
     """The pose x y z α β γ that a state is reported as."""
-    sine, cosine = (call(f"map_{name}_angles", part, state) for part in ("sine", "cosine"))
-    return mp.matrix([*frame(name, state)[1], *map(mp.atan2, sine, cosine)])
+    return mp.matrix([*frame(name, state)[1], *call(f"map_{name}_angles", "angles", state)])
 
 
 def moved(name: str, state: mp.matrix, step: mp.matrix) -> mp.matrix:
