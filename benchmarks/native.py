@@ -20,6 +20,7 @@ from pkmcal.core.library import ISAS
 HERE = Path(__file__).parent
 COMPILER = os.environ.get("CC", "gcc")
 TARGETS = {"base": [], "avx2": ["-march=x86-64-v3"], "avx512": ["-march=x86-64-v4"]}
+PEAKS = {"fused": 12 * 2, "apart": 12}  # operations of a lane in a step, see fma_peak.c
 BYTES = {"base": 16, "avx2": 32, "avx512": 64}  # of a vector register
 
 
@@ -55,11 +56,12 @@ def scalar_newton(folder: Path) -> Compiled:
 
 
 def fma_peak(folder: Path, isa: str) -> Compiled:
-    """The loop of multiply-adds at the width of an ISA."""
-    declared = """
-        double peak_double(ptrdiff_t steps, double start);
-        double peak_float(ptrdiff_t steps, double start);
-    """
+    """Loops of multiplications and additions in registers at the width of an ISA."""
+    declared = "".join(
+        f"double {how}_{kind}(ptrdiff_t steps, double start);"
+        for how in PEAKS
+        for kind in ("double", "float")
+    )
     flags = ["-O3", f"-DBYTES={BYTES[isa]}", "-ffp-contract=fast", *TARGETS[isa]]
     return compiled(folder, f"peak_{isa}", declared, [HERE / "fma_peak.c"], flags)
 

@@ -1,6 +1,8 @@
 /* What needs no lanes: names, the best ISA, checks of what calls are given, and small loops. */
 #include "pkmcal.h"
 
+enum { MOST_PARTICLES = 1 << 24 }; /* and dimensions: the size of their state is a number of 64 bits */
+
 const char *pkm_slot_names(void) { return SLOT_NAMES; }
 const char *pkm_axis_names(void) { return AXIS_NAMES; }
 const char *pkm_driver_names(void) { return DRIVER_NAMES; }
@@ -49,11 +51,23 @@ int pkm_closure_count(const pkm_machine *machine)
     return rows >= free && rows <= PKM_MAX_ROWS ? rows : 0;
 }
 
+int pkm_prepared(const pkm_machine *machine)
+{
+    const int rows = pkm_closure_count(machine);
+    unsigned seen = 0;
+    for (int r = 0; r < rows; r++) {
+        if (machine->order[r] < 0 || machine->order[r] >= rows) return 0;
+        seen |= 1u << machine->order[r];
+    }
+    return seen == (1u << rows) - 1 ? rows : 0;
+}
+
 ptrdiff_t pkm_swarm_size(const pkm_swarm *swarm)
 {
-    const ptrdiff_t width = ((ptrdiff_t)swarm->particles + 7) / 8 * 8;
-    if (swarm->particles < 1 || swarm->dims < 1) return 0;
-    return (3 * swarm->dims + 6) * width + swarm->dims + 1;
+    const ptrdiff_t width = ((ptrdiff_t)swarm->particles + 7) / 8 * 8, dims = swarm->dims;
+    if (swarm->particles < 1 || dims < 1) return 0;
+    if (swarm->particles > MOST_PARTICLES || dims > MOST_PARTICLES) return 0;
+    return (3 * dims + 6) * width + dims + 1;
 }
 
 int pkm_with_errors(ptrdiff_t n, int k, const double *error, const int32_t *place, ptrdiff_t size,

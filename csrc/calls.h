@@ -115,5 +115,35 @@ int CALL(arm_jacobian)(const pkm_arm *arm, const pkm_links *links, int frame, pt
 int CALL(arm_error_jacobian)(const pkm_arm *arm, const pkm_links *links, const double *error,
                              int frame, ptrdiff_t n, const double *theta, double *jacobian);
 
+/* Machines of chains. As forward, with the passive joints (n, passive) at the pose. */
+int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
+                        ptrdiff_t geometry_stride, const double *q, const double *guess,
+                        ptrdiff_t guess_stride, double *pose, double *passive, int32_t *status,
+                        int32_t *iterations, double *residual);
+
+/* pose (n, 6) as given -> q (n, actuators), each chain alone from its home; NaN where one of six free
+ * joints or more does not reach. */
+int CALL(chain_inverse)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
+                        ptrdiff_t geometry_stride, const double *pose, double *q);
+
+/* pose (n, 6), q (n, actuators) -> the rows that passive joints leave (n, rows) [mm], and their
+ * derivatives by a scaled twist and by what chains share (n, rows, m + shared), by the free
+ * coordinates (n, rows, m) and by q (n, rows, actuators). */
+int CALL(chain_closure)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
+                        ptrdiff_t geometry_stride, const double *pose, const double *q,
+                        double *residual, double *by_step, double *by_free, double *by_q);
+
+/* pose (n, 6), q (n, actuators) -> dpose/d(numbers) (n, 6, columns), as error_jacobian; by q where
+ * column is NULL. */
+int CALL(chain_response)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
+                         ptrdiff_t geometry_stride, const double *pose, const double *q,
+                         const int32_t *column, int columns, int twists, double *jacobian);
+
+/* pose (n, 6), q (n, actuators) -> the passive joints there (n, passive), and the frames (R, p) of the
+ * joints and of the end of each chain before they move (n, members + chains, 12). */
+int CALL(chain_frames)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
+                       ptrdiff_t geometry_stride, const double *pose, const double *q,
+                       double *passive, double *frame);
+
 /* Calls that are one formula a row. */
 #include "row_calls.h"

@@ -24,14 +24,13 @@ INLINE void map_from_pose(int map, const real *pose, real *state)
 
 INLINE void map_to_pose(int map, const real *state, real pose[6])
 {
-    real R[9], sine[3], cosine[3];
+    real R[9];
     FN(map_frame)(map, state, R, pose);
     switch (map) {
-#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_angles)(state, sine, cosine); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_angles)(state, pose + 3); break;
     EACH_MAP(CASE)
 #undef CASE
     }
-    for (int i = 0; i < 3; i++) pose[3 + i] = arctangent2(sine[i], cosine[i]);
 }
 
 INLINE void map_rates(int map, const real *state, const real *delta, real *pose)

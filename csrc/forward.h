@@ -177,7 +177,7 @@ int CALL(forward)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
 {
     const forward_call call = {machine, n, geometry, geometry_stride, q, guess, guess_stride,
                                pose, status, iterations, residual};
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
 #define CASE(NAME, name, ...) case MAP_##NAME: forward_map(MAP_##NAME, &call); break;
         EACH_MAP(CASE)

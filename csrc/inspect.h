@@ -68,7 +68,7 @@ int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
                   double *by_free, double *by_q)
 {
     const closure_out out = {residual, by_step, by_free, by_q};
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
 #define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME: closure_map(MAP_##NAME, machine, n, geometry, pose, q, &out); break;
@@ -83,7 +83,7 @@ int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
 int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry, const double *pose,
                 double *drive, double *on_base, double *on_platform)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     const int limbs = machine->limbs;
     limb_numbers limb[PKM_MAX_LIMBS];
     for (ptrdiff_t first = 0; first < n; first += LANES) {
@@ -114,7 +114,7 @@ int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
 int CALL(spheres)(const pkm_machine *machine, ptrdiff_t n, const double *geometry, const double *q,
                   double *out)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     limb_numbers limb[PKM_MAX_LIMBS];
     FN(limb_sphere) sphere[PKM_MAX_LIMBS];
     const int width = machine->limbs * PKM_SPHERE;

@@ -75,7 +75,7 @@ int CALL(inverse)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
                   ptrdiff_t geometry_stride, const double *pose, const double *near,
                   ptrdiff_t near_stride, double *q)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     enum { BLOCKS_INVERSE = 2 }; /* side by side: the processor overlaps them */
     limb_numbers limb[PKM_MAX_LIMBS];
     for (ptrdiff_t first = 0; first < n; first += BLOCKS_INVERSE * LANES) {

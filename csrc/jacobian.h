@@ -222,7 +222,7 @@ INLINE void response_map(int map, const pkm_machine *machine, ptrdiff_t n, const
 int CALL(jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                    ptrdiff_t geometry_stride, const double *pose, double *jacobian)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
 #define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME:                                                                              \
@@ -253,7 +253,7 @@ int CALL(forward_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double
                            ptrdiff_t geometry_stride, const double *pose, const double *q,
                            int twists, double *jacobian)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     responses(machine, n, geometry, geometry_stride, pose, q, NULL, machine->actuators, twists,
               jacobian);
     return 0;
@@ -263,7 +263,7 @@ int CALL(error_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *
                          ptrdiff_t geometry_stride, const double *pose, const double *q,
                          const int32_t *column, int columns, int twists, double *jacobian)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     for (int c = 0; c < columns; c++)
         if (column[c] < 0 || column[c] >= SLOTS * machine->limbs || (c && column[c] <= column[c - 1]))
             return PKM_BAD_COLUMN;

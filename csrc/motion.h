@@ -43,7 +43,7 @@ INLINE void limb_rates(const pkm_machine *machine, int i, const limb_numbers *li
 int CALL(rates)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                 const double *motion, double *q1, double *q2)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     const int actuators = machine->actuators;
     limb_numbers limb[PKM_MAX_LIMBS];
     for (ptrdiff_t first = 0; first < n; first += LANES) {
@@ -214,7 +214,7 @@ int CALL(motion)(const pkm_machine *machine, ptrdiff_t n, const double *geometry
                  const double *pose, const double *q, const double *q1, const double *q2,
                  double *motion, double *pose_rates)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
 #define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME:                                                                              \

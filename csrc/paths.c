@@ -236,7 +236,7 @@ int pkm_paths(const pkm_machine *machine, ptrdiff_t n, const double *start, cons
               double *state, double accuracy, double *frame, int32_t *status, int32_t *steps,
               double *reached)
 {
-    if (pkm_closure_count(machine) != map_m(machine->map)) return PKM_BAD_MACHINE;
+    if (pkm_prepared(machine) != map_m(machine->map)) return PKM_BAD_MACHINE;
     pkm_machine unit = *machine;
     homotopy path = {&unit, (const real *)start, (const real *)target};
     unit.length = unit.size = 1.0;

@@ -299,7 +299,7 @@ INLINE real squared_closures(const pkm_machine *machine, const limb_numbers *lim
 int CALL(closure_cost)(const pkm_machine *machine, ptrdiff_t particles, const double *geometry,
                        ptrdiff_t n, const double *pose, const double *q, double *cost)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     posture at[POSTURES];
     limb_numbers limb[PKM_MAX_LIMBS];
     for (ptrdiff_t i = 0; i < particles; i++) cost[i] = 0.0;

@@ -147,12 +147,8 @@ INLINE void adjoint_row(const real matrix[12], real adjoint[36])
 /* x y z α β γ of a motion. */
 INLINE void motion_pose_row(const real matrix[12], real pose[6])
 {
-    real sine[2], cosine[2];
     const motion T = motion_of(matrix);
-    memcpy(pose, T.p, sizeof T.p);
-    pose[5] = arctangent2(T.R[3], T.R[0]);
-    FN(rotation_tilts)(T.R, pose[5], sine, cosine);
-    for (int k = 0; k < 2; k++) pose[3 + k] = arctangent2(sine[k], cosine[k]);
+    FN(motion_pose)(T.R, T.p, pose);
 }
 
 INLINE void joint_motion_row(const real error[6], const real point[3], real matrix[16])

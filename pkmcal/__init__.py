@@ -15,7 +15,10 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal import screw as screw
     from pkmcal import trajectory as trajectory
     from pkmcal.arms.arm import SerialArm as SerialArm
+    from pkmcal.arms.denavit_hartenberg import DHTable as DHTable
     from pkmcal.arms.inverse import ArmInverse as ArmInverse
+    from pkmcal.calibration.anchors import LocatedAnchors as LocatedAnchors
+    from pkmcal.calibration.anchors import locate_anchors as locate_anchors
     from pkmcal.calibration.bootstrap import Bootstrap as Bootstrap
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
     from pkmcal.calibration.distances import Distances as Distances
@@ -32,6 +35,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.compensation.compensate import compensate as compensate
     from pkmcal.compensation.correction_grid import CorrectionGrid as CorrectionGrid
     from pkmcal.compensation.correction_grid import correction_grid as correction_grid
+    from pkmcal.compensation.program import CorrectedProgram as CorrectedProgram
+    from pkmcal.compensation.program import compensate_program as compensate_program
     from pkmcal.compensation.pso import SwarmResult as SwarmResult
     from pkmcal.compensation.pso import pso as pso
     from pkmcal.controllers.import_printer import import_printer as import_printer
@@ -63,6 +68,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.loading import machines as machines
     from pkmcal.measurements.measurement_csv import read_measurements as read_measurements
     from pkmcal.measurements.measurements import Measurements as Measurements
+    from pkmcal.measurements.probe import probed as probed
     from pkmcal.measurements.tracker import Tracker as Tracker
     from pkmcal.measurements.virtual_machine import VirtualMachine as VirtualMachine
     from pkmcal.modes.assemblies import Assemblies as Assemblies
@@ -73,7 +79,9 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
 
 _HOMES = {
     "arms.arm": ("SerialArm",),
+    "arms.denavit_hartenberg": ("DHTable",),
     "arms.inverse": ("ArmInverse",),
+    "calibration.anchors": ("LocatedAnchors", "locate_anchors"),
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
     "calibration.distances": ("Distances",),
     "calibration.identification": ("Identification",),
@@ -85,6 +93,7 @@ _HOMES = {
     "checks.finding": ("Finding",),
     "compensation.compensate": ("Compensation", "compensate"),
     "compensation.correction_grid": ("CorrectionGrid", "correction_grid"),
+    "compensation.program": ("CorrectedProgram", "compensate_program"),
     "compensation.pso": ("SwarmResult", "pso"),
     "core.swarm": ("CONSTRICTION", "SwarmSettings"),
     "error_model.allocation": ("Allocation", "allocate_tolerance"),
@@ -108,6 +117,7 @@ _HOMES = {
     "loading": ("load", "machines"),
     "measurements.measurement_csv": ("read_measurements",),
     "measurements.measurements": ("Measurements",),
+    "measurements.probe": ("probed",),
     "measurements.tracker": ("Tracker",),
     "measurements.virtual_machine": ("VirtualMachine",),
     "modes.assemblies": ("Assemblies",),

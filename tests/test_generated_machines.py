@@ -30,7 +30,7 @@ def missed(robot: pk.Robot, own: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def determinant_sides(robot: pk.Robot, own: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Sign of the closures' determinant by differences of the twin, (N,)."""
+    """Sign of the closures' determinant by differences of the twin, by a twist, (N,)."""
     columns = []
     for i in generated.FREE[kind_of(robot)]:
         step = np.zeros(6)
@@ -39,7 +39,8 @@ def determinant_sides(robot: pk.Robot, own: np.ndarray, q: np.ndarray) -> np.nda
         change -= twin_rows.closures(robot.model, own - step, q)
         columns.append(change / step[i] / (1.0 if i < 3 else robot.length))
     with np.errstate(invalid="ignore"):  # out of reach
-        return np.linalg.det(np.stack(columns, axis=-1))
+        by_coordinates = np.linalg.det(np.stack(columns, axis=-1))
+    return by_coordinates * np.sign(np.cos(own[:, 4]))  # cos β is that of α β γ by the turning
 
 
 def kind_of(robot: pk.Robot) -> str:

@@ -12,12 +12,14 @@ from pkmcal.arms.inputs import (
     ArmArguments,
     Frame,
     JointKind,
+    Source,
     axes_and_points,
     checked_errors,
     frame_number,
     joint_frames,
     kinds_of,
     motion,
+    names_of,
 )
 from pkmcal.arms.inverse import ArmInverse, Part, damped_least_squares
 from pkmcal.arrays import FloatArray, Unit, as_rows
@@ -45,10 +47,14 @@ class SerialChain:
         kinds: str | Sequence[str] | None = None,
         name: str = "serial arm",
         joint_errors: ArrayLike | None = None,
+        joint_names: Sequence[str] | None = None,
+        source: Source | None = None,
     ) -> None:
         self._name = instance("name", name, str)
         self._axes, self._points = axes_and_points(axes, points)
         self._kinds = kinds_of(kinds, len(self._axes))
+        self._joint_names = names_of(joint_names, len(self._axes))
+        self._source = source
         self._home = motion("home", home)
         prismatic = np.array([kind == "prismatic" for kind in self._kinds], dtype=np.int32)
         self.core = Arm(prismatic, joint_frames(self._axes), self._points, self._home)
@@ -68,6 +74,16 @@ class SerialChain:
     def kinds(self) -> tuple[JointKind, ...]:
         """Kind of each joint, "revolute" or "prismatic"."""
         return self._kinds
+
+    @property
+    def joint_names(self) -> tuple[str, ...] | None:
+        """What the joints are called, as in a URDF file and in logs of controllers."""
+        return self._joint_names
+
+    @property
+    def source(self) -> Source | None:
+        """The URDF file it was read from (path, tip, base), for `save_urdf`."""
+        return self._source
 
     @property
     def n_joints(self) -> int:
@@ -129,6 +145,8 @@ class SerialChain:
             "kinds": self.kinds,
             "name": self.name,
             "joint_errors": self.joint_errors,
+            "joint_names": self.joint_names,
+            "source": self.source,
         }
 
     # kinematics ---------------------------------------------------------------------------------

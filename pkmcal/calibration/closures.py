@@ -76,13 +76,13 @@ class Closures(Protocol):
     def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
         """How the platform moves with the unknowns: twists (K, 6, unknowns)."""
 
-    def by_numbers(
-        self, robot: Calibratable, states: RowStates, places: IntArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Derivatives by numbers of the geometry, unknowns held.
+    def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
+        """Derivative of the equations by numbers of the geometry, (K, equations, p)."""
 
-        Of the equations (K, equations, p) and of the platform's twist (K, 6, p).
-        """
+    def twists_by_numbers(
+        self, robot: Calibratable, states: RowStates, places: IntArray
+    ) -> FloatArray | None:
+        """How the platform moves with them while the unknowns are held, (K, 6, p); None: not."""
 
 
 class Commanded:
@@ -115,12 +115,15 @@ class Commanded:
         """No unknowns."""
         return np.empty((len(self.read), 6, 0))
 
-    def by_numbers(
+    def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
+        """No equations."""
+        return np.empty((len(self.read), 0, len(places)))
+
+    def twists_by_numbers(
         self, robot: Calibratable, states: RowStates, places: IntArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Twists by the numbers, actuators held."""
-        twists = robot.error_twists(states.pose, states.actuators)[:, :, places]
-        return np.empty((len(twists), 0, len(places))), twists
+    ) -> FloatArray | None:
+        """Twists, actuators held."""
+        return robot.error_twists(states.pose, states.actuators)[:, :, places]
 
 
 class NoisyActuators:
@@ -165,12 +168,15 @@ class NoisyActuators:
         """Twists by the actuators."""
         return robot.actuator_twists(states.pose, states.actuators)[:, :, self._free]
 
-    def by_numbers(
+    def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
+        """Nothing: what actuators read is not of the geometry."""
+        return np.zeros((len(self.read), self.equations, len(places)))
+
+    def twists_by_numbers(
         self, robot: Calibratable, states: RowStates, places: IntArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Twists by the numbers, actuators held."""
-        twists = robot.error_twists(states.pose, states.actuators)[:, :, places]
-        return np.zeros((len(twists), self.equations, len(places))), twists
+    ) -> FloatArray | None:
+        """Twists, actuators held."""
+        return robot.error_twists(states.pose, states.actuators)[:, :, places]
 
 
 class FreePoses:
@@ -210,7 +216,9 @@ class FreePoses:
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """What the limbs would read at the poses less what they read."""
         off, by_step = pose_steps.readings(_machine(robot), states.pose, self.read)
-        return off * self._white, by_step * self._white[:, :, None]
+        off *= self._white
+        by_step *= self._white[:, :, None]
+        return off, by_step
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units; the other rows are in mm."""
@@ -222,13 +230,17 @@ class FreePoses:
         """Twists by steps of the pose."""
         return pose_steps.step_twists(_machine(robot), states.pose)
 
-    def by_numbers(
+    def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
+        """What the limbs would read, poses held."""
+        by_free = pose_steps.readings_by_numbers(_machine(robot), states.pose, self.read, places)
+        by_free *= self._white[:, :, None]
+        return by_free
+
+    def twists_by_numbers(
         self, robot: Calibratable, states: RowStates, places: IntArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """The equations by the numbers; poses are held."""
-        by_all = pose_steps.readings_by_numbers(_machine(robot), states.pose, self.read)
-        by_free = by_all[:, :, places] * self._white[:, :, None]
-        return by_free, np.zeros((len(by_free), 6, len(places)))
+    ) -> FloatArray | None:
+        """Poses are held."""
+        return None
 
 
 def _machine(robot: Calibratable) -> Robot:

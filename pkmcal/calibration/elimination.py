@@ -25,9 +25,9 @@ from pkmcal.calibration.closures import Closures, RowStates
 from pkmcal.measurements.calibratable import Calibratable
 
 _STEPS = 50  # of finding the best poses
-_SETTLED = 1e-13  # share of a pose's cost that a further step would gain
+_SETTLED = 1e-12  # share of a pose's cost that a further step would gain
 _CLOSE = 1e-6  # the same where steps have become too short to gain anything
-_ROUNDING = 1e-14  # of a whitened equation, of the largest number it was made of
+_ROUNDING = 1e-15  # of a whitened equation, of the largest number it was made of
 _RIDGE = 1e-13  # of the normal matrix, for unknowns that no equation has
 _TOGETHER = 4096  # poses that are eliminated at once, to bound memory
 
@@ -200,10 +200,11 @@ class Blocks:
         damping = np.zeros(self.poses)
         residual, by_unknown = system(states)
         cost = self._sums(residual**2)
-        floor = _ROUNDING**2 * self._sums((np.abs(by_unknown).max(axis=1) * _size(states)) ** 2)
+        rounded = _ROUNDING * _size(states) * np.sqrt(self._sums((by_unknown**2).sum(axis=1)))
         for _ in range(_STEPS):
             matrix, pull = self._normal(residual, by_unknown)
             step, gain = _steps(matrix, pull, damping)
+            floor = rounded * (rounded + np.sqrt(cost))
             settled = (gain <= _SETTLED * cost + floor) | ~np.isfinite(cost)
             if settled.all():
                 break
@@ -221,7 +222,10 @@ class Blocks:
             cost = np.where(better, cost_there, cost)
             if not better.any() and damping[~settled].min() > 1e8:
                 break
-        _, gain = _steps(*self._normal(residual, by_unknown), np.zeros(self.poses))
+        else:
+            damping[:] = 1.0  # the gain is that of states before
+        if damping.any():
+            _, gain = _steps(*self._normal(residual, by_unknown), np.zeros(self.poses))
         lost = ~(gain <= _CLOSE * cost + floor)
         status = np.where(lost & (states.status == 0), 1, states.status).astype(np.int32)
         return RowStates(states.pose, states.actuators, status)

@@ -73,7 +73,9 @@ class Equations(Readings):
                     guess[place[read], 3:] = orientation.shortest(measured.values[read, 3:])
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
-        self._no_sigma = np.array([m.sigma is None and bool(m.components) for m in self.sets])
+        self._no_sigma = np.array([
+            m.sigma is None and bool(np.isfinite(m.values).any()) for m in self.sets
+        ])  # fmt: skip
         sigma = self.actuator_sigma
         self._take(closures_of(parameters.robot, self.actuators, sigma), sigma is None)
 
@@ -116,13 +118,16 @@ class Equations(Readings):
     def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
         """Evaluate where the same with commanded poses has been started."""
         self.parameters, self._states = commanded.parameters, start.states
+        if self.closures.unknowns:  # closures that contradict each other may still have a best pose
+            self.start_from(np.flatnonzero(start.status), self.parameters.robot.home)
         return start if commanded is self else self.at(start.theta)
 
     @property
     def sigma_stated(self) -> bool:
         """Whether any noise is stated, of what was read or of the actuators."""
         of_actuators = self.closures.unknowns and not self.unstated[-1]
-        return bool(of_actuators) or any(m.sigma is not None for m in self.sets)
+        of_read = [m.sigma is not None and bool(np.isfinite(m.values).any()) for m in self.sets]
+        return bool(of_actuators) or any(of_read)
 
     @property
     def family_of_unit(self) -> IntArray:
@@ -160,6 +165,10 @@ class Equations(Readings):
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
         off, by_unknown = self.closures.residual(robot, states)
+        u = self.closures.unknowns
+        equation, by_unknown = off.reshape(-1) / noise[-1], by_unknown.reshape(-1, u) / noise[-1]
+        if not self.count.any():
+            return equation, by_unknown
         twists = self.closures.twists(robot, states)
         predicted = self.predicted(states.pose, theta)
         residuals = self.residuals(predicted)
@@ -169,10 +178,9 @@ class Equations(Readings):
                 self.sets, predicted, self.pose_of, residuals, strict=True
             )
         ]
-        u, factor = self.closures.unknowns, noise[-1]
         return (
-            np.concatenate([off.reshape(-1) / factor, -self.whitened(residuals, noise)]),
-            np.concatenate([by_unknown.reshape(-1, u) / factor, self.whitened(by_pose, noise)]),
+            np.concatenate([equation, -self.whitened(residuals, noise)]),
+            np.concatenate([by_unknown, self.whitened(by_pose, noise)]),
         )
 
     def residual(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
@@ -194,11 +202,12 @@ class Equations(Readings):
         if not self.closures.unknowns:
             return readings
         p, robot, states = self.parameters, evaluation.robot, evaluation.states
-        of_closures, _ = self.closures.by_numbers(robot, states, p.places)
-        by_all = np.zeros((of_closures.shape[0] * of_closures.shape[1], len(p)))
-        by_all[:, : len(p.places)] = of_closures.reshape(len(by_all), -1) / noise[-1]
         _, by_unknown = self._system(robot, states, evaluation.theta, noise)
-        return self._blocks.left(by_unknown, np.concatenate([by_all, readings]))
+        by_all, own = np.zeros((len(by_unknown), len(p))), len(by_unknown) - len(readings)
+        of_closures = self.closures.by_numbers(robot, states, p.places)
+        np.divide(of_closures.reshape(own, -1), noise[-1], out=by_all[:own, : len(p.places)])
+        by_all[own:] = readings
+        return self._blocks.left(by_unknown, by_all)
 
     def start_from(self, rows: IntArray, poses: FloatArray) -> None:
         """Start the forward kinematics of some distinct rows of actuators from poses (s, 6)."""
@@ -294,13 +303,14 @@ class Equations(Readings):
 
         With the opposite sign that of the residuals.
         """
-        p = self.parameters
-        _, by_geometry = self.closures.by_numbers(evaluation.robot, evaluation.states, p.places)
+        p, robot = self.parameters, evaluation.robot
+        by_geometry = self.closures.twists_by_numbers(robot, evaluation.states, p.places)
         parts = []
         for i, seen in enumerate(evaluation.predicted):
             rows, k = seen.values.shape
             part = np.zeros((rows, k, len(p)))
-            part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
+            if by_geometry is not None:
+                part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
             if seen.by_frame is not None and p.frame is not None:
                 part[:, :, p.frame : p.frame + 6] = seen.by_frame
             for name, columns in self._columns[i].items():
@@ -367,14 +377,23 @@ class Equations(Readings):
         off = self.distances(evaluation)
         return rms(off[np.isfinite(off)])
 
+    def progress(self, evaluation: Evaluation) -> float:
+        """`rms`, or `closure_rms` where nothing but the actuators was read."""
+        return self.rms(evaluation) if self.count.any() else self.closure_rms(evaluation)
+
     def closure_rms(self, evaluation: Evaluation) -> float:
         """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
-        sigma = self.closures.sigma
-        if sigma is None:
-            return float("nan")
-        robot, sure = evaluation.robot, evaluation.status == 0
-        off = self.closures.residual(robot, evaluation.states)[0] * sigma
-        return rms((off * self.closures.lengths(robot))[sure])
+        return rms(self._closures_off(evaluation)[evaluation.status == 0])
+
+    def worst_closures(self, evaluation: Evaluation) -> FloatArray:
+        """The largest of them at each pose (K,); NaN where they hold."""
+        off = np.abs(self._closures_off(evaluation))
+        return off.max(axis=1) if off.shape[1] else np.full(len(off), np.nan)
+
+    def _closures_off(self, evaluation: Evaluation) -> FloatArray:
+        sigma, robot = self.closures.sigma, evaluation.robot
+        off, _ = self.closures.residual(robot, evaluation.states)
+        return off if sigma is None else off * sigma * self.closures.lengths(robot)
 
     def status(self, evaluation: Evaluation) -> Int32Array:
         """Of the forward kinematics, for each row."""

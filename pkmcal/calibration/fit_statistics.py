@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit, rms
 from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.gauges import MIRROR, Gauges, gauges, mirror_fits
 from pkmcal.calibration.identifiability import as_sum, observability, sparse_basis
 from pkmcal.calibration.outliers import outliers
 from pkmcal.calibration.uncertainty import Uncertainty
@@ -44,6 +45,7 @@ class Identifiability:
     rank: int
     gap: float
     unidentifiable: tuple[str, ...]
+    gauges: tuple[str, ...]
     observability: dict[str, float]
 
 
@@ -55,6 +57,7 @@ class Misfit:
     rms_before: float
     closure_rms: float
     closure_rms_before: float
+    closures: FloatArray
     actuator_noise: float
     redundancy: tuple[float, ...]
     idle: int
@@ -137,12 +140,18 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
     """What the measurements alone determine."""
     equations, measured = estimator.equations, estimate.state.measured
     names = equations.parameters.names
-    open_ones = sparse_basis(measured.unidentifiable, names).T
+    told = Gauges((), measured.unidentifiable)
+    if equations.closures.unknowns:
+        told = gauges(equations.parameters, measured.unidentifiable)
+    if mirror_fits(equations, estimate.evaluation, estimate.state.noise):
+        told = replace(told, texts=(*told.texts, MIRROR))
+    open_ones = sparse_basis(told.rest, names).T
     jacobian = estimator.scaled_jacobian(estimate.evaluation)
     return Identifiability(
         rank=measured.rank,
         gap=measured.gap,
         unidentifiable=tuple(as_sum(combination, names) for combination in open_ones),
+        gauges=told.texts,
         observability=observability(jacobian, len(equations.actuators), measured.rank),
     )
 
@@ -184,6 +193,7 @@ def misfit(
         rms_before=equations.rms(start),
         closure_rms=equations.closure_rms(estimate.evaluation),
         closure_rms_before=equations.closure_rms(estimator.start),
+        closures=equations.worst_closures(estimate.evaluation),
         actuator_noise=float(np.append(shown, np.nan)[len(equations.sets)]),
         redundancy=tuple(estimate.freedom.tolist()),
         idle=equations.idle,

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,6 +91,17 @@ class Identification(Parts, Result):
             for i, j in zip(first, second, strict=True)
         ]
         return tuple(sorted(pairs, key=lambda pair: -round(abs(pair[2]), _ALIKE)))
+
+    def _columns(self) -> dict[str, Any]:
+        """The parameters: value, deviation and change of each."""
+        return {
+            "name": self.free,
+            "unit": self.units,
+            "value": self.values,
+            "stderr": self.stderr,
+            "start": self.start,
+            "change": self.values - self.start,
+        }
 
     def accuracy(self, poses: ArrayLike, target: ArrayLike | None = None) -> FloatArray:
         """Standard deviation of a point of the identified machine at any pose.

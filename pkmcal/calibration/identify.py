@@ -154,7 +154,7 @@ def identify(
     if in_their_modes(commanded, start) is not start:
         start = commanded.start()  # an unknown frame was laid with rows of other modes
     try:
-        if not start.ok:
+        if not start.ok and commanded is equations:
             raise ArgumentError(commanded.failures(start))
         own = equations.begin(commanded, start)
         if not own.ok:

@@ -34,7 +34,8 @@ class Search:
     converged : bool
         Whether the last search did.
     history : list of float
-        Misfit of the rows that were reached at the start and after every step taken, rms in mm.
+        Misfit of the rows that were reached at the start and after every step taken, rms in mm; of
+        the closures where nothing else was read.
     """
 
     def __init__(self, equations: Equations, start: Evaluation) -> None:
@@ -151,7 +152,7 @@ class Search:
         def jacobian(u: FloatArray) -> FloatArray:
             evaluation = self.at(u, noise)
             equations.warm_start(evaluation)  # the step to it was taken
-            self.history.append(equations.rms(evaluation))
+            self.history.append(equations.progress(evaluation))
             by_u = self.jacobian(evaluation, noise, aside)
             return np.vstack([loss.jacobian(data(evaluation), by_u), extra, np.zeros(len(u))])
 

@@ -35,6 +35,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "rank",
     "gap",
     "unidentifiable",
+    "gauges",
     "rms",
     "rms_before",
     "holdout_rms",
@@ -190,6 +191,14 @@ class Parts(MisfitNames):
         angle counts as its arc.
         """
         return self.identifiability.unidentifiable
+
+    @property
+    def gauges(self) -> tuple[str, ...]:
+        """What readings of actuators alone leave open by their nature, in words.
+
+        Where the base stands, the common scale; these combinations are not in `unidentifiable`.
+        """
+        return self.identifiability.gauges
 
     @property
     def observability(self) -> dict[str, float]:

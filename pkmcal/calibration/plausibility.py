@@ -235,6 +235,8 @@ def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: b
     for measured in equations.sets:
         rows = equations.rows[start : start + len(measured)]
         start += len(measured)
+        if not measured.components:
+            continue  # the same readings of actuators alone may well occur twice
         targets = (
             np.zeros(len(measured)) if measured.target_index is None else measured.target_index
         )

@@ -172,7 +172,7 @@ class Readings:
 def _rounded(measured: Measurements, length: float) -> FloatArray:
     """Rounding errors (N, k) of what is predicted, mm and rad."""
     values = measured.values.reshape(len(measured), -1)
-    lengths = np.array([unit == "mm" for unit in measured.units])
+    lengths = np.array([unit == "mm" for unit in measured.units], dtype=bool)
     size = np.max(np.nan_to_num(np.abs(values[:, lengths])), initial=0.0) + length
     return np.broadcast_to(ROUNDING * size / mm_per_unit(measured.units, length), values.shape)
 

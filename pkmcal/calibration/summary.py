@@ -111,9 +111,11 @@ def limits(
     outliers: Sequence[int],
 ) -> Iterator[str]:
     """Where the result has limits: rank, correlations, outliers; `odd` names the last."""
+    yield from (filled("", text) for text in identifiability.gauges)
     if identifiability.rank < parameters:
         gap = f", gap {identifiability.gap:.0e}" if np.isfinite(identifiability.gap) else ""
-        yield f"rank {identifiability.rank} of {parameters}{gap}; unidentifiable combinations:"
+        told = "; unidentifiable combinations:" if identifiability.unidentifiable else ""
+        yield f"rank {identifiability.rank} of {parameters}{gap}{told}"
         yield from (filled("  ", text) for text in identifiability.unidentifiable[:4])
         if len(identifiability.unidentifiable) > 4:
             yield f"  and {len(identifiability.unidentifiable) - 4} more"

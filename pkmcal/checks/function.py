@@ -151,7 +151,7 @@ def _mended(robot: Robot) -> Iterator[Finding]:
                 home[:, :3] *= factor
             else:
                 stroke = factor
-            drive = robot.machine.limbs(slots, home)[0][0]
+            drive = robot.limb_machine.limbs(slots, home)[0][0]
             if _in_strokes(robot, drive, stroke):
                 mended.append(f"the {name} in {unit}" if name != "home" else f"home in {unit}")
     if mended:
@@ -295,7 +295,7 @@ def singular(robot: Robot) -> Iterator[Finding]:
 
 def _affine_error(robot: Robot) -> float | None:
     """How far the joints of a hexapod's platform are from an affine image of those of its base."""
-    if robot.model.map != "spatial" or len(robot.model.limbs) < 6:
+    if robot.model.map != "spatial" or len(robot.model.limbs) < 6 or robot.model.chains:
         return None
     base, platform = (side.points for side in joints(robot))
     system = np.column_stack([base, np.ones(len(base))])

@@ -18,7 +18,13 @@ from pkmcal.files.reading import Input
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-TARGETS = ("c", "klipper", "reprap", "marlin", "linuxcnc", "mjcf")
+_OF_ARMS = ("urdf", "dh", "dh-modified", "ur")
+TARGETS = ("c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf", *_OF_ARMS)
+_LINES = {
+    "reprap": pk.export.reprap,
+    "marlin": pk.export.marlin,
+    "hangprinter": pk.export.hangprinter,
+}
 
 
 def export(
@@ -53,8 +59,10 @@ def export(
     """Write a robot for a controller.
 
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
-    linear delta for Klipper or Kalico; reprap, marlin: its M665 and M666. linuxcnc: a kinematics
-    component, and a simulation that runs it. mjcf: a model for MuJoCo.
+    linear or rotary delta for Klipper or Kalico; reprap, marlin: its M665 and M666, or M669;
+    hangprinter: M669. linuxcnc: a kinematics component, and a simulation that runs it. mjcf: a
+    model for MuJoCo. Of serial arms: urdf, a tree of links; dh and dh-modified, a table of
+    Denavit-Hartenberg numbers; ur, the lists of a calibration.conf of Universal Robots.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -63,8 +71,10 @@ def export(
     word("--as", target, TARGETS)
     _only(target, ("c",), number=number)
     _only(target, ("klipper",), config=config)
-    _only(target, ("klipper", "reprap", "marlin"), project=project or None)
+    _only(target, ("klipper", "reprap", "marlin", "hangprinter"), project=project or None)
     read = Inputs()
+    if target in _OF_ARMS:
+        return _export_arm(read.robot(robot), target, out, read, force, json)
     machine = load_parallel(read.robot(robot))
     loss = None
     if target == "linuxcnc":
@@ -77,10 +87,40 @@ def export(
         with Output(out.parent, [out.name], read, force).draft() as draft:
             loss = _write(target, machine, draft / out.name, number, given, project)
     if json:
-        say(as_json({"robot": machine.name, "as": target, "file": str(out), "loss": loss}))
+        say(
+            as_json(
+                {"robot": machine.name, "as": target, "file": str(out), "loss": loss},
+                schema="export",
+            )
+        )
     else:
         own = "LinuxCNC's own module for it is " if target == "linuxcnc" else ""
         say(f"{out}: {machine.name}" + (f"; {own}{loss}" if loss and not loss.exact else ""))
+    return 0
+
+
+def _export_arm(
+    robot: str | Input, target: str, out: Path, read: Inputs, force: bool, json: bool
+) -> int:
+    """Write a serial arm."""
+    arm: object = pk.load(robot)
+    if not isinstance(arm, pk.SerialArm):
+        raise ArgumentError(f"{robot}: --as {target} is for serial arms")
+    with Output(out.parent, [out.name], read, force).draft() as draft:
+        if target == "urdf":
+            pk.export.urdf(arm, draft / out.name)
+        elif target == "ur":
+            pk.export.universal_robots(arm, draft / out.name)
+        else:
+            pk.export.dh(arm, draft / out.name, "standard" if target == "dh" else "modified")
+    if json:
+        say(
+            as_json(
+                {"robot": arm.name, "as": target, "file": str(out), "loss": None}, schema="export"
+            )
+        )
+    else:
+        say(f"{out}: {arm.name}")
     return 0
 
 
@@ -100,8 +140,7 @@ def _write(
     elif target == "klipper":
         return pk.export.klipper(machine, path, config, project)
     else:
-        write = pk.export.reprap if target == "reprap" else pk.export.marlin
-        return write(machine, path, project)
+        return _LINES[target](machine, path, project)
     return None
 
 

@@ -22,14 +22,16 @@ def import_file(
         Path, typer.Option(metavar="DIR", help="Where to write; made if it is not there.")
     ] = Path("."),
     firmware: Annotated[
-        str, typer.Option("--from", metavar="FIRMWARE", help="klipper, reprap or marlin.")
+        str,
+        typer.Option("--from", metavar="FIRMWARE", help="klipper, reprap, marlin or hangprinter."),
     ] = "klipper",
     force: Force = False,
     json: Json = False,
 ) -> int:
     """Make a robot file and measurements out of a printer's configuration.
 
-    Of a linear delta with Klipper or Kalico, or with the M665 and M666 of RepRapFirmware or Marlin.
+    Of a linear or rotary delta with Klipper or Kalico, of a linear one with the M665 and M666 of
+    RepRapFirmware or Marlin, or of a Hangprinter with M669.
     robot.toml has the firmware's numbers; probe.csv the heights that a DELTA_CALIBRATE stored, if
     there are any.
 
@@ -46,7 +48,12 @@ def import_file(
     if json:
         heights = 0 if printer.measurements is None else len(printer.measurements)
         parts = {"files": [str(path) for path in output.paths], "heights": heights}
-        say(as_json({"robot": printer.robot.name, **parts, "distances": printer.distances}))
+        say(
+            as_json(
+                {"robot": printer.robot.name, **parts, "distances": printer.distances},
+                schema="import",
+            )
+        )
     else:
         say(printer)
         say("written: " + ", ".join(map(str, output.paths)))

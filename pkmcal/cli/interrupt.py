@@ -23,10 +23,20 @@ class IsRaised:
 
     def __enter__(self) -> None:
         self._before = signal.getsignal(signal.SIGINT)
+        self._begin()
+
+    def _begin(self) -> None:
         _handle(signal.default_int_handler)
 
     def __exit__(self, *_: object) -> None:
         signal.signal(signal.SIGINT, self._before)
+
+
+class EndsAtOnce(IsRaised):
+    """While in this context as with `ends_at_once`: a verb is loaded."""
+
+    def _begin(self) -> None:
+        ends_at_once()
 
 
 def _handle(handler: signal._HANDLER) -> None:

@@ -3,26 +3,31 @@
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from typing import Annotated, Any
 
 import typer
 from typer.core import TyperGroup
 
 from pkmcal.cli import ending, interrupt
-from pkmcal.cli.calibrate import calibrate
-from pkmcal.cli.check import check
-from pkmcal.cli.compensate import compensate
-from pkmcal.cli.demonstration import demo
-from pkmcal.cli.export import export
-from pkmcal.cli.forward import forward
-from pkmcal.cli.import_file import import_file
-from pkmcal.cli.inverse import inverse
-from pkmcal.cli.machines import machines
-from pkmcal.cli.new import new
 from pkmcal.cli.output import say
-from pkmcal.cli.plan import plan
-from pkmcal.cli.sensitivity import sensitivity
-from pkmcal.cli.tolerance import tolerance
+
+_VERBS = {  # where each is: file and function
+    "demo": "demonstration.demo",
+    "machines": "machines.machines",
+    "new": "new.new",
+    "check": "check.check",
+    "sensitivity": "sensitivity.sensitivity",
+    "tolerance": "tolerance.tolerance",
+    "plan": "plan.plan",
+    "calibrate": "calibrate.calibrate",
+    "compensate": "compensate.compensate",
+    "export": "export.export",
+    "import": "import_file.import_file",
+    "inverse": "inverse.inverse",
+    "forward": "forward.forward",
+}
+_SIGNED = ("inverse", "forward")  # an argument may be -330,-330,-330
 
 
 class _Verbs(TyperGroup):
@@ -30,10 +35,12 @@ class _Verbs(TyperGroup):
 
     def main(self, *args: Any, **settings: Any) -> Any:
         settings["standalone_mode"] = False  # hands over return values and errors
+        given = settings.get("args", args[0] if args else None)
+        json = "--json" in (sys.argv[1:] if given is None else given)
         try:
             code = super().main(*args, **settings)
         except Exception as error:
-            code = ending.code(error)
+            code = ending.code(error, json)
         sys.exit(code)
 
     def invoke(self, ctx: Any) -> Any:
@@ -41,27 +48,30 @@ class _Verbs(TyperGroup):
             with interrupt.IsRaised():
                 return super().invoke(ctx)
         except KeyboardInterrupt as stop:
-            return ending.code(stop)
+            return ending.code(stop, "--json" in sys.argv)
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return list(_VERBS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """A verb is loaded when it is asked for, all of them if there is none of that name."""
+        with interrupt.EndsAtOnce():
+            for name in (cmd_name,) if cmd_name in _VERBS else _VERBS:
+                if name not in self.commands:
+                    self.add_command(_loaded(name))
+        return super().get_command(ctx, cmd_name)
+
+
+def _loaded(name: str) -> Any:
+    """A verb with all that it needs, which takes a while."""
+    file, _, function = _VERBS[name].partition(".")
+    verb = getattr(import_module(f"pkmcal.cli.{file}"), function)
+    alone = typer.Typer(add_completion=False)
+    alone.command(name, context_settings={"ignore_unknown_options": name in _SIGNED})(verb)
+    return typer.main.get_command(alone)
 
 
 app = typer.Typer(cls=_Verbs, pretty_exceptions_enable=False)
-for verb in (
-    demo,
-    machines,
-    new,
-    check,
-    sensitivity,
-    tolerance,
-    plan,
-    calibrate,
-    compensate,
-    export,
-):
-    app.command()(verb)
-app.command("import")(import_file)
-_SIGNED = {"ignore_unknown_options": True}  # an argument may be -330,-330,-330
-app.command(context_settings=_SIGNED)(inverse)
-app.command(context_settings=_SIGNED)(forward)
 
 
 def _version(wanted: bool) -> None:
@@ -72,11 +82,28 @@ def _version(wanted: bool) -> None:
         raise typer.Exit()
 
 
+def _schema(wanted: bool) -> None:
+    if wanted:
+        from importlib.resources import files
+
+        say(files("pkmcal.report").joinpath("schema.json").read_text("utf-8").rstrip())
+        raise typer.Exit()
+
+
 @app.callback(invoke_without_command=True)
 def _start(
     context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+    schema: Annotated[
+        bool,
+        typer.Option(
+            "--json-schema",
+            callback=_schema,
+            is_eager=True,
+            help="Print the JSON Schema of what --json prints.",
+        ),
     ] = False,
 ) -> None:
     """Model, calibrate and compensate parallel kinematic machines.

@@ -24,8 +24,8 @@ from pkmcal.kinematics.robot import Robot, require_parallel
 
 # benchmarks of the hexapod: docs/controllers.md says how
 _MEASURED = (
-    "double 4.2 kB, 720 instructions an inverse, 10 000 a forward from home;\n"
-    " * float 3.8 kB, 780 and 8 100"
+    "double 3.9 kB, 720 instructions an inverse, 10 000 a forward from home;\n"
+    " * float 3.7 kB, 780 and 8 100"
 )
 _ENUMERATORS = tuple(slot.upper().replace(".", "_") for slot in SLOTS)
 _UNUSED_FRAME = np.zeros(9)
@@ -73,6 +73,8 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
     """The header whose names begin with `prefix`."""
     word("number", number, ("double", "float"))
     machine = robot.machine
+    if robot.model.chains is not None:
+        raise ArgumentError(f"robot: {robot.name} has chains of joints; a header holds other limbs")
     if machine.rows != machine.m:
         raise ArgumentError(
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"
@@ -106,6 +108,8 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
         return ", ".join(str(int(value)) for value in values)
 
     first, second, frame, axis = prepared(robot)
+    texts = [c_source.as_c99(f, prefix, number, _ENUMERATORS) for f in functions]
+    slots = c_source.slots_read(texts, prefix, _ENUMERATORS)
     wide = number == "double"
     size = machine.struct.size
     return {
@@ -125,9 +129,11 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
         "sqrt": "sqrt" if wide else "sqrtf",
         "fabs": "fabs" if wide else "fabsf",
         "home": several(robot.home),
-        "slots": [f"{prefix}_{name}" for name in _ENUMERATORS],
+        "slots": [f"{prefix}_{name}" for name in slots],
         "axes": len(AXES),
-        "numbers": [several(row) for row in robot.slots],
+        "numbers": [
+            several(row[[_ENUMERATORS.index(slot) for slot in slots]]) for row in robot.slots
+        ],
         "first": [several(row) for row in first],
         "second": [several(row) for row in second],
         "frame": [several(row) for row in frame],
@@ -147,7 +153,7 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
             for frame_name, given in (("base", model.base_frame), ("tool", model.tool_frame))
             for name, pose in _both_ways(frame_name, given)
         },
-        "functions": [c_source.as_c99(f, prefix, number, _ENUMERATORS) for f in functions],
+        "functions": c_source.of_slots(texts, prefix, _ENUMERATORS, slots),
         "length": f"{robot.length:.6g}",
         "per_length": one(1.0 / robot.length),
         "size": one(size),

@@ -8,7 +8,7 @@ comment, ``INLINE void FN(name)(arguments)``, assignments.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib import resources
 from typing import Literal, NamedTuple
@@ -123,6 +123,39 @@ def as_c99(function: CFunction, prefix: str, number: Number, slots: Iterable[str
     if number == "double":
         code = re.sub(r"(\d+\.\d*)f\b", r"\1", code)
     return f"/*\n{function.comment} */\n{code}"
+
+
+def slots_read(texts: Iterable[str], prefix: str, slots: Iterable[str]) -> list[str]:
+    """The slots that functions need: points, and what is more than the place of a zero."""
+    needed = []
+    for slot in slots:
+        mentions = [
+            line for text in texts for line in text.splitlines() if f"[{prefix}_{slot}]" in line
+        ]
+        point = slot[-2:] in ("_X", "_Y", "_Z")  # read by its first coordinate
+        if point or not all(_zero(prefix, slot).fullmatch(line) for line in mentions):
+            needed.append(slot)
+    return needed
+
+
+def of_slots(
+    texts: Iterable[str], prefix: str, slots: Sequence[str], needed: Sequence[str]
+) -> list[str]:
+    """Functions for limbs that have the needed slots alone."""
+    made = []
+    for text in texts:
+        lines = [
+            line
+            for line in text.splitlines()
+            if not any(_zero(prefix, slot).fullmatch(line) for slot in slots if slot not in needed)
+        ]
+        made.append("\n".join(lines).replace(f"by_g[{len(slots)}]", f"by_g[{len(needed)}]") + "\n")
+    return made
+
+
+def _zero(prefix: str, slot: str) -> re.Pattern[str]:
+    """A line that writes nothing but a zero to a slot of derivatives."""
+    return re.compile(rf" *by_g\[{prefix}_{slot}\] = 0\.0f?;")
 
 
 def evaluate(name: str, inputs: Mapping[str, object], outputs: Iterable[str]) -> list[list[float]]:

@@ -8,7 +8,6 @@ H + √((L + trim)² - R²).
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from os import PathLike
 
@@ -16,23 +15,26 @@ import numpy as np
 
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
+from pkmcal.controllers.gcode_words import TOWERS, corrections, words, words_of
 from pkmcal.controllers.linear_delta import FirmwareDelta, of_robot
 from pkmcal.controllers.loss import Loss
+from pkmcal.controllers.rotary_delta import is_rotary_delta
+from pkmcal.controllers.rotary_delta import of_robot as rotary_of_robot
+from pkmcal.controllers.rotary_gcode import reprap_text as rotary_text
 from pkmcal.exceptions import FileError
 from pkmcal.files.atomic import write_whole
 from pkmcal.kinematics.robot import Robot
 
-_TOWERS = (210.0, 330.0, 90.0)
-_WORD = re.compile(r"([A-Z])([-+]?[\d.]+(?::[-+]?[\d.]+)*)")
-
 
 def reprap(robot: Robot, path: str | PathLike[str], project: bool = False) -> Loss:
-    """Write a linear delta's numbers for RepRapFirmware 3: M665 and M666 for config.g.
+    """Write a delta's numbers for RepRapFirmware 3: M665 and M666 for config.g.
+
+    Of a rotary delta M669 and M666, with the end stops at the greatest angle of the cranks.
 
     Parameters
     ----------
     robot : Robot
-        A linear delta whose actuator coordinates are 0 at the end stops.
+        A linear or rotary delta whose actuator coordinates are 0 at the end stops.
     path : str or path
         Where to write; an existing file is replaced, whole or not at all.
     project : bool, optional
@@ -48,8 +50,12 @@ def reprap(robot: Robot, path: str | PathLike[str], project: bool = False) -> Lo
     ValueError
         The firmware cannot hold the robot; nothing is written.
     """
-    path = as_path("path", path)
-    firmware, loss = of_robot(robot, flag("project", project))
+    path, project = as_path("path", path), flag("project", project)
+    if is_rotary_delta(robot):
+        turning, loss = rotary_of_robot(robot, project, one_height=False)
+        write_whole(path, rotary_text(turning))
+        return loss
+    firmware, loss = of_robot(robot, project)
     write_whole(path, reprap_text(firmware))
     return loss
 
@@ -87,8 +93,8 @@ def reprap_text(firmware: FirmwareDelta) -> str:
     height = float(np.mean(firmware.endstops))
     rods = ":".join(f"{arm:.6f}" for arm in firmware.arms)
     return (
-        f"M665 L{rods} R{firmware.radius:.6f} H{height:.6f} {_corrections(firmware)}\n"
-        f"M666 {_words('XYZ', [endstop - height for endstop in firmware.endstops])}\n"
+        f"M665 L{rods} R{firmware.radius:.6f} H{height:.6f} {corrections(firmware.angles)}\n"
+        f"M666 {words('XYZ', [endstop - height for endstop in firmware.endstops])}\n"
     )
 
 
@@ -96,10 +102,11 @@ def marlin_text(firmware: FirmwareDelta) -> str:
     """The two lines for Marlin."""
     height = min(firmware.endstops)
     rod = float(np.mean(firmware.arms))
-    trims = _words("ABC", [arm - rod for arm in firmware.arms])
+    trims = words("ABC", [arm - rod for arm in firmware.arms])
+    towers = corrections(firmware.angles)
     return (
-        f"M665 L{rod:.6f} R{firmware.radius:.6f} H{height:.6f} {_corrections(firmware)} {trims}\n"
-        f"M666 {_words('XYZ', [height - endstop for endstop in firmware.endstops])}\n"
+        f"M665 L{rod:.6f} R{firmware.radius:.6f} H{height:.6f} {towers} {trims}\n"
+        f"M666 {words('XYZ', [height - endstop for endstop in firmware.endstops])}\n"
     )
 
 
@@ -111,9 +118,9 @@ def of_reprap(text: str, place: str = "M665") -> FirmwareDelta:
     ValueError
         A number that is missing.
     """
-    size, ends = _words_of(text, "M665", place), _words_of(text, "M666", place)
+    size, ends = words_of(text, "M665", place), words_of(text, "M666", place)
     radius = _one(size, "R", place)
-    arms = [float(each) for each in _text(size, "L", place).split(":")]
+    arms = [_number(each, "L", place) for each in _text(size, "L", place).split(":")]
     arms = arms * 3 if len(arms) == 1 else arms
     if len(arms) != 3 or min(arms) <= radius:
         raise FileError(f"{place}: L of M665 must be 1 or 3 rods longer than R, found {size['L']}")
@@ -133,7 +140,7 @@ def of_marlin(text: str, place: str = "M665") -> FirmwareDelta:
     ValueError
         A number that is missing.
     """
-    size, ends = _words_of(text, "M665", place), _words_of(text, "M666", place)
+    size, ends = words_of(text, "M665", place), words_of(text, "M666", place)
     radius, rod = _one(size, "R", place), _one(size, "L", place)
     arms = tuple(rod + _one(size, letter, place, 0.0) for letter in "ABC")
     if min(arms) <= radius:
@@ -146,27 +153,6 @@ def of_marlin(text: str, place: str = "M665") -> FirmwareDelta:
     return FirmwareDelta(radius, _angles(size, place), arms, tuple(ats))
 
 
-def _corrections(firmware: FirmwareDelta) -> str:
-    off = [
-        (angle - tower + 180.0) % 360.0 - 180.0
-        for angle, tower in zip(firmware.angles, _TOWERS, strict=True)
-    ]
-    return _words("XYZ", off)
-
-
-def _words(letters: str, values: list[float]) -> str:
-    pairs = zip(letters, values, strict=True)
-    return " ".join(f"{letter}{round(value, 6) + 0.0:.6f}" for letter, value in pairs)
-
-
-def _words_of(text: str, command: str, place: str) -> dict[str, str]:
-    """The words of the last such command, as text."""
-    lines = re.findall(rf"^\s*(?:echo:\s*)?{command}\b([^;\n]*)", text, re.MULTILINE)
-    if not lines:
-        raise FileError(f"{place}: {command} is missing")
-    return dict(_WORD.findall(lines[-1]))
-
-
 def _text(words: Mapping[str, str], letter: str, place: str) -> str:
     if letter not in words:
         raise FileError(f"{place}: {letter} of M665 is missing")
@@ -176,7 +162,10 @@ def _text(words: Mapping[str, str], letter: str, place: str) -> str:
 def _one(words: Mapping[str, str], letter: str, place: str, default: float | None = None) -> float:
     if letter not in words and default is not None:
         return default
-    text = _text(words, letter, place)
+    return _number(_text(words, letter, place), letter, place)
+
+
+def _number(text: str, letter: str, place: str) -> float:
     try:
         return float(text)
     except ValueError:
@@ -184,5 +173,5 @@ def _one(words: Mapping[str, str], letter: str, place: str, default: float | Non
 
 
 def _angles(words: Mapping[str, str], place: str) -> tuple[float, ...]:
-    pairs = zip(_TOWERS, "XYZ", strict=True)
+    pairs = zip(TOWERS, "XYZ", strict=True)
     return tuple(tower + _one(words, letter, place, 0.0) for tower, letter in pairs)

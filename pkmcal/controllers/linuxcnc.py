@@ -18,7 +18,7 @@ from pkmcal.controllers.rendering import rendered
 from pkmcal.core.library import POSE, SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
-from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.kinematics.robot import Robot, commanded, determines_others, require_parallel
 
 _LETTERS = dict(zip(POSE, "XYZABC", strict=True))
 _FIELDS = dict(zip(POSE, ("tran.x", "tran.y", "tran.z", "a", "b", "c"), strict=True))
@@ -119,7 +119,7 @@ def _contents(robot: Robot, name: str) -> dict[str, Any]:
         "letters": " ".join(_LETTERS[axis] for axis in axes),
         "joints": ", ".join("deg" if turns else "mm" for turns in angular),
         "units": ", ".join(degree if turns else "1.0" for turns in angular),
-        "completes": len(axes) < 6 and robot.model.map not in ("translation", "planar"),
+        "completes": determines_others(robot),
         "places": ", ".join(str(POSE.index(axis)) for axis in axes),
         "steps": ", ".join(repr(_DIFFERENCE * (1.0 if turns else size)) for turns in angular),
         "arm": repr(float(robot.length)),
@@ -140,7 +140,7 @@ def _contents(robot: Robot, name: str) -> dict[str, Any]:
 
 def _axes(robot: Robot) -> tuple[str, ...]:
     """The coordinates that programs command: as many as there are actuators."""
-    axes = robot.model.match or robot.coordinates
+    axes = commanded(robot)
     if len(axes) != robot.n_actuators:
         raise ArgumentError(
             f"robot: {robot.name} has {robot.n_actuators} actuators for {len(axes)} coordinates"
@@ -150,7 +150,7 @@ def _axes(robot: Robot) -> tuple[str, ...]:
             f"robot: {robot.name} has base or tool frames and {len(axes)} coordinates of its own;"
             " in the frames these are no axes"
         )
-    return tuple(axes)
+    return axes
 
 
 def _axis(robot: Robot, axis: str, size: float) -> dict[str, Any]:

@@ -17,17 +17,16 @@ from pkmcal.arrays import FloatArray
 from pkmcal.controllers import linear_delta, rotary_delta
 from pkmcal.controllers.linear_delta import FirmwareDelta
 from pkmcal.controllers.loss import Loss, loss, nearest
-from pkmcal.controllers.rotary_delta import RotaryDelta
+from pkmcal.controllers.rotary_delta import OVER, RotaryDelta
 from pkmcal.core.poses import invert
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 
 _LEGS = 6
 _POSES = 200
-_OVER = "over half of its workspace"
 _LINEAR = (90.0, 210.0, 330.0)  # of joints 0, 1 and 2
 _ROTARY = (270.0, 30.0, 150.0)
-_NO_LOSS = Loss(0.0, 0.0, _OVER)
+_NO_LOSS = Loss(0.0, 0.0, OVER)
 
 
 class Module(NamedTuple):
@@ -105,7 +104,7 @@ def _rotary(robot: Robot) -> Module:
         for joint, limb in enumerate(order):
             angles[limb] = _ROTARY[joint]
         radius, crank, rod, *elbows = x.tolist()
-        numbers = (radius, 0.0, tuple(angles), (crank,) * 3, (rod,) * 3, tuple(elbows))
+        numbers = (radius, (0.0,) * 3, tuple(angles), (crank,) * 3, (rod,) * 3, tuple(elbows))
         return rotary_delta.as_robot(RotaryDelta(*numbers, built.gains), home)
 
     cranks, rods = float(np.mean(built.cranks)), float(np.mean(built.rods))
@@ -122,11 +121,11 @@ def _fitted(
     """Numbers as built where they are exact, else the nearest."""
     poses = sample_poses(robot, _POSES)
     q = robot.inverse(poses)
-    lost = loss(model(start), q, poses, _OVER)
+    lost = loss(model(start), q, poses, OVER)
     if lost.exact:
         return start, lost
     found = nearest(model, start, q, poses)
-    return found, loss(model(found), q, poses, _OVER)
+    return found, loss(model(found), q, poses, OVER)
 
 
 def _order(angles: tuple[float, ...], joints: tuple[float, ...]) -> list[int]:

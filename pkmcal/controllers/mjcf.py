@@ -15,6 +15,7 @@ from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.model import CHAIN
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 _PLATFORM = {  # joints of the platform by pose map; none: it is free
@@ -63,7 +64,7 @@ def text_of(robot: Robot) -> str:
     """The MJCF text."""
     _require(robot)
     home = robot.own_home
-    drives, directions, _ = robot.machine.limbs(robot.slots, home[None])
+    drives, directions, _ = robot.limb_machine.limbs(robot.slots, home[None])
     if not np.isfinite(drives).all():
         raise ArgumentError(f"robot: {robot.name} cannot reach its home pose")
     top = Xml.Element("mujoco", model=robot.name)
@@ -98,7 +99,9 @@ def _require(robot: Robot) -> None:
     if model.map not in _PLATFORM:
         reasons.append(f"the pose map {model.map}")
     for i, limb in enumerate(model.limbs, 1):
-        if KINDS[limb.kind].all_rows(limb.couple > 0) != _ROWS.get(limb.kind):
+        if limb.kind == CHAIN or (
+            KINDS[limb.kind].all_rows(limb.couple > 0) != _ROWS.get(limb.kind)
+        ):
             reasons.append(f"limb {i}, a {limb.kind}")
     if not robot.frames.trivial:
         reasons.append("base and tool frames")

@@ -6,6 +6,7 @@ goes before the same one in it. Own code, for configparser loses lines and comme
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +17,10 @@ from pkmcal.exceptions import FileError
 from pkmcal.files.reading import MOST_TEXT, content
 
 STEPPERS = ("stepper_a", "stepper_b", "stepper_c")
-DELTA_ANGLES = dict(zip(STEPPERS, (210.0, 330.0, 90.0), strict=True))  # where the file says nothing
+ANGLES = {  # by kinematics, where the file says nothing
+    "delta": dict(zip(STEPPERS, (210.0, 330.0, 90.0), strict=True)),
+    "rotary_delta": dict(zip(STEPPERS, (30.0, 150.0, 270.0), strict=True)),
+}
 SAME = 5e-7  # of numbers with six decimals
 
 _SAVED = re.compile(r"#\*# <-+ SAVE_CONFIG -+>")
@@ -161,11 +165,14 @@ def text_in(path: str | PathLike[str]) -> str:
         raise FileError(f"{where}: this is no text in UTF-8") from None
 
 
-def require_delta(printer: PrinterConfig) -> None:
-    """Refuse other kinematics than those of a linear delta."""
-    kinematics = printer.text("printer", "kinematics")
-    if kinematics != "delta":
-        raise printer.wrong("printer", "kinematics", f"must be delta, found {kinematics!r}")
+def kinematics(printer: PrinterConfig) -> str:
+    """Of a delta, "delta" or "rotary_delta"; all else is refused."""
+    found = printer.text("printer", "kinematics")
+    if found not in ANGLES:
+        raise printer.wrong(
+            "printer", "kinematics", f"must be delta or rotary_delta, found {found!r}"
+        )
+    return found
 
 
 def positive(
@@ -179,7 +186,7 @@ def positive(
 
 
 def step_of(printer: PrinterConfig, section: str) -> float:
-    """Mm a step."""
+    """Mm a step, or rad of a crank, which has no rotation distance but a turn."""
     gearing = 1.0
     if printer.has(section, "gear_ratio"):
         text = printer.text(section, "gear_ratio")
@@ -193,4 +200,6 @@ def step_of(printer: PrinterConfig, section: str) -> float:
             ) from None
     steps = positive(printer, section, "microsteps")
     steps *= positive(printer, section, "full_steps_per_rotation", 200.0)
+    if kinematics(printer) == "rotary_delta":
+        return 2.0 * math.pi / (steps * gearing)
     return positive(printer, section, "rotation_distance") / (steps * gearing)

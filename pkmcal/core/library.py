@@ -48,6 +48,7 @@ STATUS = {
     lib.PKM_NOT_CLOSED: "does not close",
 }
 ROWS_PER_THREAD = 10_000  # fewer do not pay for a thread
+MOST_THREADS = 256  # whatever is asked for
 PARTS_PER_THREAD = 4  # one that another program keeps waiting leaves parts to the others
 
 
@@ -199,13 +200,13 @@ def in_threads(run: Callable[[int, int], None], rows: int, threads: int | None) 
     rows : int
         Number of rows.
     threads : int or None
-        None takes as many as pay.
+        None takes as many as pay; at most `MOST_THREADS`.
     """
     if threads is None:
         threads = rows // ROWS_PER_THREAD
         threads = min(threads, len(os.sched_getaffinity(0))) if threads > 1 else 1
     else:
-        threads = min(whole("threads", threads, 1, note=" or None"), max(rows, 1))
+        threads = min(whole("threads", threads, 1, note=" or None"), max(rows, 1), MOST_THREADS)
     if threads == 1:
         return run(0, rows)
     count = min(rows, PARTS_PER_THREAD * threads)

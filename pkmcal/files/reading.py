@@ -34,10 +34,13 @@ class Input(PathLike[str]):
     ----------
     path : str or path
         A file, a pipe, or a device such as ``/dev/stdin``.
+    called : str, optional
+        What the user called it, where that also says which part of it is meant.
     """
 
-    def __init__(self, path: str | PathLike[str]) -> None:
+    def __init__(self, path: str | PathLike[str], called: str | None = None) -> None:
         self._path = arguments.path("path", path)
+        self.called = str(self._path) if called is None else called
         self._content: bytes | None = None
 
     def __fspath__(self) -> str:

@@ -12,8 +12,9 @@ import numpy as np
 
 from pkmcal.arguments import did_you_mean, words
 from pkmcal.arrays import BoolArray, FloatArray, wrapped
+from pkmcal.core.chains import AnyMachine
 from pkmcal.core.library import MAPS, POSE
-from pkmcal.core.machine import Closure, Machine
+from pkmcal.core.machine import Closure
 from pkmcal.exceptions import ArgumentError
 
 ITERATIONS = 30
@@ -46,7 +47,7 @@ def matched_coordinates(
 
 
 def complete(
-    machine: Machine,
+    machine: AnyMachine,
     map: str,
     slots: FloatArray,
     pose: FloatArray,
@@ -60,7 +61,7 @@ def complete(
 
     Parameters
     ----------
-    machine : Machine
+    machine : Machine or ChainMachine
         The machine.
     map : str
         Its pose map.
@@ -155,7 +156,7 @@ def _system(closure: Closure, free: list[int], matched: Sequence[int]) -> FloatA
 
 
 def completed_rates(
-    machine: Machine,
+    machine: AnyMachine,
     map: str,
     slots: FloatArray,
     pose: FloatArray,
@@ -186,7 +187,7 @@ def completed_rates(
 
 
 def _correct_actuators(
-    machine: Machine,
+    machine: AnyMachine,
     slots: FloatArray,
     own: FloatArray,
     q: FloatArray,

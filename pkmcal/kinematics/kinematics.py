@@ -11,11 +11,13 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows
+from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import Limb, Model
+from pkmcal.geometry.model import CHAIN, Limb, Model
+from pkmcal.kinematics.chain_limits import drives as chain_drives
 from pkmcal.kinematics.complete import complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
@@ -52,11 +54,30 @@ class Kinematics:
         self.slots = np.ascontiguousarray(model.geometry.slots)
         self.frames = Frames(model.base_frame, model.tool_frame)
         self.own_home = np.ascontiguousarray(model.home, dtype=np.float64)
+        self.machine: AnyMachine = self._machine()
+
+    @property
+    def limb_machine(self) -> Machine:
+        """The compiled machine of limbs in closed form.
+
+        Raises
+        ------
+        ValueError
+            The limbs are chains of joints.
+        """
+        if isinstance(self.machine, ChainMachine):
+            raise ArgumentError(f"robot: {self.model.name} has limbs that are chains of joints")
+        return self.machine
+
+    def _machine(self) -> AnyMachine:
+        model = self.model
+        if model.chains is not None:
+            return ChainMachine(model.chains.layout, model.closure_tolerance)
         limbs = [_limb(limb) for limb in model.limbs]
         if sum(len(limb["weights"]) for limb in limbs) == len(self.coordinates):
             for limb in limbs:  # nothing to weigh: all closures hold
                 limb["weights"] = [1.0] * len(limb["weights"])
-        self.machine = Machine(
+        return Machine(
             model.map, limbs, self.length, self.slots, self.own_home, model.closure_tolerance
         )
 
@@ -83,6 +104,8 @@ class Kinematics:
         The root mean square distance of the platform joints from their centre, or of the base
         points where the platform joints coincide.
         """
+        if self.model.chains is not None:
+            return self.model.chains.length
         for joints in (self.slots[:, 3:6], self.slots[:, 0:3]):
             spread = joints - joints.mean(axis=0)
             radius = float(np.sqrt((spread**2).sum(axis=1).mean()))
@@ -315,12 +338,45 @@ class Kinematics:
         return AssemblyProblem(
             self.machine,
             self.model.map,
-            [KINDS[limb.kind].all_rows(limb.couple > 0) for limb in limbs],
+            [
+                () if limb.kind == CHAIN else KINDS[limb.kind].all_rows(limb.couple > 0)
+                for limb in limbs
+            ],
             [limb.couple for limb in limbs],
             self.length,
             self.slots,
             q,
         )
+
+    @property
+    def passive_names(self) -> tuple[str, ...]:
+        """The passive joints of chains, in the order of `Forward.passive`; none of other limbs."""
+        if self.model.chains is None:
+            return ()
+        names = list(self.model.chains.parts)
+        coordinate = self.model.chains.layout.coordinate
+        order = sorted(range(len(names)), key=lambda k: int(coordinate[k]))
+        return tuple(names[k] for k in order if coordinate[k] >= 0)
+
+    def passive_joints(self, own: FloatArray, q: FloatArray) -> FloatArray:
+        """What the passive joints turn or slide by from home at own poses (N, 6), (N, passive).
+
+        Each chain closed for itself, in the posture that is reached from home.
+        """
+        if not isinstance(self.machine, ChainMachine):
+            raise ArgumentError(f"{self.model.name}: its limbs are no chains of joints")
+        return self.machine.frames(self.slots, np.ascontiguousarray(own), q)[0]
+
+    def chain_points(self, own: FloatArray, q: FloatArray) -> list[FloatArray]:
+        """Where the joints of each chain are at own poses (N, 6), in own axes: (N, joints, 3)."""
+        assert isinstance(self.machine, ChainMachine) and self.model.chains is not None
+        frames = self.machine.frames(self.slots, np.ascontiguousarray(own), q)[1]
+        found, start = [], 0
+        for limb, parts in zip(self.model.chains.limbs, self.model.chains.members, strict=True):
+            first = np.cumsum([0, *(joint.parts for joint in limb[:-1])])
+            found.append(frames[:, start + first, 9:])
+            start += len(parts) + 1
+        return found
 
     def closure_by_twist(self, own: FloatArray, q: FloatArray | None = None) -> FloatArray:
         """Closure rows by a scaled twist, (N, rows, m), at own poses (N, 6) and q (N, n).
@@ -329,14 +385,20 @@ class Kinematics:
         """
         if q is None:
             on_map = own.copy()
-            if self.model.map in ("translation", "planar"):  # what these do not move is 0
+            if self.model.map in ("translation", "planar", "xy"):  # what these do not move is 0
                 on_map[:, [i for i, name in enumerate(POSE) if name not in self.coordinates]] = 0.0
             q = self.machine.inverse(self.slots, on_map)
         return self.machine.closure(self.slots, own, q).by_step
 
     def drives(self, q: FloatArray) -> FloatArray:
-        """q̃ of each limb (N, limbs) at actuator coordinates (N, n)."""
+        """q̃ of each limb (N, limbs) at actuator coordinates (N, n).
+
+        Of a chain that of its first actuator, 0 where it has none.
+        """
         actuators = [limb.actuator for limb in self.model.limbs]
+        if isinstance(self.machine, ChainMachine):
+            each = np.hstack([chain_drives(self.machine, self.slots, q), np.zeros((len(q), 1))])
+            return np.asarray(each[:, actuators])
         offset, gain = self.slots[:, SLOTS.index("offset")], self.slots[:, SLOTS.index("gain")]
         found: FloatArray = gain * q[:, actuators] + offset
         return found
@@ -350,6 +412,13 @@ class Kinematics:
     def _in_strokes(self, q: FloatArray) -> BoolArray:
         """Which actuators (n,) keep the strokes of all their limbs at coordinates (n,)."""
         kept = np.ones(self.n_actuators, dtype=bool)
+        if isinstance(self.machine, ChainMachine):
+            assert self.model.chains is not None
+            drive = chain_drives(self.machine, self.slots, q[None])[0]
+            for a, (_, joint) in enumerate(self.model.chains.actuated):
+                low, high = joint.stroke or (-np.inf, np.inf)
+                kept[a] = bool(low <= drive[a] <= high)
+            return kept
         for limb, drive in zip(self.model.limbs, self.drives(q[None])[0], strict=True):
             kept[limb.actuator] &= bool(stroke_margin(limb, drive) >= 0.0)
         return kept

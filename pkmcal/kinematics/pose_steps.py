@@ -8,26 +8,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.core.machine import Machine
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 
 
 def surplus(robot: Robot) -> int:
-    """How many closures a machine has beyond its free coordinates."""
-    return robot.machine.rows - robot.machine.m
+    """How many closures a machine has beyond its free coordinates, which its limbs cannot meet.
+
+    None where limbs are chains: their joints give way, and the pose follows from that.
+    """
+    machine = robot.machine
+    return machine.rows - machine.m if isinstance(machine, Machine) else 0
 
 
 def moved(robot: Robot, pose: FloatArray, step: FloatArray) -> FloatArray:
     """Poses (N, 6) after steps (N, m)."""
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    return robot.frames.outward(robot.machine.moved(own, np.ascontiguousarray(step))[0])
+    return robot.frames.outward(_of_limbs(robot).moved(own, np.ascontiguousarray(step))[0])
 
 
 def step_twists(robot: Robot, pose: FloatArray) -> FloatArray:
     """Twist of the platform by a step at poses (N, 6): (N, 6, m)."""
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    twists = robot.machine.moved(own, np.zeros((len(own), robot.machine.m)))[1]
+    twists = _of_limbs(robot).moved(own, np.zeros((len(own), robot.machine.m)))[1]
     return robot.frames.twists_outward(own, twists)
 
 
@@ -38,17 +43,22 @@ def readings(robot: Robot, pose: FloatArray, q: FloatArray) -> tuple[FloatArray,
     other rows, weighted, in mm: (N, rows); and their derivative by a step (N, rows, m).
     """
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    residual, by_step, _ = robot.machine.readings(robot.slots, own, q)
+    residual, by_step, _ = _of_limbs(robot).readings(robot.slots, own, q)
     return residual, by_step
 
 
-def readings_by_numbers(robot: Robot, pose: FloatArray, q: FloatArray) -> FloatArray:
-    """Derivative of `readings` by each number of the geometry, (N, rows, p)."""
+def readings_by_numbers(
+    robot: Robot, pose: FloatArray, q: FloatArray, places: IntArray
+) -> FloatArray:
+    """Derivative of `readings` by numbers of the geometry at `places` (k,), (N, rows, k)."""
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    columns = robot.geometry.slot_index.astype(np.int32)
-    by_number = robot.machine.readings(robot.slots, own, q, columns)[2]
+    chain = robot.geometry.chain[:, places]  # of the limbs' numbers, through their ties
+    moving = np.flatnonzero(chain.any(axis=1))
+    columns = robot.geometry.slot_index[moving].astype(np.int32)
+    by_number = _of_limbs(robot).readings(robot.slots, own, q, columns)[2]
     assert by_number is not None
-    return robot.through_ties(by_number)
+    by_places: FloatArray = by_number @ chain[moving]
+    return by_places
 
 
 def sphere_actuators(robot: Robot) -> list[int]:
@@ -58,3 +68,8 @@ def sphere_actuators(robot: Robot) -> list[int]:
         beside = KINDS[limb.kind].all_rows(limb.couple > 0)
         of_rows += [limb.actuator] + [-1] * len(beside)
     return of_rows
+
+
+def _of_limbs(robot: Robot) -> Machine:
+    assert isinstance(robot.machine, Machine)  # `surplus` is 0 otherwise
+    return robot.machine

@@ -11,16 +11,20 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
-from pkmcal.core.machine import Machine
+from pkmcal.core.chains import AnyMachine, ChainMachine
+from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.atomic import write_whole
+from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Model
-from pkmcal.kinematics import overconstrained
+from pkmcal.kinematics import chain_limits, overconstrained
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
@@ -132,18 +136,22 @@ class Robot(Kinematics, Result):
             ``.ok`` for each pose; reach, stroke and joint cones for each limb.
         """
         rows, shape = self.own_rows(pose)
-        drive, on_base, on_platform = self.machine.limbs(self.slots, rows)
+        chains = self.model.chains
+        if chains is not None:
+            q = (
+                self.machine.inverse(self.slots, rows)
+                if actuators is None
+                else (self._batch(actuators, shape))
+            )
+            assert isinstance(self.machine, ChainMachine)
+            found = chain_limits.feasibility(chains, self.machine, self.slots, rows, q)
+            return _shaped(found, shape)
+        drive, on_base, on_platform = self.limb_machine.limbs(self.slots, rows)
         if actuators is not None:
             there = self.drives(self._batch(actuators, shape))
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
             drive = np.where(angle, there + wrapped(drive - there), drive)
-        found = feasibility(self.model.limbs, drive, on_base, on_platform)
-        return Feasibility(
-            *(
-                getattr(found, field.name).reshape(*shape, len(self.model.limbs))
-                for field in fields(Feasibility)
-            )
-        )
+        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform), shape)
 
     def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
         """Every assembly mode at given actuator coordinates, with proof.
@@ -230,7 +238,7 @@ class Robot(Kinematics, Result):
         """
         given, own, q, shape = self._commanded(pose, actuators)
         errors = self._by_numbers(own, q, twists=False)
-        errors = self.through_ties(self.frames.rates_outward(own, given, errors))
+        errors = self._through_ties(self.frames.rates_outward(own, given, errors))
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def error_twists(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
@@ -258,7 +266,7 @@ class Robot(Kinematics, Result):
         """
         _, own, q, shape = self._commanded(pose, actuators)
         errors = self._by_numbers(own, q, twists=True)
-        errors = self.through_ties(self.frames.twists_outward(own, errors))
+        errors = self._through_ties(self.frames.twists_outward(own, errors))
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
@@ -320,7 +328,7 @@ class Robot(Kinematics, Result):
             )
         return self.machine.error_jacobian(self.slots, own, q, columns, twists)
 
-    def through_ties(self, errors: FloatArray) -> FloatArray:
+    def _through_ties(self, errors: FloatArray) -> FloatArray:
         """The same (N, 6, p) with the columns of named parameters after those of the numbers."""
         count = len(self.geometry) - errors.shape[2]
         if not count:
@@ -370,7 +378,7 @@ class Robot(Kinematics, Result):
         return changed
 
     @cached_property
-    def _of_any_misfit(self) -> Machine:
+    def _of_any_misfit(self) -> AnyMachine:
         return self.machine.with_tolerance(np.inf)
 
     @property
@@ -396,7 +404,14 @@ class Robot(Kinematics, Result):
             return self
         return Robot(replace(self.model, closure_tolerance=2.0 * missed))
 
-    def save(self, path: str | PathLike[str], comment: str = "") -> None:
+    def save(
+        self,
+        path: str | PathLike[str],
+        comment: str = "",
+        *,
+        like: str | PathLike[str] | None = None,
+        deviations: Mapping[str, float] | None = None,
+    ) -> None:
         """Write the robot file; `load` reads it back to the last bit.
 
         Parameters
@@ -405,8 +420,44 @@ class Robot(Kinematics, Result):
             Where to write; an existing file is replaced, whole or not at all.
         comment : str, optional
             Lines for its head, each with its ``#``.
+        like : str or path, optional
+            The file that the robot came from: its units, order, names and comments are kept, and
+            only the values that changed are others. Numbers are then read back to 1e-13 of the
+            machine's size, for its units are not mm and rad.
+        deviations : mapping of str to float, optional
+            With `like`: standard deviations by name, mm and rad, as comments.
+
+        Raises
+        ------
+        ValueError
+            `like` describes another robot.
         """
-        robot_file.write(self.model, path, comment)
+        if like is None:
+            robot_file.write(self.model, path, comment)
+            return
+        from pkmcal.geometry.robot_file_kept import text_like
+
+        content, place, _ = robot_file.located(like)
+        source = Source(content, place)
+        head = arguments.comment(comment)
+        write_whole(path, text_like(source, self.model, deviations, head))
+
+
+def _shaped(found: Feasibility, shape: tuple[int, ...]) -> Feasibility:
+    """Limits of N rows as those of a batch."""
+    each = (getattr(found, field.name) for field in fields(Feasibility))
+    return Feasibility(*(array.reshape(*shape, array.shape[-1]) for array in each))
+
+
+def commanded(robot: Robot) -> tuple[str, ...]:
+    """The coordinates that programs command: those its file matches, or its free ones."""
+    return tuple(robot.model.match or robot.coordinates)
+
+
+def determines_others(robot: Robot) -> bool:
+    """Whether the limbs determine coordinates beside the commanded ones, which are not constant."""
+    constant = robot.model.match is None and robot.model.map in ("translation", "planar")
+    return len(commanded(robot)) < len(POSE) and not constant
 
 
 def require_parallel(robot: object, name: str = "robot") -> None:

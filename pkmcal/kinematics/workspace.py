@@ -206,8 +206,11 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
         broken = robot.feasible(robot.home[None]).broken()
         why = f"home breaks a limit: {'; '.join(broken)}" if broken else "home is singular"
         raise ArgumentError(f"{robot.name}: {why.replace(' in rows 0', '')}")
-    joints = np.abs(robot.geometry.slots[:, :6]).sum(axis=1)
-    size = float(joints.max() + np.abs(robot.home[:3]).sum())
+    if robot.model.chains is not None:
+        size = robot.model.chains.size
+    else:
+        joints = np.abs(robot.geometry.slots[:, :6]).sum(axis=1)
+        size = float(joints.max() + np.abs(robot.home[:3]).sum())
     found = {}
     for name in moved_coordinates(robot):
         step = np.radians(90.0) / _STEPS if name in POSE[3:] else 2 * size / _STEPS

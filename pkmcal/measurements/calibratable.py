@@ -192,6 +192,7 @@ class ArmMachine:
         self.arm = arm
         self.name, self.length = arm.name, arm.length
         self.n_actuators, self.actuator_units = arm.n_joints, arm.actuator_units
+        self.joint_names = arm.joint_names
         joints = range(1, arm.n_joints + 1)
         names = tuple(f"joint{i}.{error}" for i in joints for error in ERRORS)
         units = ("mm", "mm", "mm", "rad", "rad", "rad") * arm.n_joints

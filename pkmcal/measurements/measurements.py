@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import display
-from pkmcal.arguments import checked_seed, shown, word
+from pkmcal.arguments import checked_seed, shown, word, words
 from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
@@ -88,6 +88,8 @@ class Measurements(Result):
         The line of each row in the file it was read from, to name it by.
     file : str
         The name of that file.
+    notes : sequence of str
+        What was assumed when they were read, a line each.
 
     Raises
     ------
@@ -116,6 +118,7 @@ class Measurements(Result):
     actuator_sigma: FloatArray | None = None
     lines: Int64Array | None = None
     file: str = ""
+    notes: tuple[str, ...] = ()
 
     # The types above are those of the attributes; anything array-like is taken.
     def __init__(
@@ -134,6 +137,7 @@ class Measurements(Result):
         actuator_sigma: ArrayLike | None = None,
         lines: ArrayLike | None = None,
         file: str = "",
+        notes: Sequence[str] = (),
     ) -> None:
         word("kind", kind, COMPONENTS)
         q = numbers("actuators", actuators)
@@ -158,6 +162,7 @@ class Measurements(Result):
             "actuator_sigma": actuator_sigma_array(actuator_sigma, q.shape),
             "lines": None if lines is None else integers("lines", lines, len(q)),
             "file": file,
+            "notes": words("notes", notes),
         }
         self.__setstate__(fields)
 
@@ -291,6 +296,21 @@ class Measurements(Result):
             The file cannot be written; one that was there before is untouched.
         """
         write_measurements(self, path, comment)
+
+    def _columns(self) -> dict[str, Any]:
+        """As the columns of a file, but for the units, which are mm and rad."""
+        columns: dict[str, Any] = {f"q{i + 1}": q for i, q in enumerate(self.actuators.T)}
+        values = self.values.reshape(len(self), -1)
+        columns |= dict(zip(self.components, values.T, strict=True))
+        deviations = self._deviations()
+        if deviations is not None:
+            names = (f"sigma.{name}" for name in self.components)
+            columns |= dict(zip(names, deviations.T, strict=True))
+        if self.target_index is not None and self.target_names is not None:
+            columns["target"] = [self.target_names[i] for i in self.target_index]
+        if self.group is not None:
+            columns["group"] = self.group
+        return columns
 
     def _parts(self) -> Iterator[str | Table]:
         yield self._title()

@@ -182,7 +182,7 @@ def _normalized(map: str, spheres: FloatArray) -> tuple[FloatArray, float, Float
     scaled = spheres.copy()
     b, c = spheres[:, 0:3], spheres[:, 3:6]
     middle_b, middle_c = b.mean(axis=0), c.mean(axis=0)
-    if map == "planar":
+    if map in ("planar", "xy"):
         middle_b[2] = middle_c[2] = 0.0
     if map == "2tpr2tps":  # its poses are about the origins
         middle_b, middle_c = np.zeros(3), np.zeros(3)

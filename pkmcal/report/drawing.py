@@ -9,6 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
+import numpy as np
+
+from pkmcal.arrays import BoolArray, IntArray
 from pkmcal.display import printable
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
@@ -44,6 +47,7 @@ _METADATA: dict[str, dict[str, None]] = {
     "svg": {"Date": None, "Creator": None},  # the same bytes for the same figure
 }
 _DPI = 120
+MOST_DRAWN = 1000  # rows of a figure: with 1e5 of them a browser shows nothing for minutes
 _LONGEST_LINE, _LONGEST_TEXT = 200, 2000  # letters of one text
 
 P = ParamSpec("P")
@@ -70,6 +74,36 @@ def empty_figure(
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout=layout)
+
+
+def sample(count: int, first: BoolArray | None = None) -> IntArray:
+    """Which of many rows a figure draws, in order: at most `MOST_DRAWN`, evenly spaced.
+
+    Parameters
+    ----------
+    count : int
+        How many there are.
+    first : ndarray of bool (count,), optional
+        Rows that the others make room for.
+
+    Examples
+    --------
+    >>> len(sample(7)), sample(5001)[[0, 1, -1]].tolist()
+    (7, [0, 5, 5000])
+    """
+    if count <= MOST_DRAWN:
+        return np.arange(count)
+    wanted = np.flatnonzero(np.zeros(count, dtype=bool) if first is None else first)
+    wanted = _spaced(wanted, MOST_DRAWN)
+    others = np.setdiff1d(np.arange(count), wanted, assume_unique=True)
+    return np.sort(np.concatenate([wanted, _spaced(others, MOST_DRAWN - len(wanted))]))
+
+
+def _spaced(rows: IntArray, most: int) -> IntArray:
+    """At most so many of these, the ends among them."""
+    if len(rows) <= most:
+        return rows
+    return rows[np.round(np.linspace(0, len(rows) - 1, most)).astype(np.intp)]
 
 
 def encoded(figure: Figure, kind: str, salt: str = "pkmcal", background: str = "white") -> bytes:

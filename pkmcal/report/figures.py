@@ -10,7 +10,16 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
 from pkmcal.display import printable
 from pkmcal.report.contents import Slice, WorkspaceAccuracy
-from pkmcal.report.drawing import BLUE, FAINT, GREEN, ORANGE, empty_figure, in_context
+from pkmcal.report.drawing import (
+    BLUE,
+    FAINT,
+    GREEN,
+    MOST_DRAWN,
+    ORANGE,
+    empty_figure,
+    in_context,
+    sample,
+)
 from pkmcal.report.skeleton import Skeleton, exaggerated
 
 if TYPE_CHECKING:
@@ -39,7 +48,10 @@ def before_after(groups: dict[str, tuple[FloatArray, FloatArray]]) -> Figure:
         for values, colour, label in zip(pair, (ORANGE, BLUE), ("before", "after"), strict=True):
             off = np.sort(np.maximum(values[np.isfinite(values)], _LEAST))
             share = 100 * (np.arange(len(off)) + 0.5) / max(len(off), 1)
-            panel.plot(share, off, marker="o", ms=3, lw=1, color=colour, label=label)
+            drawn = sample(len(off))
+            panel.plot(share[drawn], off[drawn], marker="o", ms=3, lw=1, color=colour, label=label)
+        if max(map(len, pair)) > MOST_DRAWN:
+            title += f", {MOST_DRAWN} drawn"
         panel.set(title=title, xlabel="cumulative share of points [%]", xlim=(0, 100), yscale="log")
         _grid(panel)
     panels[0].set_ylabel("distance, measured from predicted [mm]")
@@ -180,17 +192,18 @@ def poses(score: dict[str, Any]) -> Figure:
     """
     figure = empty_figure(_WIDTH, 3.0)
     panel = figure.subplots()
-    number = np.arange(1, score["poses"] + 1)
+    drawn = sample(score["poses"])
+    some = "" if len(drawn) == score["poses"] else f", {len(drawn)} of {score['poses']} drawn"
     for key, colour, mark, label in (
         ("accuracy_before", ORANGE, "o", "AP before"),
         ("accuracy", BLUE, "s", "AP after"),
         ("repeatability", GREEN, "^", "RP"),
     ):
-        values = np.asarray(score[key], dtype=float)
+        values = np.asarray(score[key], dtype=float)[drawn]
         if np.isfinite(values).any():
             shown = np.maximum(values, _LEAST)
-            panel.plot(number, shown, ls="", marker=mark, ms=4, color=colour, label=label)
-    panel.set(xlabel="pose and target", ylabel="[mm]", yscale="log")
+            panel.plot(drawn + 1, shown, ls="", marker=mark, ms=4, color=colour, label=label)
+    panel.set(xlabel=f"pose and target{some}", ylabel="[mm]", yscale="log")
     panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     _grid(panel)
     return figure

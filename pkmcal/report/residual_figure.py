@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pkmcal.arrays import propagate
+from pkmcal.arrays import IntArray, propagate
 from pkmcal.display import displayed, printable
-from pkmcal.report.drawing import BLUE, GREEN, ORANGE, PINK, empty_figure, in_context
+from pkmcal.report.drawing import BLUE, GREEN, ORANGE, PINK, empty_figure, in_context, sample
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,33 +30,42 @@ _LOOKS = {
 
 @in_context
 def residuals(found: Identification) -> Figure:
-    """Draw residuals row by row, over the workspace with their direction, and as quantiles."""
+    """Draw residuals row by row, over the workspace with their direction, and as quantiles.
+
+    Of very many rows the outliers and a sample of the others; the title says so.
+    """
     units = [
         unit for unit in ("mm", "rad") if any(unit in m.units for m in found.fit.equations.sets)
     ]
     figure = empty_figure(11.0, 3.0 * len(units) + 4.2)
     heights = [3.0] * len(units) + [4.2]
     grid = figure.add_gridspec(len(units) + 1, 2, height_ratios=heights)
+    drawn = sample(len(found.rows), np.isin(found.rows, found.outliers))
     for k, unit in enumerate(units):
-        _by_row(figure.add_subplot(grid[k, :]), found, unit)
-    _over_the_workspace(figure.add_subplot(grid[-1, 0]), found)
+        _by_row(figure.add_subplot(grid[k, :]), found, drawn, unit)
+    _over_the_workspace(figure.add_subplot(grid[-1, 0]), found, drawn)
     _quantiles(figure.add_subplot(grid[-1, 1]), found)
-    figure.suptitle(f"{printable(found.robot.name)}: residuals of the calibration")
+    title = f"{printable(found.robot.name)}: residuals of the calibration"
+    if len(drawn) < len(found.rows):
+        title += f", {len(drawn)} of {len(found.rows)} rows drawn"
+    figure.suptitle(title)
     return figure
 
 
-def _by_row(panel: Axes, found: Identification, unit: str) -> None:
+def _by_row(panel: Axes, found: Identification, drawn: IntArray, unit: str) -> None:
     """Draw one mark per row and component, rows that are outliers ringed."""
     equations, seen = found.fit.equations, set()
     shown = displayed(0.0, unit)[1]
     for i, (measured, residual) in enumerate(zip(equations.sets, found.residuals, strict=True)):
-        rows = found.rows[equations.set_of == i]
+        own = np.flatnonzero(equations.set_of == i)
+        shared = np.isin(own, drawn)
+        rows = found.rows[own][shared]
         odd = np.isin(rows, found.outliers)
         for k, name in enumerate(measured.components):
             if measured.units[k] != unit:
                 continue
             colour, mark = _LOOKS[name]
-            values = displayed(1.0, unit)[0] * residual[:, k]
+            values = displayed(1.0, unit)[0] * residual[shared, k]
             label = None if name in seen else name
             panel.plot(rows, values, ls="", marker=mark, ms=3.5, color=colour, label=label)
             panel.plot(rows[odd], values[odd], ls="", marker="o", ms=11, mfc="none", color="0.2")
@@ -67,20 +76,24 @@ def _by_row(panel: Axes, found: Identification, unit: str) -> None:
     panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(seen))
 
 
-def _over_the_workspace(panel: Axes, found: Identification) -> None:
+def _over_the_workspace(panel: Axes, found: Identification, drawn: IntArray) -> None:
     """Draw residuals at their poses: arrows in x and y, a colour for the other component."""
     equations, pose = found.fit.equations, found.fit.end.pose
     at, along, other = [], [], []
     for place, residual in zip(equations.pose_of, found.residuals, strict=True):
         at.append(pose[place, :2])
-        flat = residual.shape[1] == 1  # a height or a distance has no direction across
+        flat = residual.shape[1] <= 1  # a height or a distance has no direction across
         along.append(np.zeros((len(residual), 2)) if flat else residual[:, :2])
-        other.append(residual[:, 0] if flat else residual[:, 2])
-    (x, y), (dx, dy) = np.concatenate(at).T, np.concatenate(along).T
-    colour = np.concatenate(other)
-    most = max(float(np.abs(colour).max()), 1e-12)
+        worst = found.misfit.closures[place]  # where nothing was read
+        last = residual[:, -1 if flat else 2] if residual.shape[1] else worst
+        other.append(last)
+    (x, y), (dx, dy) = np.concatenate(at)[drawn].T, np.concatenate(along)[drawn].T
+    colour = np.concatenate(other)[drawn]
+    read = np.isfinite(colour) & np.isfinite(dx + dy)
+    x, y, dx, dy, colour = x[read], y[read], dx[read], dy[read], colour[read]
+    most = max(float(np.abs(colour).max(initial=0.0)), 1e-12)
     marks = panel.scatter(x, y, c=colour, cmap="coolwarm", vmin=-most, vmax=most, s=26, zorder=3)
-    long = float(np.quantile(np.hypot(dx, dy), 0.9))
+    long = float(np.quantile(np.hypot(dx, dy), 0.9)) if len(dx) else 0.0
     if long > 0:
         arrows = panel.quiver(
             *(x, y, dx, dy),
@@ -110,7 +123,8 @@ def _quantiles(panel: Axes, found: Identification) -> None:
     checked = redundancy > 1e-6  # the others are fitted exactly, whatever was measured
     scaled = np.sort(estimate.residual[checked] / np.sqrt(redundancy[checked]))
     normal = ndtri((np.arange(len(scaled)) + 0.5) / max(len(scaled), 1))
-    panel.plot(normal, scaled, ls="", marker="o", ms=3.5, color=BLUE)
+    drawn = sample(len(scaled))
+    panel.plot(normal[drawn], scaled[drawn], ls="", marker="o", ms=3.5, color=BLUE)
     ends = np.array([-3.0, 3.0])
     panel.plot(ends, ends, color="0.5", lw=0.8)
     panel.grid()

@@ -1,4 +1,4 @@
-"""Every row has a pose of its own: the estimator against all poses as unknowns."""
+"""Every row has a pose of its own: against all poses as unknowns, and what is stated of it."""
 
 from __future__ import annotations
 
@@ -267,3 +267,132 @@ def test_stated_actuator_noise_makes_the_stated_deviations_true() -> None:
             z[stated].append((found.values - want) / found.stderr * widened)
     assert 0.75 <= np.sqrt(np.mean(np.square(z[True]))) <= 1.3
     assert np.sqrt(np.mean(np.square(z[False]))) > 2.0  # their noise taken for the camera's
+
+
+def test_arms_with_noisy_joints_state_true_deviations() -> None:
+    arm = pk.load("3r")
+    rng = np.random.default_rng(5)
+    theta = rng.uniform(-1.2, 1.2, (40, 3))
+    noise = np.array([2e-4, 1e-4, 0.0])  # the third joint's encoder is perfect
+    free = ("joint2.dx", "joint2.dy", "joint3.dphi")
+    z = []
+    for _ in range(10):
+        errors = arm.joint_errors.copy()
+        errors[1, :2] += rng.normal(0, 0.3, 2)
+        errors[2, 3] += rng.normal(0, 1e-3)
+        true = arm.replace(errors)
+        there = pk.VirtualMachine(true, noise=0).measure(theta + rng.normal(0, 1, (40, 3)) * noise)
+        read = there.values + rng.normal(0, 0.01, (40, 3))
+        m = pk.Measurements(theta, read, sigma=0.01, actuator_sigma=noise)
+        found = pk.identify(arm, m, free)
+        z.append((found.values - [errors[1, 0], errors[1, 1], errors[2, 3]]) / found.stderr)
+        assert found.dof == 3 * 40 - 3
+    assert 0.6 <= np.sqrt(np.mean(np.square(z))) <= 1.5
+
+
+# what was read, and what was not ------------------------------------------------------------------
+
+
+def test_rows_that_say_nothing_are_counted_and_change_nothing() -> None:
+    robot = pk.load("linear-delta")
+    true = robot.replace({"offset1": robot.geometry["offset1"] + 0.3})
+    q = robot.inverse(pk.sample_poses(robot, 20))
+    whole = pk.VirtualMachine(true, noise=0.02, seed=3).measure(q, "position")
+    values = whole.values.copy()
+    values[[2, 5, 11]] = np.nan
+    values[[3, 4], :2] = np.nan  # heights alone
+    some = pk.Measurements(q, values, sigma=0.02)
+    found = pk.identify(robot, some, "offset*")
+    assert found.idle == 3 and "3 poses say nothing" in str(found)
+    assert found.rows.tolist() == [i for i in range(20) if i not in (2, 5, 11)]
+    assert found.dof == 3 * 17 - 4 - 3
+    read = [i for i in range(20) if i not in (2, 3, 4, 5, 11)]
+    heights = pk.Measurements(q[[3, 4]], values[[3, 4], 2], "height", sigma=0.02)
+    apart = pk.identify(
+        robot, [pk.Measurements(q[read], values[read], sigma=0.02), heights], "offset*"
+    )
+    np.testing.assert_allclose(found.values, apart.values, atol=1e-9)
+    np.testing.assert_allclose(found.stderr, apart.stderr, rtol=1e-9)
+
+
+def test_actuators_alone_say_nothing_of_a_machine_whose_closures_always_hold() -> None:
+    robot = pk.load("hexapod")
+    alone = pk.Measurements(robot.inverse(pk.sample_poses(robot, 9)), None, "closure")
+    with pytest.raises(ValueError, match="nothing was read but the actuators"):
+        pk.identify(robot, alone, "offset*")
+
+
+def test_an_actuator_that_is_never_wrong_has_no_place_among_surplus_closures(
+    cables: pk.Robot,
+) -> None:
+    with pytest.raises(ValueError, match="actuator_sigma must be positive, or None"):
+        pk.identify(cables, measured(simulated(0, 12, "all"), actuator_sigma=0.0))
+    stated = measured(simulated(0, 12, "all"))
+    with pytest.raises(ValueError, match="state actuator_sigma of all sets, or of none"):
+        pk.identify(cables, [stated, measured(simulated(1, 12, "all"), actuator_sigma=None)])
+
+
+@pytest.mark.parametrize(
+    ("kind", "free", "told"),
+    [
+        (
+            "none",
+            ("base*", "offset*"),
+            ["moved along x, y and z and turned about x, y and z", "mirror"],
+        ),
+        ("heights", ("base*", "offset*"), ["moved along x and y and turned about z", "mirror"]),
+        ("none", ("base*", "offset*", "gain*"), ["moved along", "common scale", "mirror"]),
+        ("third", ("base*", "offset*"), []),
+    ],
+)
+def test_what_self_calibration_leaves_open_is_named(
+    cables: pk.Robot, kind: Kind, free: tuple[str, ...], told: list[str]
+) -> None:
+    found = pk.identify(cables, measured(simulated(2, 60, kind)), free)
+    assert len(found.gauges) == len(told)
+    for text, words in zip(found.gauges, told, strict=True):
+        assert words in text and words in str(found)
+    assert found.unidentifiable == ()  # nothing else is
+    assert (found.rank < len(found.free)) == bool(told)
+
+
+def test_points_held_out_are_missed_as_expected(cables: pk.Robot) -> None:
+    off, expected = [], []
+    for seed in range(6):
+        found = pk.identify(cables, measured(simulated(seed, 60, "all")), holdout=0.4)
+        off.append(found.holdout_rms)
+        expected.append(found.holdout_expected)
+    assert np.mean(off) == pytest.approx(np.mean(expected), rel=0.1)
+
+
+def test_spoilt_cables_are_named_row_by_row(cables: pk.Robot) -> None:
+    drawn = simulated(4, 60, "all")
+    lengths = drawn.lengths.copy()
+    lengths[[7, 30, 51], [0, 2, 1]] += [25.0, -18.0, 30.0]
+    for loss in ("huber", "cauchy"):
+        found = pk.identify(cables, measured(drawn._replace(lengths=lengths)), loss=loss)
+        assert found.outliers == (7, 30, 51)
+        true = np.array([drawn.true[name] for name in found.free])
+        assert np.sqrt(np.mean(((found.values - true) / found.stderr) ** 2)) < 2.0
+
+
+def test_limbs_are_fitted_beyond_twelve(tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    anchors = rng.normal([0, 0, 500], 1000, (24, 3))
+    limbs = "".join(
+        f'[[limb]]\nkind = "cable"\nbase = {anchor.tolist()}\nplatform = [0.0, 0.0, 0.0]\n'
+        for anchor in anchors
+    )
+    path = tmp_path / "many.toml"
+    path.write_text(
+        'name = "many"\nunits = { length = "mm", angle = "deg" }\n'
+        '[pose]\nmap = "translation"\nhome = { z = 10.0 }\n'
+        '[calibration]\nfree = ["offset*"]\n' + limbs
+    )
+    robot = pk.load(path)
+    offset = rng.normal(0, 5, 24)
+    at = rng.uniform(-300, 300, (30, 3))
+    lengths = np.linalg.norm(at[:, None] - anchors, axis=2) - offset + rng.normal(0, 0.1, (30, 24))
+    found = pk.identify(robot, pk.Measurements(lengths, None, "closure", actuator_sigma=0.1))
+    assert found.rank == 24 and found.dof == 30 * 21 - 24
+    assert np.sqrt(np.mean(((found.values - offset) / found.stderr) ** 2)) < 1.6

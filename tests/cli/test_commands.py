@@ -353,7 +353,7 @@ def test_mistake_of_the_program_is_not_taken_for_wrong_input(
     run: Any,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def broken(*arguments: Any) -> None:
+    def broken(*arguments: Any, **options: Any) -> None:
         raise ZeroDivisionError
 
     monkeypatch.setattr(pk, "read_measurements", broken)
@@ -364,7 +364,7 @@ def test_mistake_of_the_program_is_not_taken_for_wrong_input(
 def test_ctrl_c_ends_the_command_without_a_traceback(
     run: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def stopped(*arguments: Any) -> None:
+    def stopped(*arguments: Any, **options: Any) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(pk, "read_measurements", stopped)

@@ -44,7 +44,15 @@ def mixed() -> pk.Robot:
 CASES = {name: lambda name=name: pk.load(name) for name in PARALLEL}
 CASES |= {"mixed, framed": mixed}
 # every driver, row and pose map
-SOME = ["2tpr2tps", "2tpr2tps-spatial", "3rps", "3rrr-planar", "linear-delta", "mixed, framed"]
+SOME = [
+    "2tpr2tps",
+    "2tpr2tps-spatial",
+    "3rps",
+    "3prs",
+    "3rrr-planar",
+    "linear-delta",
+    "mixed, framed",
+]
 
 
 @pytest.fixture(scope="module")
@@ -137,6 +145,12 @@ def test_machine_with_more_closures_than_coordinates_is_refused(tmp_path: Path) 
     assert not (tmp_path / "robot.h").exists()
 
 
+def test_machine_of_chains_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(pk.ArgumentError, match="chains of joints; a header holds other limbs"):
+        pk.export.c_header(pk.load("trivariant"), tmp_path / "robot.h")
+    assert not (tmp_path / "robot.h").exists()
+
+
 def test_names_come_from_the_file(tmp_path: Path) -> None:
     needed("gcc")
     pk.export.c_header(pk.load("2tpr2tps"), tmp_path / "2tpr-2tps.h")
@@ -165,3 +179,21 @@ def test_only_the_square_root_and_the_absolute_value_are_of_the_library(tmp_path
         assert names <= allowed
         writable = subprocess.run(["size", tmp_path / "o"], capture_output=True, text=True)
         assert writable.stdout.splitlines()[1].split()[1:3] == ["0", "0"]  # data, bss
+
+
+def test_a_hexapod_takes_four_kilobytes_of_a_controller(tmp_path: Path) -> None:
+    """Code and numbers of inverse and forward on a Cortex-M7, without the C library."""
+    needed("arm-none-eabi-gcc", "arm-none-eabi-size")
+    pk.export.c_header(pk.load("hexapod"), tmp_path / "robot.h")
+    (tmp_path / "robot.c").write_text(
+        '#include "robot.h"\nint both(double *pose, double *q);\n'
+        "int both(double *pose, double *q)\n"
+        "{ return robot_inverse(pose, q) || robot_forward(q, pose); }\n"
+    )
+    command = "arm-none-eabi-gcc -std=c99 -O2 -mcpu=cortex-m7 -mthumb -mfpu=fpv5-d16"
+    command += " -mfloat-abi=hard -c -o robot.o robot.c"
+    subprocess.run(command.split(), cwd=tmp_path, check=True)
+    size = ["arm-none-eabi-size", tmp_path / "robot.o"]
+    text = subprocess.run(size, capture_output=True, text=True, check=True).stdout
+    code, data, bss = map(int, text.splitlines()[1].split()[:3])
+    assert code <= 4096 and data == bss == 0

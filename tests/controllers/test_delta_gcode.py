@@ -110,6 +110,12 @@ def test_lines_are_found_as_firmwares_print_them(tmp_path: Path) -> None:
     assert np.degrees(g["angle1"]) == pytest.approx(210.0)
 
 
+def test_a_rod_among_three_that_is_no_number_is_named(tmp_path: Path) -> None:
+    (tmp_path / "config.g").write_text("M665 L250:25..0:250 R125 H300\nM666 X0\n")
+    with pytest.raises(pk.FileError, match=r"L must be a number, found '25\.\.0'"):
+        pk.import_printer(tmp_path / "config.g", "reprap")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -134,3 +140,64 @@ def test_leaning_towers_are_refused(tmp_path: Path) -> None:
         assert not (tmp_path / "x").exists()
         assert not getattr(pk.export, firmware)(leaning, tmp_path / "x", project=True).exact
         (tmp_path / "x").unlink()
+
+
+def rotary(**changes: float) -> pk.Robot:
+    """Heights of its own for every shoulder, end stops above the horizontal, angles upwards."""
+    limbs: list[dict[str, Any]] = []
+    for angle, crank, rod, z, zero in (
+        (210.5, 170.0, 400.0, 520.0, 0.6),
+        (329.0, 170.5, 401.0, 521.0, 0.61),
+        (90.0, 169.5, 399.5, 519.5, 0.59),
+    ):
+        limbs.append(
+            {
+                "kind": "RUS",
+                "base": robots.ring(180.0, angle, z),
+                "platform": [0.0, 0.0, 0.0],
+                "crank": crank,
+            }
+            | {"rod": rod, "offset": zero, "axis": robots.ring(-1.0, angle + 90.0), "gain": -1.0}
+            | {"zero": robots.ring(1.0, angle), "branch": -1}
+        )
+    return robots.made("translation", {"z": 150.0}, limbs).replace(changes)
+
+
+def reprap_rotary_model(text: str, nozzle: Any) -> Any:
+    """How far each crank stands below its switch, deg: Transform() of RepRapFirmware."""
+    size, ends = words(text, "M669"), words(text, "M666")
+    (radius,), (_, greatest) = size["R"], size["A"]
+    arms, rods, heights = (np.array(size[letter]) for letter in "ULH")
+    towers = np.radians([-150.0, -30.0, 90.0]) + np.radians([size[axis][0] for axis in "XYZ"])
+    x = nozzle[:, :1] * np.cos(towers) + nozzle[:, 1:2] * np.sin(towers)
+    y = nozzle[:, 1:2] * np.cos(towers) - nozzle[:, :1] * np.sin(towers)
+    out, up = radius - x, heights - nozzle[:, 2:]
+    a, b = 2.0 * arms * out, 2.0 * arms * up
+    c = rods**2 - arms**2 - up**2 - out**2 - y**2
+    sine = (b * c - a * np.sqrt(a**2 + b**2 - c**2)) / (a**2 + b**2)
+    adjustment = np.array([ends[axis][0] for axis in "XYZ"])
+    return greatest + adjustment - np.degrees(np.arcsin(sine))
+
+
+def test_cranks_go_where_the_model_of_reprap_says_and_are_read_back(tmp_path: Path) -> None:
+    robot = rotary()
+    loss = pk.export.reprap(robot, tmp_path / "delta.g")
+    assert loss.exact
+    text = (tmp_path / "delta.g").read_text()
+    assert text.startswith("M669 K10 U170.000000:170.500000:169.500000 L400.000000:")
+    nozzle = np.random.default_rng(1).uniform([-60, -60, 100], [60, 60, 200], (40, 3))
+    poses = np.pad(nozzle, ((0, 0), (0, 3)))
+    down = np.degrees(robot.inverse(poses))
+    np.testing.assert_allclose(reprap_rotary_model(text, nozzle), down, rtol=0, atol=1e-5)
+    again = pk.import_printer(tmp_path / "delta.g", "reprap")
+    assert str(again) == "delta: a rotary delta, no stored heights"
+    np.testing.assert_allclose(again.robot.inverse(poses), robot.inverse(poses), atol=1e-7)
+    with pytest.raises(pk.ArgumentError, match="one radius and one height"):
+        pk.export.klipper(robot, tmp_path / "x.cfg")
+    with pytest.raises(pk.ArgumentError, match="one radius, and cranks"):
+        pk.export.reprap(rotary(**{"axis1.tilt2": 0.003}), tmp_path / "x.g")
+    with pytest.raises(pk.ArgumentError, match="no linear delta"):
+        pk.export.marlin(robot, tmp_path / "x.g")
+    (tmp_path / "delta.g").write_text(text.replace("R180", "P180"))
+    with pytest.raises(pk.FileError, match="R of M669 must be a number"):
+        pk.import_printer(tmp_path / "delta.g", "reprap")

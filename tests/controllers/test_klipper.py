@@ -195,18 +195,24 @@ def test_what_the_firmware_cannot_hold_is_refused_or_projected(tmp_path: Path) -
 
 
 def test_other_machines_are_refused(tmp_path: Path) -> None:
-    for name in ("hexapod", "linear-delta-6", "rotary-delta"):
+    for name in ("hexapod", "linear-delta-6"):
         with pytest.raises(pk.ArgumentError, match="no linear delta"):
             pk.export.klipper(pk.load(name), tmp_path / "x")
     with pytest.raises(pk.ArgumentError, match="q must be 0 at the end stops"):
         pk.export.klipper(pk.load("linear-delta"), tmp_path / "x")
+    with pytest.raises(pk.ArgumentError, match="and q 0 at the end stops"):
+        pk.export.klipper(pk.load("rotary-delta"), tmp_path / "x")
     assert not (tmp_path / "x").exists()
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("kinematics: delta", "kinematics: corexy", "line 21: [printer] kinematics must be delta"),
+        (
+            "kinematics: delta",
+            "kinematics: corexy",
+            "line 21: [printer] kinematics must be delta or rotary",
+        ),
         ("microsteps: 32", "", "[stepper_b] microsteps is missing"),
         (
             "arm_length: 333.0",

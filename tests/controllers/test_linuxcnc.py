@@ -21,6 +21,7 @@ import pytest
 import pkmcal as pk
 
 from .. import robots
+from .c_headers import PARALLEL
 
 MODULES = Path("/usr/lib/linuxcnc/modules")
 SESSION = Path(__file__).with_name("linuxcnc_session.py")
@@ -36,11 +37,7 @@ FRAMES = {
     "base": {"x": 10.0, "y": -20.0, "z": 30.0, "alpha": 0.1, "beta": -0.2, "gamma": 0.5},
     "tool": {"x": 1.0, "y": 2.0, "z": -40.0, "alpha": -0.3, "beta": 0.1, "gamma": 0.2},
 }
-CASES = {
-    name: lambda name=name: pk.load(name)
-    for name in pk.machines()
-    if name != "rbt-6t03p-printed" and isinstance(pk.load(name), pk.Robot)
-}
+CASES = {name: lambda name=name: pk.load(name) for name in PARALLEL if name != "rbt-6t03p-printed"}
 CASES["framed"] = lambda: robots.hexapod({"offset": 12.0, "gain": -1.01}, frames=FRAMES)
 
 
@@ -307,6 +304,24 @@ def pk_rotation(angles: Any) -> Any:
     )
 
 
+def test_the_command_line_writes_the_folder_and_keeps_what_was_changed_in_it(
+    run: Any, refused: Any, tmp_path: Path
+) -> None:
+    folder = tmp_path / "Mill 2"
+    arguments = ("export", "linear-delta", "--as", "linuxcnc", "--out", folder)
+    assert run(*arguments).stdout == f"{folder}: linear delta\n"
+    names = {"mill_2.ini", "mill_2.hal", "pkm_mill_2.c", "lineardeltakins.hal"}
+    assert {path.name for path in folder.iterdir()} == names
+    assert run(*arguments).exit_code == 0  # nobody has touched it
+    ini = folder / "mill_2.ini"
+    ini.write_text(ini.read_text().replace("MAX_VELOCITY = 200", "MAX_VELOCITY = 20"))
+    assert refused(*arguments).startswith(f"{ini}: would be replaced")
+    pk.load("linear-delta").replace({"rod1": 216.0}).save(tmp_path / "robot.toml")
+    arguments = ("export", tmp_path / "robot.toml", *arguments[2:-1], tmp_path / "other")
+    assert re.search(r"; LinuxCNC.s own module for it is off by 0\.\d+ mm", run(*arguments).stdout)
+    assert not (tmp_path / "other" / "lineardeltakins.hal").exists()
+
+
 def test_what_linuxcnc_cannot_hold_is_refused(tmp_path: Path) -> None:
     revolute = {"kind": "UPR", "revolute": [1.0, 0.0, 0.0]}
     framed = robots.made(
@@ -321,6 +336,7 @@ def test_what_linuxcnc_cannot_hold_is_refused(tmp_path: Path) -> None:
     for robot, folder, reason in (
         (robots.hexapod(revolute, revolute), "x", "8 closures for 6 free coordinates"),
         (framed, "x", "base or tool frames"),
+        (pk.load("trivariant"), "x", "chains of joints"),
         (pk.load("hexapod"), "a" * 30, "folder must have a name"),
         (pk.load("rbt-6t03p-printed"), "x", "cannot reach its home pose"),
     ):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 import tracemalloc
 from collections.abc import Callable
 from types import SimpleNamespace
@@ -17,7 +18,7 @@ import pkmcal as pk
 from pkmcal.arrays import as_rows
 from pkmcal.core import library
 from pkmcal.core import poses as core_poses
-from pkmcal.core.library import ISAS, SLOTS, lib
+from pkmcal.core.library import ISAS, MOST_THREADS, SLOTS, ffi, in_threads, lib
 
 from ..workspaces import WORKSPACE, poses
 
@@ -192,6 +193,49 @@ def test_the_core_refuses_an_isa_a_machine_and_columns_it_does_not_have() -> Non
     machine.isa = 3
     with pytest.raises(ValueError, match="has no ISA"):
         machine.forward(robot.slots, q, robot.home, None)
+
+
+def test_threads_are_limited_whatever_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[int] = []
+    begin = threading.Thread.start
+    monkeypatch.setattr(
+        threading.Thread, "start", lambda thread: (started.append(1), begin(thread))[1]
+    )
+    done = np.zeros(100_000, dtype=int)
+
+    def run(start: int, stop: int) -> None:
+        done[start:stop] += 1
+
+    in_threads(run, len(done), 10**9)
+    assert 1 < len(started) < MOST_THREADS
+    assert (done == 1).all()
+
+
+@pytest.mark.parametrize("order", [[99], [-1], [1, 1], [2**31 - 1], [0, 1, 2, 3, 4, 6]])
+def test_the_core_refuses_a_machine_whose_order_of_elimination_is_none(order: list[int]) -> None:
+    """It indexes what a call writes: one that is not a permutation wrote beyond it."""
+    robot = pk.load("hexapod")
+    machine, pose, q = robot.machine, robot.home[None], robot.inverse(robot.home)[None]
+    assert lib.pkm_prepared(machine.struct) == machine.rows == 6
+    for row, place in enumerate(order):
+        machine.struct.order[row] = place
+    assert lib.pkm_prepared(machine.struct) == 0
+    for refused in (
+        lambda: machine.inverse(robot.slots, pose),
+        lambda: machine.forward(robot.slots, q, robot.home, None),
+        lambda: machine.jacobian(robot.slots, pose),
+    ):
+        with pytest.raises(ValueError, match="refused"):
+            refused()
+
+
+@pytest.mark.parametrize("many", ["particles", "dims"])
+def test_the_core_refuses_a_swarm_whose_size_is_no_number(many: str) -> None:
+    swarm = ffi.new("pkm_swarm *", {"particles": 8, "dims": 2})
+    assert lib.pkm_swarm_size(swarm) == 3 * 2 * 8 + 6 * 8 + 2 + 1
+    for count in (0, -1, 2**31 - 1):
+        setattr(swarm, many, count)
+        assert lib.pkm_swarm_size(swarm) == 0
 
 
 # importing ----------------------------------------------------------------------------------------

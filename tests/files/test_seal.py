@@ -26,6 +26,7 @@ CONTENTS = {
     ".svg": SVG,
     ".png": PNG,
     ".xml": b"<a>\n  <b/>\n</a>\n",
+    ".urdf": b"<a>\n  <b/>\n</a>\n",
     ".h": b"#ifndef A_H\n#define A_H\n#endif\n",
     ".c": b"int a;\n",
     ".ini": b"[A]\nB = 1\n",

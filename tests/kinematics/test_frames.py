@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 import pkmcal as pk
 from pkmcal.core.library import POSE
 from pkmcal.core.poses import compose, compose_rates, invert
+from pkmcal.screw import to_pose
 
 from .. import robots, twin
 from ..workspaces import WORKSPACE, poses
@@ -51,6 +52,23 @@ def same_poses(found: np.ndarray, expected: np.ndarray, tolerance: float) -> Non
     """The same points and rotations: angles may be others that describe the same turn."""
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(matrix(one), matrix(other), rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize("beta", [90.0, -90.0])
+def test_rotations_are_kept_near_every_beta(beta: float) -> None:
+    """Where α and γ turn about the same axis, a pose still has the angles of its rotation."""
+    rng = np.random.default_rng(90)
+    for power in range(1, 19):
+        goal = np.array([*rng.uniform(-300, 300, 3), *rng.uniform(-3, 3, 3)])
+        goal[4] = np.radians(beta) - rng.choice([-1, 0, 1]) * 10.0**-power
+        one = np.array([*rng.uniform(-300, 300, 3), *rng.uniform(-3, 3, 3)])
+        other = to_pose(np.linalg.inv(matrix(one)) @ matrix(goal))
+        for found, expected in (
+            (compose(one, other[None])[0], matrix(one) @ matrix(other)),
+            (invert(to_pose(np.linalg.inv(matrix(goal)))), matrix(goal)),
+            (to_pose(matrix(goal)), matrix(goal)),
+        ):
+            np.testing.assert_allclose(twin.rotation(found), expected[:3, :3], rtol=0, atol=2e-15)
 
 
 @framed

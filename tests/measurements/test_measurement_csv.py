@@ -318,6 +318,14 @@ def test_errors_are_one_line_that_names_file_line_and_column(
 
 def test_bytes_that_are_not_text_are_an_error(tmp_path: Path) -> None:
     path = tmp_path / "m.csv"
-    path.write_bytes("q1 [mm],z [µm]\n1,2\n".encode("latin-1"))
+    path.write_bytes(b"q1 [mm],z [\xb5m]\n1,2\x00\n")
     with pytest.raises(ValueError, match="not a UTF-8 text file"):
         read_measurements(path)
+
+
+def test_text_of_windows_is_read_and_that_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "m.csv"
+    path.write_bytes("q1 [mm],z [µm]\n1,2\n".encode("cp1252"))
+    m = read_measurements(path)
+    assert m.values.tolist() == [0.002]
+    assert m.notes == (f"{path}: not UTF-8, read as Windows-1252",)

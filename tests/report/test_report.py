@@ -71,6 +71,20 @@ def data(folder: Path) -> dict[str, Any]:
     return json.loads((folder / "report.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
+def test_a_report_of_very_many_rows_is_no_larger_than_a_browser_shows(tmp_path: Path) -> None:
+    robot, rng = pk.load("linear-delta"), np.random.default_rng(0)
+    poses = np.pad(rng.uniform([-50, -50, 50], [50, 50, 150], (100_000, 3)), ((0, 0), (0, 3)))
+    true = robot.replace({"offset1": robot.geometry["offset1"] + 0.3})
+    measured = pk.VirtualMachine(true, noise=0.01).measure(robot.inverse(poses), "position")
+    pk.identify(robot, measured, free="offset*").report(tmp_path)
+    page = (tmp_path / "report.html").read_bytes()
+    assert len(page) < 5_000_000
+    assert b"1000 of 100000 rows drawn" in page
+    data = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert len(data["points"]) == 100_000  # for programs: all of them
+
+
 # --- what it says --------------------------------------------------------------------------------
 
 

@@ -10,6 +10,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
+from pkmcal.report.drawing import MOST_DRAWN, sample
 from pkmcal.report.residual_figure import residuals
 
 from ..simulated import hexapod_poses
@@ -61,6 +62,41 @@ def test_good_residuals_lie_on_the_line_of_normal_quantiles() -> None:
     points = residuals(good).axes[-1].get_lines()[0]
     normal, scaled = points.get_xdata(), points.get_ydata()
     assert np.abs(scaled - normal)[np.abs(normal) < 1.5].max() < 0.35
+
+
+def test_of_very_many_rows_a_sample_is_drawn_and_the_title_says_so() -> None:
+    robot, rng = pk.load("linear-delta"), np.random.default_rng(2)
+    poses = np.pad(
+        rng.uniform([-50, -50, 50], [50, 50, 150], (3 * MOST_DRAWN, 3)), ((0, 0), (0, 3))
+    )
+    measured = pk.VirtualMachine(robot).measure(robot.inverse(poses), "height")
+    wrong = measured.values.copy()
+    wrong[[17, 2503]] += 1.0
+    measured = dataclasses.replace(measured, values=wrong)
+    many = pk.identify(robot, measured, free="offset*", loss="cauchy")
+    assert {17, 2503} <= set(many.outliers)
+    figure = residuals(many)
+    assert figure.get_suptitle().endswith(f"{MOST_DRAWN} of {3 * MOST_DRAWN} rows drawn")
+    lines = {line.get_label(): line for line in figure.axes[0].get_lines()}
+    assert len(lines["z"].get_xdata()) == MOST_DRAWN
+    assert {0, 17, 2503, 3 * MOST_DRAWN - 1} <= set(lines["z"].get_xdata().tolist())
+    residual = many.residuals[0][:, 0]
+    np.testing.assert_array_equal(lines["z"].get_ydata(), residual[lines["z"].get_xdata()])
+
+
+@pytest.mark.parametrize("count", [0, 1, MOST_DRAWN, MOST_DRAWN + 1, 10 * MOST_DRAWN])
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.5, 1.0])
+def test_a_sample_has_the_rows_that_must_be_in_it_and_is_spread_over_the_others(
+    count: int, share: float
+) -> None:
+    first = np.random.default_rng(count).random(count) < share
+    rows = sample(count, first)
+    assert len(rows) == min(count, MOST_DRAWN)
+    assert (np.diff(rows) > 0).all()
+    assert len(np.intersect1d(rows, np.flatnonzero(first))) == min(first.sum(), MOST_DRAWN)
+    if count > len(rows) and share < 0.1:
+        assert rows[0] == 0 and rows[-1] == count - 1
+        assert np.diff(rows).max() <= 2 * count / len(rows)
 
 
 @pytest.mark.parametrize(("ending", "start"), [("png", b"\x89PNG"), ("svg", b"<?xml")])

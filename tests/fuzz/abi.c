@@ -1,0 +1,359 @@
+/* Every call of the C interface with a machine, a swarm or an arm and rows made of arbitrary bytes.
+ *
+ * What a caller owes is kept: arrays are as long as calls.h says, to the byte, so that the address
+ * sanitizer sees what is read or written beyond. What the numbers are, and what the structs say, is
+ * free. Each call either refuses, and has then written nothing, or gives the same bits with every ISA
+ * of this processor. */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "pkmcal.h"
+
+enum { MOST_ROWS = 24, ARRAYS = 16, ISAS = 3 };
+
+static struct {
+    const uint8_t *at, *end;
+    uint64_t noise;
+    int wanted, call;
+} in;
+
+static unsigned byte(void) { return in.at < in.end ? *in.at++ : 0; }
+
+static uint64_t bits(void)
+{
+    in.noise ^= in.noise << 13, in.noise ^= in.noise >> 7, in.noise ^= in.noise << 17;
+    return in.noise;
+}
+
+static double any_double(void)
+{
+    uint64_t word = bits();
+    double number;
+    memcpy(&number, &word, sizeof number);
+    return number;
+}
+
+/* An input is for one of the calls of a group. */
+static void one_of(int calls)
+{
+    in.wanted = (int)byte() % calls;
+    in.call = 0;
+}
+
+/* Numbers as machines have them, with some that no machine has. */
+static double number(unsigned strange)
+{
+    static const double odd[] = {0.0, -0.0, NAN, INFINITY, -INFINITY, 1e308, -1e308, 5e-324, 1e-160,
+                                 1e160, 1e15, -1e15, 1.0, -1.0, 3.14159265358979312, 1e-9};
+    const uint64_t word = bits();
+    if (strange && (word & 63) < strange) {
+        const unsigned which = word >> 8 & 31;
+        return which < 16 ? odd[which] : any_double();
+    }
+    return ((double)(word >> 11) * 0x1p-53 - 0.5) * (word & 64 ? 1000.0 : 2.0);
+}
+
+/* An array of exactly `count` numbers, freed by `forget`. */
+static struct {
+    void *at[4 * ARRAYS * ISAS];
+    int count;
+} heap;
+
+static void *fresh(size_t bytes)
+{
+    void *made = malloc(bytes ? bytes : 1);
+    if (!made) abort();
+    memset(made, 0xa5, bytes);
+    heap.at[heap.count++] = made;
+    return made;
+}
+
+static void forget(void)
+{
+    while (heap.count) free(heap.at[--heap.count]);
+}
+
+static double *numbers(ptrdiff_t count, unsigned strange)
+{
+    double *made = fresh(sizeof(double) * (size_t)count);
+    for (ptrdiff_t i = 0; i < count; i++) made[i] = number(strange);
+    return made;
+}
+
+/* Outputs of one call with every ISA, which are compared when it has returned. */
+static struct {
+    char *of[ISAS][ARRAYS];
+    size_t bytes[ARRAYS];
+    int code[ISAS], count, written;
+} out;
+
+static void *output(int isa, int which, size_t bytes)
+{
+    out.bytes[which] = bytes;
+    out.count = which + 1 > out.count ? which + 1 : out.count;
+    return out.of[isa][which] = fresh(bytes);
+}
+
+static double *doubles(int isa, int which, ptrdiff_t count)
+{
+    return output(isa, which, sizeof(double) * (size_t)count);
+}
+
+static int32_t *whole(int isa, int which, ptrdiff_t count)
+{
+    return output(isa, which, sizeof(int32_t) * (size_t)count);
+}
+
+static void wrong(const char *call, const char *what)
+{
+    fprintf(stderr, "%s: %s\n", call, what);
+    abort();
+}
+
+/* Equal bits, but for which NaN it is: that differs between vector instructions. */
+static void compared(const char *call, int isas)
+{
+    for (int i = 0; i < isas; i++) {
+        if (out.code[i] != out.code[0]) wrong(call, "another code with another ISA");
+        for (int k = 0; k < out.count; k++) {
+            const char *first = out.of[0][k], *other = out.of[i][k];
+            if (out.code[i] < 0) {
+                for (size_t b = 0; b < out.bytes[k]; b++)
+                    if (other[b] != (char)0xa5) wrong(call, "written although refused");
+                continue;
+            }
+            if (!memcmp(first, other, out.bytes[k])) continue;
+            for (size_t b = 0; b + 8 <= out.bytes[k]; b += 8) {
+                double x, y;
+                memcpy(&x, first + b, 8), memcpy(&y, other + b, 8);
+                if (memcmp(&x, &y, 8) && !(isnan(x) && isnan(y))) {
+                    fprintf(stderr, "output %d, number %zu: %a %a\n", k, b / 8, x, y);
+                    wrong(call, "other bits with another ISA");
+                }
+            }
+            if (out.bytes[k] % 8) wrong(call, "other whole numbers with another ISA");
+        }
+    }
+    memset(&out, 0, sizeof out);
+}
+
+#ifdef __x86_64__
+#define EACH_ISA(name, ...)                                                                           \
+    do {                                                                                          \
+        int isa = 0;                                                                              \
+        if (in.call++ != in.wanted) break;                                                        \
+        out.code[0] = pkm_base_##name(__VA_ARGS__);                                               \
+        if (isas > 1) isa = 1, out.code[1] = pkm_avx2_##name(__VA_ARGS__);                        \
+        if (isas > 2) isa = 2, out.code[2] = pkm_avx512_##name(__VA_ARGS__);                      \
+        compared(#name, isas);                                                                    \
+    } while (0)
+#else
+#define EACH_ISA(name, ...)                                                                           \
+    do {                                                                                          \
+        int isa = 0;                                                                              \
+        if (in.call++ != in.wanted) break;                                                        \
+        out.code[0] = pkm_base_##name(__VA_ARGS__);                                               \
+        compared(#name, isas);                                                                    \
+    } while (0)
+#endif
+#define D(which, count) doubles(isa, which, count)
+#define I(which, count) whole(isa, which, count)
+
+static int map_free(int map)
+{
+#define CASE(NAME, name, M, ...) if (map == MAP_##NAME) return M;
+    EACH_MAP(CASE)
+#undef CASE
+    return 0;
+}
+
+/* A number that is nearly always within [0, most], sometimes anything. */
+static int small(int most)
+{
+    const unsigned found = byte();
+    if (found >= 250) return (int)bits();
+    return (int)(found % (unsigned)(most + 1));
+}
+
+static void some_machine(pkm_machine *machine, unsigned strange)
+{
+    memset(machine, 0, sizeof *machine);
+    machine->map = small(3);
+    machine->limbs = small(PKM_MAX_LIMBS);
+    machine->actuators = byte() < 200 ? machine->limbs : small(PKM_MAX_LIMBS);
+    machine->size = fabs(number(strange));
+    machine->length = fabs(number(strange));
+    machine->closure_tolerance = fabs(number(strange));
+    for (int i = 0; i < PKM_MAX_LIMBS; i++) {
+        machine->driver[i] = small(DRIVERS - 1);
+        machine->rows[i] = byte() < 160 ? 0 : small(ALL_ROWS);
+        machine->actuator[i] = byte() < 200 ? i : small(PKM_MAX_LIMBS - 1);
+        machine->branch[i] = byte() & 1 ? 1.0 : number(strange);
+        machine->angle[i] = byte() & 1;
+        machine->near[i] = byte() & 1 ? NAN : number(strange);
+        machine->lever[i] = number(strange);
+        for (int a = 0; a < AXES; a++) { /* three axes at right angles, or anything */
+            double *frame = machine->frame + 9 * (AXES * i + a);
+            const unsigned kind = byte();
+            for (int k = 0; k < 9; k++)
+                frame[k] = kind & 64 ? number(strange) : (double)(k % 3 == (k / 3 + (int)kind) % 3);
+        }
+    }
+    for (int r = 0; r < PKM_MAX_ROWS; r++) machine->weight[r] = byte() & 1 ? 1.0 : number(strange);
+}
+
+static void of_machine(ptrdiff_t n, unsigned strange, int isas)
+{
+    pkm_machine machine;
+    some_machine(&machine, strange);
+    const int limbs = machine.limbs >= 0 && machine.limbs <= PKM_MAX_LIMBS ? machine.limbs : 0;
+    const ptrdiff_t size = (ptrdiff_t)limbs * SLOTS, stride = byte() & 1 ? size : 0;
+    double *geometry = numbers(n * size + size, strange);
+    for (ptrdiff_t i = 0; i < n + 1; i++)
+        for (int limb = 0; limb < limbs; limb++)
+            if (byte() < 128) { /* as they mostly are */
+                double *g = geometry + i * size + (ptrdiff_t)limb * SLOTS;
+                for (int slot = OFFSET; slot < SLOTS; slot++)
+                    if (slot != ROD && slot != CRANK) g[slot] = slot == GAIN;
+            }
+    const int code = pkm_prepare(&machine, geometry, numbers(6, strange));
+    const int count = pkm_closure_count(&machine), m = map_free(machine.map);
+    if ((code < 0) != (count == 0)) wrong("prepare", "a machine refused here and taken there");
+    if (byte() > 240) /* not prepared, or spoilt since */
+        for (int r = 0; r < PKM_MAX_ROWS; r++) machine.order[r] = small(PKM_MAX_ROWS - 1);
+    const ptrdiff_t q = count ? machine.actuators : 0, rows = count;
+    const double *pose = numbers(6 * n, strange), *near = byte() & 1 ? numbers(q * n, strange) : NULL;
+    const double *guess = numbers(6 * n + 6, strange), *motion = numbers(48 * n, strange);
+    const double *q1 = numbers(q * n, strange), *q2 = numbers(q * n, strange);
+    double *drives = numbers(q * n, strange);
+    if (count && byte() & 1) pkm_base_inverse(&machine, n, geometry, stride, pose, NULL, 0, drives);
+    const ptrdiff_t some = byte() & 1 ? 6 : 0, about = byte() & 1 ? q : 0;
+    int32_t column[8];
+    for (int k = 0; k < 8; k++) column[k] = (int32_t)(byte() < 250 && size ? byte() % size : bits());
+    const pkm_machine *is = &machine;
+    const int twists = byte() & 1;
+    one_of(11);
+
+    EACH_ISA(inverse, is, n, geometry, stride, pose, near, about, D(0, n * q));
+    EACH_ISA(forward, is, n, geometry, stride, drives, guess, some, D(0, 6 * n), I(1, n), I(2, n),
+             D(3, n));
+    EACH_ISA(jacobian, is, n, geometry, stride, pose, D(0, n * q * m));
+    EACH_ISA(forward_jacobian, is, n, geometry, stride, pose, drives, D(0, 6 * n * q));
+    EACH_ISA(error_jacobian, is, n, geometry, stride, pose, drives, column, 8, twists,
+             D(0, 6 * n * 8));
+    EACH_ISA(closure, is, n, geometry, pose, drives, D(0, n * rows), D(1, n * rows * m),
+             D(2, n * rows * m), D(3, n * rows * q));
+    EACH_ISA(spheres, is, n, geometry, drives, D(0, n * limbs * PKM_SPHERE));
+    EACH_ISA(limbs, is, n, geometry, pose, D(0, n * limbs), D(1, 3 * n * limbs), D(2, 3 * n * limbs));
+    EACH_ISA(rates, is, n, geometry, motion, D(0, n * q), D(1, n * q));
+    EACH_ISA(motion, is, n, geometry, pose, drives, q1, q2, D(0, 48 * n), D(1, 12 * n));
+    EACH_ISA(closure_cost, is, n, geometry, n, pose, drives, D(0, n));
+}
+
+static void of_path(ptrdiff_t n, unsigned strange)
+{
+    pkm_machine machine;
+    some_machine(&machine, strange);
+    const int limbs = machine.limbs >= 0 && machine.limbs <= PKM_MAX_LIMBS ? machine.limbs : 0;
+    if (pkm_prepare(&machine, numbers((ptrdiff_t)limbs * SLOTS, strange), numbers(6, strange)) < 0)
+        return;
+    n = n % 4;
+    const ptrdiff_t spheres = 2 * (ptrdiff_t)limbs * PKM_SPHERE;
+    double *state = numbers(2 * n * pkm_state_size(), strange);
+    const int isa = 0;
+    pkm_paths(&machine, n, numbers(spheres, strange), numbers(spheres, strange), state,
+              number(strange), D(0, 24 * n), I(1, n), I(2, n), D(3, n));
+    memset(&out, 0, sizeof out);
+}
+
+static void of_swarm(ptrdiff_t n, unsigned strange, int isas)
+{
+    pkm_swarm swarm = {small(40), small(9), number(strange), number(strange), number(strange)};
+    const ptrdiff_t size = pkm_swarm_size(&swarm), rows = byte() % 5;
+    if (size > 4000) return; /* a caller that cannot have the memory */
+    const int dims = size ? swarm.dims : 0, iterations = byte() % 6;
+    const double *lower = numbers(dims, strange), *upper = numbers(dims, strange);
+    const double *begin = numbers(size, strange), *off = numbers(n * rows * dims, strange);
+    const uint64_t seed = bits();
+    one_of(4);
+#define STATE memcpy(doubles(isa, 0, size), begin, sizeof(double) * (size_t)size)
+    EACH_ISA(swarm_start, &swarm, seed, lower, upper, D(0, size));
+    if (!size) return; /* refused as a whole: what follows has nothing to begin with */
+    EACH_ISA(swarm_update_best, &swarm, STATE);
+    EACH_ISA(swarm_move, &swarm, lower, upper, STATE);
+    const ptrdiff_t first = (ptrdiff_t)(bits() & 0xffff);
+    EACH_ISA(swarm_eq18, &swarm, iterations, seed, first, n, rows, off, lower, upper, D(0, size), D(1, n * dims), D(2, n * (iterations + 1)));
+}
+
+static void of_arm(ptrdiff_t n, unsigned strange, int isas)
+{
+    enum { MOST = 9 };
+    const int joints = (int)(byte() % MOST) + 1, by_row = byte() & 1, frame = small(2);
+    int32_t prismatic[MOST];
+    for (int j = 0; j < joints; j++) prismatic[j] = byte() < 128 ? 0 : small(1);
+    const pkm_arm arm = {joints, prismatic, numbers(9 * joints, strange), numbers(3 * joints, strange),
+                         numbers(16, strange)};
+    const double *error = numbers(n * 6 * joints + 6 * joints, strange);
+    const double *theta = numbers(n * joints, strange);
+    const pkm_links links = {by_row, numbers((n + 1) * (joints + 1) * 12, strange)};
+    one_of(4);
+    EACH_ISA(arm_links, &arm, n, error, D(0, n * (joints + 1) * 12));
+    EACH_ISA(arm_forward, &arm, &links, n, theta, D(0, 16 * n));
+    EACH_ISA(arm_jacobian, &arm, &links, frame, n, theta, D(0, 6 * n * joints));
+    EACH_ISA(arm_error_jacobian, &arm, &links, error, frame, n, theta, D(0, 36 * n * joints));
+}
+
+/* Calls that are one formula a row. */
+static void of_rows(ptrdiff_t n, unsigned strange, int isas)
+{
+    const double *a = numbers(6 * n + 6, strange), *b = numbers(6 * n + 6, strange);
+    const double *c = numbers(6 * n + 6, strange), *motion = numbers(16 * n, strange);
+    const ptrdiff_t six = byte() & 1 ? 6 : 0, three = byte() & 1 ? 3 : 0;
+    one_of(17);
+    EACH_ISA(compose, n, a, six, b, 6 - six, D(0, 6 * n));
+    EACH_ISA(invert, n, a, D(0, 6 * n));
+    EACH_ISA(compose_rates, n, a, b, c, six, a, D(0, 36 * n));
+    EACH_ISA(compose_twists, n, a, b, c, D(0, 36 * n));
+    EACH_ISA(points, n, a, b, three, D(0, 3 * n), D(1, 18 * n), D(2, 9 * n));
+    EACH_ISA(seen_points, n, a, b, D(0, 3 * n), D(1, 18 * n), D(2, 9 * n));
+    EACH_ISA(distances, n, a, b, three, c, 3 - three, D(0, n), D(1, 6 * n), D(2, 3 * n), D(3, 3 * n));
+    EACH_ISA(tpr2tps_lengths, n, a, b, D(0, 4 * n));
+    EACH_ISA(tpr2tps_jacobian, n, a, b, D(0, 16 * n));
+    EACH_ISA(exp, n, a, D(0, 16 * n));
+    EACH_ISA(log, n, motion, D(0, 6 * n));
+    EACH_ISA(adjoint, n, motion, D(0, 36 * n));
+    EACH_ISA(motion_pose, n, motion, D(0, 6 * n));
+    EACH_ISA(exp_jacobian, n, a, D(0, 36 * n));
+    EACH_ISA(log_jacobian, n, a, D(0, 36 * n));
+    EACH_ISA(joint_motions, n, a, b, D(0, 16 * n));
+    const uint64_t seed[32] = {bits(), bits(), bits(), bits()};
+    EACH_ISA(normals, 17 * n, memcpy(output(isa, 1, sizeof seed), seed, sizeof seed), D(0, 17 * n));
+    int32_t place[8];
+    for (int k = 0; k < 8; k++) place[k] = (int32_t)(byte() < 250 ? byte() % 6 : bits());
+    pkm_with_errors(n, 6, a, place, 6, b, memcpy(fresh(48 * (size_t)n), a, 48 * (size_t)n));
+    int64_t *count = fresh(6 * 10 * sizeof *count);
+    memset(count, 0, 6 * 10 * sizeof *count);
+    pkm_count(6, n, a, b, c, 8, count);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    in.at = data, in.end = data + size, in.noise = UINT64_C(88172645463325252);
+    memset(&out, 0, sizeof out);
+    const unsigned what = byte(), strange = byte() % 17;
+    const ptrdiff_t n = byte() % (MOST_ROWS + 1);
+    for (int k = 0; k < 4; k++) in.noise = in.noise << 8 ^ in.noise ^ byte();
+    if (!in.noise) in.noise = 1;
+    const int isas = pkm_best_isa() + 1;
+    switch (what % 8) {
+    case 0: of_path(n, strange); break;
+    case 1: of_swarm(n, strange, isas); break;
+    case 2: of_arm(n, strange, isas); break;
+    case 3: of_rows(n, strange, isas); break;
+    default: of_machine(n, strange, isas);
+    }
+    forget();
+    return 0;
+}

@@ -1,0 +1,37 @@
+"""The C interface, fed by libFuzzer under the sanitizers: a short run of ``make fuzz-abi``."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from .doors import ROOT
+
+
+def has_libfuzzer(folder: Path) -> bool:
+    """Whether clang is there with its runtime."""
+    if not (shutil.which("clang") and shutil.which("make")):
+        return False
+    (folder / "empty.c").write_text("int LLVMFuzzerTestOneInput(void) { return 0; }")
+    command = ["clang", "-fsanitize=fuzzer,address,undefined", "empty.c", "-o", "empty"]
+    return not subprocess.run(command, cwd=folder, capture_output=True).returncode
+
+
+@pytest.mark.slow
+def test_no_call_writes_beyond_its_arrays_or_gives_other_bits_on_another_isa(
+    tmp_path: Path,
+) -> None:
+    if not has_libfuzzer(tmp_path):
+        pytest.skip("needs clang with libFuzzer (on Debian: clang libclang-rt-14-dev)")
+    options = ("FUZZ_LEVEL=-O0", "COUNT=5000", f"FUZZED={tmp_path}/fuzzed")
+    done = subprocess.run(
+        ["make", "--no-print-directory", "fuzz-abi", *options],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, (done.stdout + done.stderr)[-5000:]
+    assert "number_of_executed_units: 5000" in done.stderr

@@ -1,0 +1,62 @@
+"""Damaged inputs at every door: refused in the package's words, or taken and usable.
+
+A short run; ``python -m tests.fuzz`` makes long ones, and docs/reliability.md has their figures.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+
+from .damage import inputs
+from .doors import DOORS, ROOT, emptied
+
+INPUTS = {"toml": 8000, "csv": 6000, "xlsx": 4000, "sheet": 3000, "urdf": 6000, "printer": 4000}
+LINES = 500
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DOORS)
+def test_a_damaged_input_is_refused_by_name_or_can_be_used(name: str, tmp_path: Path) -> None:
+    door = DOORS[name]
+
+    @settings(
+        max_examples=INPUTS.get(name, LINES),
+        deadline=None,
+        suppress_health_check=[HealthCheck.too_slow],
+    )
+    @given(inputs(door))
+    def enter(content: bytes) -> None:
+        emptied(tmp_path)
+        door.enter(tmp_path, content)
+
+    enter()
+
+
+@pytest.mark.parametrize("name", DOORS)
+def test_seeds_are_taken(name: str, tmp_path: Path) -> None:
+    """A run whose seeds are refused would test next to nothing."""
+    if name in ("xlsx", "sheet"):
+        pytest.importorskip("openpyxl")
+    door, taken = DOORS[name], 0
+    seeds = door.seeds[:1] if name == "line" else door.seeds
+    for seed in seeds:
+        emptied(tmp_path)
+        taken += door.enter(tmp_path, seed)
+    assert taken >= 0.5 * len(seeds)
+
+
+def test_a_number_gives_its_input_again(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "tests.fuzz", "toml", "--seed", "7", "--from", "3"]
+    told = []
+    for _ in range(2):
+        done = subprocess.run(
+            [*command, "--count", "20"], cwd=ROOT, capture_output=True, text=True, check=True
+        )
+        told.append(done.stdout.split(";")[0])
+    assert told[0] == told[1]
+    assert "numbers 3 to 22: 20 inputs" in told[0]
