@@ -30,7 +30,8 @@ class PriorTest:
     Attributes
     ----------
     ratio, chance : float
-        Mean square of what the data say over what is expected, and how likely that is.
+        Mean square of what the data say over what is expected, and how likely that is; NaN and 1
+        where they say nothing.
     pulls : ndarray (k,)
         Each parameter's change over its expected deviation; NaN where the data hardly move it.
     pull_chance : float
@@ -97,7 +98,10 @@ def prior_test(
     own = with_prior - basis @ (basis.T @ with_prior)
     left = data - basis @ (basis.T @ data)
     turn, singular, rows = np.linalg.svd(own, full_matrices=False)
-    told = singular > _ROUNDING * max(float(singular[0]), 1e-300)
+    told = singular > _ROUNDING * float(np.linalg.norm(with_prior))
+    if not told.any():  # the other parameters take up all that the data say
+        nothing = np.full(with_prior.shape[1], np.nan)
+        return PriorTest(float("nan"), 1.0, nothing, 1.0, float("nan"))
     singular, rows = singular[told], rows[told]
     along = turn[:, told].T @ left
     expected = singular**2 + variance

@@ -78,3 +78,10 @@ def test_a_number_far_off_has_the_largest_pull() -> None:
         true[2] = 3.0
         found = contrasted(jacobian, 6, jacobian @ true + 0.05 * rng.normal(size=120), 0.3)
         assert found.contradicted and np.nanargmax(np.abs(found.pulls)) == 2
+
+
+def test_a_prior_on_which_the_data_say_nothing_is_not_contradicted() -> None:
+    rng = np.random.default_rng(5)
+    others = rng.normal(size=(6, 6))
+    found = prior_test(rng.normal(size=(6, 3)), others, rng.normal(size=6), 1.0, np.inf)
+    assert not found.contradicted and np.isnan(found.pulls).all()
