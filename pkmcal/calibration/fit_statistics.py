@@ -82,7 +82,7 @@ class SearchRecord:
 def reported_covariance(estimator: Estimator, estimate: Estimate) -> FloatArray:
     """Covariance (n, n) of the reported parameters, mm and rad; inf where noise is not known."""
     rates = _reported_by_scaled(estimator, estimate)
-    if (estimator.unstated & (estimate.freedom < estimator.least_freedom)).any():
+    if estimator.unknown_noise(estimate).any():
         return np.full((len(rates), len(rates)), np.inf)
     covariance: FloatArray = rates @ estimate.covariance @ rates.T
     return covariance

@@ -181,7 +181,7 @@ def _warnings(
     notes += in_other_modes(equations, fit.end)
     notes += distant_points(fit.end, equations.parameters)
     notes += beyond_strokes(equations, fit.start, fit.end)
-    unknown = estimator.unstated & (estimate.freedom < estimator.least_freedom)
+    unknown = estimator.unknown_noise(estimate)
     if estimator.equations.closures.unknowns and unknown.any():
         names = [f"of measurements {i + 1}" for i in range(len(equations.sets))]
         names = [n for n, u in zip([*names, "of the actuators"], unknown, strict=True) if u]
