@@ -115,6 +115,7 @@ class Estimator:
         self.search = Search(equations, start)
         self.scale, self.prior = self.search.scale, self.search.prior
         self.unstated = equations.unstated
+        self._at_first: FloatArray | None = None
         self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
 
     @property
@@ -122,9 +123,14 @@ class Estimator:
         """Degrees of freedom from which the noise of a group is estimated."""
         return LEAST_REDUNDANCY if self.equations.closures.unknowns else LEAST_FREEDOM
 
-    def unknown(self, estimate: Estimate) -> BoolArray:
-        """Groups (G,) whose noise is neither stated nor shown by enough equations."""
-        return self.unstated & (estimate.freedom < self.least_freedom)
+    def unknown_noise(self, estimate: Estimate) -> BoolArray:
+        """Groups (G,) whose noise is neither stated nor can be estimated: too little is left.
+
+        Where poses have unknowns it is what is left at equal noise of all groups: one that turns
+        out small beside the others has little left, but is known to be small.
+        """
+        freedom = estimate.freedom if self._at_first is None else self._at_first
+        return self.unstated & (freedom < self.least_freedom)
 
     def solve(self, near: Evaluation | None = None) -> Estimate:
         """Estimate the parameters and, where no sigma is stated, the noise of each group.
@@ -146,6 +152,8 @@ class Estimator:
             u = self.search.best(u, state.noise, state.loss, pins)
             u = u - kept @ (kept.T @ u)
             estimate = self._estimate(u, state)
+            if self.equations.closures.unknowns and self._at_first is None:
+                self._at_first = estimate.freedom
             revised = self._revised(estimate)
             settled = self._settled(state, revised)
             state = revised

@@ -207,7 +207,7 @@ def uncertainty(
             components=apart,
         ),
         reported=rates @ fit.back,
-        unknown=estimator.unknown(estimate),
+        unknown=estimator.unknown_noise(estimate),
         equations=equations,
         factors=state.noise,
     )

@@ -51,7 +51,8 @@ def test_a_fit_that_starts_at_the_answer_stays_there(
 ) -> None:
     robot = pk.load(name)
     found = fitted(robot, robot, kind, sigma, seed=1)
-    assert found.converged and found.evaluations <= 6
+    more = 2 * (len(found.redundancy) > 1)  # poses are fitted anew for the noise of closures
+    assert found.converged and found.evaluations <= 6 + more
     assert found.rms <= found.rms_before + 1e-12 < 1e-10
     assert np.abs(found.values - found.start).max() < 1e-9
 
