@@ -37,10 +37,11 @@ int CALL(error_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *
 
 /* pose (n, 6), q (n, actuators) -> the closure rows, limb by limb and the sphere first: residual
  * (n, rows) [mm]; their derivatives by a scaled twist (n, rows, m), by the free coordinates
- * (n, rows, m) and by q (n, rows, actuators). */
+ * (n, rows, m) and by q (n, rows, actuators); and the pose (n, 6) as the map has it, with its
+ * derivatives by the free coordinates (n, 6, m). */
 int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                   const double *pose, const double *q, double *residual, double *by_step,
-                  double *by_free, double *by_q);
+                  double *by_free, double *by_q, double *on_map, double *pose_by_free);
 
 /* q (n, actuators) -> the limbs (n, limbs, PKM_SPHERE); lengths are NaN where one of them is not
  * positive. */

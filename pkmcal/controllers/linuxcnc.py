@@ -140,7 +140,7 @@ def _contents(robot: Robot, name: str) -> dict[str, Any]:
 
 def _axes(robot: Robot) -> tuple[str, ...]:
     """The coordinates that programs command: as many as there are actuators."""
-    axes = robot.model.match or robot.coordinates
+    axes = robot.moved
     if len(axes) != robot.n_actuators:
         raise ArgumentError(
             f"robot: {robot.name} has {robot.n_actuators} actuators for {len(axes)} coordinates"
