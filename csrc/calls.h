@@ -38,10 +38,11 @@ int CALL(error_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *
 
 /* pose (n, 6), q (n, actuators) -> the closure rows, limb by limb and the sphere first: residual
  * (n, rows) [mm]; their derivatives by a scaled twist (n, rows, m), by the free coordinates
- * (n, rows, m) and by q (n, rows, actuators). */
+ * (n, rows, m) and by q (n, rows, actuators); and the pose (n, 6) as the map has it, with its
+ * derivatives by the free coordinates (n, 6, m). */
 int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                   const double *pose, const double *q, double *residual, double *by_step,
-                  double *by_free, double *by_q);
+                  double *by_free, double *by_q, double *on_map, double *pose_by_free);
 
 /* pose (n, 6), q (n, actuators) -> actuators as instruments, limb by limb: of the sphere row the
  * coordinate that the limb needs at the pose less the one read, nearest turn, of the other rows the
@@ -131,7 +132,8 @@ int CALL(chain_inverse)(const pkm_chains *machine, ptrdiff_t n, const double *ge
  * coordinates (n, rows, m) and by q (n, rows, actuators). */
 int CALL(chain_closure)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
                         ptrdiff_t geometry_stride, const double *pose, const double *q,
-                        double *residual, double *by_step, double *by_free, double *by_q);
+                        double *residual, double *by_step, double *by_free, double *by_q,
+                        double *on_map, double *pose_by_free);
 
 /* pose (n, 6), q (n, actuators) -> dpose/d(numbers) (n, 6, columns), as error_jacobian; by q where
  * column is NULL. */

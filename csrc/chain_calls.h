@@ -210,7 +210,8 @@ INLINE int chain_by_drive(const pkm_chains *machine, int l, const motion *frame,
 
 int CALL(chain_closure)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
                         ptrdiff_t geometry_stride, const double *pose, const double *q,
-                        double *residual, double *by_step, double *by_free, double *by_q)
+                        double *residual, double *by_step, double *by_free, double *by_q,
+                        double *on_map, double *pose_by_free)
 {
     const int all = chains_fit(machine), m = map_m(machine->map), unknowns = m + machine->shared;
     const int actuators = machine->actuators;
@@ -229,6 +230,11 @@ int CALL(chain_closure)(const pkm_chains *machine, ptrdiff_t n, const double *ge
         const real zero = select(good, fill(0.0), fill(NAN));
         const int rows = chain_views(machine, &numbers, &at, drive, NULL, view, phi, jacobian, &worst,
                                      &flat);
+        real found[6], by_free_of_pose[36];
+        map_to_pose(machine->map, at.state, found);
+        scatter_row(found, 6, on_map, 6, row, count);
+        pose_rates_by_free(machine->map, at.state, by_free_of_pose);
+        scatter_row(by_free_of_pose, 6 * m, pose_by_free, 6 * m, row, count);
         for (int r = 0; r < rows; r++) {
             real step[6], free[6];
             phi[r] += zero;

@@ -1,8 +1,8 @@
 """Machines that nobody drew: random limbs, gains, frames, shared actuators, strokes of any turn.
 
-Homes are level or where β is ±90°. Each machine is assembled at home by construction: joints,
-directions and drives are drawn, and the lengths follow. What it does is judged by `twin_rows`,
-which knows nothing of the core.
+Homes are level, near γ = 180° or where β is ±90°. Each machine is assembled at home by
+construction: joints, directions and drives are drawn, and the lengths follow. What it does is
+judged by `twin_rows`, which knows nothing of the core.
 """
 
 from __future__ import annotations
@@ -77,9 +77,12 @@ def _drawn(kind: str, rng: np.random.Generator) -> pk.Robot:
     home = {"z": SIZE * rng.uniform(0.8, 1.4)}
     if kind == "planar":
         home = {"x": rng.uniform(-20, 20), "y": rng.uniform(-20, 20), "gamma": rng.uniform(-3, 3)}
-    if kind in ("six", "redundant") and rng.random() < 0.3:
+    turned = rng.random() if kind in ("six", "redundant") else 1.0
+    if turned < 0.3:
         home |= {"alpha": rng.uniform(-3, 3), "gamma": rng.uniform(-3, 3)}
         home["beta"] = rng.choice([-1, 1]) * np.pi / 2
+    elif turned < 0.6:
+        home["gamma"] = np.pi + rng.uniform(-0.2, 0.2)
     sections: dict[str, Any] = {}
     if kind == "tripod":
         limbs = _tripod(rng)
@@ -91,7 +94,7 @@ def _drawn(kind: str, rng: np.random.Generator) -> pk.Robot:
         count = {"six": 6, "translation": 3, "planar": 3, "redundant": int(rng.integers(7, 10))}
         limbs = [_limb(*_joints(kind, i, count[kind], rng), home, kind, rng)
                  for i in range(count[kind])]  # fmt: skip
-    if rng.random() < 0.3 and kind not in CONSTRAINED:
+    if rng.random() < 0.3:
         sections["frames"] = {
             name: dict(zip(COORDINATES, rng.uniform(-1, 1, 6) * [100, 100, 100, 3, 1.4, 3],
                            strict=True))

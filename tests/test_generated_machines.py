@@ -57,17 +57,25 @@ def judged(kind: str, seed: int, rows: int) -> Counter[str]:
     # there ...
     if kind in generated.CONSTRAINED:
         names = MATCHES[kind][rng.integers(3)]
-        at = robot.complete(own, names)
-        q = robot.inverse(own, names)
+        at = robot.complete(out(own), names)
+        q = robot.inverse(out(own), names)
         known = np.isfinite(q).all(axis=1)
         kept = [POSE.index(name) for name in names]
         found["wrong: half known"] += int((known != np.isfinite(at).all(axis=1)).sum())
-        off = np.abs(at - own)[known][:, kept].max(axis=1, initial=0.0)
-        found["wrong: not kept"] += int((off > 1e-6).sum())
-        own = at
+        off = at - out(own)
+        off[:, 3:] = (off[:, 3:] + np.pi) % (2 * np.pi) - np.pi
+        not_kept = np.abs(off)[known][:, kept].max(axis=1, initial=0.0) > 1e-6
+        found["wrong: not kept"] += int(not_kept.sum())
+        own = robot.frames.inward(at)
     else:
         q = robot.inverse(out(own))
         known = np.isfinite(q).all(axis=1)
+        if (
+            abs(robot.own_home[4]) < 1.0
+            and robot.violation(out(own[known])).max(initial=0.0) < CLOSED
+        ):
+            completed = robot.complete(out(own[known]))
+            found["wrong: taken but not completed"] += int(np.isnan(completed).any(axis=1).sum())
     found["out of reach"] += int((~known).sum())
     own, q = own[known], q[known]
     found["wrong: inverse"] += int((missed(robot, own, q) > CLOSED).sum())

@@ -259,7 +259,7 @@ def singular(robot: Robot) -> Iterator[Finding]:
     """Machines that are singular in every pose, or at home."""
     random = np.random.default_rng(0)
     scale = np.array([1.0, 1.0, 1.0, *[1.0 / robot.length] * 3]) * _SPREAD * robot.length
-    free = [name in (robot.model.match or robot.coordinates) for name in POSE]
+    free = [name in robot.moved for name in POSE]
     poses = robot.home + scale * free * random.uniform(-1, 1, (_POSES, 6))
     conditioning = dexterity(robot, completed(robot, np.vstack([robot.home, poses]))).conditioning
     seen = conditioning[np.isfinite(conditioning)]

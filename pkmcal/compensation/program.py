@@ -17,7 +17,7 @@ from pkmcal.compensation.gcode import Move, Program, number
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import MOST_TEXT, content
-from pkmcal.kinematics.robot import Robot, commanded, determines_others, require_parallel
+from pkmcal.kinematics.robot import Robot, determines_others, require_parallel
 from pkmcal.result import Result
 
 _LETTERS = dict(zip(POSE, "XYZABC", strict=True))
@@ -143,7 +143,7 @@ class _Machine:
     """Commands of the controller for coordinates (N, axes) in mm and deg, and where they lead."""
 
     def __init__(self, controller: Robot, calibrated: Robot, joints: bool) -> None:
-        self.axes = commanded(controller)
+        self.axes = controller.moved
         self.letters = "".join(_LETTERS[axis] for axis in self.axes)
         self.joints = joints
         self.written = "XYZABC"[: controller.n_actuators] if joints else self.letters

@@ -18,7 +18,7 @@ from pkmcal.controllers.rendering import rendered
 from pkmcal.core.library import POSE, SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
-from pkmcal.kinematics.robot import Robot, commanded, determines_others, require_parallel
+from pkmcal.kinematics.robot import Robot, determines_others, require_parallel
 
 _LETTERS = dict(zip(POSE, "XYZABC", strict=True))
 _FIELDS = dict(zip(POSE, ("tran.x", "tran.y", "tran.z", "a", "b", "c"), strict=True))
@@ -140,7 +140,7 @@ def _contents(robot: Robot, name: str) -> dict[str, Any]:
 
 def _axes(robot: Robot) -> tuple[str, ...]:
     """The coordinates that programs command: as many as there are actuators."""
-    axes = commanded(robot)
+    axes = robot.moved
     if len(axes) != robot.n_actuators:
         raise ArgumentError(
             f"robot: {robot.name} has {robot.n_actuators} actuators for {len(axes)} coordinates"

@@ -273,6 +273,8 @@ class ChainMachine:
             np.empty((n, rows, self.m + shared)),
             np.empty((n, rows, self.m)),
             np.empty((n, rows, self.actuators)),
+            np.empty((n, 6)),
+            np.empty((n, 6, self.m)),
         )
         stride = slots[0].size if slots.ndim == 3 else 0
         call("chain_closure", self.struct, n, slots, stride, pose, q, *out, isa=self.isa)
@@ -337,4 +339,6 @@ def _without_shared(closure: Closure, m: int) -> Closure:
         across @ by_step,
         across @ closure.by_free,
         across @ closure.by_q,
+        closure.pose,
+        closure.pose_by_free,
     )

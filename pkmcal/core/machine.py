@@ -41,12 +41,18 @@ class Closure(NamedTuple):
         By the free coordinates, mm and rad.
     by_q : ndarray (N, rows, n)
         By the actuator coordinates.
+    pose : ndarray (N, 6)
+        As the pose map has it: what it does not move follows from the free coordinates.
+    pose_by_free : ndarray (N, 6, m)
+        Its derivatives by the free coordinates.
     """
 
     residual: FloatArray
     by_step: FloatArray
     by_free: FloatArray
     by_q: FloatArray
+    pose: FloatArray
+    pose_by_free: FloatArray
 
 
 class Machine:
@@ -259,6 +265,8 @@ class Machine:
             np.empty((n, self.rows, m)),
             np.empty((n, self.rows, m)),
             np.empty((n, self.rows, self.actuators)),
+            np.empty((n, 6)),
+            np.empty((n, 6, m)),
         )
         call("closure", self.struct, n, slots, pose, q, *out, isa=self.isa)
         return out

@@ -18,13 +18,15 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import CHAIN, Limb, Model
 from pkmcal.kinematics.chain_limits import drives as chain_drives
-from pkmcal.kinematics.complete import complete, matched_coordinates
+from pkmcal.kinematics.complete import Completed, complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
 from pkmcal.kinematics.limits import stroke_margin
 from pkmcal.modes.find import AssemblyProblem
 
 Match = bool | str | Sequence[str] | None
+
+_FOLLOWS = 0.3  # of what follows the free coordinates most: a coordinate that determines a pose
 
 
 class Kinematics:
@@ -92,6 +94,34 @@ class Kinematics:
         """The m free coordinates of its pose, in the machine's own frame."""
         return MAPS[self.model.map]
 
+    @cached_property
+    def moved(self) -> tuple[str, ...]:
+        """The coordinates that determine a pose, in the user's frames.
+
+        Those that the robot file declares to match, or else the free ones. Where base and tool
+        frames turn a machine so that these do not determine its pose (a planar machine that stands
+        upright moves along x and z), others take the place of those that hardly follow.
+        """
+        names = tuple(self.model.match or self.coordinates)
+        if self.frames.trivial or self.model.match or len(names) == len(POSE):
+            return names
+        own = self.own_home[None]
+        closure = self.machine.closure(self.slots, own, self.machine.inverse(self.slots, own))
+        rates = self.frames.rates_outward(own, self.home[None], closure.pose_by_free)[0]
+        scale = np.where(np.arange(len(POSE)) < 3, 1.0, self.length)  # angles as arcs
+        rates *= scale[:, None] / scale[[POSE.index(name) for name in names]]
+        if not np.isfinite(rates).all():
+            return names
+        order = [*names, *(name for name in POSE if name not in names)]
+        found: list[str] = []
+        for _ in names:
+            left = np.linalg.norm(rates, axis=1)
+            name = next(n for n in order if left[POSE.index(n)] >= _FOLLOWS * left.max())
+            found.append(name)
+            along = rates[POSE.index(name)] / left[POSE.index(name)]
+            rates -= np.outer(rates @ along, along)
+        return tuple(sorted(found, key=POSE.index))
+
     @property
     def n_actuators(self) -> int:
         """Number of actuator coordinates, n."""
@@ -124,8 +154,8 @@ class Kinematics:
             x y z in mm, α β γ in rad.
         match : bool or names of coordinates, optional
             By default the six numbers are taken as given. Where limbs constrain the pose, `match`
-            names the coordinates to keep and the machine determines the others (`complete`);
-            True takes those the robot file declares.
+            names the coordinates to keep, in the user's frames, and the machine determines the
+            others (`complete`); True takes those the robot file declares.
         near : array_like (n,) or (..., n), optional
             Coordinates: an actuator that turns is given at the turn nearest to them. By default
             it is the turn nearest to the middle of its stroke, or, where the file states none, to
@@ -146,12 +176,12 @@ class Kinematics:
         -----
         Length limbs: eq. 3 of the 2TPR&2TPS paper, ‖p + R b - base‖.
         """
-        rows, shape = self.own_rows(pose)
+        rows, shape = as_rows("pose", pose, 6)
         about = None if near is None else self._near(near, shape)
         if match is None:
-            q = self.machine.inverse(self.slots, rows, about)
+            q = self.machine.inverse(self.slots, self.frames.inward(rows), about)
         else:
-            q = self._completed(rows, match, about)[1]
+            q = self._completed(rows, match, about).q
         return q.reshape(*shape, self.n_actuators)
 
     @property
@@ -326,11 +356,11 @@ class Kinematics:
 
     def _completed(
         self, rows: FloatArray, match: Match, near: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> Completed:
         if match is None:
             raise ArgumentError("match must be True or names of coordinates, found None")
-        places = matched_coordinates(match, self.model.match, self.coordinates)
-        return complete(self.machine, self.model.map, self.slots, rows, places, near)
+        places = matched_coordinates(match, self.moved)
+        return complete(self.machine, self.model.map, self.slots, self.frames, rows, places, near)
 
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (n,) or (N, n), for certificates and searches for modes."""

@@ -82,8 +82,8 @@ class Robot(Kinematics, Result):
         pose : array_like (..., 6)
             x y z in mm, α β γ in rad; what is not matched is where the search starts.
         match : True or names of coordinates
-            As many as the machine has degrees of freedom; True takes those its file declares, or
-            its free coordinates.
+            As many as the machine has degrees of freedom, in the user's frames; True takes those
+            its file declares, or those that it moves (`moved`).
 
         Returns
         -------
@@ -97,8 +97,8 @@ class Robot(Kinematics, Result):
         >>> bool(abs(pose[0] - 400 * np.tan(0.2)) < 1e-9)
         True
         """
-        rows, shape = self.own_rows(pose)
-        return self.frames.outward(self._completed(rows, match)[0]).reshape(*shape, 6)
+        rows, shape = as_rows("pose", pose, 6)
+        return self._completed(rows, match).pose.reshape(*shape, 6)
 
     def violation(self, pose: ArrayLike) -> FloatArray:
         """How far a pose is from one the machine can take.
@@ -111,13 +111,18 @@ class Robot(Kinematics, Result):
         Returns
         -------
         ndarray (...)
-            The largest closure error that is left with the limbs at their inverse, mm. Near 0
-            where six numbers are free, or where they fit.
+            The largest closure error that is left with the limbs at their inverse, mm, or what its
+            pose map does not move, an angle as its arc at the characteristic length. Near 0 where
+            six numbers are free, or where they fit.
         """
         rows, shape = self.own_rows(pose)
         q = self.machine.inverse(self.slots, rows)
-        residual = self.machine.closure(self.slots, rows, q).residual
-        return np.asarray(np.abs(residual).max(axis=1)).reshape(shape)
+        closure = self.machine.closure(self.slots, rows, q)
+        off = np.abs(rows - closure.pose)
+        off[:, 3:] = self.length * np.abs(wrapped(off[:, 3:]))
+        if self.model.map == "spatial":  # which has every pose, by whatever angles
+            off[:] = 0.0
+        return np.asarray(np.abs(np.hstack([closure.residual, off])).max(axis=1)).reshape(shape)
 
     def feasible(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> Feasibility:
         """Which limits of which limbs a pose keeps.
@@ -449,15 +454,10 @@ def _shaped(found: Feasibility, shape: tuple[int, ...]) -> Feasibility:
     return Feasibility(*(array.reshape(*shape, array.shape[-1]) for array in each))
 
 
-def commanded(robot: Robot) -> tuple[str, ...]:
-    """The coordinates that programs command: those its file matches, or its free ones."""
-    return tuple(robot.model.match or robot.coordinates)
-
-
 def determines_others(robot: Robot) -> bool:
     """Whether the limbs determine coordinates beside the commanded ones, which are not constant."""
     constant = robot.model.match is None and robot.model.map in ("translation", "planar")
-    return len(commanded(robot)) < len(POSE) and not constant
+    return len(robot.moved) < len(POSE) and not constant
 
 
 def require_parallel(robot: object, name: str = "robot") -> None:

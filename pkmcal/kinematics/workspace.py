@@ -212,7 +212,7 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
         joints = np.abs(robot.geometry.slots[:, :6]).sum(axis=1)
         size = float(joints.max() + np.abs(robot.home[:3]).sum())
     found = {}
-    for name in moved_coordinates(robot):
+    for name in robot.moved:
         step = np.radians(90.0) / _STEPS if name in POSE[3:] else 2 * size / _STEPS
         ends = []
         for sign in (-1.0, 1.0):
@@ -223,11 +223,6 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
             ends.append(float(ray[last, POSE.index(name)]))
         found[name] = (ends[0], ends[1])
     return found
-
-
-def moved_coordinates(robot: Robot) -> tuple[str, ...]:
-    """The coordinates that determine a pose."""
-    return tuple(robot.model.match or robot.coordinates)
 
 
 def require_moved(robot: Robot, axes: Mapping[str, object]) -> None:
@@ -244,7 +239,7 @@ def require_moved(robot: Robot, axes: Mapping[str, object]) -> None:
         )
     if not axes:
         raise ArgumentError("axes names no coordinate")
-    moved = moved_coordinates(robot)
+    moved = robot.moved
     for name in axes:
         if name not in moved:
             known = did_you_mean(name, moved)
