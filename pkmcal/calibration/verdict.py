@@ -206,7 +206,7 @@ def _misfit(found: Parts) -> tuple[float, float, str]:
         first, last = found.holdout_distances_before, found.holdout_distances
         name = _points(held, "held-out", len(found.holdout_outliers))
     elif np.isnan(found.rms):
-        what = f"actuators of {len(found.rows)} rows"
+        what = f"the closures of {len(found.rows)} rows"
         return found.closure_rms_before, found.closure_rms, what
     else:
         first, last = found.distances_before, found.distances
@@ -230,8 +230,9 @@ def _points(count: int, which: str, outliers: int) -> str:
 
 
 def _falls(before: float, after: float) -> str:
-    verb = "falls" if after < before else "goes"
-    return f"{verb} from {before:.3g} to {after:.3g} mm rms"
+    first, last = f"{before:.3g}", f"{after:.3g}"
+    verb = "falls" if after < before and first != last else "goes"
+    return f"{verb} from {first} to {last} mm rms"
 
 
 def _disagreement(found: Parts, robust: RobustCheck) -> str:

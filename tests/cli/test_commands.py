@@ -169,7 +169,7 @@ def test_json_stands_alone_and_holds_the_attributes_of_the_result(run: Any, tmp_
     assert list(found["parameters"]) == names
     for name, value, stderr in zip(names, expected.values, expected.stderr, strict=True):
         assert found["parameters"][name] == {"value": value, "stderr": stderr}
-    for name in set(found) - {"parameters", "correlations"}:
+    for name in set(found) - {"schema", "parameters", "correlations"}:
         assert hasattr(expected, name), name
     assert {"free", "covariance", "rank", "outliers", "warnings", "holdout_rms"} <= set(found)
     assert found["robot"]["geometry"]["radius"] == expected.robot.geometry["radius"]
