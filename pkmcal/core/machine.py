@@ -279,7 +279,7 @@ class Machine:
         Of each limb the coordinate that it needs at the pose less the one read, then its other
         rows, weighted, in mm: (N, rows). Their derivatives by the map's step, mm and rad,
         (N, rows, m), and by the numbers at `columns` of the flattened slots (N, rows, columns).
-        NaN where a limb does not reach.
+        Of a limb that does not reach, the closure at q over its slope by q.
         """
         n = len(pose)
         residual, by_step = np.empty((n, self.rows)), np.empty((n, self.rows, self.m))
