@@ -201,6 +201,7 @@ def marked(book: bytes, offset: int, bits: int) -> bytes:
 DAMAGED: dict[str, Callable[[bytes], bytes]] = {
     "half": lambda book: book[: len(book) // 2],
     "cut sheet": lambda book: edited(book, lambda xml: xml[: len(xml) // 2]),
+    "long file name": lambda book: book[:26] + b"\x00\x04" + book[28:],
     "encrypted": lambda book: marked(book, 6, 1),
     "unknown compression": lambda book: marked(book, 8, 99),
     "doctype": lambda book: edited(
