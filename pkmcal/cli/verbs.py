@@ -48,7 +48,6 @@ class _Verbs(TyperGroup):
         except KeyboardInterrupt as stop:
             return ending.code(stop)
 
-
     def list_commands(self, ctx: Any) -> list[str]:
         return list(_VERBS)
 
