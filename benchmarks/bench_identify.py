@@ -116,7 +116,7 @@ def bench_28_parameters(report: Report) -> None:
         f" within {apart:.1g} standard deviations of each other. The models in NumPy have Newton's"
         " method with derivatives in closed form from good guesses, and finite differences by the"
         " parameters; identify's time includes rank, covariance, outliers and the combinations that"
-        " cannot be told."
+        " cannot be identified."
     )
     rows = [
         [name, f"{1e3 * seconds:.2f}", times(seconds / took["identify"])]

@@ -10,7 +10,7 @@ import numpy as np
 
 import pkmcal as pk
 from benchmarks.timing import Report
-from pkmcal.modes.find import _from_random_starts, frames_of
+from pkmcal.modes.find import frames_of, from_random_starts
 from tests import dietmaier
 
 STARTS = 200_000
@@ -71,7 +71,7 @@ def bench_starts(report: Report) -> None:
     found = robot.forward_all(dietmaier.LENGTHS)
     problem = robot.assembly_problem(np.array(dietmaier.LENGTHS))
     begin = time.process_time()
-    frames = _from_random_starts(problem, problem.spheres(), STARTS)
+    frames = from_random_starts(problem, problem.spheres(), STARTS)
     each = (time.process_time() - begin) / STARTS
     own = frames_of(found.poses)
     hits = np.zeros(len(own), dtype=int)

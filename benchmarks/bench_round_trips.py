@@ -1,7 +1,7 @@
 """Round trips of machines with random errors: how many return, and what becomes of the others.
 
 A row is wrong where it came with a pose that is neither the one it started from nor another that
-meets the closures. tests/round_trips.py says how that is judged.
+meets the closures. tests/round_trips.py says how that is checked.
 """
 
 from __future__ import annotations

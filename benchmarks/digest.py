@@ -97,7 +97,7 @@ def of_machine(name: str) -> Iterator[Call]:
 def of_arm(name: str) -> Iterator[Call]:
     """Every call of a serial arm, with errors shared and of each row."""
     arm = pk.load(name)
-    core_arm = arm._arm
+    core_arm = arm.core
     rng = np.random.default_rng(2)
     theta = rng.uniform(-3, 3, (ROWS, arm.n_joints))
     theta[::50, 0] = np.nan

@@ -23,10 +23,11 @@ int CALL(forward)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
 int CALL(jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                    ptrdiff_t geometry_stride, const double *pose, double *jacobian);
 
-/* pose (n, 6), q (n, actuators) -> dpose/dq (n, 6, actuators). */
+/* pose (n, 6), q (n, actuators) -> dpose/dq (n, 6, actuators), or with `twists` the twist (omega, v) of
+ * the platform's origin in base axes by them. */
 int CALL(forward_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                            ptrdiff_t geometry_stride, const double *pose, const double *q,
-                           double *jacobian);
+                           int twists, double *jacobian);
 
 /* pose (n, 6), q (n, actuators) -> dpose/d(numbers) (n, 6, columns) at held actuators, or with
  * `twists` the twist (omega, v) of the platform's origin in base axes by them; columns are indices
@@ -37,10 +38,24 @@ int CALL(error_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *
 
 /* pose (n, 6), q (n, actuators) -> the closure rows, limb by limb and the sphere first: residual
  * (n, rows) [mm]; their derivatives by a scaled twist (n, rows, m), by the free coordinates
- * (n, rows, m) and by q (n, rows, actuators). */
+ * (n, rows, m) and by q (n, rows, actuators); and the pose (n, 6) as the map has it, with its
+ * derivatives by the free coordinates (n, 6, m). */
 int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                   const double *pose, const double *q, double *residual, double *by_step,
-                  double *by_free, double *by_q);
+                  double *by_free, double *by_q, double *on_map, double *pose_by_free);
+
+/* pose (n, 6), q (n, actuators) -> actuators as instruments, limb by limb: of the sphere row the
+ * coordinate that the limb needs at the pose less the one read, nearest turn, of the other rows the
+ * weighted closure [mm] (n, rows); by the map's step [mm, rad] (n, rows, m) and by the numbers (n, rows,
+ * columns; NULL: not wanted); columns are indices into limbs x SLOTS. NaN out of reach. */
+int CALL(readings)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                   const double *pose, const double *q, const int32_t *column, int columns,
+                   double *residual, double *by_step, double *by_number);
+
+/* pose (n, 6), step of the map (n, m) [mm, rad] -> the pose moved by it (n, 6), and the twist
+ * (omega, v) by a step at the pose (n, 6, m). */
+int CALL(moved)(const pkm_machine *machine, ptrdiff_t n, const double *pose, const double *step,
+                double *moved, double *twist);
 
 /* q (n, actuators) -> the limbs (n, limbs, PKM_SPHERE); lengths are NaN where one of them is not
  * positive. */
@@ -100,6 +115,37 @@ int CALL(arm_jacobian)(const pkm_arm *arm, const pkm_links *links, int frame, pt
                        const double *theta, double *jacobian);
 int CALL(arm_error_jacobian)(const pkm_arm *arm, const pkm_links *links, const double *error,
                              int frame, ptrdiff_t n, const double *theta, double *jacobian);
+
+/* Machines of chains. As forward, with the passive joints (n, passive) at the pose. */
+int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
+                        ptrdiff_t geometry_stride, const double *q, const double *guess,
+                        ptrdiff_t guess_stride, double *pose, double *passive, int32_t *status,
+                        int32_t *iterations, double *residual);
+
+/* pose (n, 6) as given -> q (n, actuators), each chain alone from its home; NaN where one of six free
+ * joints or more does not reach. */
+int CALL(chain_inverse)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
+                        ptrdiff_t geometry_stride, const double *pose, double *q);
+
+/* pose (n, 6), q (n, actuators) -> the rows that passive joints leave (n, rows) [mm], and their
+ * derivatives by a scaled twist and by what chains share (n, rows, m + shared), by the free
+ * coordinates (n, rows, m) and by q (n, rows, actuators). */
+int CALL(chain_closure)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
+                        ptrdiff_t geometry_stride, const double *pose, const double *q,
+                        double *residual, double *by_step, double *by_free, double *by_q,
+                        double *on_map, double *pose_by_free);
+
+/* pose (n, 6), q (n, actuators) -> dpose/d(numbers) (n, 6, columns), as error_jacobian; by q where
+ * column is NULL. */
+int CALL(chain_response)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
+                         ptrdiff_t geometry_stride, const double *pose, const double *q,
+                         const int32_t *column, int columns, int twists, double *jacobian);
+
+/* pose (n, 6), q (n, actuators) -> the passive joints there (n, passive), and the frames (R, p) of the
+ * joints and of the end of each chain before they move (n, members + chains, 12). */
+int CALL(chain_frames)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
+                       ptrdiff_t geometry_stride, const double *pose, const double *q,
+                       double *passive, double *frame);
 
 /* Calls that are one formula a row. */
 #include "row_calls.h"

@@ -24,14 +24,13 @@ INLINE void map_from_pose(int map, const real *pose, real *state)
 
 INLINE void map_to_pose(int map, const real *state, real pose[6])
 {
-    real R[9], sine[3], cosine[3];
+    real R[9];
     FN(map_frame)(map, state, R, pose);
     switch (map) {
-#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_angles)(state, sine, cosine); break;
+#define CASE(NAME, name, ...) case MAP_##NAME: FN(map_##name##_angles)(state, pose + 3); break;
     EACH_MAP(CASE)
 #undef CASE
     }
-    for (int i = 0; i < 3; i++) pose[3 + i] = arctangent2(sine[i], cosine[i]);
 }
 
 INLINE void map_rates(int map, const real *state, const real *delta, real *pose)
@@ -91,6 +90,7 @@ SHARED void prepare_limbs(const pkm_machine *machine, const double *geometry, pt
             FN(name##_directions)(one->g, F, one->first, one->second);                            \
             break;
             EACH_DRIVER(CASE)
+            NO_OTHER_CASE;
 #undef CASE
         }
 #define PREPARE(name, K, ROWS)                                                                    \
@@ -116,6 +116,7 @@ INLINE void sphere_of_numbers(int driver, const limb_numbers *limb, FN(limb_sphe
         if (!STRETCHES) FN(name##_radius)(still, limb->g, &sphere->rho);                          \
         break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
 }
@@ -134,6 +135,7 @@ INLINE void sphere_at(int driver, const limb_numbers *limb, real q, FN(limb_sphe
         if (STRETCHES) FN(name##_radius)(qt, limb->g, &sphere->rho);                              \
         break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     *reachable &= (sphere->rho > fill(1e-30)) & (sphere->rho < fill(1e30)) & (absolute(qt) < fill(1e30));
@@ -145,6 +147,7 @@ INLINE int driver_moves(int driver)
     switch (driver) {
 #define CASE(NAME, name, MOVES, STRETCHES) case DRIVER_##NAME: return MOVES;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     return 0;
@@ -155,6 +158,7 @@ INLINE int driver_stretches(int driver)
     switch (driver) {
 #define CASE(NAME, name, MOVES, STRETCHES) case DRIVER_##NAME: return STRETCHES;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     return 0;

@@ -9,7 +9,27 @@ typedef struct {
     double *by_step;   /* (n, rows, m), angles as arcs at the characteristic length */
     double *by_free;   /* (n, rows, m), by the free coordinates as reported */
     double *by_q;      /* (n, rows, actuators) */
+    double *pose;      /* (n, 6), as the map has it */
+    double *pose_by_free; /* (n, 6, m) */
 } closure_out;
+
+/* How the reported pose follows the free coordinates: ∂step/∂free, then the rates of the pose. */
+INLINE void pose_rates_by_free(int map, const real *state, real out[36])
+{
+    const int m = map_m(map);
+    real step_by_free[36];
+    for (int j = 0; j < m; j++) {
+        real covector[6];
+        for (int k = 0; k < m; k++) covector[k] = fill(j == k);
+        map_free(map, state, covector, step_by_free + j * m);
+    }
+    for (int k = 0; k < m; k++) {
+        real step[6], rates[6];
+        for (int j = 0; j < m; j++) step[j] = step_by_free[j * m + k];
+        map_rates(map, state, step, rates);
+        for (int i = 0; i < 6; i++) out[i * m + k] = rates[i];
+    }
+}
 
 /* The closure rows at poses and actuator coordinates, limb by limb. */
 INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const double *geometry,
@@ -21,12 +41,17 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
         ptrdiff_t row[LANES];
         real lane_pose[6], lane_q[PKM_MAX_LIMBS], state[MAX_STATE], R[9], p[3];
         real residual[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6];
+        real on_map[6], by_free_of_pose[36];
         FN(limb_sphere) sphere[PKM_MAX_LIMBS];
         const int count = block_rows(first, n, row);
         if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
         gather_row(pose, 6, 6, row, lane_pose);
         gather_row(q, actuators, actuators, row, lane_q);
         map_from_pose(map, lane_pose, state);
+        map_to_pose(map, state, on_map);
+        scatter_row(on_map, 6, out->pose, 6, row, count);
+        pose_rates_by_free(map, state, by_free_of_pose);
+        scatter_row(by_free_of_pose, 6 * m, out->pose_by_free, 6 * m, row, count);
         FN(map_frame)(map, state, R, p);
         spheres_at(machine, limb, lane_q, sphere);
         const int rows = scaled_rows(map, machine, sphere, state, residual, jacobian);
@@ -65,9 +90,9 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
 
 int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                   const double *pose, const double *q, double *residual, double *by_step,
-                  double *by_free, double *by_q)
+                  double *by_free, double *by_q, double *on_map, double *pose_by_free)
 {
-    const closure_out out = {residual, by_step, by_free, by_q};
+    const closure_out out = {residual, by_step, by_free, by_q, on_map, pose_by_free};
     if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
 #define CASE(NAME, name, ...)                                                                       \

@@ -8,13 +8,14 @@
  * that squares overflow. */
 INLINE real limb_drive_at(const pkm_machine *machine, int i, const limb_numbers *limb, const real *h)
 {
-    real qt = fill(NAN);
+    real qt;
     switch (machine->driver[i]) {
 #define CASE(NAME, name, ...)                                                                     \
     case DRIVER_##NAME:                                                                           \
         FN(name##_inverse)(limb->g, h, limb->first, limb->second, fill(machine->branch[i]), &qt); \
         break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     return qt;

@@ -16,6 +16,7 @@ INLINE void sphere_derivatives(const pkm_machine *machine, int i, const limb_num
 #define CASE(NAME, name, ...)                                                                     \
     case DRIVER_##NAME: FN(name##_derivatives)(R, p, q, limb->g, F, by_q, by_g); break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
 }
@@ -41,6 +42,7 @@ SHARED void constraint_derivatives(const pkm_machine *machine, int i, int kind,
         FN(name##_derivatives)(R, p, sphere->c, limb->g, F, P, fill(machine->lever[i]), v, by_g); \
         break;
         EACH_ROW(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     for (int k = 0; k < 3; k++) pull[k] = -v[k]; /* Φ depends on d = p + R b - c */
@@ -49,6 +51,7 @@ SHARED void constraint_derivatives(const pkm_machine *machine, int i, int kind,
 #define CASE(NAME, name, ...)                                                                     \
     case DRIVER_##NAME: FN(name##_carry)(q, limb->g, pull, F, by_q, of_anchor); break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     for (int s = 0; s < SLOTS; s++) by_g[s] += of_anchor[s];
@@ -248,10 +251,11 @@ SHARED void responses(const pkm_machine *machine, ptrdiff_t n, const double *geo
 
 int CALL(forward_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                            ptrdiff_t geometry_stride, const double *pose, const double *q,
-                           double *jacobian)
+                           int twists, double *jacobian)
 {
     if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
-    responses(machine, n, geometry, geometry_stride, pose, q, NULL, machine->actuators, 0, jacobian);
+    responses(machine, n, geometry, geometry_stride, pose, q, NULL, machine->actuators, twists,
+              jacobian);
     return 0;
 }
 

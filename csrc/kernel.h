@@ -3,6 +3,9 @@
  * paths.c for complex numbers. */
 
 #define UNROLL _Pragma("GCC unroll 6") /* the loops of elimination: registers hold its rows then */
+/* Ends a switch over the drivers or rows of a machine: `pkm_closure_count` refuses others, so what
+ * every case sets is set. */
+#define NO_OTHER_CASE default: __builtin_unreachable()
 
 INLINE real FN(fill)(NUMBER x) { return (real){0} + x; }
 
@@ -120,6 +123,7 @@ INLINE void FN(constraint_row)(int kind, const real *R, const real *p, const rea
         FN(name##_row)(R, p, b, c, axis[N], axis[A], FN(fill)(lever), phi, omega, v);             \
         break;
     EACH_ROW(CASE)
+    NO_OTHER_CASE;
 #undef CASE
     }
 }

@@ -32,6 +32,7 @@ INLINE void limb_rates(const pkm_machine *machine, int i, const limb_numbers *li
         FN(name##_rates)(qt, h[0], h[1], h[2], limb->first, limb->second, &qt1, &qt2);            \
         break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     *rate = qt1 * limb->per_gain;
@@ -93,6 +94,7 @@ SHARED int limb_bends(const pkm_machine *machine, int i, const limb_numbers *lim
             memcpy(d, h, sizeof d);                                                               \
         break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
     bend[r] *= rough_reciprocal(sphere->rho) * weight[r];
@@ -111,6 +113,7 @@ SHARED int limb_bends(const pkm_machine *machine, int i, const limb_numbers *lim
                             fill(machine->lever[i]), &bend[r]);                                   \
             break;
             EACH_ROW(CASE)
+            NO_OTHER_CASE;
 #undef CASE
         }
         bend[r] *= weight[r];

@@ -12,7 +12,7 @@
 #include "names.h"
 
 /* cffi begin */
-enum { PKM_MAX_LIMBS = 12, PKM_MAX_ROWS = 24 };
+enum { PKM_MAX_LIMBS = 24, PKM_MAX_ROWS = 48 };
 enum { PKM_OK, PKM_NOT_CONVERGED, PKM_SINGULAR, PKM_INFEASIBLE, PKM_INVALID,
        PKM_NOT_CLOSED };
 enum { PKM_BAD_MACHINE = -1, PKM_BAD_COLUMN = -2, PKM_BAD_SWARM = -3 };
@@ -25,17 +25,17 @@ typedef struct {
     double size;                    /* [mm] what rounding is measured against */
     double length;                  /* characteristic length [mm]: rotations times it are mm */
     double closure_tolerance;       /* [mm]: what more rows than coordinates may miss */
-    int driver[12];                 /* DRIVER_... of each limb */
-    int rows[12];                   /* set of ROW_... beside the sphere */
-    int actuator[12];               /* which actuator drives the limb */
-    double branch[12];              /* +1 or -1 for slider and crank */
-    int angle[12];                  /* is q̃ an angle, the same after a whole turn? */
-    double near[12];                /* q̃ an angle is given nearest to: see pkm_prepare */
-    double frame[12 * AXES * 9];    /* of each axis of each limb, 3 x 3 row by row */
-    double lever[12];               /* of the couple row [mm] */
-    double weight[24];              /* of each row, limb by limb, the sphere first */
-    int order[24];                  /* place of each row in the elimination: see pkm_prepare */
-    double sharing[12];             /* how many limbs each actuator drives: see pkm_prepare */
+    int driver[24];                 /* DRIVER_... of each limb */
+    int rows[24];                   /* set of ROW_... beside the sphere */
+    int actuator[24];               /* which actuator drives the limb */
+    double branch[24];              /* +1 or -1 for slider and crank */
+    int angle[24];                  /* is q̃ an angle, the same after a whole turn? */
+    double near[24];                /* q̃ an angle is given nearest to: see pkm_prepare */
+    double frame[24 * AXES * 9];    /* of each axis of each limb, 3 x 3 row by row */
+    double lever[24];               /* of the couple row [mm] */
+    double weight[48];              /* of each row, limb by limb, the sphere first */
+    int order[48];                  /* place of each row in the elimination: see pkm_prepare */
+    double sharing[24];             /* how many limbs each actuator drives: see pkm_prepare */
 } pkm_machine;
 
 /* A swarm in `dims` dimensions and the factors of eq. 19. Its state, pkm_swarm_size numbers, begins
@@ -59,6 +59,33 @@ typedef struct {
     int by_row;
     const double *link;
 } pkm_links;
+
+/* A machine of limbs that are chains of joints: see chains.h. Joints are counted once where chains
+ * share them; a joint is turned or slid by an actuator, or passive. What chains share comes first among
+ * the passive ones. Places are those of numbers in the geometry. */
+enum { PKM_MAX_CHAIN = 8, PKM_MAX_JOINTS = 72, PKM_MAX_SHARED = 6, PKM_MAX_CHAIN_ROWS = 36,
+       PKM_MAX_NUMBERS = 1024 };
+typedef struct {
+    int map, chains, joints, actuators, passive, shared, numbers;
+    double size, length, closure_tolerance; /* [mm], as of pkm_machine */
+    int over;                       /* more rows than unknowns: weigh them by compliance */
+    double home[12];                /* the platform's frame at home, the first rows of its matrix */
+    const int32_t *first;           /* (chains + 1) where the joints of each begin in `member` */
+    const int32_t *member;          /* joints from base to platform, chain after chain */
+    const int32_t *ball;            /* (chains) does the chain end in a ball, after its joints? */
+    const int32_t *end_place;       /* (chains) of the six errors on the platform's side */
+    const int32_t *ball_place;      /* (chains) of the three errors of the ball */
+    const double *end;              /* (chains, 3) the point on the platform, at home */
+    const int32_t *prismatic;       /* (joints) */
+    const int32_t *actuator;        /* (joints) or -1 */
+    const int32_t *coordinate;      /* (joints) which of the passive ones, or -1 */
+    const int32_t *place;           /* (joints) of the six errors */
+    const double *axes;             /* (joints, 9), the joint's own the third column, at home */
+    const double *point;            /* (joints, 3), at home */
+    const double *soft;             /* (joints) compliance [mm per unit force], others relative */
+    const int32_t *drive_place;     /* (actuators) of the offset; the gain follows */
+    const double *zero;             /* (actuators) the reading at home */
+} pkm_chains;
 
 enum { PKM_SPACE, PKM_BODY, PKM_TIP }; /* tip: velocity of the tool's origin, in base axes */
 

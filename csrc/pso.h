@@ -53,7 +53,7 @@ INLINE void store_rng(const generator *g, double *random, ptrdiff_t width)
     for (int k = 0; k < 4; k++) memcpy(random + k * width, &g->s[k], sizeof g->s[k]);
 }
 
-/* Particles anywhere within the bounds, at rest. `stream` tells swarms of one seed apart. */
+/* Particles anywhere within the bounds, at rest. `stream` distinguishes swarms of one seed. */
 SHARED void start_swarm(const pkm_swarm *swarm, uint64_t seed, uint64_t stream,
                         const double *lower, const double *upper, double *state)
 {
@@ -222,6 +222,7 @@ INLINE void anchor_at(int driver, const limb_numbers *one, double q, real c[3], 
         FN(name##_radius)(qt, one->g, rho);                                                       \
         break;
         EACH_DRIVER(CASE)
+        NO_OTHER_CASE;
 #undef CASE
     }
 }
@@ -284,6 +285,7 @@ INLINE real squared_closures(const pkm_machine *machine, const limb_numbers *lim
 #define CASE(NAME, name, ...)                                                                     \
         case DRIVER_##NAME: sum = add_squared_##name(machine, i, r, &limb[i], n, at, sum); break;
             EACH_DRIVER(CASE)
+            NO_OTHER_CASE;
 #undef CASE
         }
         r += 1 + __builtin_popcount((unsigned)machine->rows[i]);

@@ -147,12 +147,8 @@ INLINE void adjoint_row(const real matrix[12], real adjoint[36])
 /* x y z α β γ of a motion. */
 INLINE void motion_pose_row(const real matrix[12], real pose[6])
 {
-    real sine[2], cosine[2];
     const motion T = motion_of(matrix);
-    memcpy(pose, T.p, sizeof T.p);
-    pose[5] = arctangent2(T.R[3], T.R[0]);
-    FN(rotation_tilts)(T.R, pose[5], sine, cosine);
-    for (int k = 0; k < 2; k++) pose[3 + k] = arctangent2(sine[k], cosine[k]);
+    FN(motion_pose)(T.R, T.p, pose);
 }
 
 INLINE void joint_motion_row(const real error[6], const real point[3], real matrix[16])
@@ -302,7 +298,7 @@ int CALL(arm_jacobian)(const pkm_arm *arm, const pkm_links *links, int frame, pt
     const real still[3] = {fill(0.0), fill(0.0), fill(0.0)};
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
-        motion T;
+        motion T = unmoved();
         const int count = block_rows(first, n, row);
         const motion view = arm_view(arm, links, frame, theta, row);
         for (int i = 0; i < arm->joints; i++) {

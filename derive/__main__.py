@@ -11,6 +11,7 @@ from pathlib import Path
 
 from . import (
     calls,
+    chains,
     elementary,
     frames,
     limb_functions,
@@ -34,6 +35,7 @@ def headers() -> dict[str, str]:
         "names.h": _header("limbs", _names() + calls.table()),
         "row_calls.h": _header("calls", calls.prototypes()),
         "row_loops.h": _header("calls", calls.loops()),
+        "chains.h": _header("chains", _functions(chains.functions())),
         "elementary.h": _header("elementary", elementary.emit()),
         "frames.h": _header("frames", _functions(frames.functions())),
         "limbs.h": _header("limb_functions", _functions(limb_functions.functions()), "limbs"),
@@ -47,6 +49,7 @@ def headers() -> dict[str, str]:
 
 def _names() -> str:
     """What C and Python call the numbers of a limb, its drivers and rows, and the pose maps."""
+
     def enum(prefix: str, names: Iterable[str]) -> str:
         return "enum { " + ", ".join(prefix + name.upper() for name in names) + " };"
 

@@ -112,9 +112,7 @@ class Call:
     def entry(self) -> str:
         """Its line of the table that Python reads."""
         inputs = " ".join(f"{each.name}:{each.width}{MARK[each.given]}" for each in self.inputs)
-        outputs = " ".join(
-            f"{each.name}:{','.join(map(str, each.shape))}" for each in self.outputs
-        )
+        outputs = " ".join(f"{each.name}:{','.join(map(str, each.shape))}" for each in self.outputs)
         return f"{self.name} {inputs} -> {outputs}"
 
 
@@ -133,10 +131,7 @@ def formula(
         Input(own, argument.size or 1, (given or {}).get(own, "each"))
         for own, argument in zip(called, made.inputs, strict=False)
     ]
-    outputs = [
-        Output(own, shape)
-        for own, shape in zip(called[len(inputs) :], shapes, strict=True)
-    ]
+    outputs = [Output(own, shape) for own, shape in zip(called[len(inputs) :], shapes, strict=True)]
     for output, (argument, _) in zip(outputs, made.outputs, strict=True):
         if output.width != (argument.size or 1):
             raise ValueError(f"{name}: {output.name} is no array of {argument.size} numbers")
@@ -147,9 +142,9 @@ def calls() -> list[Call]:
     """Every call that is one formula a row."""
     matrix = Input("motion", 16, used=12)
     return [
-        Call("compose", "A followed by B", "compose_row",
-             (Input("a", 6, "either"), Input("b", 6, "either")), (Output("out", (6,)),)),
-        Call("invert", "the inverse of A", "invert_row", (Input("a", 6),), (Output("out", (6,)),)),
+        formula("compose", "A followed by B", frames.compose, "a b out", ((6,),),
+                {"a": "either", "b": "either"}),
+        formula("invert", "the inverse of A", frames.invert, "a out", ((6,),)),
         formula("compose_rates", "rates of A T C by those of T", frames.rates,
                 "a pose c composed rates", ((6, 6),), {"a": "shared", "c": "either"}),
         formula("compose_twists", "twists of A T C by those of T", frames.twists,

@@ -9,8 +9,8 @@ from __future__ import annotations
 import sympy as sp
 
 from .emit import Function
-from .posemaps import euler_rate_matrix, rpy_angles
-from .rotation import rpy, skew
+from .posemaps import euler_rate_matrix
+from .rotation import rpy, rpy_angles, skew
 
 
 def posed(f: Function, name: str, doc: str) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
@@ -23,14 +23,11 @@ def posed(f: Function, name: str, doc: str) -> tuple[sp.Matrix, sp.Matrix, sp.Ma
 
 
 def _give(f: Function, R: sp.Matrix, p: sp.Matrix) -> None:
-    R = f.let("R", R)
-    pairs = rpy_angles(R, sp.Matrix())
-    f.output("p", p, "origin [mm]")
-    f.output("sine", sp.Matrix([s for s, _ in pairs]), "of α β γ, up to a positive factor")
-    f.output("cosine", sp.Matrix([c for _, c in pairs]), "of α β γ")
+    f.output("pose", sp.Matrix([*p, *rpy_angles(f, R)]), "x y z [mm], α β γ [rad]")
 
 
-def _compose() -> Function:
+def compose() -> Function:
+    """Derive one pose after another."""
     f = Function("pose_compose", "one pose after another", "T = A B: R = Ra Rb, p = pa + Ra pb")
     _, Ra, pa = posed(f, "a", "first")
     _, Rb, pb = posed(f, "b", "second")
@@ -38,7 +35,8 @@ def _compose() -> Function:
     return f
 
 
-def _invert() -> Function:
+def invert() -> Function:
+    """Derive the inverse of a pose."""
     f = Function("pose_invert", "the inverse of a pose", "T⁻¹: Rᵀ, -Rᵀ p")
     _, R, p = posed(f, "a", "pose")
     _give(f, R.T, -(R.T * p))
@@ -71,9 +69,7 @@ def rates() -> Function:
     inverse = inverse.applyfunc(lambda e: sp.expand(e).subs(sb / cb, tangent).subs(1 / cb, secant))
     angles = inverse * spin
     along = -(Ra * skew(arm) * E)
-    matrix = sp.Matrix.vstack(
-        sp.Matrix.hstack(Ra, along), sp.Matrix.hstack(sp.zeros(3, 3), angles)
-    )
+    matrix = sp.Matrix.vstack(sp.Matrix.hstack(Ra, along), sp.Matrix.hstack(sp.zeros(3, 3), angles))
     f.output("rates", matrix, "6 x 6, row by row")
     return f
 
@@ -98,4 +94,4 @@ def twists() -> Function:
 
 def functions() -> list[Function]:
     """The emitted functions of frames."""
-    return [_compose(), _invert(), rates(), twists()]
+    return [compose(), invert(), rates(), twists()]

@@ -138,7 +138,7 @@ def newton(system: System, x: Array, g: Array, steps: int) -> tuple[Array, Array
 
 
 def follow(system: System, x: Array, start: Array, end: Array) -> Array:
-    """States (N, state) continued straight from numbers `start` to `end`, without lost ones."""
+    """States (N, state) continued straight from numbers `start` to `end`; failed paths left out."""
     t, h, before, last = 0.0, 0.01, x, 0.01
     while t < 1.0 and len(x):
         h = min(h, 1.0 - t)

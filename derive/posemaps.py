@@ -8,7 +8,7 @@ definition: the state's frame, its retraction, and the pose it reports.
 * ``frame``      state -> R, p
 * ``retract``    state, delta -> state
 * ``tidy``       state, off its manifold by rounding -> state
-* ``angles``     state -> sines and cosines of the reported orientation
+* ``angles``     state -> α β γ, the reported orientation
 * ``pull``       covector of a twist at the state -> covector of delta
 * ``rates``      delta -> rates of the pose x y z α β γ
 * ``twist``      delta -> (ω, v) of the frame
@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import sympy as sp
 
 from .emit import Function
-from .rotation import quaternion_matrix, quaternion_product, rot_x, rot_y, rot_z, rpy
+from .rotation import quaternion_matrix, quaternion_product, rot_x, rot_y, rot_z, rpy, rpy_angles
 
 POSE = ("x", "y", "z", "alpha", "beta", "gamma")
 
@@ -40,7 +40,8 @@ class PoseMap:
     from_pose: Callable[[Function, sp.Matrix], sp.Matrix]
     frame: Callable[[sp.Matrix], tuple[sp.Matrix, sp.Matrix]]
     retract: Callable[[Function, sp.Matrix, sp.Matrix], sp.Matrix]
-    angles: Callable[[sp.Matrix, sp.Matrix], list[tuple[sp.Expr, sp.Expr]]]
+    angles: Callable[[Function, sp.Matrix], sp.Matrix]
+    quaternion: int | None = None  # where a unit quaternion of R begins in the state
 
     @property
     def m(self) -> int:
@@ -51,12 +52,6 @@ class PoseMap:
     def lengths(self) -> int:
         """How many of them are lengths: they come before the angles."""
         return sum(each in POSE[:3] for each in self.free)
-
-
-def rpy_angles(R: sp.Matrix, state: sp.Matrix) -> list[tuple[sp.Expr, sp.Expr]]:
-    """(sine, cosine) of α, β, γ up to a common positive factor, from R (eq. 1)."""
-    c_beta = sp.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2)
-    return [(R[2, 1], R[2, 2]), (-R[2, 0], c_beta), (R[1, 0], R[0, 0])]
 
 
 def to_unit(f: Function, square: sp.Expr, name: str) -> sp.Expr:
@@ -109,7 +104,8 @@ SPATIAL = PoseMap(
     from_pose=_spatial_from_pose,
     frame=_spatial_frame,
     retract=_spatial_retract,
-    angles=rpy_angles,
+    angles=lambda f, s: rpy_angles(f, _spatial_frame(s)[0]),
+    quaternion=3,
 )
 
 TRANSLATION = PoseMap(
@@ -120,7 +116,7 @@ TRANSLATION = PoseMap(
     from_pose=lambda f, pose: sp.Matrix(pose[:3]),
     frame=lambda s: (sp.eye(3), s),
     retract=lambda f, s, delta: s + delta,
-    angles=lambda R, s: [(sp.S.Zero, sp.S.One)] * 3,
+    angles=lambda f, s: sp.zeros(3, 1),
 )
 
 
@@ -139,7 +135,7 @@ PLANAR = PoseMap(
     retract=lambda f, s, delta: sp.Matrix(
         [s[0] + delta[0], s[1] + delta[1], *turned(f, s[2], s[3], delta[2], "g")]
     ),
-    angles=lambda R, s: [(sp.S.Zero, sp.S.One), (sp.S.Zero, sp.S.One), (s[3], s[2])],
+    angles=lambda f, s: sp.Matrix([0, 0, f.angle("gamma", s[3], s[2])]),
 )
 
 
@@ -161,16 +157,48 @@ TPR2TPS = PoseMap(
     free=("y", "z", "alpha", "beta"),
     from_pose=_2tpr2tps_from_pose,
     frame=_2tpr2tps_frame,
-    retract=lambda f, s, delta: sp.Matrix([
-        s[0] + delta[0],
-        s[1] + delta[1],
-        *turned(f, s[2], s[3], delta[2], "a"),
-        *turned(f, s[4], s[5], delta[3], "b"),
-    ]),
-    angles=lambda R, s: [(s[3], s[2]), (s[5], s[4]), (sp.S.Zero, sp.S.One)],
+    retract=lambda f, s, delta: sp.Matrix(
+        [
+            s[0] + delta[0],
+            s[1] + delta[1],
+            *turned(f, s[2], s[3], delta[2], "a"),
+            *turned(f, s[4], s[5], delta[3], "b"),
+        ]
+    ),
+    angles=lambda f, s: sp.Matrix([f.angle("alpha", s[3], s[2]), f.angle("beta", s[5], s[4]), 0]),
 )
 
-MAPS = (SPATIAL, TRANSLATION, PLANAR, TPR2TPS)
+
+def _spherical_retract(f: Function, s: sp.Matrix, delta: sp.Matrix) -> sp.Matrix:
+    still = sp.zeros(3, 1)
+    moved = _spatial_retract(f, still.col_join(s), still.col_join(delta))
+    return sp.Matrix(moved[3:])
+
+
+SPHERICAL = PoseMap(
+    name="spherical",
+    title="α β γ about the origin, p = 0; state: the unit quaternion of R; step: ω",
+    state_size=4,
+    free=("alpha", "beta", "gamma"),
+    from_pose=lambda f, pose: sp.Matrix(_spatial_from_pose(f, pose)[3:]),
+    frame=lambda s: (quaternion_matrix(s), sp.zeros(3, 1)),
+    retract=_spherical_retract,
+    angles=lambda f, s: rpy_angles(f, quaternion_matrix(s)),
+    quaternion=0,
+)
+
+XY = PoseMap(
+    name="xy",
+    title="x y in the plane z = 0, R = 1; state: x, y; step: (vx, vy)",
+    state_size=2,
+    free=("x", "y"),
+    from_pose=lambda f, pose: sp.Matrix(pose[:2]),
+    frame=lambda s: (sp.eye(3), sp.Matrix([s[0], s[1], 0])),
+    retract=lambda f, s, delta: s + delta,
+    angles=lambda f, s: sp.zeros(3, 1),
+)
+
+MAPS = (SPATIAL, TRANSLATION, PLANAR, TPR2TPS, SPHERICAL, XY)
 
 
 def tangent(pose_map: PoseMap, s: sp.Matrix) -> tuple[sp.Matrix, sp.Matrix, sp.Matrix]:
@@ -193,9 +221,10 @@ def tangent(pose_map: PoseMap, s: sp.Matrix) -> tuple[sp.Matrix, sp.Matrix, sp.M
 
 def on_manifold(pose_map: PoseMap, expr: sp.Expr, s: sp.Matrix) -> sp.Expr:
     """Reduce modulo the state's constraints (unit quaternion, unit circles)."""
-    if pose_map.name == "spatial":
-        unit = [s[3] ** 2 + s[4] ** 2 + s[5] ** 2 + s[6] ** 2]
-        pairs = [(s[3] ** 2, 1 - s[4] ** 2 - s[5] ** 2 - s[6] ** 2)]
+    if pose_map.quaternion is not None:
+        w, x, y, z = (each**2 for each in s[pose_map.quaternion :])
+        unit = [w + x + y + z]
+        pairs = [(w, 1 - x - y - z)]
     else:
         circles = {"planar": [(2, 3)], "2tpr2tps": [(2, 3), (4, 5)]}.get(pose_map.name, [])
         unit = [s[i] ** 2 + s[j] ** 2 for i, j in circles]
@@ -239,13 +268,9 @@ def _functions(pose_map: PoseMap) -> list[Function]:
     s = tidy.vector("state", size, "of the map, nearly")
     tidy.output("moved", pose_map.retract(tidy, s, sp.zeros(m, 1)), "the state")
 
-    angles = new("angles", "the reported orientation", "sine and cosine up to a positive factor")
+    angles = new("angles", "the reported orientation", "R = Rz(γ) Ry(β) Rx(α) (eq. 1)")
     s = angles.vector("state", size, "of the map")
-    R, _ = pose_map.frame(s)
-    R = angles.let("R", R)
-    pairs = pose_map.angles(R, s)
-    angles.output("sine", sp.Matrix([a for a, _ in pairs]), "of α β γ")
-    angles.output("cosine", sp.Matrix([b for _, b in pairs]), "of α β γ")
+    angles.output("angles", pose_map.angles(angles, s), "α β γ [rad]")
 
     pull = new("pull", "covector of a twist to covector of a step", "λ = ωᵀ ∂ω/∂δ + vᵀ ∂p/∂δ")
     s = pull.vector("state", size, "of the map")
@@ -297,7 +322,7 @@ def _pose_rates(
     f: Function, pose_map: PoseMap, s: sp.Matrix, d_p: sp.Matrix, d_omega: sp.Matrix,
     d_state: sp.Matrix, delta: sp.Matrix,
 ) -> sp.Matrix:  # fmt: skip
-    if pose_map.name != "spatial":  # the angles are coordinates of the state
+    if pose_map.quaternion is None:  # the angles are coordinates of the state
         angles = {"alpha": 0, "beta": 0, "gamma": 0}
         angles.update({c: delta[i] for i, c in enumerate(pose_map.free) if c in angles})
         return sp.Matrix([*(d_p * delta), *(angles[c] for c in POSE[3:])])
@@ -308,9 +333,9 @@ def _pose_rates(
 
 
 def _free(f: Function, pose_map: PoseMap, s: sp.Matrix, row: sp.Matrix) -> sp.Matrix:
-    if pose_map.name == "spatial":
+    if pose_map.quaternion is not None:
         E = euler_rate_matrix(*_euler(f, pose_map, s))
-        return sp.Matrix([*row[:3], *(E.T * sp.Matrix(row[3:]))])
+        return sp.Matrix([*row[:-3, 0], *(E.T * row[-3:, 0])])
     if pose_map.name == "2tpr2tps":  # w = z / cos β, so dw = dz / cos β + z sin β / cos² β dβ
         _, w, _, _, cb, sb = s
         z, c, sine = sp.symbols("z c sine", positive=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sympy as sp
 
+from .emit import Function
+
 
 def rot_x(c: sp.Expr, s: sp.Expr) -> sp.Matrix:
     """Rotation about x, by its cosine and sine."""
@@ -27,6 +29,20 @@ def rpy(alpha: sp.Expr, beta: sp.Expr, gamma: sp.Expr) -> sp.Matrix:
         * rot_y(sp.cos(beta), sp.sin(beta))
         * rot_x(sp.cos(alpha), sp.sin(alpha))
     )
+
+
+def rpy_angles(f: Function, R: sp.Matrix) -> sp.Matrix:
+    """α, β, γ of R = Rz(γ) Ry(β) Rx(α), which R gives back near β = ±90° too.
+
+    There α and γ are angles of numbers that are rounding alone, and only their sum or difference is
+    one of R: γ is taken first, and α from Rz(γ)ᵀ R = Ry(β) Rx(α).
+    """
+    R = f.let("R", R)
+    gamma = f.angle("gamma", R[1, 0], R[0, 0])
+    s, c = f.sincos("g", gamma, "α from Rz(γ)ᵀ R, which holds whatever γ is near β = ±90°")
+    alpha = f.angle("alpha", s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1])
+    beta = f.angle("beta", -R[2, 0], sp.sqrt(R[0, 0] ** 2 + R[1, 0] ** 2))
+    return sp.Matrix([alpha, beta, gamma])
 
 
 def skew(v: sp.Matrix) -> sp.Matrix:

@@ -15,7 +15,7 @@ import mpmath as mp
 import sympy as sp
 
 from .emit import Function
-from .rotation import rot_z, rpy, skew
+from .rotation import rot_z, rpy, rpy_angles, skew
 
 SERIES_END = 10.0  # x up to which c4 and c5 come from their series: a little over π²
 SERIES_COUNT = 14  # terms: the first left out is below 1e-17 of the sum
@@ -300,17 +300,10 @@ def _error_twists() -> Function:
     return f
 
 
-def _tilts() -> Function:
-    f = Function(
-        "rotation_tilts",
-        "α and β of R = Rz(γ) Ry(β) Rx(α) once γ = atan2(R10, R00) is known",
-        "from Rz(γ)ᵀ R = Ry(β) Rx(α): it holds near β = ±90° too",
-    )
-    R = f.matrix("R", "rotation, row by row")
-    s, c = f.sincos("g", f.scalar("gamma", "γ [rad]"))
-    left = (rot_z(c, s).T * R).applyfunc(sp.expand)
-    f.output("sine", sp.Matrix([-left[1, 2], -left[2, 0]]), "of α and β")
-    f.output("cosine", sp.Matrix([left[1, 1], left[0, 0]]), "of α and β")
+def _pose() -> Function:
+    f = Function("motion_pose", "x y z α β γ of a motion", "R = Rz(γ) Ry(β) Rx(α)")
+    R, p = _motion(f)
+    f.output("pose", sp.Matrix([*p, *rpy_angles(f, R)]), "x y z [mm], α β γ [rad]")
     return f
 
 
@@ -318,6 +311,6 @@ def functions() -> list[Function]:
     """The emitted functions of screws and serial arms."""
     return [
         _near(), _far(), _exp(), _rotation_log(), _log(), _exp_jacobian(), _log_jacobian(),
-        _adjoint(), _moved(), _compose(), _invert(), _joint_error(), _tilts(),
+        _adjoint(), _moved(), _compose(), _invert(), _joint_error(), _pose(),
         _link(), _turned(), _slid(), _axis_twist(), _error_twists(),
     ]  # fmt: skip

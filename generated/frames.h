@@ -1,5 +1,5 @@
 /* Generated from derive/frames.py by `python -m derive`; never edited by hand.
- * derivation dfc15f40517de458
+ * derivation 064796f6c05fd882
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -8,13 +8,10 @@
  *     T = A B: R = Ra Rb, p = pa + Ra pb
  * in  a[6]           first: x y z [mm], α β γ [rad]
  * in  b[6]           second: x y z [mm], α β γ [rad]
- * out p[3]           origin [mm]
- * out sine[3]        of α β γ, up to a positive factor
- * out cosine[3]      of α β γ
- * operations: 28 +, 52 *, 0 /, 1 sqrt
+ * out pose[6]        x y z [mm], α β γ [rad]
+ * operations: 34 +, 62 *, 0 /, 1 sqrt
  */
-INLINE void FN(pose_compose)(const real a[6], const real b[6], real p[3], real sine[3],
-        real cosine[3])
+INLINE void FN(pose_compose)(const real a[6], const real b[6], real pose[6])
 {
     real sa_a, ca_a;
     FN(sincos)(a[3], &sa_a, &ca_a);
@@ -51,19 +48,24 @@ INLINE void FN(pose_compose)(const real a[6], const real b[6], real p[3], real s
     const real b_R7 = sb_a*cb_b;
     const real b_R8 = cb_a*cb_b;
     const real R0 = a_R0*b_R0 + a_R1*b_R3 - a_R2*sb_b;
+    const real R1 = a_R0*b_R1 + a_R1*b_R4 + a_R2*b_R7;
+    const real R2 = a_R0*b_R2 + a_R1*b_R5 + a_R2*b_R8;
     const real R3 = a_R3*b_R0 + a_R4*b_R3 - a_R5*sb_b;
+    const real R4 = a_R3*b_R1 + a_R4*b_R4 + a_R5*b_R7;
+    const real R5 = a_R3*b_R2 + a_R4*b_R5 + a_R5*b_R8;
     const real R6 = a_R7*b_R3 - sa_b*b_R0 - a_R8*sb_b;
-    const real R7 = a_R7*b_R4 + a_R8*b_R7 - sa_b*b_R1;
-    const real R8 = a_R7*b_R5 + a_R8*b_R8 - sa_b*b_R2;
-    p[0] = a[0] + a_R0*b[0] + a_R1*b[1] + a_R2*b[2];
-    p[1] = a[1] + a_R3*b[0] + a_R4*b[1] + a_R5*b[2];
-    p[2] = a[2] + a_R7*b[1] + a_R8*b[2] - sa_b*b[0];
-    sine[0] = R7;
-    sine[1] = -R6;
-    sine[2] = R3;
-    cosine[0] = R8;
-    cosine[1] = FN(root)(R0*R0 + R3*R3);
-    cosine[2] = R0;
+    const real gamma = arctangent2(R3, R0);
+    /* α from Rz(γ)ᵀ R, which holds whatever γ is near β = ±90° */
+    real sg, cg;
+    FN(sincos)(gamma, &sg, &cg);
+    const real alpha = arctangent2(R2*sg - R5*cg, R4*cg - R1*sg);
+    const real beta = arctangent2(-R6, FN(root)(R0*R0 + R3*R3));
+    pose[0] = a[0] + a_R0*b[0] + a_R1*b[1] + a_R2*b[2];
+    pose[1] = a[1] + a_R3*b[0] + a_R4*b[1] + a_R5*b[2];
+    pose[2] = a[2] + a_R7*b[1] + a_R8*b[2] - sa_b*b[0];
+    pose[3] = alpha;
+    pose[4] = beta;
+    pose[5] = gamma;
 }
 #endif
 
@@ -72,12 +74,10 @@ INLINE void FN(pose_compose)(const real a[6], const real b[6], real p[3], real s
  * the inverse of a pose
  *     T⁻¹: Rᵀ, -Rᵀ p
  * in  a[6]           pose: x y z [mm], α β γ [rad]
- * out p[3]           origin [mm]
- * out sine[3]        of α β γ, up to a positive factor
- * out cosine[3]      of α β γ
- * operations: 11 +, 24 *, 0 /, 1 sqrt
+ * out pose[6]        x y z [mm], α β γ [rad]
+ * operations: 13 +, 28 *, 0 /, 1 sqrt
  */
-INLINE void FN(pose_invert)(const real a[6], real p[3], real sine[3], real cosine[3])
+INLINE void FN(pose_invert)(const real a[6], real pose[6])
 {
     real sa_a, ca_a;
     FN(sincos)(a[3], &sa_a, &ca_a);
@@ -96,15 +96,18 @@ INLINE void FN(pose_invert)(const real a[6], real p[3], real sine[3], real cosin
     const real a_R5 = sa_b*t0 - sa_a*ca_g;
     const real a_R7 = sa_a*ca_b;
     const real a_R8 = ca_a*ca_b;
-    p[0] = a[2]*sa_b - a[0]*a_R0 - a[1]*a_R3;
-    p[1] = -a[0]*a_R1 - a[1]*a_R4 - a[2]*a_R7;
-    p[2] = -a[0]*a_R2 - a[1]*a_R5 - a[2]*a_R8;
-    sine[0] = a_R5;
-    sine[1] = -a_R2;
-    sine[2] = a_R1;
-    cosine[0] = a_R8;
-    cosine[1] = FN(root)(a_R0*a_R0 + a_R1*a_R1);
-    cosine[2] = a_R0;
+    const real gamma = arctangent2(a_R1, a_R0);
+    /* α from Rz(γ)ᵀ R, which holds whatever γ is near β = ±90° */
+    real sg, cg;
+    FN(sincos)(gamma, &sg, &cg);
+    const real alpha = arctangent2(-sa_b*sg - a_R7*cg, a_R4*cg - a_R3*sg);
+    const real beta = arctangent2(-a_R2, FN(root)(a_R0*a_R0 + a_R1*a_R1));
+    pose[0] = a[2]*sa_b - a[0]*a_R0 - a[1]*a_R3;
+    pose[1] = -a[0]*a_R1 - a[1]*a_R4 - a[2]*a_R7;
+    pose[2] = -a[0]*a_R2 - a[1]*a_R5 - a[2]*a_R8;
+    pose[3] = alpha;
+    pose[4] = beta;
+    pose[5] = gamma;
 }
 #endif
 

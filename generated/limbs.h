@@ -1,5 +1,5 @@
 /* Generated from derive/limb_functions.py by `python -m derive`; never edited by hand.
- * derivation 2e284218ac314ca2
+ * derivation a8596fa83ad0682d
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*

@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation 763d362d69e78d15
+ * derivation 2b280541b1c38441
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* the numbers of one limb, in the order of the core */
@@ -22,11 +22,11 @@ enum { DRIVER_LENGTH, DRIVER_SLIDER, DRIVER_CRANK, DRIVERS };
 #define ROW_NAMES "base_plane base;platform_plane platform;couple base platform;hinge_plane hinge"
 #define EACH_ROW(X) X(BASE_PLANE, base_plane, 0, 0) X(PLATFORM_PLANE, platform_plane, 0, 1) X(COUPLE, couple, 0, 1) X(HINGE_PLANE, hinge_plane, 2, 0)
 /* pose maps: m free coordinates, how many of them are lengths, iterated on a state */
-enum { MAP_SPATIAL, MAP_TRANSLATION, MAP_PLANAR, MAP_2TPR2TPS };
-#define MAP_NAMES "spatial translation planar 2tpr2tps"
-#define MAP_FREE "x y z alpha beta gamma;x y z;x y gamma;y z alpha beta"
+enum { MAP_SPATIAL, MAP_TRANSLATION, MAP_PLANAR, MAP_2TPR2TPS, MAP_SPHERICAL, MAP_XY };
+#define MAP_NAMES "spatial translation planar 2tpr2tps spherical xy"
+#define MAP_FREE "x y z alpha beta gamma;x y z;x y gamma;y z alpha beta;alpha beta gamma;x y"
 #define MAX_STATE 7
-#define EACH_MAP(X) X(SPATIAL, spatial, 6, 3) X(TRANSLATION, translation, 3, 3) X(PLANAR, planar, 3, 2) X(2TPR2TPS, 2tpr2tps, 4, 2)
+#define EACH_MAP(X) X(SPATIAL, spatial, 6, 3) X(TRANSLATION, translation, 3, 3) X(PLANAR, planar, 3, 2) X(2TPR2TPS, 2tpr2tps, 4, 2) X(SPHERICAL, spherical, 3, 0) X(XY, xy, 2, 2)
 #define ROW_CALLS \
     "compose a:6* b:6* -> out:6\n" \
     "invert a:6 -> out:6\n" \

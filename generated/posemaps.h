@@ -1,5 +1,5 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation becd94bbe7937f1b
+ * derivation c82604cd594b497c
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -151,30 +151,39 @@ INLINE void FN(map_spatial_tidy)(const real state[7], real moved[7])
     moved[6] = state[6]*k;
 }
 
+#ifndef NARROW
 /*
  * spatial: the reported orientation
- *     sine and cosine up to a positive factor
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
  * in  state[7]       of the map
- * out sine[3]        of α β γ
- * out cosine[3]      of α β γ
- * operations: 7 +, 18 *, 0 /, 1 sqrt
+ * out angles[3]      α β γ [rad]
+ * operations: 11 +, 25 *, 0 /, 1 sqrt
  */
-INLINE void FN(map_spatial_angles)(const real state[7], real sine[3], real cosine[3])
+INLINE void FN(map_spatial_angles)(const real state[7], real angles[3])
 {
-    const real t0 = 2.0f*state[5]*state[5] - 1.0f;
-    const real R0 = -2.0f*state[6]*state[6] - t0;
+    const real t0 = 2.0f*state[6]*state[6] - 1.0f;
+    const real R0 = -2.0f*state[5]*state[5] - t0;
     const real t1 = 2.0f*state[3];
-    const real R3 = 2.0f*state[4]*state[5] + state[6]*t1;
-    const real R6 = 2.0f*state[4]*state[6] - state[5]*t1;
-    const real R7 = state[4]*t1 + 2.0f*state[5]*state[6];
-    const real R8 = -2.0f*state[4]*state[4] - t0;
-    sine[0] = R7;
-    sine[1] = -R6;
-    sine[2] = R3;
-    cosine[0] = R8;
-    cosine[1] = FN(root)(R0*R0 + R3*R3);
-    cosine[2] = R0;
+    const real t2 = state[6]*t1;
+    const real R1 = 2.0f*state[4]*state[5] - t2;
+    const real t3 = state[5]*t1;
+    const real t4 = 2.0f*state[4];
+    const real R2 = state[6]*t4 + t3;
+    const real R3 = state[5]*t4 + t2;
+    const real R4 = -2.0f*state[4]*state[4] - t0;
+    const real R5 = 2.0f*state[5]*state[6] - state[4]*t1;
+    const real R6 = 2.0f*state[4]*state[6] - t3;
+    const real gamma = arctangent2(R3, R0);
+    /* α from Rz(γ)ᵀ R, which holds whatever γ is near β = ±90° */
+    real sg, cg;
+    FN(sincos)(gamma, &sg, &cg);
+    const real alpha = arctangent2(R2*sg - R5*cg, R4*cg - R1*sg);
+    const real beta = arctangent2(-R6, FN(root)(R0*R0 + R3*R3));
+    angles[0] = alpha;
+    angles[1] = beta;
+    angles[2] = gamma;
 }
+#endif
 
 /*
  * spatial: covector of a twist to covector of a step
@@ -363,20 +372,16 @@ INLINE void FN(map_translation_tidy)(const real state[3], real moved[3])
 
 /*
  * translation: the reported orientation
- *     sine and cosine up to a positive factor
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
  * in  state[3]       of the map
- * out sine[3]        of α β γ
- * out cosine[3]      of α β γ
+ * out angles[3]      α β γ [rad]
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(map_translation_angles)(const real state[3], real sine[3], real cosine[3])
+INLINE void FN(map_translation_angles)(const real state[3], real angles[3])
 {
-    sine[0] = FN(fill)(0.0f);
-    sine[1] = FN(fill)(0.0f);
-    sine[2] = FN(fill)(0.0f);
-    cosine[0] = FN(fill)(1.0f);
-    cosine[1] = FN(fill)(1.0f);
-    cosine[2] = FN(fill)(1.0f);
+    angles[0] = FN(fill)(0.0f);
+    angles[1] = FN(fill)(0.0f);
+    angles[2] = FN(fill)(0.0f);
 }
 
 /*
@@ -544,23 +549,22 @@ INLINE void FN(map_planar_tidy)(const real state[4], real moved[4])
     moved[3] = state[3]*kg;
 }
 
+#ifndef NARROW
 /*
  * planar: the reported orientation
- *     sine and cosine up to a positive factor
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
  * in  state[4]       of the map
- * out sine[3]        of α β γ
- * out cosine[3]      of α β γ
+ * out angles[3]      α β γ [rad]
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(map_planar_angles)(const real state[4], real sine[3], real cosine[3])
+INLINE void FN(map_planar_angles)(const real state[4], real angles[3])
 {
-    sine[0] = FN(fill)(0.0f);
-    sine[1] = FN(fill)(0.0f);
-    sine[2] = state[3];
-    cosine[0] = FN(fill)(1.0f);
-    cosine[1] = FN(fill)(1.0f);
-    cosine[2] = state[2];
+    const real gamma = arctangent2(state[3], state[2]);
+    angles[0] = FN(fill)(0.0f);
+    angles[1] = FN(fill)(0.0f);
+    angles[2] = gamma;
 }
+#endif
 
 /*
  * planar: covector of a twist to covector of a step
@@ -744,23 +748,23 @@ INLINE void FN(map_2tpr2tps_tidy)(const real state[6], real moved[6])
     moved[5] = state[5]*kb;
 }
 
+#ifndef NARROW
 /*
  * 2tpr2tps: the reported orientation
- *     sine and cosine up to a positive factor
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
  * in  state[6]       of the map
- * out sine[3]        of α β γ
- * out cosine[3]      of α β γ
+ * out angles[3]      α β γ [rad]
  * operations: 0 +, 0 *, 0 /, 0 sqrt
  */
-INLINE void FN(map_2tpr2tps_angles)(const real state[6], real sine[3], real cosine[3])
+INLINE void FN(map_2tpr2tps_angles)(const real state[6], real angles[3])
 {
-    sine[0] = state[3];
-    sine[1] = state[5];
-    sine[2] = FN(fill)(0.0f);
-    cosine[0] = state[2];
-    cosine[1] = state[4];
-    cosine[2] = FN(fill)(1.0f);
+    const real alpha = arctangent2(state[3], state[2]);
+    const real beta = arctangent2(state[5], state[4]);
+    angles[0] = alpha;
+    angles[1] = beta;
+    angles[2] = FN(fill)(0.0f);
 }
+#endif
 
 /*
  * 2tpr2tps: covector of a twist to covector of a step
@@ -852,4 +856,409 @@ INLINE void FN(map_2tpr2tps_free)(const real state[6], const real row[4], real o
     out[1] = t0;
     out[2] = row[2];
     out[3] = state[1]*state[5]*t0 + row[3];
+}
+
+#ifndef NARROW
+/*
+ * spherical: the state of a pose
+ *     α β γ about the origin, p = 0; state: the unit quaternion of R; step: ω
+ * in  pose[6]        x y z [mm], α β γ [rad]
+ * out state[4]       of the map
+ * operations: 4 +, 16 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_spherical_from_pose)(const real pose[6], real state[4])
+{
+    /* half angles */
+    real sa, ca;
+    FN(sincos)(0.5f*pose[3], &sa, &ca);
+    real sb, cb;
+    FN(sincos)(0.5f*pose[4], &sb, &cb);
+    real sg, cg;
+    FN(sincos)(0.5f*pose[5], &sg, &cg);
+    const real t0 = sb*sg;
+    state[0] = sa*t0 + ca*cb*cg;
+    state[1] = sa*cb*cg - ca*t0;
+    const real t1 = sb*cg;
+    const real t2 = cb*sg;
+    state[2] = sa*t2 + ca*t1;
+    state[3] = ca*t2 - sa*t1;
+}
+#endif
+
+/*
+ * spherical: the frame of a state
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
+ * in  state[4]       of the map
+ * out R[9]           platform to base, row by row
+ * out p[3]           platform origin [mm]
+ * operations: 11 +, 21 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_spherical_frame)(const real state[4], real R[9], real p[3])
+{
+    const real t0 = 2.0f*state[2]*state[2];
+    const real t1 = 2.0f*state[3]*state[3] - 1.0f;
+    R[0] = -t0 - t1;
+    const real t2 = 2.0f*state[0];
+    const real t3 = state[3]*t2;
+    R[1] = 2.0f*state[1]*state[2] - t3;
+    const real t4 = state[2]*t2;
+    const real t5 = 2.0f*state[1];
+    R[2] = state[3]*t5 + t4;
+    R[3] = state[2]*t5 + t3;
+    const real t6 = 2.0f*state[1]*state[1];
+    R[4] = -t1 - t6;
+    const real t7 = state[1]*t2;
+    R[5] = 2.0f*state[2]*state[3] - t7;
+    R[6] = 2.0f*state[1]*state[3] - t4;
+    R[7] = 2.0f*state[2]*state[3] + t7;
+    R[8] = 1.0f - t0 - t6;
+    p[0] = FN(fill)(0.0f);
+    p[1] = FN(fill)(0.0f);
+    p[2] = FN(fill)(0.0f);
+}
+
+/*
+ * spherical: the state moved by a step
+ *     state ⊕ delta
+ * in  state[4]       of the map
+ * in  delta[3]       step [mm, rad]
+ * out moved[4]       the new state
+ * operations: 20 +, 27 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_spherical_retract)(const real state[4], const real delta[3], real moved[4])
+{
+    /* (1, ω/2) q, then to unit length */
+    const real t0 = 0.5f*delta[0];
+    const real t1 = 0.5f*delta[1];
+    const real t2 = 0.5f*delta[2];
+    const real q0 = state[0] - state[1]*t0 - state[2]*t1 - state[3]*t2;
+    const real q1 = state[0]*t0 + state[1] + state[3]*t1 - state[2]*t2;
+    const real q2 = state[0]*t1 + state[1]*t2 + state[2] - state[3]*t0;
+    const real q3 = state[0]*t2 + state[2]*t0 + state[3] - state[1]*t1;
+    /* how far from unit length: 1/√(1 + e) by its series */
+    const real e = q0*q0 + q1*q1 + q2*q2 + q3*q3 - 1.0f;
+    const real k = 1.0f + e*(e*(0.375f + (0.2734375f*e - 0.3125f)*e) - 0.5f);
+    moved[0] = q0*k;
+    moved[1] = q1*k;
+    moved[2] = q2*k;
+    moved[3] = q3*k;
+}
+
+/*
+ * spherical: the state without what rounding added
+ *     state ⊕ 0
+ * in  state[4]       of the map, nearly
+ * out moved[4]       the state
+ * operations: 8 +, 12 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_spherical_tidy)(const real state[4], real moved[4])
+{
+    /* how far from unit length: 1/√(1 + e) by its series */
+    const real e = state[0]*state[0] + state[1]*state[1] + state[2]*state[2] + state[3]*state[3] -
+        1.0f;
+    const real k = 1.0f + e*(e*(0.375f + (0.2734375f*e - 0.3125f)*e) - 0.5f);
+    moved[0] = state[0]*k;
+    moved[1] = state[1]*k;
+    moved[2] = state[2]*k;
+    moved[3] = state[3]*k;
+}
+
+#ifndef NARROW
+/*
+ * spherical: the reported orientation
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
+ * in  state[4]       of the map
+ * out angles[3]      α β γ [rad]
+ * operations: 11 +, 25 *, 0 /, 1 sqrt
+ */
+INLINE void FN(map_spherical_angles)(const real state[4], real angles[3])
+{
+    const real t0 = 2.0f*state[3]*state[3] - 1.0f;
+    const real R0 = -2.0f*state[2]*state[2] - t0;
+    const real t1 = 2.0f*state[0];
+    const real t2 = state[3]*t1;
+    const real R1 = 2.0f*state[1]*state[2] - t2;
+    const real t3 = state[2]*t1;
+    const real t4 = 2.0f*state[1];
+    const real R2 = state[3]*t4 + t3;
+    const real R3 = state[2]*t4 + t2;
+    const real R4 = -2.0f*state[1]*state[1] - t0;
+    const real R5 = 2.0f*state[2]*state[3] - state[1]*t1;
+    const real R6 = 2.0f*state[1]*state[3] - t3;
+    const real gamma = arctangent2(R3, R0);
+    /* α from Rz(γ)ᵀ R, which holds whatever γ is near β = ±90° */
+    real sg, cg;
+    FN(sincos)(gamma, &sg, &cg);
+    const real alpha = arctangent2(R2*sg - R5*cg, R4*cg - R1*sg);
+    const real beta = arctangent2(-R6, FN(root)(R0*R0 + R3*R3));
+    angles[0] = alpha;
+    angles[1] = beta;
+    angles[2] = gamma;
+}
+#endif
+
+/*
+ * spherical: covector of a twist to covector of a step
+ *     λ = ωᵀ ∂ω/∂δ + vᵀ ∂p/∂δ
+ * in  state[4]       of the map
+ * in  omega[3]       rotation part of the covector
+ * in  v[3]           translation part of the covector
+ * out row[3]         covector of the step
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_spherical_pull)(const real state[4], const real omega[3], const real v[3],
+        real row[3])
+{
+    row[0] = omega[0];
+    row[1] = omega[1];
+    row[2] = omega[2];
+}
+
+/*
+ * spherical: rates of the pose for a step
+ *     d(x y z α β γ) = M delta
+ * in  state[4]       of the map
+ * in  delta[3]       step [mm, rad]
+ * out pose[6]        rates
+ * operations: 8 +, 20 *, 1 /, 1 sqrt
+ */
+INLINE void FN(map_spherical_rates)(const real state[4], const real delta[3], real pose[6])
+{
+    /* sin β, cos β, and γ, from R */
+    const real t0 = 2.0f*state[2];
+    const real t1 = 2.0f*state[3];
+    const real sb = state[0]*t0 - state[1]*t1;
+    const real r00 = 1.0f - 2.0f*state[2]*state[2] - 2.0f*state[3]*state[3];
+    const real r10 = state[0]*t1 + state[1]*t0;
+    const real cb = FN(root)(r00*r00 + r10*r10);
+    const real t2 = 1.0f/cb;
+    const real sg = r10*t2;
+    const real cg = r00*t2;
+    /* E⁻¹ ω, ω = E (α̇, β̇, γ̇) */
+    const real along = (delta[0]*cg + delta[1]*sg)*t2;
+    pose[0] = FN(fill)(0.0f);
+    pose[1] = FN(fill)(0.0f);
+    pose[2] = FN(fill)(0.0f);
+    pose[3] = along;
+    pose[4] = delta[1]*cg - delta[0]*sg;
+    pose[5] = delta[2] + sb*along;
+}
+
+/*
+ * spherical: twist of the frame for a step
+ *     ω = ∂ω/∂δ δ, v = ∂p/∂δ δ
+ * in  state[4]       of the map
+ * in  delta[3]       step [mm, rad]
+ * out twist[6]       (ω, v), base axes
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_spherical_twist)(const real state[4], const real delta[3], real twist[6])
+{
+    twist[0] = delta[0];
+    twist[1] = delta[1];
+    twist[2] = delta[2];
+    twist[3] = FN(fill)(0.0f);
+    twist[4] = FN(fill)(0.0f);
+    twist[5] = FN(fill)(0.0f);
+}
+
+/*
+ * spherical: rates of the state for a step
+ *     ∂state/∂delta delta
+ * in  state[4]       of the map
+ * in  delta[3]       step [mm, rad]
+ * out rate[4]        rates of the state
+ * operations: 8 +, 15 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_spherical_velocity)(const real state[4], const real delta[3], real rate[4])
+{
+    const real t0 = 0.5f*delta[0];
+    const real t1 = 0.5f*delta[1];
+    const real t2 = 0.5f*delta[2];
+    rate[0] = -state[1]*t0 - state[2]*t1 - state[3]*t2;
+    rate[1] = state[0]*t0 + state[3]*t1 - state[2]*t2;
+    rate[2] = state[0]*t1 + state[1]*t2 - state[3]*t0;
+    rate[3] = state[0]*t2 + state[2]*t0 - state[1]*t1;
+}
+
+/*
+ * spherical: covector of a step to one of the free coordinates
+ *     ∂/∂free
+ * in  state[4]       of the map
+ * in  row[3]         covector of the step
+ * out out[3]         by alpha beta gamma
+ * operations: 8 +, 21 *, 1 /, 1 sqrt
+ */
+INLINE void FN(map_spherical_free)(const real state[4], const real row[3], real out[3])
+{
+    /* sin β, cos β, and γ, from R */
+    const real t0 = 2.0f*state[2];
+    const real t1 = 2.0f*state[3];
+    const real sb = state[0]*t0 - state[1]*t1;
+    const real r00 = 1.0f - 2.0f*state[2]*state[2] - 2.0f*state[3]*state[3];
+    const real r10 = state[0]*t1 + state[1]*t0;
+    const real cb = FN(root)(r00*r00 + r10*r10);
+    const real t2 = 1.0f/cb;
+    const real sg = r10*t2;
+    const real cg = r00*t2;
+    out[0] = row[0]*cb*cg + row[1]*cb*sg - row[2]*sb;
+    out[1] = row[1]*cg - row[0]*sg;
+    out[2] = row[2];
+}
+
+/*
+ * xy: the state of a pose
+ *     x y in the plane z = 0, R = 1; state: x, y; step: (vx, vy)
+ * in  pose[6]        x y z [mm], α β γ [rad]
+ * out state[2]       of the map
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_from_pose)(const real pose[6], real state[2])
+{
+    state[0] = pose[0];
+    state[1] = pose[1];
+}
+
+/*
+ * xy: the frame of a state
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
+ * in  state[2]       of the map
+ * out R[9]           platform to base, row by row
+ * out p[3]           platform origin [mm]
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_frame)(const real state[2], real R[9], real p[3])
+{
+    R[0] = FN(fill)(1.0f);
+    R[1] = FN(fill)(0.0f);
+    R[2] = FN(fill)(0.0f);
+    R[3] = FN(fill)(0.0f);
+    R[4] = FN(fill)(1.0f);
+    R[5] = FN(fill)(0.0f);
+    R[6] = FN(fill)(0.0f);
+    R[7] = FN(fill)(0.0f);
+    R[8] = FN(fill)(1.0f);
+    p[0] = state[0];
+    p[1] = state[1];
+    p[2] = FN(fill)(0.0f);
+}
+
+/*
+ * xy: the state moved by a step
+ *     state ⊕ delta
+ * in  state[2]       of the map
+ * in  delta[2]       step [mm, rad]
+ * out moved[2]       the new state
+ * operations: 2 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_retract)(const real state[2], const real delta[2], real moved[2])
+{
+    moved[0] = state[0] + delta[0];
+    moved[1] = state[1] + delta[1];
+}
+
+/*
+ * xy: the state without what rounding added
+ *     state ⊕ 0
+ * in  state[2]       of the map, nearly
+ * out moved[2]       the state
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_tidy)(const real state[2], real moved[2])
+{
+    moved[0] = state[0];
+    moved[1] = state[1];
+}
+
+/*
+ * xy: the reported orientation
+ *     R = Rz(γ) Ry(β) Rx(α) (eq. 1)
+ * in  state[2]       of the map
+ * out angles[3]      α β γ [rad]
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_angles)(const real state[2], real angles[3])
+{
+    angles[0] = FN(fill)(0.0f);
+    angles[1] = FN(fill)(0.0f);
+    angles[2] = FN(fill)(0.0f);
+}
+
+/*
+ * xy: covector of a twist to covector of a step
+ *     λ = ωᵀ ∂ω/∂δ + vᵀ ∂p/∂δ
+ * in  state[2]       of the map
+ * in  omega[3]       rotation part of the covector
+ * in  v[3]           translation part of the covector
+ * out row[2]         covector of the step
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_pull)(const real state[2], const real omega[3], const real v[3], real row[2])
+{
+    row[0] = v[0];
+    row[1] = v[1];
+}
+
+/*
+ * xy: rates of the pose for a step
+ *     d(x y z α β γ) = M delta
+ * in  state[2]       of the map
+ * in  delta[2]       step [mm, rad]
+ * out pose[6]        rates
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_rates)(const real state[2], const real delta[2], real pose[6])
+{
+    pose[0] = delta[0];
+    pose[1] = delta[1];
+    pose[2] = FN(fill)(0.0f);
+    pose[3] = FN(fill)(0.0f);
+    pose[4] = FN(fill)(0.0f);
+    pose[5] = FN(fill)(0.0f);
+}
+
+/*
+ * xy: twist of the frame for a step
+ *     ω = ∂ω/∂δ δ, v = ∂p/∂δ δ
+ * in  state[2]       of the map
+ * in  delta[2]       step [mm, rad]
+ * out twist[6]       (ω, v), base axes
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_twist)(const real state[2], const real delta[2], real twist[6])
+{
+    twist[0] = FN(fill)(0.0f);
+    twist[1] = FN(fill)(0.0f);
+    twist[2] = FN(fill)(0.0f);
+    twist[3] = delta[0];
+    twist[4] = delta[1];
+    twist[5] = FN(fill)(0.0f);
+}
+
+/*
+ * xy: rates of the state for a step
+ *     ∂state/∂delta delta
+ * in  state[2]       of the map
+ * in  delta[2]       step [mm, rad]
+ * out rate[2]        rates of the state
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_velocity)(const real state[2], const real delta[2], real rate[2])
+{
+    rate[0] = delta[0];
+    rate[1] = delta[1];
+}
+
+/*
+ * xy: covector of a step to one of the free coordinates
+ *     ∂/∂free
+ * in  state[2]       of the map
+ * in  row[2]         covector of the step
+ * out out[2]         by x y
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_free)(const real state[2], const real row[2], real out[2])
+{
+    out[0] = row[0];
+    out[1] = row[1];
 }

@@ -1,5 +1,5 @@
 /* Generated from derive/rates.py by `python -m derive`; never edited by hand.
- * derivation e51ad75c7c0a4b9b
+ * derivation d08ef53fd1ac55ee
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*
@@ -473,6 +473,42 @@ INLINE void FN(map_2tpr2tps_bend)(const real state[6], const real delta[4], real
     twist_rate[3] = (state[4]*t1 - state[5]*t2)*delta[3];
     twist_rate[4] = FN(fill)(0.0f);
     twist_rate[5] = -(state[4]*t2 + state[5]*t1)*delta[3];
+}
+
+/*
+ * spherical: rate of the twist on the path state ⊕ δ t
+ *     (ω̇, v̇) at t = 0
+ * in  state[4]       of the map
+ * in  delta[3]       step a second [mm/s, rad/s]
+ * out twist_rate[6]  (ω̇, v̇), base axes
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_spherical_bend)(const real state[4], const real delta[3], real twist_rate[6])
+{
+    twist_rate[0] = FN(fill)(0.0f);
+    twist_rate[1] = FN(fill)(0.0f);
+    twist_rate[2] = FN(fill)(0.0f);
+    twist_rate[3] = FN(fill)(0.0f);
+    twist_rate[4] = FN(fill)(0.0f);
+    twist_rate[5] = FN(fill)(0.0f);
+}
+
+/*
+ * xy: rate of the twist on the path state ⊕ δ t
+ *     (ω̇, v̇) at t = 0
+ * in  state[2]       of the map
+ * in  delta[2]       step a second [mm/s, rad/s]
+ * out twist_rate[6]  (ω̇, v̇), base axes
+ * operations: 0 +, 0 *, 0 /, 0 sqrt
+ */
+INLINE void FN(map_xy_bend)(const real state[2], const real delta[2], real twist_rate[6])
+{
+    twist_rate[0] = FN(fill)(0.0f);
+    twist_rate[1] = FN(fill)(0.0f);
+    twist_rate[2] = FN(fill)(0.0f);
+    twist_rate[3] = FN(fill)(0.0f);
+    twist_rate[4] = FN(fill)(0.0f);
+    twist_rate[5] = FN(fill)(0.0f);
 }
 
 /*

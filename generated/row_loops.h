@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 92f796481b2717cf
+ * derivation 819687c1ff82f54f
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
@@ -11,7 +11,7 @@ int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double
         const int count = block_rows(first, n, row);
         gather_row(a, a_stride, 6, row, lane_a);
         gather_row(b, b_stride, 6, row, lane_b);
-        compose_row(lane_a, lane_b, lane_out);
+        FN(pose_compose)(lane_a, lane_b, lane_out);
         scatter_row(lane_out, 6, out, 6, row, count);
     }
     return 0;
@@ -24,7 +24,7 @@ int CALL(invert)(ptrdiff_t n, const double *a, double *out)
         real lane_a[6], lane_out[6];
         const int count = block_rows(first, n, row);
         gather_row(a, 6, 6, row, lane_a);
-        invert_row(lane_a, lane_out);
+        FN(pose_invert)(lane_a, lane_out);
         scatter_row(lane_out, 6, out, 6, row, count);
     }
     return 0;

@@ -1,5 +1,5 @@
 /* Generated from derive/screws.py by `python -m derive`; never edited by hand.
- * derivation 6ece6d74e53e8878
+ * derivation 049ec697311cf9c9
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #define SERIES_END 10.0
@@ -564,22 +564,27 @@ INLINE void FN(joint_error)(const real e[6], const real r[3], real R[9], real p[
 
 #ifndef NARROW
 /*
- * α and β of R = Rz(γ) Ry(β) Rx(α) once γ = atan2(R10, R00) is known
- *     from Rz(γ)ᵀ R = Ry(β) Rx(α): it holds near β = ±90° too
+ * x y z α β γ of a motion
+ *     R = Rz(γ) Ry(β) Rx(α)
  * in  R[9]           rotation, row by row
- * in  gamma          γ [rad]
- * out sine[2]        of α and β
- * out cosine[2]      of α and β
- * operations: 3 +, 6 *, 0 /, 0 sqrt
+ * in  p[3]           displacement [mm]
+ * out pose[6]        x y z [mm], α β γ [rad]
+ * operations: 3 +, 6 *, 0 /, 1 sqrt
  */
-INLINE void FN(rotation_tilts)(const real R[9], real gamma, real sine[2], real cosine[2])
+INLINE void FN(motion_pose)(const real R[9], const real p[3], real pose[6])
 {
+    const real gamma = arctangent2(R[3], R[0]);
+    /* α from Rz(γ)ᵀ R, which holds whatever γ is near β = ±90° */
     real sg, cg;
     FN(sincos)(gamma, &sg, &cg);
-    sine[0] = R[2]*sg - R[5]*cg;
-    sine[1] = -R[6];
-    cosine[0] = R[4]*cg - R[1]*sg;
-    cosine[1] = R[0]*cg + R[3]*sg;
+    const real alpha = arctangent2(R[2]*sg - R[5]*cg, R[4]*cg - R[1]*sg);
+    const real beta = arctangent2(-R[6], FN(root)(R[0]*R[0] + R[3]*R[3]));
+    pose[0] = p[0];
+    pose[1] = p[1];
+    pose[2] = p[2];
+    pose[3] = alpha;
+    pose[4] = beta;
+    pose[5] = gamma;
 }
 #endif
 

@@ -15,7 +15,10 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal import screw as screw
     from pkmcal import trajectory as trajectory
     from pkmcal.arms.arm import SerialArm as SerialArm
+    from pkmcal.arms.denavit_hartenberg import DHTable as DHTable
     from pkmcal.arms.inverse import ArmInverse as ArmInverse
+    from pkmcal.calibration.anchors import LocatedAnchors as LocatedAnchors
+    from pkmcal.calibration.anchors import locate_anchors as locate_anchors
     from pkmcal.calibration.bootstrap import Bootstrap as Bootstrap
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
     from pkmcal.calibration.identification import Identification as Identification
@@ -29,8 +32,11 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.compensation.compensate import compensate as compensate
     from pkmcal.compensation.correction_grid import CorrectionGrid as CorrectionGrid
     from pkmcal.compensation.correction_grid import correction_grid as correction_grid
+    from pkmcal.compensation.program import CorrectedProgram as CorrectedProgram
+    from pkmcal.compensation.program import compensate_program as compensate_program
     from pkmcal.compensation.pso import SwarmResult as SwarmResult
     from pkmcal.compensation.pso import pso as pso
+    from pkmcal.controllers.import_printer import import_printer as import_printer
     from pkmcal.core.swarm import CONSTRICTION as CONSTRICTION
     from pkmcal.core.swarm import SwarmSettings as SwarmSettings
     from pkmcal.error_model.allocation import Allocation as Allocation
@@ -45,7 +51,6 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.exceptions import CalibrationWarning as CalibrationWarning
     from pkmcal.exceptions import Error as Error
     from pkmcal.exceptions import FileError as FileError
-    from pkmcal.export.import_printer import import_printer as import_printer
     from pkmcal.geometry.geometry import Geometry as Geometry
     from pkmcal.kinematics.dexterity import Dexterity as Dexterity
     from pkmcal.kinematics.dexterity import dexterity as dexterity
@@ -60,6 +65,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.loading import machines as machines
     from pkmcal.measurements.measurement_csv import read_measurements as read_measurements
     from pkmcal.measurements.measurements import Measurements as Measurements
+    from pkmcal.measurements.probe import probed as probed
     from pkmcal.measurements.tracker import Tracker as Tracker
     from pkmcal.measurements.virtual_machine import VirtualMachine as VirtualMachine
     from pkmcal.modes.assemblies import Assemblies as Assemblies
@@ -70,15 +76,18 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
 
 _HOMES = {
     "arms.arm": ("SerialArm",),
+    "arms.denavit_hartenberg": ("DHTable",),
     "arms.inverse": ("ArmInverse",),
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),
+    "calibration.anchors": ("LocatedAnchors", "locate_anchors"),
     "calibration.plan_poses": ("Plan", "plan_poses"),
     "checks.check_geometry": ("GeometryCheck", "check_geometry"),
     "checks.finding": ("Finding",),
     "compensation.compensate": ("Compensation", "compensate"),
     "compensation.correction_grid": ("CorrectionGrid", "correction_grid"),
+    "compensation.program": ("CorrectedProgram", "compensate_program"),
     "compensation.pso": ("SwarmResult", "pso"),
     "core.swarm": ("CONSTRICTION", "SwarmSettings"),
     "error_model.allocation": ("Allocation", "allocate_tolerance"),
@@ -91,7 +100,7 @@ _HOMES = {
         "Error",
         "FileError",
     ),
-    "export.import_printer": ("import_printer",),
+    "controllers.import_printer": ("import_printer",),
     "geometry.geometry": ("Geometry",),
     "kinematics.dexterity": ("Dexterity", "dexterity"),
     "kinematics.forward": ("Forward",),
@@ -102,6 +111,7 @@ _HOMES = {
     "loading": ("load", "machines"),
     "measurements.measurement_csv": ("read_measurements",),
     "measurements.measurements": ("Measurements",),
+    "measurements.probe": ("probed",),
     "measurements.tracker": ("Tracker",),
     "measurements.virtual_machine": ("VirtualMachine",),
     "modes.assemblies": ("Assemblies",),

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
-from typing import ClassVar
+from importlib import import_module
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pkmcal.display import Table, first_rows, visible
+from pkmcal.exceptions import ArgumentError
 
 
 class Result:
@@ -31,6 +33,23 @@ class Result:
 
     def __str__(self) -> str:
         return visible("\n".join(str(part) for part in self._parts()))
+
+    def _columns(self) -> Mapping[str, Sequence[Any]]:
+        """Columns of a data frame by heading; a result that has rows gives them."""
+        raise ArgumentError(f"a {type(self).__name__} has no rows to make a data frame of")
+
+    def to_pandas(self) -> Any:
+        """The rows as a pandas data frame, where pandas is installed; mm and rad.
+
+        Raises
+        ------
+        ImportError
+            pandas is not installed.
+        ValueError
+            This result has no rows.
+        """
+        columns = self._columns()
+        return import_module("pandas").DataFrame(dict(columns))
 
     def _repr_html_(self) -> str:
         return "\n".join(

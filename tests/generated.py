@@ -1,7 +1,8 @@
 """Machines that nobody drew: random limbs, gains, frames, shared actuators, strokes of any turn.
 
-Each is assembled at home by construction: joints, directions and drives are drawn, and the lengths
-follow. What it does is judged by `twin_rows`, which knows nothing of the core.
+Homes are level, near γ = 180° or where β is ±90°. Each machine is assembled at home by
+construction: joints, directions and drives are drawn, and the lengths follow. What it does is
+judged by `twin_rows`, which knows nothing of the core.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 import pkmcal as pk
 
 from .robots import made
+from .twin import rotation
 
 SIZE = 300.0  # mm
 ROOM = np.array([0.1 * SIZE] * 3 + [0.2] * 3)  # half widths of the box of poses about home
@@ -46,10 +48,17 @@ def machine(kind: str, rng: np.random.Generator, *, errors: float = 0.0) -> pk.R
 
 
 def poses(kind: str, robot: pk.Robot, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Random poses about home, in the machine's own frame."""
+    """Random poses about home, in the machine's own frame.
+
+    Of a machine whose home has β = ±90°, half of them are nearer to that by any power of ten.
+    """
     at = np.tile(robot.own_home, (count, 1))
     free = list(FREE[kind])
     at[:, free] += ROOM[free] * rng.uniform(-1, 1, (count, len(free)))
+    if abs(robot.own_home[4]) == np.pi / 2:
+        near = rng.random(count) < 0.5
+        off = 10.0 ** -rng.uniform(1, 18, near.sum())
+        at[near, 4] = robot.own_home[4] + rng.choice([-1, 1], near.sum()) * off
     return at
 
 
@@ -68,6 +77,12 @@ def _drawn(kind: str, rng: np.random.Generator) -> pk.Robot:
     home = {"z": SIZE * rng.uniform(0.8, 1.4)}
     if kind == "planar":
         home = {"x": rng.uniform(-20, 20), "y": rng.uniform(-20, 20), "gamma": rng.uniform(-3, 3)}
+    turned = rng.random() if kind in ("six", "redundant") else 1.0
+    if turned < 0.3:
+        home |= {"alpha": rng.uniform(-3, 3), "gamma": rng.uniform(-3, 3)}
+        home["beta"] = rng.choice([-1, 1]) * np.pi / 2
+    elif turned < 0.6:
+        home["gamma"] = np.pi + rng.uniform(-0.2, 0.2)
     sections: dict[str, Any] = {}
     if kind == "tripod":
         limbs = _tripod(rng)
@@ -79,12 +94,14 @@ def _drawn(kind: str, rng: np.random.Generator) -> pk.Robot:
         count = {"six": 6, "translation": 3, "planar": 3, "redundant": int(rng.integers(7, 10))}
         limbs = [_limb(*_joints(kind, i, count[kind], rng), home, kind, rng)
                  for i in range(count[kind])]  # fmt: skip
-    if rng.random() < 0.3 and kind not in CONSTRAINED:
+    if rng.random() < 0.3:
         sections["frames"] = {
             name: dict(zip(COORDINATES, rng.uniform(-1, 1, 6) * [100, 100, 100, 3, 1.4, 3],
                            strict=True))
             for name in ("base", "tool")
         }  # fmt: skip
+        if rng.random() < 0.3:
+            sections["frames"]["base"]["beta"] = np.pi / 2
     map = {"translation": "translation", "planar": "planar"}.get(kind, "spatial")
     return made(map, home, limbs, **sections)
 
@@ -92,7 +109,7 @@ def _drawn(kind: str, rng: np.random.Generator) -> pk.Robot:
 def _joints(
     kind: str, i: int, count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Base and platform joint of limb i, the latter in the platform's frame."""
+    """Base and platform joint of limb i, the latter from the platform's origin at home."""
     angle = 2 * np.pi * (i + rng.uniform(-0.2, 0.2)) / count
     other = angle + rng.choice([-0.6, 0.6]) * (i % 2 or rng.random()) + rng.uniform(-0.2, 0.2)
     base = SIZE * np.array([np.cos(angle), np.sin(angle), rng.uniform(-0.2, 0.2)])
@@ -110,11 +127,13 @@ def _limb(
     rng: np.random.Generator,
 ) -> dict[str, Any]:
     """A limb of any kind between two joints at home."""
-    turn = home.get("gamma", 0.0)
-    c, s = np.cos(turn), np.sin(turn)
-    at = np.array([home.get(name, 0.0) for name in "xyz"])
-    h = at + np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ platform - base
-    limb = {"base": base, "platform": platform, "gain": rng.choice([-1, 1]) * rng.uniform(0.5, 2)}
+    at = np.array([home.get(name, 0.0) for name in COORDINATES])
+    h = at[:3] + platform - base
+    limb = {
+        "base": base,
+        "platform": rotation(at).T @ platform,
+        "gain": rng.choice([-1, 1]) * rng.uniform(0.5, 2),
+    }
     which = rng.choice(["UPS", "PUS", "RUS", "RUS"])
     if which == "UPS":
         return limb | {"kind": "UPS", "offset": rng.uniform(-100, 100)}

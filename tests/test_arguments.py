@@ -227,6 +227,11 @@ CALLS: dict[str, Call] = {
         {"path": "probe.csv", "comment": "# of a test"},
         {"path": "path", "comment": "comment"},
     ),
+    "probed": (
+        pk.probed,
+        {"robot": pk.load("linear-delta"), "points": [[0.0, 0.0, 0.2]], "offset": [0.0, 0.0, 0.0]},
+        {"robot": "robot", "points": "numbers", "offset": "numbers"},
+    ),
     "read_measurements": (pk.read_measurements, {"path": "probe.csv"}, {"path": "path"}),
     "Tracker": (
         pk.Tracker,
@@ -483,7 +488,7 @@ def test_every_public_call_is_among_them() -> None:
         *("Allocation", "ArmInverse", "Assemblies", "Bootstrap", "Certificate", "Compensation"),
         *("CorrectionGrid", "Dexterity", "Event", "Feasibility", "Finding", "Forward"),
         *("Geometry", "GeometryCheck", "Identification", "Move", "MoveSample", "Plan"),
-        *("Sensitivity", "SwarmResult", "Tolerance", "Workspace"),
+        *("DHTable", "Sensitivity", "SwarmResult", "Tolerance", "Workspace"),
     }
     raised = {"ArgumentError", "ArgumentTypeError", "CalibrationWarning", "Error", "FileError"}
     no_calls = {"machines", "CONSTRICTION", "export", "screw", "trajectory"}

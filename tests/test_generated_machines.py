@@ -30,7 +30,7 @@ def missed(robot: pk.Robot, own: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def determinant_sides(robot: pk.Robot, own: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Sign of the closures' determinant by differences of the twin, (N,)."""
+    """Sign of the closures' determinant by differences of the twin, by a twist, (N,)."""
     columns = []
     for i in generated.FREE[kind_of(robot)]:
         step = np.zeros(6)
@@ -39,7 +39,8 @@ def determinant_sides(robot: pk.Robot, own: np.ndarray, q: np.ndarray) -> np.nda
         change -= twin_rows.closures(robot.model, own - step, q)
         columns.append(change / step[i] / (1.0 if i < 3 else robot.length))
     with np.errstate(invalid="ignore"):  # out of reach
-        return np.linalg.det(np.stack(columns, axis=-1))
+        by_coordinates = np.linalg.det(np.stack(columns, axis=-1))
+    return by_coordinates * np.sign(np.cos(own[:, 4]))  # cos β is that of α β γ by the turning
 
 
 def kind_of(robot: pk.Robot) -> str:
@@ -56,17 +57,25 @@ def judged(kind: str, seed: int, rows: int) -> Counter[str]:
     # there ...
     if kind in generated.CONSTRAINED:
         names = MATCHES[kind][rng.integers(3)]
-        at = robot.complete(own, names)
-        q = robot.inverse(own, names)
+        at = robot.complete(out(own), names)
+        q = robot.inverse(out(own), names)
         known = np.isfinite(q).all(axis=1)
         kept = [POSE.index(name) for name in names]
         found["wrong: half known"] += int((known != np.isfinite(at).all(axis=1)).sum())
-        off = np.abs(at - own)[known][:, kept].max(axis=1, initial=0.0)
-        found["wrong: not kept"] += int((off > 1e-6).sum())
-        own = at
+        off = at - out(own)
+        off[:, 3:] = (off[:, 3:] + np.pi) % (2 * np.pi) - np.pi
+        not_kept = np.abs(off)[known][:, kept].max(axis=1, initial=0.0) > 1e-6
+        found["wrong: not kept"] += int(not_kept.sum())
+        own = robot.frames.inward(at)
     else:
         q = robot.inverse(out(own))
         known = np.isfinite(q).all(axis=1)
+        if (
+            abs(robot.own_home[4]) < 1.0
+            and robot.violation(out(own[known])).max(initial=0.0) < CLOSED
+        ):
+            completed = robot.complete(out(own[known]))
+            found["wrong: taken but not completed"] += int(np.isnan(completed).any(axis=1).sum())
     found["out of reach"] += int((~known).sum())
     own, q = own[known], q[known]
     found["wrong: inverse"] += int((missed(robot, own, q) > CLOSED).sum())

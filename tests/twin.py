@@ -67,6 +67,7 @@ def free_columns(model: Any) -> list[int]:
         "spatial": [0, 1, 2, 3, 4, 5],
         "translation": [0, 1, 2],
         "planar": [0, 1, 5],
+        "xy": [0, 1],
         "2tpr2tps": [1, 2, 3, 4],
     }[model.map]
 

@@ -10,6 +10,10 @@ import numpy as np
 
 from pkmcal.geometry import robot_file
 
+# Machines whose limbs are chains of joints: tests/kinematics/test_chains.py and tests/checks hold
+# their laws, where others are of spheres.
+CHAINS = tuple(name for name in robot_file.builtin_names() if robot_file.read(name).chains)
+
 # Half widths of the box about the home pose: x y z in mm, alpha beta gamma in rad. A coordinate
 # that the machine does not move, or that follows from the others, has 0. rbt-6t03p-printed has no
 # workspace: it is singular in every pose.

@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import partial
 from os import PathLike
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import screw
 from pkmcal.arms import arm_file
-from pkmcal.arms.denavit_hartenberg import Convention, screws_of
+from pkmcal.arms.denavit_hartenberg import Convention, DHTable, screws_of, table_of
 from pkmcal.arms.inputs import motion
 from pkmcal.arms.serial_chain import SerialChain
 from pkmcal.arrays import FloatArray
 from pkmcal.display import Table, fixed
-from pkmcal.exceptions import FileError
+from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.reading import Input
 from pkmcal.result import Result
 
@@ -45,6 +46,10 @@ class SerialArm(SerialChain, Result):
         For messages and files.
     joint_errors : array_like (n, 6), optional
         Its errors Δx Δy Δz Δφ Δθ Δψ, mm and rad, wherever a call gives no others; 0 by default.
+    joint_names : sequence of str, optional
+        What the joints are called, so that columns of measurements may be.
+    source : (path, tip, base), optional
+        The URDF file it was read from; `from_urdf` gives it.
 
     Raises
     ------
@@ -162,14 +167,8 @@ class SerialArm(SerialChain, Result):
         ValueError, TypeError
             A wrong shape, no numbers, or errors that are not finite.
         """
-        return SerialArm(
-            self._axes,
-            self._points,
-            self._home,
-            kinds=self.kinds,
-            name=self.name,
-            joint_errors=joint_errors,
-        )
+        changed: Any = {**self.arguments, "joint_errors": joint_errors}
+        return SerialArm(**changed)
 
     def corrected(self) -> SerialArm:
         """The same arm without joint errors: they are built into its axes, points and home.
@@ -182,11 +181,44 @@ class SerialArm(SerialChain, Result):
             before = before @ moved
             axes[i] = before[:3, :3] @ self._axes[i]
             points[i] = before[:3, :3] @ self._points[i] + before[:3, 3]
-        return SerialArm(axes, points, before @ self._home, kinds=self.kinds, name=self.name)
+        return SerialArm(
+            axes,
+            points,
+            before @ self._home,
+            kinds=self.kinds,
+            name=self.name,
+            joint_names=self.joint_names,
+        )
 
     def error_motions(self) -> FloatArray:
         """The motions E by its joint errors, in the base (eq. 10 and 18), (n, 4, 4)."""
         return screw.at_points(self._errors, self._points)
+
+    def dh(self, convention: Convention = "standard") -> DHTable:
+        """Denavit–Hartenberg numbers of the arm, its joint errors built in.
+
+        Any arm has them, between a base and a tool. Where neighbouring axes are nearly parallel,
+        a and d are large, far-off numbers that cancel, and small errors change them much.
+
+        Parameters
+        ----------
+        convention : {"standard", "modified"}
+            As in `from_dh`.
+
+        Returns
+        -------
+        DHTable
+            .a .alpha .d .theta (n,), mm and rad, and .base and .tool (4, 4).
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> arm = pk.SerialArm.from_dh(a=[300, 200], alpha=0, d=[0, 50])
+        >>> arm.dh().a.tolist(), arm.dh().d.tolist()
+        ([300.0, 200.0], [0.0, 50.0])
+        """
+        real = self.corrected()
+        return table_of(real.axes, real.points, real.home, convention)
 
     # files --------------------------------------------------------------------------------------
 
@@ -205,7 +237,7 @@ class SerialArm(SerialChain, Result):
     def save_urdf(
         self,
         path: str | PathLike[str],
-        source: str | PathLike[str],
+        source: str | PathLike[str] | None = None,
         tip: str | None = None,
         *,
         base: str | None = None,
@@ -218,18 +250,23 @@ class SerialArm(SerialChain, Result):
         ----------
         path : str or path
             Where to write; complete or untouched.
-        source : str or path
-            The URDF file this arm was read from.
+        source : str or path, optional
+            The URDF file this arm was read from; by default the one it remembers, with its tip
+            and base.
         tip, base : str, optional
             As in `from_urdf`.
 
         Raises
         ------
         ValueError
-            The source holds another arm.
+            The source holds another arm, or none is known.
         """
         from pkmcal.arms import urdf
 
+        if source is None:
+            if self.source is None:
+                raise ArgumentError("source: this arm was not read from a URDF file; name one")
+            source, tip, base = self.source
         read = Input(source)
         if not self._is_alike(SerialArm.from_urdf(read, tip, base)):
             raise FileError(f"source: {source} holds another arm than this one")

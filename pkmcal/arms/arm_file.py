@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,7 @@ def parse(source: Source) -> ArmArguments:
     tool.only(("home",))
     joints = top.tables("joint", "an arm")
     for joint in joints:
-        joint.only(("kind", "axis", "point", "error"))
+        joint.only(("name", "kind", "axis", "point", "error"))
     kinds = [joint.choice("kind", KINDS, "kind of joint") for joint in joints]
     return {
         "axes": np.array([joint.vector("axis") for joint in joints]),
@@ -52,6 +52,8 @@ def parse(source: Source) -> ArmArguments:
         "kinds": kinds_of(kinds, len(joints)),
         "name": top.text("name"),
         "joint_errors": np.array([_error(joint) for joint in joints]),
+        "joint_names": _names(joints),
+        "source": None,
     }
 
 
@@ -66,13 +68,29 @@ def write(arm: ArmArguments, path: str | os.PathLike[str], comment: str = "") ->
     head = {"name": arm["name"], "units": {"length": "mm", "angle": "rad"}}
     blocks = [HEADER, lines(head), "[tool]\n" + lines({"home": arm["home"][:3].tolist()})]
     for i, kind in enumerate(arm["kinds"]):
-        joint: dict[str, Any] = {"kind": kind, "axis": arm["axes"][i].tolist()}
+        joint: dict[str, Any] = {}
+        if arm["joint_names"] is not None:
+            joint["name"] = arm["joint_names"][i]
+        joint |= {"kind": kind, "axis": arm["axes"][i].tolist()}
         joint["point"] = arm["points"][i].tolist()
         error = dict(zip(ERRORS, arm["joint_errors"][i].tolist(), strict=True))
         if any(error.values()):
             joint["error"] = error
         blocks.append("[[joint]]\n" + lines(joint))
     write_whole(path, arguments.comment(comment) + "\n".join(blocks))
+
+
+def _names(joints: Sequence[Table]) -> tuple[str, ...] | None:
+    """Names of the joints: of all, each another one, or of none."""
+    if not any("name" in joint for joint in joints):
+        return None
+    names: list[str] = []
+    for joint in joints:
+        name = joint.text("name")
+        if name in names:
+            joint.fail("name", f"{name!r} is another joint's name")
+        names.append(name)
+    return tuple(names)
 
 
 def _point(joint: Table) -> list[float]:

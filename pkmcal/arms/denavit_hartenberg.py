@@ -1,7 +1,8 @@
-"""Axes, points and home of an arm from Denavit–Hartenberg numbers."""
+"""Axes, points and home of an arm from Denavit–Hartenberg numbers, and back."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -13,6 +14,8 @@ from pkmcal.arrays import FloatArray, as_numbers
 from pkmcal.exceptions import ArgumentError
 
 Convention = Literal["standard", "modified"]
+_PARALLEL = 1e-10  # sine of the angle between axes of which the common normal is anyone's
+_SAME = 1e-9  # mm, and of unit vectors
 
 
 def screws_of(
@@ -50,3 +53,102 @@ def screws_of(
         if convention == "standard":
             frame = frame @ across[i]
     return axes, points, frame
+
+
+@dataclass(frozen=True)
+class DHTable:
+    """Denavit–Hartenberg numbers of an arm, between a base and a tool that hold the rest.
+
+    Attributes
+    ----------
+    a, alpha, d, theta : ndarray (n,)
+        mm and rad; of the variable, θ or of a prismatic joint d, the offset.
+    convention : {"standard", "modified"}
+    base, tool : ndarray (4, 4)
+        The first frame in the base, and the tool in the last frame, mm.
+    """
+
+    a: FloatArray
+    alpha: FloatArray
+    d: FloatArray
+    theta: FloatArray
+    convention: Convention
+    base: FloatArray
+    tool: FloatArray
+
+
+def table_of(
+    axes: FloatArray, points: FloatArray, home: FloatArray, convention: Convention
+) -> DHTable:
+    """The numbers of an arm: the inverse of `screws_of`, for any axes.
+
+    Of each pair of neighbouring axes the common normal is x, on the side where x was before; of
+    parallel ones that through the frame before, or at last through the tool. Axes that are nearly
+    parallel have it far away: a and d are then large and cancel. The tool's z counts as an axis.
+    """
+    word("convention", convention, get_args(Convention))
+    z = np.vstack([axes, home[:3, 2]])
+    on = np.vstack([points, home[:3, 3]])
+    x = _across(z[0], np.eye(3)[0])
+    origin = on[0] - z[0] * (on[0] @ z[0])  # the point of axis 1 next to the base's origin
+    base = _frame(x, z[0], origin)
+    rows = np.empty((len(axes), 4))
+    for i in range(len(axes)):
+        near = on[-1] if i + 1 == len(axes) else origin  # where the normal of parallel axes is
+        normal, foot, end = _normal(z[i], on[i], z[i + 1], on[i + 1], x, near)
+        rows[i, 3] = np.arctan2(z[i] @ np.cross(x, normal), x @ normal)  # θ
+        rows[i, 2] = (foot - origin) @ z[i]  # d
+        rows[i, 0] = (end - foot) @ normal  # a
+        rows[i, 1] = np.arctan2(normal @ np.cross(z[i], z[i + 1]), z[i] @ z[i + 1])  # α
+        x, origin = normal, end
+    a, alpha, d, theta = rows.T.copy()
+    tool = np.linalg.inv(_frame(x, z[-1], origin)) @ home
+    if convention == "modified":
+        along = np.zeros((6,))
+        along[0], along[3] = alpha[-1], a[-1]
+        tool = screw.exp(along) @ tool
+        a, alpha = np.roll(a, 1), np.roll(alpha, 1)
+        a[0] = alpha[0] = 0.0
+    return DHTable(a, alpha, d, theta, convention, base, tool)
+
+
+def _normal(
+    z: FloatArray,
+    on: FloatArray,
+    other: FloatArray,
+    beyond: FloatArray,
+    before: FloatArray,
+    origin: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Common normal of two axes, and where it leaves the one and meets the other."""
+    cross = np.cross(z, other)
+    sine = np.linalg.norm(cross)
+    if sine < _PARALLEL:
+        foot = on + z * ((origin - on) @ z)
+        end = beyond + other * ((foot - beyond) @ other)
+        apart = end - foot
+        far = np.linalg.norm(apart)
+        normal = apart / far if far > _SAME else _across(z, before)
+    else:
+        normal = cross / sine
+        ways = np.stack([z, -other, normal], axis=1)
+        s, t, _ = np.linalg.solve(ways, beyond - on)
+        foot, end = on + s * z, beyond + t * other
+    if normal @ before < -_SAME:
+        normal = -normal
+    return normal, foot, end
+
+
+def _across(z: FloatArray, wanted: FloatArray) -> FloatArray:
+    """The direction across z that is nearest to the wanted one."""
+    across = wanted - z * (z @ wanted)
+    if np.linalg.norm(across) < _SAME:
+        across = np.eye(3)[1] - z * z[1]
+    unit: FloatArray = across / np.linalg.norm(across)
+    return unit
+
+
+def _frame(x: FloatArray, z: FloatArray, origin: FloatArray) -> FloatArray:
+    frame = np.eye(4)
+    frame[:3] = np.stack([x, np.cross(z, x), z, origin], axis=1)
+    return frame

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, TypedDict
+from typing import Literal, NamedTuple, TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import screw
-from pkmcal.arguments import word, words
+from pkmcal.arguments import shown, word, words
 from pkmcal.arrays import FloatArray, as_numbers, as_rows
 from pkmcal.core.screws import FRAMES
 from pkmcal.exceptions import ArgumentError
@@ -21,6 +21,14 @@ KINDS: tuple[JointKind, ...] = ("revolute", "prismatic")
 ERRORS = ("dx", "dy", "dz", "dphi", "dtheta", "dpsi")  # of a joint: three in mm, three in rad
 
 
+class Source(NamedTuple):
+    """The URDF file that an arm was read from, and the links between which it is."""
+
+    path: str
+    tip: str | None
+    base: str | None
+
+
 class ArmArguments(TypedDict):
     """The arguments of `SerialArm`: what readers of files return and writers take."""
 
@@ -30,6 +38,18 @@ class ArmArguments(TypedDict):
     kinds: tuple[JointKind, ...]
     name: str
     joint_errors: FloatArray
+    joint_names: tuple[str, ...] | None
+    source: Source | None
+
+
+def names_of(given: Sequence[str] | None, joints: int) -> tuple[str, ...] | None:
+    """Check the names of joints: a different one for each, or None."""
+    if given is None:
+        return None
+    names = words("joint_names", given)
+    if len(names) != joints or len(set(names)) < joints:
+        raise ArgumentError(f"joint_names: {joints} different names, found {shown(given)}")
+    return names
 
 
 def axes_and_points(axes: ArrayLike, points: ArrayLike) -> tuple[FloatArray, FloatArray]:

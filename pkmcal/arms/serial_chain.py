@@ -12,12 +12,14 @@ from pkmcal.arms.inputs import (
     ArmArguments,
     Frame,
     JointKind,
+    Source,
     axes_and_points,
     checked_errors,
     frame_number,
     joint_frames,
     kinds_of,
     motion,
+    names_of,
 )
 from pkmcal.arms.inverse import ArmInverse, Part, damped_least_squares
 from pkmcal.arrays import FloatArray, Unit, as_rows
@@ -29,6 +31,11 @@ class SerialChain:
     """What a `SerialArm` computes: where its tool is, twists by joints and errors, the inverse.
 
     Its parameters are those of `SerialArm`.
+
+    Attributes
+    ----------
+    core : pkmcal.core.screws.Arm
+        The arm as the core has it.
     """
 
     def __init__(
@@ -40,17 +47,21 @@ class SerialChain:
         kinds: str | Sequence[str] | None = None,
         name: str = "serial arm",
         joint_errors: ArrayLike | None = None,
+        joint_names: Sequence[str] | None = None,
+        source: Source | None = None,
     ) -> None:
         self._name = instance("name", name, str)
         self._axes, self._points = axes_and_points(axes, points)
         self._kinds = kinds_of(kinds, len(self._axes))
+        self._joint_names = names_of(joint_names, len(self._axes))
+        self._source = source
         self._home = motion("home", home)
         prismatic = np.array([kind == "prismatic" for kind in self._kinds], dtype=np.int32)
-        self._arm = Arm(prismatic, joint_frames(self._axes), self._points, self._home)
+        self.core = Arm(prismatic, joint_frames(self._axes), self._points, self._home)
         self._errors = np.zeros((self.n_joints, 6))
         if joint_errors is not None:
             self._errors += checked_errors(joint_errors, self.n_joints, ())
-        self._links = self._arm.links(self._errors)
+        self._links = self.core.links(self._errors)
         if not np.isfinite(self._links.numbers).all():
             raise ArgumentError("points, home or joint_errors are too large to be computed with")
 
@@ -63,6 +74,16 @@ class SerialChain:
     def kinds(self) -> tuple[JointKind, ...]:
         """Kind of each joint, "revolute" or "prismatic"."""
         return self._kinds
+
+    @property
+    def joint_names(self) -> tuple[str, ...] | None:
+        """What the joints are called, as in a URDF file and in logs of controllers."""
+        return self._joint_names
+
+    @property
+    def source(self) -> Source | None:
+        """The URDF file it was read from (path, tip, base), for `save_urdf`."""
+        return self._source
 
     @property
     def n_joints(self) -> int:
@@ -124,6 +145,8 @@ class SerialChain:
             "kinds": self.kinds,
             "name": self.name,
             "joint_errors": self.joint_errors,
+            "joint_names": self.joint_names,
+            "source": self.source,
         }
 
     # kinematics ---------------------------------------------------------------------------------
@@ -158,7 +181,7 @@ class SerialChain:
             A wrong shape, no numbers, or errors that are not finite.
         """
         rows, shape, links = self._given(theta, joint_errors)
-        return self._arm.forward(rows, links, threads).reshape(*shape, 4, 4)
+        return self.core.forward(rows, links, threads).reshape(*shape, 4, 4)
 
     def jacobian(
         self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: Frame = "space"
@@ -187,7 +210,7 @@ class SerialChain:
         """
         seen = frame_number(frame)
         rows, shape, links = self._given(theta, joint_errors)
-        return self._arm.jacobian(rows, links, seen).reshape(*shape, 6, self.n_joints)
+        return self.core.jacobian(rows, links, seen).reshape(*shape, 6, self.n_joints)
 
     def error_jacobian(
         self, theta: ArrayLike, joint_errors: ArrayLike | None = None, frame: Frame = "space"
@@ -215,7 +238,7 @@ class SerialChain:
         """
         seen = frame_number(frame)
         rows, shape, links = self._given(theta, joint_errors)
-        return self._arm.error_jacobian(rows, links, seen).reshape(*shape, 6, 6 * self.n_joints)
+        return self.core.error_jacobian(rows, links, seen).reshape(*shape, 6, 6 * self.n_joints)
 
     def inverse(
         self,
@@ -260,4 +283,4 @@ class SerialChain:
         if joint_errors is None:
             return rows, shape, self._links
         errors = checked_errors(joint_errors, self.n_joints, shape)
-        return rows, shape, self._arm.links(errors)
+        return rows, shape, self.core.links(errors)

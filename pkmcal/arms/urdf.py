@@ -11,7 +11,7 @@ import numpy as np
 from pkmcal import screw
 from pkmcal.arguments import did_you_mean
 from pkmcal.arms import urdf_file
-from pkmcal.arms.inputs import ArmArguments, JointKind
+from pkmcal.arms.inputs import ArmArguments, JointKind, Source
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import FileError
 from pkmcal.files.atomic import write_whole
@@ -45,6 +45,8 @@ def read(path: str | os.PathLike[str], tip: str | None, base: str | None) -> Arm
         "kinds": tuple(joint.kind for joint in joints),
         "name": name,
         "joint_errors": np.zeros((len(joints), 6)),
+        "joint_names": tuple(joint.name for joint in joints),
+        "source": Source(str(path), tip, base),
     }
 
 
@@ -125,5 +127,8 @@ def _only_end(path: str | os.PathLike[str], robot: urdf_file.File) -> str:
     ends = [link for link in robot.links if link not in parents]
     if len(ends) != 1:
         named = ", ".join(ends[:12]) + (", …" if len(ends) > 12 else "")
-        raise FileError(f"tip: name one of the ends of {path}: {named or 'it has none'}")
+        raise FileError(
+            f"tip: name one of the ends of {path}: {named or 'it has none'}; a robot may be given"
+            f" as {path}#TIP or {path}#BASE:TIP"
+        )
     return ends[0]

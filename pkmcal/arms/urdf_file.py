@@ -77,9 +77,10 @@ def read(path: str | PathLike[str]) -> File:
 
 def tree(path: str | PathLike[str]) -> ElementTree.Element:
     """The root element of the file, with its comments."""
+    content = reading.content(path, reading.MOST_URDF)
     parser = ElementTree.XMLParser(target=_Builder(f"{path}"))
     try:
-        parser.feed(reading.content(path, reading.MOST_URDF))
+        parser.feed(content)
         root: ElementTree.Element = parser.close()
     except FileError:
         raise

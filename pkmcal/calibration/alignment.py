@@ -105,7 +105,7 @@ def of_heights(values: FloatArray, point: FloatArray) -> FloatArray:
     up /= np.linalg.norm(up)
     frame = np.zeros(6)
     frame[2] = (values - point @ up).mean()
-    frame[3:5] = np.arctan2(up[1], up[2]), -np.arcsin(np.clip(up[0], -1.0, 1.0))
+    frame[3:5] = np.arctan2(up[1], up[2]), np.arctan2(-up[0], np.hypot(up[1], up[2]))
     return frame
 
 

@@ -143,7 +143,15 @@ def bootstrap(
     """
     instance("found", found, Identification)
     whole("replicates", replicates, 2)
-    if not (found.fit.estimate.freedom > 0).all() or not np.isfinite(found.fit.covariance).all():
+    if len(found.redundancy) > len(found.noise):
+        raise ArgumentError(
+            "found: its rows have poses of their own, from which no residuals are drawn yet;"
+            " stderr and covariance have the poses' part in them"
+        )
+    if (
+        not (found.fit.estimate.freedom > _LEFT).all()
+        or not np.isfinite(found.fit.covariance).all()
+    ):
         raise ArgumentError("found: no degrees of freedom are left, so no residuals to draw from")
     seeds = np.random.SeedSequence(checked_seed(seed)).spawn(replicates)
     parts = [seeds[k : k + _TOGETHER] for k in range(0, replicates, _TOGETHER)]

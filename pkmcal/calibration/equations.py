@@ -1,28 +1,33 @@
-"""The equations of a calibration: measured less predicted, whitened, and their Jacobian."""
+"""The equations of a calibration: measured less predicted, whitened, and their Jacobian.
+
+What the estimator works on are `Equations.residual` (M,) and `Equations.by_parameters` (M, n): the
+equations that are left when every pose has taken those that determine it (`elimination`). On a
+machine whose poses follow exactly from its actuators no pose takes any, and they are the readings
+themselves, set by set and row by row.
+"""
 
 from __future__ import annotations
 
 import copy
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Int32Array, IntArray, mm_per_unit, rms
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
 from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_poses
-from pkmcal.calibration.parameters import POINTS, FitData, Parameters
+from pkmcal.calibration.closures import Closures, Commanded, RowStates, closures_of
+from pkmcal.calibration.elimination import Blocks, Shares
+from pkmcal.calibration.parameters import FitData, Parameters
+from pkmcal.calibration.readings import ROUNDING, Readings, of_read
 from pkmcal.core import instruments
 from pkmcal.core.library import STATUS
 from pkmcal.measurements import orientation
 from pkmcal.measurements.calibratable import Calibratable
-from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import (
     Predicted,
     by_difference,
-    difference,
     distance_per_point,
-    predict,
 )
 from pkmcal.result import failed_rows
 
@@ -39,6 +44,8 @@ class Evaluation:
         With their geometry.
     pose : ndarray (K, 6)
         Where the machine is at each distinct row of actuators; NaN where it cannot be.
+    actuators : ndarray (K, n)
+        Where the actuators are there; what they read unless their noise is stated.
     status : ndarray of int (K,)
         Of the forward kinematics.
     predicted : tuple of Predicted
@@ -50,6 +57,7 @@ class Evaluation:
     theta: FloatArray
     robot: Calibratable
     pose: FloatArray
+    actuators: FloatArray
     status: Int32Array
     predicted: tuple[Predicted, ...]
     residuals: tuple[FloatArray, ...]
@@ -59,8 +67,13 @@ class Evaluation:
         """Whether the forward kinematics solved every row."""
         return not self.status.any()
 
+    @property
+    def states(self) -> RowStates:
+        """Where the machine is at each distinct row of actuators."""
+        return RowStates(self.pose, self.actuators, self.status)
 
-class Equations:
+
+class Equations(Readings):
     """The stacked residual equations of all measurements, and their Jacobian.
 
     Parameters
@@ -69,93 +82,169 @@ class Equations:
         The rows to fit; rows with the same actuators are solved once.
     parameters : Parameters
         The parameter vector.
+    unread : int
+        How many rows were left out because nothing was read there.
+
+    Attributes
+    ----------
+    closures : Closures
+        What the closures say of the poses.
+    components : ndarray of int (U,)
+        Equations of each unit. A unit is what counts together: a row where poses follow from the
+        actuators, else all that was read at one pose, less what determines that pose.
+    unit_of_row : ndarray of int (N,)
+        Of each row of the sets; -1 where none of its equations is left.
+    pose_of_unit : ndarray of int (U,)
+        The pose of each unit: rows of one pose have its errors in common.
+    idle : int
+        How many rows or poses say nothing: unread, or all that was read determines their pose.
+    unstated : ndarray of bool (G,)
+        Whose deviation is not known, of each group of equations with a noise of its own: the sets,
+        then the actuators where they have equations.
     """
 
-    def __init__(self, datasets: Sequence[FitData], parameters: Parameters) -> None:
-        self.datasets = tuple(datasets)
-        self.sets = tuple(data.measured for data in datasets)
-        self.rows = np.concatenate([data.rows for data in datasets])
-        self.parameters = parameters
-        self._framed = [data.framed for data in datasets]
-        self._columns = [  # of the points that are sought, by what `predict` calls them
-            {
-                name: parameters.columns_of(role, data.measured)
-                for name, role in POINTS[data.measured.kind].items()
-                if role in data.sought
-            }
-            for data in datasets
-        ]
-        self._known = [
-            {
-                name: m.attachments if role == "attachment" else m.targets
-                for name, role in POINTS[m.kind].items()
-                if name not in columns
-            }
-            for m, columns in zip(self.sets, self._columns, strict=True)
-        ]
-        # several targets or repeats at the same actuators are one pose
-        actuators = np.concatenate([m.actuators for m in self.sets])
-        self.actuators, inverse = np.unique(actuators, axis=0, return_inverse=True)
-        edges = np.cumsum([0, *map(len, self.sets)])
-        self.pose_of = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
-        self._guess = np.tile(parameters.robot.home, (len(self.actuators), 1))
+    def __init__(
+        self, datasets: Sequence[FitData], parameters: Parameters, unread: int = 0
+    ) -> None:
+        super().__init__(datasets, parameters)
+        self.datasets, self._unread = tuple(datasets), unread
+        guess = np.tile(parameters.robot.home, (len(self.actuators), 1))
         for measured, framed, place in zip(self.sets, self._framed, self.pose_of, strict=True):
             if measured.kind in ("pose", "position") and not framed:
-                self._guess[place, :3] = measured.values[:, :3]
+                read = np.isfinite(measured.values).all(axis=1)
+                guess[place[read], :3] = measured.values[read, :3]
                 if measured.kind == "pose":
-                    self._guess[place, 3:] = orientation.shortest(measured.values[:, 3:])
-        self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
-        self.components = np.concatenate([np.full(len(m), len(m.components)) for m in self.sets])
-        self.first = np.cumsum(self.components) - self.components  # equation of each row
-        self.set_of = np.repeat(np.arange(len(self.sets)), np.diff(edges))
+                    guess[place[read], 3:] = orientation.shortest(measured.values[read, 3:])
+        unknown = np.zeros(len(guess), dtype=np.int32)
+        self._states = RowStates(guess, self.actuators, unknown)
+        self._no_sigma = np.array([
+            m.sigma is None and bool(np.isfinite(m.values).any()) for m in self.sets
+        ])  # fmt: skip
+        sigma = self.actuator_sigma
+        self._take(closures_of(parameters.robot, self.actuators, sigma), sigma is None)
 
-    def at(self, theta: FloatArray) -> Evaluation:
-        """Evaluate at `theta` (n,)."""
-        robot = self.parameters.robot.with_values(self.parameters.values_at(theta))
-        solved = robot.forward(self.actuators, self._guess)
-        predicted = self._predicted(solved.pose, theta)
-        residuals = self._residuals(predicted)
-        return Evaluation(theta, robot, solved.pose, solved.status, predicted, residuals)
+    def _take(self, closures: Closures, estimated: bool) -> None:
+        """Build the units for these closures; `estimated`: their deviations are not known."""
+        self.closures = closures
+        of_row, pose_of_row = self.count, np.concatenate(self.pose_of)
+        if not closures.unknowns:
+            self.unstated: BoolArray = self._no_sigma
+            self.components: IntArray = of_row[of_row > 0]
+            self.pose_of_unit: IntArray = pose_of_row[of_row > 0]
+            self.unit_of_row: IntArray = np.where(of_row > 0, np.cumsum(of_row > 0) - 1, -1)
+            self._family_of_unit = self.set_of[of_row > 0]
+            self.idle = self._unread + int((of_row == 0).sum())
+            return
+        self.unstated = np.append(self._no_sigma, estimated)
+        poses = len(self.actuators)
+        own = np.repeat(np.arange(poses), closures.equations)
+        pose_of_equation = np.concatenate([own, np.repeat(pose_of_row, of_row)])
+        self._group_of_equation = np.concatenate([
+            np.full(len(own), len(self.sets)),
+            np.repeat(self.set_of, of_row),
+        ])  # fmt: skip
+        self._blocks = Blocks(pose_of_equation, poses, closures.unknowns)
+        self.components, self.pose_of_unit = self._blocks.components, self._blocks.pose_of_unit
+        unit_of_pose = np.full(poses, -1)
+        unit_of_pose[self.pose_of_unit] = np.arange(len(self.pose_of_unit))
+        self.unit_of_row = unit_of_pose[pose_of_row]
+        self._family_of_unit = np.zeros(len(self.components), dtype=np.intp)
+        self.idle = self._blocks.idle
 
-    def _predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
-        """Readings of each set at poses (K, 6)."""
-        frame = self.parameters.frame_at(theta)
-        return tuple(
-            predict(
-                measured.kind,
-                pose[self.pose_of[i]],
-                frame=frame if self._framed[i] else None,
-                origin=self.parameters.origin,
-                **self._known[i],
-                **{name: theta[columns] for name, columns in self._columns[i].items()},
-            )
-            for i, measured in enumerate(self.sets)
-        )
+    def commanded(self) -> Equations:
+        """The same with poses that follow from the actuators as they read."""
+        if not self.closures.unknowns:
+            return self
+        other = copy.copy(self)
+        other._take(Commanded(self.actuators), estimated=False)
+        return other
 
-    def _residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
-        """Measured less predicted of each set."""
-        return tuple(
-            difference(measured.kind, measured.values, seen.values)
-            for measured, seen in zip(self.sets, predicted, strict=True)
-        )
+    def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
+        """Evaluate where the same with commanded poses has been started."""
+        self.parameters, self._states = commanded.parameters, start.states
+        if self.closures.unknowns:  # closures that contradict each other may still have a best pose
+            self.start_from(np.flatnonzero(start.status), self.parameters.robot.home)
+        return start if commanded is self else self.at(start.theta)
 
-    def misfit(self, pose: FloatArray, theta: FloatArray) -> FloatArray:
-        """How far off the worst reading at each pose (K, 6) is, mm (K,); inf without a pose.
+    @property
+    def family_of_unit(self) -> IntArray:
+        """Family of each unit (U,): the set, or one for all where poses mix the groups' noise."""
+        return self._family_of_unit
 
-        Angles count as their arc.
+    @property
+    def family_of_group(self) -> IntArray:
+        """The same of each group (G,)."""
+        groups = np.arange(len(self.unstated))
+        return np.zeros_like(groups) if self.closures.unknowns else groups
+
+    def at(self, theta: FloatArray, noise: FloatArray | None = None) -> Evaluation:
+        """Evaluate at `theta` (n,), every pose where it fits best what was read of it.
+
+        `noise` (G,) multiplies the stated deviations of each group, as in `whitened`.
         """
-        worst = np.zeros(len(pose))
-        residuals = self._residuals(self._predicted(pose, theta))
-        for measured, place, residual in zip(self.sets, self.pose_of, residuals, strict=True):
-            arcs = mm_per_unit(measured.units, self.parameters.robot.length)
-            off = np.linalg.norm(residual * arcs, axis=1)
-            np.maximum.at(worst, place, np.where(np.isfinite(off), off, np.inf))
-        return worst
+        robot = self.parameters.robot.with_values(self.parameters.values_at(theta))
+        states = self.closures.settled(robot, self._states)
+        if self.closures.unknowns:
+            factors = np.ones(len(self.unstated)) if noise is None else noise
+
+            def system(states: RowStates) -> tuple[FloatArray, FloatArray]:
+                return self._system(robot, states, theta, factors)
+
+            states = self._blocks.best(self.closures, robot, states, system)
+        predicted = self.predicted(states.pose, theta)
+        residuals = self.residuals(predicted)
+        return Evaluation(
+            theta, robot, states.pose, states.actuators, states.status, predicted, residuals
+        )
+
+    def _system(
+        self, robot: Calibratable, states: RowStates, theta: FloatArray, noise: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
+        off, by_unknown = self.closures.residual(robot, states)
+        u = self.closures.unknowns
+        equation, by_unknown = off.reshape(-1) / noise[-1], by_unknown.reshape(-1, u) / noise[-1]
+        if not self.count.any():
+            return equation, by_unknown
+        twists = self.closures.twists(robot, states)
+        predicted = self.predicted(states.pose, theta)
+        residuals = self.residuals(predicted)
+        by_pose = [
+            by_difference(m.kind, seen.by_twist @ twists[place], residual)
+            for m, seen, place, residual in zip(
+                self.sets, predicted, self.pose_of, residuals, strict=True
+            )
+        ]
+        return (
+            np.concatenate([equation, -self.whitened(residuals, noise)]),
+            np.concatenate([by_unknown, self.whitened(by_pose, noise)]),
+        )
+
+    def residual(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """Measured less predicted (M,), whitened: what is left when poses have taken their part."""
+        if not self.closures.unknowns:
+            return self.whitened(evaluation.residuals, noise)
+        off, by_unknown = self._system(evaluation.robot, evaluation.states, evaluation.theta, noise)
+        return -self._blocks.left(by_unknown, off)
+
+    def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """Derivative (M, n) of what is predicted by the parameters; of what is left likewise."""
+        readings = self.whitened(self.jacobian(evaluation), noise)
+        if not self.closures.unknowns:
+            return readings
+        p, robot, states = self.parameters, evaluation.robot, evaluation.states
+        _, by_unknown = self._system(robot, states, evaluation.theta, noise)
+        by_all, own = np.zeros((len(by_unknown), len(p))), len(by_unknown) - len(readings)
+        of_closures = self.closures.by_numbers(robot, states, p.places)
+        np.divide(of_closures.reshape(own, -1), noise[-1], out=by_all[:own, : len(p.places)])
+        by_all[own:] = readings
+        return self._blocks.left(by_unknown, by_all)
 
     def start_from(self, rows: IntArray, poses: FloatArray) -> None:
         """Start the forward kinematics of some distinct rows of actuators from poses (s, 6)."""
-        self._guess = self._guess.copy()
-        self._guess[rows] = poses
+        guess = self._states.pose.copy()
+        guess[rows] = poses
+        self._states = replace(self._states, pose=guess)
 
     def with_readings(self, values: Sequence[FloatArray], prior_centre: FloatArray) -> Equations:
         """The same with other measured values (N, k) of each set, and another centre (n,)."""
@@ -176,7 +265,7 @@ class Equations:
         theta = self.parameters.start.copy()
         evaluation = self.at(theta)
         if not evaluation.ok:
-            self._guess[evaluation.status != 0] = self.parameters.robot.home
+            self.start_from(np.flatnonzero(evaluation.status), self.parameters.robot.home)
             evaluation = self.at(theta)
         if self.parameters.frame is None or not evaluation.ok:
             return evaluation
@@ -230,20 +319,21 @@ class Equations:
 
     def warm_start(self, evaluation: Evaluation) -> None:
         """Start the forward kinematics of later calls of `at` from its poses."""
-        self._guess = np.where(evaluation.status[:, None] == 0, evaluation.pose, self._guess)
+        self._states = evaluation.states.chosen(evaluation.status == 0, self._states)
 
     def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n).
 
         With the opposite sign that of the residuals.
         """
-        p = self.parameters
-        by_geometry = evaluation.robot.error_twists(evaluation.pose, self.actuators)[:, :, p.places]
+        p, robot = self.parameters, evaluation.robot
+        by_geometry = self.closures.twists_by_numbers(robot, evaluation.states, p.places)
         parts = []
         for i, seen in enumerate(evaluation.predicted):
             rows, k = seen.values.shape
             part = np.zeros((rows, k, len(p)))
-            part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
+            if by_geometry is not None:
+                part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
             if seen.by_frame is not None and p.frame is not None:
                 part[:, :, p.frame : p.frame + 6] = seen.by_frame
             for name, columns in self._columns[i].items():
@@ -253,45 +343,80 @@ class Equations:
             parts.append(by_difference(self.sets[i].kind, part, evaluation.residuals[i]))
         return parts
 
-    def whitened(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
-        """Parts (N, k, ...) of all sets in units of their standard deviation, stacked: (M, ...).
+    def by_groups(
+        self,
+        evaluation: Evaluation,
+        noise: FloatArray,
+        weights: FloatArray,
+        residual: FloatArray,
+        taken: FloatArray,
+    ) -> Shares:
+        """Squares and degrees of freedom of each group.
 
-        `noise` (sets,) multiplies what `Measurements.sigma` says.
+        Parameters
+        ----------
+        evaluation : Evaluation
+            The equations there.
+        noise : ndarray (G,)
+            See `whitened`.
+        weights : ndarray (U,)
+            Of the units.
+        residual : ndarray (M,)
+            Whitened and weighted.
+        taken : ndarray (M, r)
+            Weighted Jacobian in directions in which the parameters' covariance is 1: the squares
+            of a row are the leverage of its equation.
         """
-        stacked = []
-        for part, white, factor in zip(parts, self._whiten, noise, strict=True):
-            if white.ndim == 3:
-                scaled = np.einsum("nij,nj...->ni...", white, part)
-            else:
-                scaled = white.reshape(*white.shape, *(1,) * (part.ndim - 2)) * part
-            stacked.append((scaled / factor).reshape(-1, *part.shape[2:]))
-        return np.concatenate(stacked)
+        count = len(self.unstated)
+        if not self.closures.unknowns:
+            group = np.repeat(self._family_of_unit, self.components)
+            every = np.repeat(weights, self.components)
+            left = every - (taken**2).sum(axis=1)
+            freedom = np.bincount(group, left, count).astype(np.float64)
+            squares = np.bincount(group, residual**2, count).astype(np.float64)
+            return Shares(squares, freedom, np.diag(freedom))
+        _, by_unknown = self._system(evaluation.robot, evaluation.states, evaluation.theta, noise)
+        group = self._group_of_equation
+        return self._blocks.given_back(by_unknown, group, weights, residual, taken)
 
-    def unwhiten(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:
-        """Invert `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad."""
-        parts, rest = [], whitened
-        for measured, white, factor in zip(self.sets, self._whiten, noise, strict=True):
-            mine, rest = np.split(rest, [len(measured) * white.shape[1]])
-            part = factor * mine.reshape(len(measured), -1)
-            if white.ndim == 3:
-                parts.append(np.linalg.solve(white, part[:, :, None])[:, :, 0])
-            else:
-                parts.append(part / white)
-        return parts
-
-    def white(self, i: int) -> FloatArray:
-        """Matrices (N, k, k) that make the noise of set `i` one, as its sigma says."""
-        white = self._whiten[i]
-        return white if white.ndim == 3 else white[:, :, None] * np.eye(white.shape[1])
+    def rounding(self, noise: FloatArray) -> float:
+        """Length of the whitened rounding errors of what is predicted."""
+        readings = super().rounding(noise)
+        sigma = self.closures.sigma
+        if sigma is None:
+            return readings
+        size = ROUNDING * float(np.abs(self.actuators).max())
+        return float(np.hypot(readings, size / noise[-1] * np.linalg.norm(1.0 / sigma)))
 
     def distances(self, evaluation: Evaluation) -> FloatArray:
         """How far off each measured point is, mm, in the order of the sets."""
-        return np.concatenate([distance_per_point(r) for r in evaluation.residuals])
+        return np.concatenate([
+            distance_per_point(of_read(m, r))
+            for m, r in zip(self.sets, evaluation.residuals, strict=True)
+        ])  # fmt: skip
 
     def rms(self, evaluation: Evaluation) -> float:
         """Root mean square of `distances` over the rows that were reached; NaN without any."""
         off = self.distances(evaluation)
         return rms(off[np.isfinite(off)])
+
+    def progress(self, evaluation: Evaluation) -> float:
+        """`rms`, or `closure_rms` where nothing but the actuators was read."""
+        return self.rms(evaluation) if self.count.any() else self.closure_rms(evaluation)
+
+    def closure_rms(self, evaluation: Evaluation) -> float:
+        """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
+        return rms(self._closures_off(evaluation)[evaluation.status == 0])
+
+    def worst_closures(self, evaluation: Evaluation) -> FloatArray:
+        """The largest of them at each pose (K,); NaN where they hold."""
+        off = np.abs(self._closures_off(evaluation))
+        return off.max(axis=1) if off.shape[1] else np.full(len(off), np.nan)
+
+    def _closures_off(self, evaluation: Evaluation) -> FloatArray:
+        sigma, robot = self.closures.sigma, evaluation.robot
+        off, _ = self.closures.residual(robot, evaluation.states)
+        return off if sigma is None else off * sigma * self.closures.lengths(robot)
 
     def status(self, evaluation: Evaluation) -> Int32Array:
         """Of the forward kinematics, for each row."""
@@ -300,20 +425,3 @@ class Equations:
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""
         return failed_rows(self.status(evaluation), STATUS, self.rows, most=10)
-
-
-def _whitening(measured: Measurements, length: float) -> FloatArray:
-    """Factors (N, k) or matrices (N, k, k) that make the noise one; 1 mm where it is not known."""
-    sigma = measured.sigma
-    if sigma is None:
-        return np.tile(mm_per_unit(measured.units, length), (len(measured), 1))
-    if measured.kind == "pose" and not _same_turnings(sigma):
-        sigma = orientation.covariance(sigma, measured.values[:, 3:])
-    if sigma.ndim == 2:
-        return 1.0 / sigma
-    return np.linalg.inv(np.linalg.cholesky(sigma))
-
-
-def _same_turnings(sigma: FloatArray) -> bool:
-    """Whether standard deviations (N, 6) are the same about every axis."""
-    return sigma.ndim == 2 and bool((sigma[:, 4:] == sigma[:, 3:4]).all())

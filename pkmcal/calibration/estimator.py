@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pkmcal.arrays import FloatArray, mm_per_unit
+from pkmcal.calibration.elimination import Shares
 from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.identifiability import (
     Decomposed,
@@ -21,9 +22,11 @@ from pkmcal.calibration.outliers import median_ratio
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.lack_of_fit import SIGNIFICANT, Split, groups, split
 
-_ROUNDS = 20  # of estimating noise and unidentifiable combinations anew
+_ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
+_LEAST_FALL = 0.1  # of a mean square, which a step of scoring does not go below
 _LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
 LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
+LEAST_REDUNDANCY = 2.0  # the same of one group of several that share poses
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +35,9 @@ class IterationState:
 
     Attributes
     ----------
-    noise : ndarray (sets,)
-        Factor on the stated deviations of each set; where none is stated, the deviation in mm.
+    noise : ndarray (G,)
+        Factor on the stated deviations of each group of equations (the sets, then the actuators
+        where poses have unknowns); where none is stated, the deviation in mm.
     loss : Loss
         How rows count.
     measured : Directions
@@ -55,6 +59,10 @@ class IterationState:
 class Estimate:
     """The equations and their statistics at the solution.
 
+    All of it is of the M equations that are left when poses have taken their part: noise is 1 in
+    each, and those of different poses are independent. Nothing else of poses and closures is to be
+    known to judge a fit: `Equations.pose_of_unit` says which units are of one pose.
+
     Attributes
     ----------
     evaluation : Evaluation
@@ -65,12 +73,12 @@ class Estimate:
         Measured less predicted, whitened.
     jacobian : ndarray (M, n)
         Scaled and whitened.
-    weights : ndarray (N,)
-        Of each row; 1 unless the loss is robust.
+    weights : ndarray (U,)
+        Of each unit (`Equations.components`); 1 unless the loss is robust.
     covariance : ndarray (n, n)
         Scaled; nothing along combinations that are not determined.
-    freedom : ndarray (sets,)
-        Equations of each set less the parameters they went into.
+    shares : Shares
+        Of each group, the sum of squared residuals and what it says of the noise.
     """
 
     evaluation: Evaluation
@@ -79,7 +87,12 @@ class Estimate:
     jacobian: FloatArray
     weights: FloatArray
     covariance: FloatArray
-    freedom: FloatArray
+    shares: Shares
+
+    @property
+    def freedom(self) -> FloatArray:
+        """Equations of each group less the poses and parameters they went into, (G,)."""
+        return self.shares.freedom
 
 
 class Estimator:
@@ -99,12 +112,14 @@ class Estimator:
         self.equations, self.start, self.loss = equations, start, loss
         self.search = Search(equations, start)
         self.scale, self.prior = self.search.scale, self.search.prior
-        self.unstated = np.array([m.sigma is None for m in equations.sets])
-        set_of = np.repeat(equations.set_of, equations.components)
-        self._equations_of = [set_of == i for i in range(len(self.unstated))]
+        self.unstated = equations.unstated
         self._groups = [groups(measured) for measured in equations.sets]
-        self._at_start = self.search.jacobian(start, np.ones(len(self.unstated)))
         self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
+
+    @property
+    def least_freedom(self) -> float:
+        """Degrees of freedom from which the noise of a group is estimated."""
+        return LEAST_REDUNDANCY if self.equations.closures.unknowns else LEAST_FREEDOM
 
     def solve(self) -> Estimate:
         """Estimate the parameters and, where no sigma is stated, the noise of each set."""
@@ -133,23 +148,28 @@ class Estimator:
     # between the least squares ------------------------------------------------------------------
 
     def _loss(self, name: LossName, width: FloatArray) -> Loss:
-        of_rows = width[self.equations.set_of]
-        return Loss(name, self.equations.components, of_rows)
+        of_units = width[self.equations.family_of_unit]
+        return Loss(name, self.equations.components, of_units)
 
     def _first_loss(self) -> Loss:
         """Limits wide enough for the nominal machine, and no wider than gross errors allow."""
         ones = np.ones(len(self.unstated))
         if self.loss == "linear":
             return self._loss("linear", ones)
-        squares = self._squares(self.equations.whitened(self.start.residuals, ones))
-        set_of, components = self.equations.set_of, self.equations.components
-        medians = [
-            median_ratio(squares[set_of == i], components[set_of == i]) for i in range(len(ones))
-        ]
+        medians = self._medians(self.equations.residual(self.start, ones))
         return self._loss(self.loss, np.maximum(np.sqrt(medians), 1.0))
 
+    def _medians(self, residual: FloatArray) -> FloatArray:
+        """Variance (F,) that whitened residuals (M,) of each family show by their median."""
+        squares, components = self._squares(residual), self.equations.components
+        family_of = self.equations.family_of_unit
+        return np.array([
+            median_ratio(squares[family_of == f], components[family_of == f])
+            for f in range(int(family_of.max()) + 1)
+        ])  # fmt: skip
+
     def _squares(self, residual: FloatArray) -> FloatArray:
-        """Squared length of each row, (N,)."""
+        """Squared length of each unit, (U,)."""
         components = self.equations.components
         squares: FloatArray = np.add.reduceat(residual**2, np.cumsum(components) - components)
         return squares
@@ -162,8 +182,7 @@ class Estimator:
         noise_known = evaluation is not None or not self.unstated.any()
         worst = size if noise_known else np.inf
         if self._first is None or (noise != self._first[0]).any():
-            at_start = self._at_start / (noise @ np.array(self._equations_of))[:, None]
-            self._first = noise, self._decomposed(at_start)
+            self._first = noise, self._decomposed(self.search.jacobian(self.start, noise))
         _, first = self._first
         now = (
             (None, None)
@@ -183,31 +202,52 @@ class Estimator:
 
     def _revised(self, estimate: Estimate) -> IterationState:
         """Estimate unstated noise and limits of the loss, and split the directions anew."""
-        factor = self._spread(estimate)
+        factor, of_families = self._spread(estimate)
         noise = np.where(
             self.unstated,
             np.maximum(estimate.state.noise * factor, _LEAST_NOISE),
             estimate.state.noise,
         )
-        # while the model is still far off, outliers are rows further off than most
-        width = np.where(self.unstated, 1.0, np.maximum(factor, 1.0))
+        # while the model is still far off, outliers are units further off than most
+        family_of = self.equations.family_of_group
+        families = range(len(of_families))
+        none_stated = np.array([bool(self.unstated[family_of == f].all()) for f in families])
+        width = np.where(none_stated, 1.0, np.maximum(of_families, 1.0))
         return self._state(noise, self._loss(self.loss, width), estimate.evaluation)
 
-    def _spread(self, estimate: Estimate) -> FloatArray:
-        """Deviation of the whitened residuals of each set, (sets,); 1 without freedom."""
-        rows, components = self.equations.set_of, self.equations.components
-        squares = self._squares(estimate.residual)
-        factor = np.ones(len(self.unstated))
-        for i in np.flatnonzero(estimate.freedom >= LEAST_FREEDOM):
-            mine, k = squares[rows == i], components[rows == i]
-            if self.loss == "linear":
-                variance = mine.sum() / estimate.freedom[i]
-            else:
-                variance = median_ratio(mine, k) * k.sum() / estimate.freedom[i]
-            if self.unstated[i]:
-                variance *= self._inflation(estimate, int(i))
-            factor[i] = np.sqrt(variance)
-        return factor
+    def _spread(self, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
+        """Deviation of the whitened residuals of each group (G,), and of each family (F,).
+
+        1 without freedom.
+        """
+        family_of = self.equations.family_of_group
+        squares, freedom, information = estimate.shares
+        medians = None if self.loss == "linear" else self._medians(estimate.residual)
+        factor, of_families = np.ones(len(freedom)), np.ones(int(family_of.max()) + 1)
+        for f in range(len(of_families)):
+            mine = np.flatnonzero(family_of == f)
+            left = float(freedom[mine].sum())
+            if left < LEAST_FREEDOM:
+                continue
+            variance = together = float(squares[mine].sum()) / left
+            if medians is not None:
+                of_family = self.equations.family_of_unit == f
+                count = float(self.equations.components[of_family].sum())
+                variance = float(medians[f]) * count / left
+            of_families[f] = np.sqrt(variance)
+            known = mine[self.unstated[mine] & (freedom[mine] >= self.least_freedom)]
+            if len(mine) == 1:
+                known = mine
+            # a step of Fisher's scoring of the restricted likelihood: of one group, its mean square
+            excess = np.linalg.solve(
+                information[np.ix_(known, known)], squares[known] - freedom[known]
+            )
+            common = variance / together if together > 0 else 1.0
+            least = _LEAST_FALL * squares[known] / freedom[known]
+            factor[known] = np.sqrt(common * np.maximum(1.0 + excess, least))
+            if len(mine) == 1 and self.unstated[f]:
+                factor[f] *= np.sqrt(self._inflation(estimate, f))
+        return factor, of_families
 
     def _inflation(self, estimate: Estimate, i: int) -> float:
         """Factor on the variance under lack of fit, which the repeats of a pose share."""
@@ -222,16 +262,25 @@ class Estimator:
         return [self._repeats(estimate, i, plain) for i in range(len(self._groups))]
 
     def _repeats(self, estimate: Estimate, i: int, plain: bool = False) -> Split:
+        if self.equations.closures.unknowns:  # poses of their own take part in what they scatter
+            return Split(0.0, 0.0, 0.0, 0.0, 1.0)
         group, residual = self._groups[i], estimate.evaluation.residuals[i]
-        k = residual.shape[1]
-        leverage = len(residual) * k - float(estimate.freedom[i])
+        k, whole = residual.shape[1], np.isfinite(residual).all(axis=1)
+        leverage = float(self.equations.components[self.equations.set_of == i].sum())
+        leverage -= float(estimate.freedom[i])
         if plain:
             lengths = min(k, 3)
             white = np.tile(np.eye(lengths), (len(residual), 1, 1))
-            return split(residual[:, :lengths], white, group, leverage * lengths / k)
-        weights = estimate.weights[self.equations.set_of == i]
-        white = self.equations.white(i) * np.sqrt(weights)[:, None, None]
-        return split(residual, white / estimate.state.noise[i], group, leverage)
+            leverage *= lengths / k
+            residual = residual[:, :lengths]
+        else:
+            weights = estimate.weights[self.equations.set_of == i]
+            white = self.equations.white(i) * np.sqrt(weights)[:, None, None]
+            white = white / estimate.state.noise[i]
+        if not whole.all():  # repeats of a part of a pose are left out
+            group = np.unique(group[whole], return_inverse=True)[1]
+            residual, white = residual[whole], white[whole]
+        return split(residual, white, group, leverage)
 
     def _settled(self, old: IterationState, new: IterationState) -> bool:
         if old.fitted.rank != new.fitted.rank:
@@ -243,7 +292,12 @@ class Estimator:
         )
 
     def scaled_jacobian(self, evaluation: Evaluation) -> FloatArray:
-        """Scaled Jacobian (M, n), not whitened: mm per mm, angles as their arc."""
+        """Scaled Jacobian (M, n), not whitened: mm per mm, angles as their arc.
+
+        Where poses have unknowns it is that of what is left of all equations, whitened as stated.
+        """
+        if self.equations.closures.unknowns:
+            return self.search.jacobian(evaluation, np.ones(len(self.unstated)))
         parts = []
         for part, measured in zip(
             self.equations.jacobian(evaluation), self.equations.sets, strict=True
@@ -254,20 +308,17 @@ class Estimator:
         return jacobian
 
     def _estimate(self, u: FloatArray, state: IterationState) -> Estimate:
-        evaluation = self.search.at(u)
+        evaluation = self.search.at(u, state.noise)
         jacobian = self.search.jacobian(evaluation, state.noise)
-        residual = self.equations.whitened(evaluation.residuals, state.noise)
+        residual = self.equations.residual(evaluation, state.noise)
         weights = state.loss.weights(residual)
-        every = np.repeat(weights, self.equations.components)
-        parts = [np.sqrt(every[mine, None]) * jacobian[mine] for mine in self._equations_of]
-        factors = [triangle(part) for part in parts]
+        root = np.sqrt(np.repeat(weights, self.equations.components))
+        weighted = root[:, None] * jacobian
         basis = state.determined.identifiable
         _, singular, rows = np.linalg.svd(
-            triangle(np.vstack([*factors, self.prior])) @ basis, full_matrices=False
+            triangle(np.vstack([weighted, self.prior])) @ basis, full_matrices=False
         )
         half = basis @ (rows.T / singular)
-        fitted = half[:, : state.fitted.rank]
-        leverage = [float(((factor @ fitted) ** 2).sum()) for factor in factors]
-        count = [float(every[mine].sum()) for mine in self._equations_of]
-        freedom = np.array(count) - np.array(leverage)
-        return Estimate(evaluation, state, residual, jacobian, weights, half @ half.T, freedom)
+        taken = weighted @ half[:, : state.fitted.rank]
+        shares = self.equations.by_groups(evaluation, state.noise, weights, root * residual, taken)
+        return Estimate(evaluation, state, residual, jacobian, weights, half @ half.T, shares)

@@ -20,11 +20,13 @@ class Fit:
     Attributes
     ----------
     equations : Equations
-        The residual equations of the fitted rows.
-    start : Evaluation
-        They at the nominal machine, an unknown frame aligned with the readings.
+        The residual equations of the fitted rows, poses following from the actuators.
+    start, end : Evaluation
+        They at the nominal machine, an unknown frame aligned with the readings, and at the
+        solution.
     estimate : Estimate
-        They at the solution, with its statistics.
+        What was fitted at the solution, with its statistics. On machines where every row has a
+        pose of its own the residual equations there are those that are left of all.
     covariance : ndarray (n, n)
         Of the reported parameters along determined combinations, mm and rad; inf where the noise
         is not known.
@@ -32,6 +34,7 @@ class Fit:
 
     equations: Equations
     start: Evaluation
+    end: Evaluation
     estimate: Estimate
     covariance: FloatArray
 
@@ -39,11 +42,6 @@ class Fit:
     def parameters(self) -> Parameters:
         """The parameter vector."""
         return self.equations.parameters
-
-    @property
-    def end(self) -> Evaluation:
-        """The equations at the solution."""
-        return self.estimate.evaluation
 
     def undetermined(self) -> FloatArray:
         """Scaled combinations (n, d) that are not determined, at the identified geometry.

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
+from pkmcal.calibration.equations import Evaluation
+from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.gauges import MIRROR, Gauges, gauges, mirror_fits
 from pkmcal.calibration.identifiability import as_sum, observability, sparse_basis
 from pkmcal.calibration.outliers import outliers
 from pkmcal.measurements.lack_of_fit import joined
@@ -35,6 +37,7 @@ class Identifiability:
     rank: int
     gap: float
     unidentifiable: tuple[str, ...]
+    gauges: tuple[str, ...]
     observability: dict[str, float]
 
 
@@ -44,6 +47,12 @@ class Misfit:
 
     rms: float
     rms_before: float
+    closure_rms: float
+    closure_rms_before: float
+    closures: FloatArray
+    actuator_noise: float
+    redundancy: tuple[float, ...]
+    idle: int
     chi2_per_dof: float
     dof: float
     noise: tuple[float, ...]
@@ -73,7 +82,7 @@ class SearchRecord:
 def reported_covariance(estimator: Estimator, estimate: Estimate) -> FloatArray:
     """Covariance (n, n) of the reported parameters, mm and rad; inf where noise is not known."""
     rates = _reported_by_scaled(estimator, estimate)
-    if (estimator.unstated & (estimate.freedom < LEAST_FREEDOM)).any():
+    if (estimator.unstated & (estimate.freedom < estimator.least_freedom)).any():
         return np.full((len(rates), len(rates)), np.inf)
     covariance: FloatArray = rates @ estimate.covariance @ rates.T
     return covariance
@@ -114,25 +123,35 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
     """What the measurements alone determine."""
     equations, measured = estimator.equations, estimate.state.measured
     names = equations.parameters.names
-    open_ones = sparse_basis(measured.unidentifiable, names).T
+    told = Gauges((), measured.unidentifiable)
+    if equations.closures.unknowns:
+        told = gauges(equations.parameters, measured.unidentifiable)
+    if mirror_fits(equations, estimate.evaluation, estimate.state.noise):
+        told = replace(told, texts=(*told.texts, MIRROR))
+    open_ones = sparse_basis(told.rest, names).T
     jacobian = estimator.scaled_jacobian(estimate.evaluation)
     return Identifiability(
         rank=measured.rank,
         gap=measured.gap,
         unidentifiable=tuple(as_sum(combination, names) for combination in open_ones),
+        gauges=told.texts,
         observability=observability(jacobian, len(equations.actuators), measured.rank),
     )
 
 
-def misfit(estimator: Estimator, estimate: Estimate) -> Misfit:
-    """Residuals before and after, χ² per degree of freedom, noise and outliers."""
+def misfit(estimator: Estimator, estimate: Estimate, start: Evaluation, end: Evaluation) -> Misfit:
+    """Residuals before and after, χ² per degree of freedom, noise and outliers.
+
+    `start` and `end` are the equations with poses that follow from the actuators.
+    """
     equations, state = estimator.equations, estimate.state
     chosen, fitted = equations.parameters, state.fitted.identifiable
     moved = (estimate.evaluation.theta - chosen.start) / chosen.scale
     prior = estimator.prior @ moved
     dof = float(estimate.weights @ equations.components) + len(prior) - state.fitted.rank
     squares = np.repeat(estimate.weights, equations.components) @ estimate.residual**2
-    no_sigma = bool(estimator.unstated.all()) or dof <= 0
+    involved = estimate.freedom != 0.0  # sets of which nothing was read are not
+    no_sigma = bool(estimator.unstated[involved].all()) or dof <= 0
     odd = outliers(
         estimate.residual,
         estimate.jacobian @ fitted,
@@ -140,15 +159,23 @@ def misfit(estimator: Estimator, estimate: Estimate) -> Misfit:
         estimate.weights,
         estimator.prior @ fitted,
     )
+    sets = len(equations.sets)
+    unknown_noise = np.where(estimator.unstated, state.noise, np.nan)
     return Misfit(
-        rms=equations.rms(estimate.evaluation),
-        rms_before=equations.rms(estimator.start),
+        rms=equations.rms(end),
+        rms_before=equations.rms(start),
+        closure_rms=equations.closure_rms(estimate.evaluation),
+        closure_rms_before=equations.closure_rms(estimator.start),
+        closures=equations.worst_closures(estimate.evaluation),
+        actuator_noise=float(np.append(unknown_noise, np.nan)[sets]),
+        redundancy=tuple(estimate.freedom.tolist()),
+        idle=equations.idle,
         chi2_per_dof=float("nan") if no_sigma else float((squares + prior @ prior) / dof),
         dof=dof,
-        noise=tuple(np.where(estimator.unstated, state.noise, np.nan).tolist()),
-        residuals=estimate.evaluation.residuals,
+        noise=tuple(unknown_noise[:sets].tolist()),
+        residuals=end.residuals,
         rows=equations.rows,
-        outliers=tuple(equations.rows[odd].tolist()),
+        outliers=tuple(equations.rows[np.isin(equations.unit_of_row, odd)].tolist()),
     )
 
 

@@ -10,11 +10,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, propagate
+from pkmcal.arrays import FloatArray, IntArray, mm_per_unit, propagate
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.mode_slips import in_their_modes
 from pkmcal.calibration.parameters import FitData
+from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 
 
@@ -70,16 +71,21 @@ def evaluate(
     """
     if not held:
         return HeldOut()
-    equations = Equations([data for data, _ in held], estimator.equations.parameters)
+    equations = Equations([data for data, _ in held], estimator.equations.parameters).commanded()
+    estimated = estimate.state.noise[len(estimator.equations.sets) :]  # of the actuators, or none
     after = in_their_modes(equations, equations.at(estimate.evaluation.theta))
     before = equations.at(estimator.start.theta)
     scaled = estimate.covariance * np.outer(estimator.scale, estimator.scale)
     variances = []
-    for part, (data, like) in zip(equations.jacobian(after), held, strict=True):
+    by_actuators = after.robot.actuator_twists(after.pose, after.actuators)
+    for i, (part, (data, like)) in enumerate(zip(equations.jacobian(after), held, strict=True)):
         lengths = part[:, :3]  # of a pose its position
-        variances.append(
-            propagate(lengths, scaled) + _noise(data.measured, estimate.state.noise[like])
-        )
+        variance = propagate(lengths, scaled) + _noise(data.measured, estimate.state.noise[like])
+        sigma = _of_actuators(data.measured, after.robot, estimated)
+        if sigma is not None:
+            moved = after.predicted[i].by_twist[:, :3] @ by_actuators[equations.pose_of[i]]
+            variance += ((moved * sigma[:, None]) ** 2).sum(axis=(1, 2))
+        variances.append(variance)
     return HeldOut(
         rms_before=equations.rms(before),
         rms=equations.rms(after),
@@ -88,6 +94,18 @@ def evaluate(
         off_before=equations.distances(before),
         off=equations.distances(after),
     )
+
+
+def _of_actuators(
+    measured: Measurements, robot: Calibratable, estimated: FloatArray
+) -> FloatArray | None:
+    """Deviations (N, n) of what the actuators of held-out rows read; None where they have none."""
+    if measured.actuator_sigma is not None:
+        return measured.actuator_sigma
+    if not len(estimated):
+        return None
+    units = mm_per_unit(robot.actuator_units, robot.length)
+    return np.tile(estimated[0] / units, (len(measured), 1))
 
 
 def _noise(measured: Measurements, estimated: float) -> FloatArray:

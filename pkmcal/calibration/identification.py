@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,6 +60,17 @@ class Identification(Parts, Result):
             for i, j in zip(first, second, strict=True)
         ]
         return tuple(sorted(pairs, key=lambda pair: -round(abs(pair[2]), _ALIKE)))
+
+    def _columns(self) -> dict[str, Any]:
+        """The parameters: value, deviation and change of each."""
+        return {
+            "name": self.free,
+            "unit": self.units,
+            "value": self.values,
+            "stderr": self.stderr,
+            "start": self.start,
+            "change": self.values - self.start,
+        }
 
     def accuracy(self, poses: ArrayLike, target: ArrayLike | None = None) -> FloatArray:
         """Standard deviation of a point of the identified machine at any pose.
@@ -144,14 +156,20 @@ class Identification(Parts, Result):
 
     def _parts(self) -> Iterator[str | Table]:
         count = len(self.rows)
+        what = "row" if np.isnan(self.rms) else "measured point"
         yield (
-            f"{self.robot.name}: {len(self.free)} parameters from {count} measured"
-            f" point{'s' if count > 1 else ''}"
+            f"{self.robot.name}: {len(self.free)} parameters from {count} {what}"
+            f"{'s' if count > 1 else ''}"
         )
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)
         yield from summary.limits(
-            self.identifiability, len(self.free), self.correlations, self.outliers, self.at_bounds
+            self.identifiability,
+            len(self.free),
+            self.correlations,
+            self.outliers,
+            self.at_bounds,
+            self.idle,
         )
         if not self.converged:
             yield "not converged"

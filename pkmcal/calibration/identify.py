@@ -10,7 +10,8 @@ import numpy as np
 
 from pkmcal.arguments import instance, word
 from pkmcal.arms.arm import SerialArm
-from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.closures import has_equations
+from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_statistics import (
@@ -132,23 +133,28 @@ def identify(
     elif holdout is not None:
         pairs = [draw(data, holdout) for data in datasets]
         datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
+    datasets, unread = _telling(machine, datasets)
     chosen = parameters(machine, datasets, free, prior, bounds)
     word("loss", loss, LIMITS)
-    equations = Equations(datasets, chosen)
-    start = equations.start()
-    if in_their_modes(equations, start) is not start:
-        start = equations.start()  # an unknown frame was laid with rows of other modes
+    equations = Equations(datasets, chosen, unread)
+    commanded = equations.commanded()
+    start = commanded.start()
+    if in_their_modes(commanded, start) is not start:
+        start = commanded.start()  # an unknown frame was laid with rows of other modes
     try:
-        if not start.ok:
-            raise ArgumentError(equations.failures(start))
-        estimator = Estimator(equations, start, loss)
+        if not start.ok and commanded is equations:
+            raise ArgumentError(commanded.failures(start))
+        own = equations.begin(commanded, start)
+        if not own.ok:
+            raise ArgumentError(equations.failures(own))
+        estimator = Estimator(equations, own, loss)
         estimate = estimator.solve()
     except ValueError as error:
         hint = likely_unit_errors(datasets, chosen, start)
         if not hint and not start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
-    result = _result(estimator, estimate, evaluate(held, estimator, estimate))
+    result = _result(estimator, estimate, commanded, start, evaluate(held, estimator, estimate))
     notes = _warnings(result, estimator, estimate, datasets)
     for text in notes:
         warnings.warn(text, CalibrationWarning, stacklevel=2)
@@ -159,19 +165,30 @@ def _warnings(
     result: Identification, estimator: Estimator, estimate: Estimate, datasets: Sequence[FitData]
 ) -> list[str]:
     """Say what looks wrong with the measurements or the fit."""
-    equations, size = estimator.equations, estimator.start.robot.length
+    fit = result.fit
+    equations, size = fit.equations, estimator.start.robot.length
     notes = implausible_changes(estimator.start, estimate.evaluation, equations.parameters)
     if notes or result.rms > _POOR * result.rms_before or result.chi2_per_dof > _NOISY:
-        notes = likely_unit_errors(datasets, equations.parameters, estimator.start) or notes
-    notes += insufficient_data(equations, result.rank, result.dof, bool(len(estimator.prior)))
+        notes = likely_unit_errors(datasets, equations.parameters, fit.start) or notes
+    notes += insufficient_data(
+        estimator.equations, result.rank, result.dof, bool(len(estimator.prior))
+    )
     if result.chi2_per_dof > _NOISY:
         notes.append(
             f"residuals are {np.sqrt(result.chi2_per_dof):.3g} times what sigma says:"
             f" {_remedy(result, estimator, estimate)}"
         )
-    notes += in_other_modes(equations, estimate.evaluation)
-    notes += distant_points(estimate.evaluation, equations.parameters)
-    notes += beyond_strokes(equations, estimator.start, estimate.evaluation)
+    notes += in_other_modes(equations, fit.end)
+    notes += distant_points(fit.end, equations.parameters)
+    notes += beyond_strokes(equations, fit.start, fit.end)
+    unknown = estimator.unstated & (estimate.freedom < estimator.least_freedom)
+    if estimator.equations.closures.unknowns and unknown.any():
+        names = [f"of measurements {i + 1}" for i in range(len(equations.sets))]
+        names = [n for n, u in zip([*names, "of the actuators"], unknown, strict=True) if u]
+        notes.append(
+            f"too little is left over to estimate the noise {' and '.join(names)}: state sigma and"
+            " actuator_sigma"
+        )
     kept = estimate.state.determined.rank - estimate.state.fitted.rank
     if kept:
         notes.append(
@@ -216,12 +233,41 @@ def _datasets(
     for measured, unknowns in zip(sets, unknown, strict=True):
         datasets.append(FitData(measured, np.arange(first, first + len(measured)), *unknowns))
         first += len(measured)
+    known = [data.measured.actuator_sigma is not None for data in datasets]
+    if any(known) and not all(known):
+        raise ArgumentError("measurements: state actuator_sigma of all sets, or of none")
     if any(data.unknown_frame for data in datasets) and not any(data.framed for data in datasets):
         raise ArgumentError("frame: distances do not depend on it, it cannot be unknown")
     distances = any(data.measured.kind == "distance" for data in datasets)
     if any(data.unknown_attachment for data in datasets) and not distances:
         raise ArgumentError("attachment: distances alone have one, it cannot be unknown")
     return datasets
+
+
+def _telling(machine: Calibratable, datasets: list[FitData]) -> tuple[list[FitData], int]:
+    """Leave rows out that say nothing: unread, where poses follow from the actuators exactly.
+
+    And count them.
+    """
+    if has_equations(machine, [data.measured.actuator_sigma for data in datasets]):
+        return datasets, 0
+    kept, unread = [], 0
+    for data in datasets:
+        values = data.measured.values.reshape(len(data.measured), -1)
+        read = np.isfinite(values).any(axis=1)
+        unread += int((~read).sum())
+        if read.all():
+            kept.append(data)
+        elif read.any():
+            measured = data.measured.select(read)
+            kept.append(replace(data, measured=measured, rows=data.rows[read]))
+    if not kept:
+        raise ArgumentError(
+            f"measurements: nothing was read but the actuators; poses of {machine.name} follow from"
+            " these, which then say nothing of its geometry: measure poses, points, heights or"
+            " distances"
+        )
+    return kept, unread
 
 
 def _as_fitted(
@@ -255,19 +301,29 @@ def _unknown(argument: str, given: str | Sequence[str], count: int) -> list[bool
     return [word(argument, each, KNOWN) == "unknown" for each in said]
 
 
-def _result(estimator: Estimator, estimate: Estimate, held: HeldOut) -> Identification:
+def _result(
+    estimator: Estimator,
+    estimate: Estimate,
+    commanded: Equations,
+    start: Evaluation,
+    held: HeldOut,
+) -> Identification:
     chosen, search = estimator.equations.parameters, estimator.search
     covariance = reported_covariance(estimator, estimate)
     robot = as_given(chosen.robot.replace(chosen.values_at(estimate.evaluation.theta)))
     if isinstance(robot, Robot):
-        robot = robot.closing(estimator.equations.actuators, estimate.evaluation.pose)
+        robot = robot.closing(commanded.actuators, estimate.evaluation.pose)
+    end = estimate.evaluation
+    if commanded is not estimator.equations:
+        commanded.warm_start(end)
+        end = commanded.at(end.theta)
     return Identification(
         robot=robot,
         table=parameter_table(estimator, estimate, covariance),
         identifiability=identifiability(estimator, estimate),
-        misfit=misfit(estimator, estimate),
+        misfit=misfit(estimator, estimate, start, end),
         holdout=held,
         repeats=repeats(estimator, estimate),
         search=SearchRecord(search.converged, search.evaluations, tuple(search.history)),
-        fit=Fit(estimator.equations, estimator.start, estimate, covariance),
+        fit=Fit(commanded, start, end, estimate, covariance),
     )

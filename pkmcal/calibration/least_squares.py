@@ -6,14 +6,12 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
+from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.calibration.equations import Equations, Evaluation
 from pkmcal.calibration.loss import Loss
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.measurements import Measurements
 
 _FTOL = 1e-12  # of the cost: 1e-5 of a standard deviation
-_ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
 
 
 class Search:
@@ -35,7 +33,8 @@ class Search:
     converged : bool
         Whether the last search did.
     history : list of float
-        Misfit of the rows that were reached at the start and after every step taken, rms in mm.
+        Misfit of the rows that were reached at the start and after every step taken, rms in mm; of
+        the closures where nothing else was read.
     """
 
     def __init__(self, equations: Equations, start: Evaluation) -> None:
@@ -47,24 +46,27 @@ class Search:
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
         self._method: Literal["trf", "lm"] = "trf" if bounded else "lm"
-        self._rounding = [_rounded(m, start.robot.length) for m in equations.sets]
-        self._last: tuple[FloatArray, Evaluation] = (np.zeros(len(self.scale)), start)
-        self._refused = np.zeros(len(equations.rows), dtype=bool)
+        ones = np.ones(len(equations.unstated))
+        self._last: tuple[FloatArray, FloatArray, Evaluation]
+        self._last = (np.zeros(len(self.scale)), ones, start)
+        self._refused = np.zeros(len(equations.components), dtype=bool)
         self.evaluations = 0
         self.converged = False
         self.history: list[float] = []
 
-    def at(self, u: FloatArray) -> Evaluation:
-        """The equations at scaled parameters (n,)."""
-        if not np.array_equal(u, self._last[0]):
-            self._last = (u.copy(), self.equations.at(self.start.theta + self.scale * u))
+    def at(self, u: FloatArray, noise: FloatArray) -> Evaluation:
+        """The equations at scaled parameters (n,), poses found with this noise (G,)."""
+        same = not self.equations.closures.unknowns or np.array_equal(noise, self._last[1])
+        if not (same and np.array_equal(u, self._last[0])):
+            there = self.equations.at(self.start.theta + self.scale * u, noise)
+            self._last = (u.copy(), noise, there)
             self.evaluations += 1
-        return self._last[1]
+        return self._last[2]
 
     def jacobian(
         self, evaluation: Evaluation, noise: FloatArray, aside: BoolArray | None = None
     ) -> FloatArray:
-        """Derivative (M, n) of the predicted values, scaled and whitened; 0 for rows set aside.
+        """Derivative (M, n) of the predicted values, scaled and whitened; 0 for units set aside.
 
         Raises
         ------
@@ -72,7 +74,7 @@ class Search:
             It does not exist, at a singularity of the machine.
         """
         equations = self.equations
-        jacobian = equations.whitened(equations.jacobian(evaluation), noise) * self.scale
+        jacobian = equations.by_parameters(evaluation, noise) * self.scale
         if aside is not None:
             jacobian[np.repeat(aside, equations.components)] = 0.0
         if not np.isfinite(jacobian).all():
@@ -92,7 +94,7 @@ class Search:
         ----------
         u : ndarray (n,)
             Where to start.
-        noise : ndarray (sets,)
+        noise : ndarray (G,)
             See `Equations.whitened`.
         loss : Loss
             How rows count.
@@ -106,13 +108,13 @@ class Search:
         barred = self._refused.copy()
         if not barred.any() or barred.all():
             return straight
-        converged, here = self.converged, self.at(straight)
+        converged, here = self.converged, self.at(straight, noise)
         around, _ = self._minimum(u, noise, loss, pins, barred)
-        if self.at(around).ok:
+        if self.at(around, noise).ok:
             around, other = self._minimum(around, noise, loss, pins, everything)
             if other < cost:
                 return around
-        self.converged, self._last = converged, (straight, here)
+        self.converged, self._last = converged, (straight, noise, here)
         equations.warm_start(here)
         return straight
 
@@ -128,28 +130,28 @@ class Search:
         without = np.repeat(aside, equations.components)
 
         def data(evaluation: Evaluation) -> FloatArray:
-            whitened = equations.whitened(evaluation.residuals, noise)
+            whitened = equations.residual(evaluation, noise)
             whitened[without] = 0.0
             return whitened
 
         # a cost that nothing lowers: by less than rounding it need not fall
-        floor = np.linalg.norm(equations.whitened(self._rounding, noise)) / np.sqrt(_FTOL)
-        first = data(self.at(u))
+        floor = equations.rounding(noise) / np.sqrt(_FTOL)
+        first = data(self.at(u, noise))
         worse = 10.0 * (1.0 + np.abs(first).max())
 
         def residual(u: FloatArray) -> FloatArray:
-            evaluation = self.at(u)
+            evaluation = self.at(u, noise)
             held = extra @ u - offset
-            missed = (equations.status(evaluation) != 0) & ~aside
+            missed = (evaluation.status[equations.pose_of_unit] != 0) & ~aside
             if missed.any():  # worse than any step that is taken
                 self._refused |= missed
                 return np.full(len(first) + len(held) + 1, worse + floor)
             return np.concatenate([-loss.residual(data(evaluation)), held, [floor]])
 
         def jacobian(u: FloatArray) -> FloatArray:
-            evaluation = self.at(u)
+            evaluation = self.at(u, noise)
             equations.warm_start(evaluation)  # the step to it was taken
-            self.history.append(equations.rms(evaluation))
+            self.history.append(equations.progress(evaluation))
             by_u = self.jacobian(evaluation, noise, aside)
             return np.vstack([loss.jacobian(data(evaluation), by_u), extra, np.zeros(len(u))])
 
@@ -167,11 +169,3 @@ class Search:
         )
         self.converged = bool(found.status > 0)
         return found.x, float(found.cost)
-
-
-def _rounded(measured: Measurements, length: float) -> FloatArray:
-    """Rounding errors (N, k) of what is predicted, mm and rad."""
-    values = measured.values.reshape(len(measured), -1)
-    lengths = np.array([unit == "mm" for unit in measured.units])
-    size = np.abs(values[:, lengths]).max() + length
-    return np.broadcast_to(_ROUNDING * size / mm_per_unit(measured.units, length), values.shape)

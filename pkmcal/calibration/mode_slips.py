@@ -52,12 +52,12 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
     if not isinstance(robot, Robot):
         return none  # an arm has one pose
     misfit = equations.misfit(pose, evaluation.theta)
-    solved = np.isfinite(misfit)
+    solved, read = np.isfinite(misfit), ~np.isnan(misfit)
     if not solved.any():
         return none
     limit = max(_GROSS * float(np.median(misfit[solved])), _LEAST)
-    gross = np.flatnonzero(~(misfit <= limit))
-    if not 0 < len(gross) <= _MOST * len(misfit):
+    gross = np.flatnonzero(read & ~(misfit <= limit))
+    if not 0 < len(gross) <= _MOST * np.count_nonzero(read):
         return none
     least, best = np.where(solved, misfit, np.inf), pose.copy()
     modes = [_modes(robot, equations.actuators, pose, int(k), misfit <= limit) for k in gross]

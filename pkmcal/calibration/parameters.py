@@ -31,6 +31,7 @@ POINTS: dict[Kind, dict[str, str]] = {
     "position": {"target": "target"},
     "height": {"target": "target"},
     "distance": {"target": "attachment", "anchor": "anchor"},
+    "closure": {},
 }
 
 

@@ -29,6 +29,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "rank",
     "gap",
     "unidentifiable",
+    "gauges",
     "rms",
     "rms_before",
     "holdout_rms",
@@ -37,9 +38,14 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "holdout_unreached",
     "holdout_off",
     "holdout_off_before",
+    "closure_rms",
+    "closure_rms_before",
     "chi2_per_dof",
     "dof",
     "noise",
+    "actuator_noise",
+    "redundancy",
+    "idle",
     "repeatability",
     "lack_of_fit",
     "lack_of_fit_chance",
@@ -147,6 +153,14 @@ class Parts:
         return self.identifiability.unidentifiable
 
     @property
+    def gauges(self) -> tuple[str, ...]:
+        """What readings of actuators alone leave open by their nature, in words.
+
+        Where the base stands, the common scale; these combinations are not in `unidentifiable`.
+        """
+        return self.identifiability.gauges
+
+    @property
     def rms(self) -> float:
         """√(Σ r²/N) over the N fitted points, mm.
 
@@ -224,6 +238,39 @@ class Parts:
     def observability(self) -> dict[str, float]:
         """Indices O1 … O5 of the scaled Jacobian, over the identifiable combinations."""
         return self.identifiability.observability
+
+    @property
+    def closure_rms(self) -> float:
+        """How far the machine's own closures disagree at the poses found, mm of the actuators.
+
+        NaN where poses follow from the actuators exactly: as many closures as free coordinates, and
+        no `Measurements.actuator_sigma`.
+        """
+        return self.misfit.closure_rms
+
+    @property
+    def closure_rms_before(self) -> float:
+        """The same of the nominal machine."""
+        return self.misfit.closure_rms_before
+
+    @property
+    def actuator_noise(self) -> float:
+        """Estimated deviation of what the actuators read, mm; NaN where it was stated."""
+        return self.misfit.actuator_noise
+
+    @property
+    def redundancy(self) -> tuple[float, ...]:
+        """Degrees of freedom left in each set, then in the closures where those are fitted.
+
+        Equations less what poses and parameters took of them; a deviation estimated from r of them
+        is itself good to 1/√(2 r) of it.
+        """
+        return self.misfit.redundancy
+
+    @property
+    def idle(self) -> int:
+        """How many poses say nothing, for nothing is left when they are determined."""
+        return self.misfit.idle
 
     @property
     def residuals(self) -> tuple[FloatArray, ...]:

@@ -295,7 +295,7 @@ def _equations(
         index = np.tile(np.arange(count), len(q))
         measured = replace(measured, target=several, target_index=index)
     data = FitData(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
-    return Equations([data], parameters(robot, [data], free, prior, None))
+    return Equations([data], parameters(robot, [data], free, prior, None)).commanded()
 
 
 def _design(

@@ -44,11 +44,19 @@ def likely_unit_errors(
     size = parameters.robot.length
     found = []
     for i, data in enumerate(datasets):
-        present = _misfit(evaluation.residuals[i], data.measured.units, size)
+        read = np.isfinite(data.measured.values.reshape(evaluation.residuals[i].shape))
+        if not read.any():
+            continue
+        residual = np.where(read, evaluation.residuals[i], 0.0)
+        present = _misfit(residual, data.measured.units, size)
         if present <= _GROSS * size:
             continue
         trials = {
-            words: _misfit(_alone(replace(data, measured=other), parameters), other.units, size)
+            words: _misfit(
+                np.where(read, _alone(replace(data, measured=other), parameters), 0.0),
+                other.units,
+                size,
+            )
             for words, other in _readings(data.measured, parameters.robot.actuator_units)
         }
         # exchanges that are equivalent on a symmetric machine misfit alike
@@ -64,7 +72,7 @@ def likely_unit_errors(
 
 
 def _alone(data: FitData, parameters: Parameters) -> FloatArray:
-    (residual,) = Equations([data], parameters).start().residuals
+    (residual,) = Equations([data], parameters).commanded().start().residuals
     return residual
 
 
@@ -206,6 +214,8 @@ def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: b
     for measured in equations.sets:
         rows = equations.rows[start : start + len(measured)]
         start += len(measured)
+        if not measured.components:
+            continue  # the same readings of actuators alone may well occur twice
         targets = (
             np.zeros(len(measured)) if measured.target_index is None else measured.target_index
         )

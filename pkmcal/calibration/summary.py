@@ -22,6 +22,11 @@ _BETWEEN = 3  # letters between tables side by side
 def misfit_table(misfit: Misfit, holdout: HeldOut) -> Table:
     """Misfit before and after, of fitted points and of those held out."""
     rows = [["fitted", _short(misfit.rms_before), _short(misfit.rms), ""]]
+    if np.isnan(misfit.rms):  # nothing but the actuators was read
+        rows = []
+    if np.isfinite(misfit.closure_rms):
+        pair = _short(misfit.closure_rms_before), _short(misfit.closure_rms)
+        rows.append(["closures", *pair, "of the actuators"])
     if np.isfinite(holdout.rms):
         pair = _short(holdout.rms_before), _short(holdout.rms)
         rows.append(["held out", *pair, f"expected {_short(holdout.expected)}"])
@@ -37,6 +42,8 @@ def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -
         facts.append(f"chi²/dof {shown} (1 ± {np.sqrt(2 / misfit.dof):.2f} expected)")
     misses = repeats.lack_of_fit_chance < SIGNIFICANT
     estimated = [_short(noise) for noise in misfit.noise if np.isfinite(noise)]
+    if np.isfinite(misfit.actuator_noise):
+        estimated.append(f"of the actuators {_short(misfit.actuator_noise)}")
     if estimated:
         included = ", lack of fit included" if misses else ""
         facts.append(f"noise {', '.join(estimated)} mm, estimated from the residuals{included}")
@@ -57,11 +64,14 @@ def limits(
     correlations: Sequence[tuple[str, str, float]],
     outliers: Sequence[int],
     at_bounds: Sequence[str],
+    idle: int,
 ) -> Iterator[str]:
     """Where the result has limits: rank, correlations, outliers, bounds."""
+    yield from (filled("", text) for text in identifiability.gauges)
     if identifiability.rank < parameters:
         gap = f", gap {identifiability.gap:.0e}" if np.isfinite(identifiability.gap) else ""
-        yield f"rank {identifiability.rank} of {parameters}{gap}; unidentifiable combinations:"
+        told = "; unidentifiable combinations:" if identifiability.unidentifiable else ""
+        yield f"rank {identifiability.rank} of {parameters}{gap}{told}"
         yield from (filled("  ", text) for text in identifiability.unidentifiable[:4])
         if len(identifiability.unidentifiable) > 4:
             yield f"  and {len(identifiability.unidentifiable) - 4} more"
@@ -69,6 +79,11 @@ def limits(
         shown = ", ".join(f"{a} / {b} {value:+.3f}" for a, b, value in correlations[:3])
         more = f" and {len(correlations) - 3} more" if len(correlations) > 3 else ""
         yield filled("correlated: ", shown + more)
+    if idle:
+        yield (
+            f"{idle} {'poses say' if idle > 1 else 'pose says'} nothing: what was read there"
+            " determines the pose at most"
+        )
     if outliers:
         yield filled("outliers: ", f"rows {first_rows(outliers, 10)}")
     if at_bounds:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pkmcal.arguments import instance
 from pkmcal.arms.arm import SerialArm
 from pkmcal.checks.arm import ARM_CHECKS
+from pkmcal.checks.chains import CHAIN_CHECKS, surplus
 from pkmcal.checks.finding import Finding
 from pkmcal.checks.function import (
     not_closed,
@@ -73,7 +74,7 @@ class GeometryCheck(Result):
         count = len(self.findings)
         if not count:
             yield f"{self.robot.name}: no problems found"
-            if isinstance(self.robot, Robot) and (remark := unusual_size(self.robot)):
+            if isinstance(self.robot, Robot) and (remark := _remark(self.robot)):
                 yield remark
             return
         yield f"{self.robot.name}: {count} finding{'s' if count > 1 else ''}"
@@ -124,6 +125,11 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
     10 mm or above 100 m is no finding, for there are such; where nothing else is found ``print``
     remarks on its size, since all of its lengths may be in another unit.
 
+    Of a machine of chains it is checked that the platform stands still while its actuators do
+    (mobility: what it can still do is named), that home values are the distances they seem to be
+    (home), limits and singularities. Where the limbs close more than they need to, ``print``
+    remarks on that.
+
     Of a serial arm fewer things can be checked: lengths, joint errors and Denavit–Hartenberg twists
     in another unit (unit, angle), and neighbouring joints on one axis (double), where
     ``Finding.limbs`` counts joints.
@@ -140,5 +146,10 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
         found = [finding for check in ARM_CHECKS for finding in check(robot)]
     else:
         instance("robot", robot, Robot, " or SerialArm")
-        found = [finding for check in CHECKS for finding in check(robot)]
+        checks = CHECKS if robot.model.chains is None else CHAIN_CHECKS
+        found = [finding for check in checks for finding in check(robot)]
     return GeometryCheck(robot, tuple(found))
+
+
+def _remark(robot: Robot) -> str:
+    return unusual_size(robot) if robot.model.chains is None else surplus(robot)

@@ -151,7 +151,7 @@ def _mended(robot: Robot) -> Iterator[Finding]:
                 home[:, :3] *= factor
             else:
                 stroke = factor
-            drive = robot.machine.limbs(slots, home)[0][0]
+            drive = robot.limb_machine.limbs(slots, home)[0][0]
             if _in_strokes(robot, drive, stroke):
                 mended.append(f"the {name} in {unit}" if name != "home" else f"home in {unit}")
     if mended:
@@ -259,7 +259,7 @@ def singular(robot: Robot) -> Iterator[Finding]:
     """Machines that are singular in every pose, or at home."""
     random = np.random.default_rng(0)
     scale = np.array([1.0, 1.0, 1.0, *[1.0 / robot.length] * 3]) * _SPREAD * robot.length
-    free = [name in (robot.model.match or robot.coordinates) for name in POSE]
+    free = [name in robot.moved for name in POSE]
     poses = robot.home + scale * free * random.uniform(-1, 1, (_POSES, 6))
     conditioning = dexterity(robot, completed(robot, np.vstack([robot.home, poses]))).conditioning
     seen = conditioning[np.isfinite(conditioning)]
@@ -295,7 +295,7 @@ def singular(robot: Robot) -> Iterator[Finding]:
 
 def _affine_error(robot: Robot) -> float | None:
     """How far the joints of a hexapod's platform are from an affine image of those of its base."""
-    if robot.model.map != "spatial" or len(robot.model.limbs) < 6:
+    if robot.model.map != "spatial" or len(robot.model.limbs) < 6 or robot.model.chains:
         return None
     base, platform = (side.points for side in joints(robot))
     system = np.column_stack([base, np.ones(len(base))])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -13,9 +14,20 @@ import typer
 import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.calibration.loss import LIMITS
-from pkmcal.calibration.parameters import KNOWN
+from pkmcal.calibration.parameters import KNOWN, Known
 from pkmcal.cli.geometry_options import free_names, read_deviations
 from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.measured import (
+    Columns,
+    Controller,
+    Ignore,
+    JoinBy,
+    ProbeOffset,
+    Reading,
+    Rename,
+    Rotation,
+    Units,
+)
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
@@ -29,7 +41,9 @@ from pkmcal.report.report import FILES as REPORT
 
 def calibrate(
     robot: RobotOrArm,
-    csv: Annotated[Path, typer.Argument(metavar="CSV", help="Measurements with units.")],
+    csv: Annotated[
+        list[Path], typer.Argument(metavar="CSV...", help="Measurements: one file or several.")
+    ],
     free: Free = None,
     prior: Prior = None,
     holdout: Annotated[
@@ -47,7 +61,8 @@ def calibrate(
         str,
         typer.Option(
             metavar="WORD",
-            help="unknown: identify the frame of the instrument, too.",
+            help="unknown: identify the frame of the instrument, too. Of several files one word"
+            " each, with commas, if not the same for all.",
         ),
     ] = "known",
     target: Annotated[
@@ -61,6 +76,14 @@ def calibrate(
             help="unknown: identify where distances end, too.",
         ),
     ] = "known",
+    controller: Controller = None,
+    join: JoinBy = "auto",
+    ignore: Ignore = None,
+    rename: Rename = None,
+    columns: Columns = None,
+    units: Units = None,
+    rotation: Rotation = None,
+    probe_offset: ProbeOffset = None,
     tracker: Annotated[
         str | None,
         typer.Option(
@@ -93,43 +116,69 @@ def calibrate(
     read = Inputs()
     given = pk.load(read.robot(robot))
     machine = as_machine(given)
-    measured = pk.read_measurements(read.file(csv), machine)
-    held = None if holdout is None else _read_holdout(holdout, read, machine)
-    output = None if out is None else Output(out, ["robot.toml", "residuals.png"], read, force)
+    reading = Reading(
+        controller, join, ignore or (), rename or (), columns, units, rotation, probe_offset
+    )
+    with warnings.catch_warnings(record=True) as doubts:
+        warnings.simplefilter("always", pk.CalibrationWarning)
+        measured = [reading.measurements(path, read, machine) for path in csv]
+    for doubt in doubts:
+        say(f"pkmcal: {doubt.message}", err=True)
+    held = None if holdout is None else _read_holdout(holdout, read, machine, reading)
+    urdf = isinstance(given, pk.SerialArm) and given.source is not None
+    names = ["robot.toml", "residuals.png", *["robot.urdf"] * urdf]
+    output = None if out is None else Output(out, names, read, force)
     reported = None if report is None else Output(report, REPORT, read, force)
     if tracker is not None:
-        measured = _seen_by(read_tracker(tracker), measured)
+        seen = read_tracker(tracker)
+        measured = [_seen_by(seen, each) for each in measured]
     chosen = free_names(machine, free)
     with progress("identifying"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
         found = pk.identify(
             given,
-            measured,
+            measured[0] if len(measured) == 1 else measured,
             free=chosen or None,
             prior=read_deviations("--prior", prior or [], machine, chosen),
             loss=word("--loss", loss, LIMITS),
-            frame=word("--frame", frame, KNOWN),
-            target=word("--target", target, KNOWN),
-            attachment=word("--attachment", attachment, KNOWN),
+            frame=_known("--frame", frame, measured),
+            target=_known("--target", target, measured),
+            attachment=_known("--attachment", attachment, measured),
             holdout=held,
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:
-            found.robot.save(draft / "robot.toml", read.comment())
+            _save(found, draft / "robot.toml", read, robot)
             found.plot(draft / "residuals.png")
+            if isinstance(found.robot, pk.SerialArm) and urdf:
+                found.robot.save_urdf(draft / "robot.urdf")
     if reported is not None:
         with progress("report"), reported.draft() as draft:
             found.report(draft, read.contents())
+            _save(found, draft / "robot.toml", read, robot)
     if json:
-        say(as_json(found, "parameters", "correlations"))
+        say(as_json(found, "parameters", "correlations", schema="calibrate"))
     else:
         say(found.summary())
         if output is not None:
             say(f"\ncalibrated robot: {output.paths[0]}")
             say(f"residuals: {output.paths[1]}")
+            if urdf:
+                say(f"URDF with the joint errors in its origins: {output.paths[2]}")
         if reported is not None:
             say(f"\nreport: {reported.paths[0]}")
-    return 0 if found.converged and not found.warnings else 1
+    return 0 if found.converged and not (found.warnings or doubts) else 1
+
+
+def _save(found: pk.Identification, path: Path, read: Inputs, robot: str) -> None:
+    """Write the calibrated robot; in the words of the user's file, where there is one."""
+    calibrated, source = found.robot, read.robot(robot)
+    if isinstance(calibrated, pk.SerialArm) or isinstance(source, str):
+        calibrated.save(path, read.comment())
+        return
+    sigmas = zip(found.free, found.stderr.tolist(), strict=True)
+    known = {name: sigma for name, sigma in sigmas if name in calibrated.geometry.names}
+    calibrated.save(path, read.comment(), like=source, deviations=known)
 
 
 def read_tracker(text: str) -> Tracker:
@@ -163,10 +212,20 @@ def _seen_by(tracker: Tracker, measured: Measurements) -> Measurements:
     return replace(measured, sigma=tracker.covariance(measured.values))
 
 
-def _read_holdout(text: str, read: Inputs, robot: Calibratable) -> float | Measurements:
+def _known(option: str, text: str, measured: Sequence[Measurements]) -> Known | list[Known]:
+    """One word for all files, or one for each."""
+    words = [word(option, part.strip(), KNOWN) for part in text.split(",")]
+    if len(words) not in (1, len(measured)):
+        raise ArgumentError(f"{option} {text}: {len(words)} words for {len(measured)} files")
+    return words[0] if len(words) == 1 else words
+
+
+def _read_holdout(
+    text: str, read: Inputs, robot: Calibratable, reading: Reading
+) -> float | Measurements:
     """Return a fraction, a number of poses, or the measurements of a file."""
     try:
         number = float(text)
     except ValueError:
-        return pk.read_measurements(read.file(text), robot)
+        return reading.measurements(text, read, robot)
     return int(number) if number.is_integer() else number

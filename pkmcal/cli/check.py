@@ -10,6 +10,17 @@ import typer
 
 import pkmcal as pk
 from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.measured import (
+    Columns,
+    Controller,
+    Ignore,
+    JoinBy,
+    ProbeOffset,
+    Reading,
+    Rename,
+    Rotation,
+    Units,
+)
 from pkmcal.cli.options import Json, RobotOrArm
 from pkmcal.cli.output import say
 from pkmcal.display import first_rows
@@ -23,6 +34,14 @@ def check(
         Path | None,
         typer.Argument(metavar="CSV", help="Measurements of it: columns, units, numbers."),
     ] = None,
+    controller: Controller = None,
+    join: JoinBy = "auto",
+    ignore: Ignore = None,
+    rename: Rename = None,
+    columns: Columns = None,
+    units: Units = None,
+    rotation: Rotation = None,
+    probe_offset: ProbeOffset = None,
     json: Json = False,
 ) -> int:
     """Look for mistakes in the geometry of a machine.
@@ -38,7 +57,10 @@ def check(
     machine = pk.load(read.robot(robot))
     measured = None
     if measurements is not None:
-        measured = pk.read_measurements(read.file(measurements), machine)
+        reading = Reading(
+            controller, join, ignore or (), rename or (), columns, units, rotation, probe_offset
+        )
+        measured = reading.measurements(measurements, read, as_machine(machine))
     found = pk.check_geometry(machine)
     unsolved: list[int] = []
     if measured is not None:
@@ -48,7 +70,7 @@ def check(
         if measured is not None:
             said = {"kind": measured.kind, "rows": len(measured), "without_pose": unsolved}
         parts = {"robot": machine, "findings": found.findings, "ok": found.ok, "measurements": said}
-        say(as_json(parts))
+        say(as_json(parts, schema="check"))
     else:
         say(found)
         if measured is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, cast
@@ -15,6 +16,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json, ParallelRobot, Seed
 from pkmcal.cli.output import Output, say
+from pkmcal.cli.rows import POSE_UNITS, numbers_on_line
 from pkmcal.compensation.compensate import Method, Orientation
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
@@ -24,18 +26,25 @@ from pkmcal.loading import load_parallel
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
 
+PROGRAMS = (".ngc", ".nc", ".gcode", ".g", ".tap")
 _BESIDE = re.compile(r"q\d+|sigma(\..+)?|group")  # in a file of measurements, and not needed here
 
 
 def compensate(
     robot: ParallelRobot,
-    desired: Annotated[Path, typer.Argument(metavar="DESIRED.csv", help="Desired poses.")],
+    desired: Annotated[
+        Path,
+        typer.Argument(
+            metavar="DESIRED.csv|PROGRAM", help="Desired poses, or a program in plain G-code."
+        ),
+    ],
     measured: Annotated[
         Path,
         typer.Argument(
-            metavar="MEASURED.csv",
+            metavar="MEASURED.csv|CALIBRATED",
             help="Where the commands of the inverse kinematics led the machine, row by row:"
-            " poses, or positions 'x \\[mm], y \\[mm], z \\[mm]'.",
+            " poses, or positions 'x \\[mm], y \\[mm], z \\[mm]'. Of a program: the calibrated"
+            " robot, where ROBOT is as the controller has it.",
         ),
     ],
     method: Annotated[
@@ -61,12 +70,31 @@ def compensate(
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write poses, commands, corrections: DIR/corrected.csv."),
+        typer.Option(metavar="DIR", help="Write DIR/corrected.csv, or the program by its name."),
+    ] = None,
+    chord: Annotated[
+        float | None,
+        typer.Option(
+            metavar="MM", help="Of a program: how far from straight lines, 0.01 by default."
+        ),
+    ] = None,
+    joints: Annotated[
+        bool, typer.Option("--joints", help="Of a program: write actuator coordinates.")
+    ] = False,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z,A,B,C", help="Of a program: the pose where it begins, mm and deg."
+        ),
     ] = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
     """Correct the commands of a machine by measured poses (eq. 18 of the 2TPR&2TPS paper).
+
+    Or a program (.ngc, .nc, .gcode, .g, .tap) for a controller that has other numbers than the
+    calibrated machine: its G0 and G1 are written with poses that lead where they are meant, long
+    ones in parts, and nothing else is changed.
 
     Exit code 1: a limb cannot reach some of the poses, or a measured error is implausibly large.
 
@@ -75,6 +103,12 @@ def compensate(
     """
     read = Inputs()
     machine = load_parallel(read.robot(robot))
+    if desired.suffix.lower() in PROGRAMS:
+        beside = {"orientation": orientation, "match": match, "common": common, "bounds": bounds}
+        _refuse(beside | {"seed": seed, "method": method != "exact"}, "a program")
+        calibrated = load_parallel(read.robot(str(measured)))
+        return _program(machine, calibrated, desired, chord, joints, start, out, read, force, json)
+    _refuse({"chord": chord, "joints": joints, "start": start}, "a table of poses")
     poses = read_poses(read.file(desired), machine)
     reached = read_reached(read.file(measured))
     output = None if out is None else Output(out, ["corrected.csv"], read, force)
@@ -101,12 +135,55 @@ def compensate(
         with output.draft() as draft:
             write_poses(draft / "corrected.csv", poses, columns, comment=read.comment())
     if json:
-        say(as_json(found))
+        say(as_json(found, schema="compensate"))
     else:
         say(found)
         if output is not None:
             say(f"\ncommands: {output.paths[0]}")
     return 0 if np.isfinite(found.actuators).all() and not found.gross.any() else 1
+
+
+def _refuse(given: Mapping[str, object], what: str) -> None:
+    """Refuse options that say nothing of what is compensated."""
+    for name, value in given.items():
+        if value:
+            raise ArgumentError(f"--{name} says nothing of {what}")
+
+
+def _program(
+    machine: Robot,
+    calibrated: Robot,
+    path: Path,
+    chord: float | None,
+    joints: bool,
+    start: str | None,
+    out: Path | None,
+    read: Inputs,
+    force: bool,
+    json: bool,
+) -> int:
+    begin = None
+    if start is not None:
+        row = numbers_on_line("--start", start, POSE_UNITS, rad=False)
+        if row is None:
+            raise ArgumentError(f"--start must be six numbers, found {start!r}")
+        begin = row[0]
+    if out is None:
+        raise ArgumentError("--out is needed: the folder for the corrected program")
+    program = read.file(path)
+    output = Output(out, [path.name], read, force)
+    found = pk.compensate_program(
+        machine,
+        calibrated,
+        program,
+        chord=0.01 if chord is None else chord,
+        joints=joints,
+        start=begin,
+    )
+    with output.draft() as draft:
+        (draft / path.name).write_bytes(found.text.encode("utf-8", errors="surrogateescape"))
+    say(as_json(found) if json else f"{found}\nprogram: {output.paths[0]}")
+    return 0
 
 
 def read_reached(path: str | PathLike[str]) -> FloatArray:

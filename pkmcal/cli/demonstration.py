@@ -72,7 +72,7 @@ def demo(
         with output.draft() as draft:
             result.write(draft)
     if json:
-        say(as_json(result))
+        say(as_json(result, schema="demo"))
     else:
         listed = [[str(out / name), what] for name, what in FILES.items()]
         say(f"{result}\n\n{display.Table(['file', 'content'], listed, left=2)}")

@@ -6,6 +6,7 @@ file cannot be read or written, 3 nothing done, because of a mistake in this pro
 
 from __future__ import annotations
 
+import re
 import sys
 import traceback
 from pathlib import Path
@@ -17,21 +18,42 @@ from pkmcal.exceptions import Error
 
 DONE, NOT_TRUSTED, REFUSED, MISTAKE = 0, 1, 2, 3
 _LONGEST = 1000  # letters of a message: names of others may be in it
+_KINDS = {REFUSED: "input", MISTAKE: "mistake", interrupt.STOPPED: "stopped"}
+_WHERE = re.compile(r"(?P<file>.+?), line (?P<line>[0-9]+)(?:, column '(?P<column>[^']*)')?: ")
 
 
-def code(error: BaseException) -> int:
-    """Print why a command ended in one line on stderr, and return its exit code."""
+def code(error: BaseException, json: bool = False) -> int:
+    """Print why a command ended in one line on stderr, and return its exit code.
+
+    With `json` also as JSON on stdout: the message, and file, line and column where it has them.
+    """
+    message, how = _reason(error)
+    message = _one_line(message)
+    print("pkmcal:", message, file=sys.stderr)
+    if json:
+        from pkmcal.report.as_json import as_json  # loads the package, which may be what failed
+
+        where = _WHERE.match(message)
+        parts = where.groupdict() if where else dict.fromkeys(("file", "line", "column"))
+        parts["line"] = parts["line"] and int(parts["line"])
+        said = {"message": message, "kind": _KINDS[how], "exit_code": how, **parts}
+        print(as_json({"error": said}, schema="error"))
+    return how
+
+
+def _reason(error: BaseException) -> tuple[str, int]:
+    """What to say of an error, and the exit code."""
     if isinstance(error, KeyboardInterrupt):
-        return _ended(interrupt.WORDS, interrupt.STOPPED)
+        return interrupt.WORDS, interrupt.STOPPED
     if isinstance(error, MemoryError):
-        return _ended("not enough memory for what was given", REFUSED)
+        return "not enough memory for what was given", REFUSED
     if isinstance(error, OSError):
-        return _ended(_of_system(error), REFUSED)
+        return _of_system(error), REFUSED
     if isinstance(error, Error):
-        return _ended(str(error), REFUSED)
+        return str(error), REFUSED
     if hasattr(error, "format_message"):  # typer's, of the command line
-        return _ended(_of_command_line(error), REFUSED)
-    return _ended(f"a mistake in pkmcal, please report this line: {_of_program(error)}", MISTAKE)
+        return _of_command_line(error), REFUSED
+    return f"a mistake in pkmcal, please report this line: {_of_program(error)}", MISTAKE
 
 
 def warned(
@@ -44,11 +66,6 @@ def warned(
 ) -> None:
     """Print a warning in one line, in place of `warnings.showwarning`."""
     print("pkmcal: warning:", _one_line(str(message)), file=sys.stderr)
-
-
-def _ended(message: str, how: int) -> int:
-    print("pkmcal:", _one_line(message), file=sys.stderr)
-    return how
 
 
 def _one_line(message: str) -> str:

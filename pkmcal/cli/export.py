@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -10,13 +9,22 @@ import typer
 
 import pkmcal as pk
 from pkmcal.arguments import word
+from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json, ParallelRobot
-from pkmcal.cli.output import say
+from pkmcal.cli.output import Output, say
+from pkmcal.controllers.linuxcnc import contents
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.reading import Input
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-TARGETS = ("c", "klipper", "reprap", "marlin", "mjcf")
+_OF_ARMS = ("urdf", "dh", "dh-modified", "ur")
+TARGETS = ("c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf", *_OF_ARMS)
+_LINES = {
+    "reprap": pk.export.reprap,
+    "marlin": pk.export.marlin,
+    "hangprinter": pk.export.hangprinter,
+}
 
 
 def export(
@@ -24,7 +32,9 @@ def export(
     target: Annotated[
         str, typer.Option("--as", metavar="TARGET", help=f"What for: {', '.join(TARGETS)}.")
     ],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Where to write.")],
+    out: Annotated[
+        Path, typer.Option(metavar="PATH", help="Where to write: a file; of LinuxCNC a folder.")
+    ],
     number: Annotated[
         str | None,
         typer.Option(metavar="TYPE", help="Of a C header: double, the default, or float."),
@@ -49,42 +59,95 @@ def export(
     """Write a robot for a controller.
 
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
-    linear delta for Klipper or Kalico; reprap, marlin: its M665 and M666.
-    mjcf: a model for MuJoCo.
+    linear or rotary delta for Klipper or Kalico; reprap, marlin: its M665 and M666, or M669;
+    hangprinter: M669. linuxcnc: a kinematics component, and a simulation that runs it. mjcf: a
+    model for MuJoCo. Of serial arms: urdf, a tree of links; dh and dh-modified, a table of
+    Denavit-Hartenberg numbers; ur, the lists of a calibration.conf of Universal Robots.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
     Example: pkmcal export hexapod --as c --out hexapod.h
     """
     word("--as", target, TARGETS)
-    if os.path.lexists(out) and not force:
-        raise ArgumentError(f"{out}: would be replaced; name another file, or give --force")
-    machine = load_parallel(robot)
+    _only(target, ("c",), number=number)
+    _only(target, ("klipper",), config=config)
+    _only(target, ("klipper", "reprap", "marlin", "hangprinter"), project=project or None)
+    read = Inputs()
+    if target in _OF_ARMS:
+        return _export_arm(read.robot(robot), target, out, read, force, json)
+    machine = load_parallel(read.robot(robot))
     loss = None
-    if target == "c":
-        _only(target, config=config, project=project or None)
-        pk.export.c_header(machine, out, _number(number))
-    elif target == "mjcf":
-        _only(target, number=number, config=config, project=project or None)
-        pk.export.mjcf(machine, out)
-    elif target == "klipper":
-        _only(target, number=number)
-        loss = pk.export.klipper(machine, out, config, project)
+    if target == "linuxcnc":
+        files, loss = contents(machine, out.resolve().name)
+        with Output(out, list(files), read, force).draft() as draft:
+            for name, text in files.items():
+                (draft / name).write_text(text, encoding="utf-8")
     else:
-        _only(target, number=number, config=config)
-        write = pk.export.reprap if target == "reprap" else pk.export.marlin
-        loss = write(machine, out, project)
+        given = None if config is None else read.file(config)
+        with Output(out.parent, [out.name], read, force).draft() as draft:
+            loss = _write(target, machine, draft / out.name, number, given, project)
     if json:
-        say(as_json({"robot": machine.name, "as": target, "file": str(out), "loss": loss}))
+        say(
+            as_json(
+                {"robot": machine.name, "as": target, "file": str(out), "loss": loss},
+                schema="export",
+            )
+        )
     else:
-        say(f"{out}: {machine.name}" + (f"; {loss}" if loss and not loss.exact else ""))
+        own = "LinuxCNC's own module for it is " if target == "linuxcnc" else ""
+        say(f"{out}: {machine.name}" + (f"; {own}{loss}" if loss and not loss.exact else ""))
     return 0
 
 
-def _only(target: str, **options: object) -> None:
-    """Refuse options of another target."""
+def _export_arm(
+    robot: str | Input, target: str, out: Path, read: Inputs, force: bool, json: bool
+) -> int:
+    """Write a serial arm."""
+    arm: object = pk.load(robot)
+    if not isinstance(arm, pk.SerialArm):
+        raise ArgumentError(f"{robot}: --as {target} is for serial arms")
+    with Output(out.parent, [out.name], read, force).draft() as draft:
+        if target == "urdf":
+            pk.export.urdf(arm, draft / out.name)
+        elif target == "ur":
+            pk.export.universal_robots(arm, draft / out.name)
+        else:
+            pk.export.dh(arm, draft / out.name, "standard" if target == "dh" else "modified")
+    if json:
+        say(
+            as_json(
+                {"robot": arm.name, "as": target, "file": str(out), "loss": None}, schema="export"
+            )
+        )
+    else:
+        say(f"{out}: {arm.name}")
+    return 0
+
+
+def _write(
+    target: str,
+    machine: pk.Robot,
+    path: Path,
+    number: str | None,
+    config: Input | None,
+    project: bool,
+) -> pk.export.Loss | None:
+    """Write one file, and say what is lost."""
+    if target == "c":
+        pk.export.c_header(machine, path, _number(number))
+    elif target == "mjcf":
+        pk.export.mjcf(machine, path)
+    elif target == "klipper":
+        return pk.export.klipper(machine, path, config, project)
+    else:
+        return _LINES[target](machine, path, project)
+    return None
+
+
+def _only(target: str, targets: tuple[str, ...], **options: object) -> None:
+    """Refuse options of other targets."""
     for name, value in options.items():
-        if value is not None:
+        if value is not None and target not in targets:
             raise ArgumentError(f"--{name} says nothing of --as {target}")
 
 

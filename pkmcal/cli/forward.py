@@ -50,7 +50,7 @@ def forward(
         with output.draft() as draft:
             write_poses(draft / "poses.csv", solved.pose, comment=read.comment())
     if json:
-        say(as_json({"pose": solved.pose, "status": solved.status}))
+        say(as_json({"pose": solved.pose, "status": solved.status}, schema="forward"))
     else:
         say(table(POSE, POSE_UNITS, solved.pose))
         for i in np.flatnonzero(~solved.ok):

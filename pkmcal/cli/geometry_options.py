@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
-from pkmcal.files.csv_table import UNITS
+from pkmcal.files.units import UNITS
 from pkmcal.measurements.calibratable import Calibratable
 
 _FRAME = dict(zip(POSE, ("mm", "mm", "mm", "rad", "rad", "rad"), strict=True))

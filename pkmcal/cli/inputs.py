@@ -7,6 +7,7 @@ from pathlib import Path
 from pkmcal.files import provenance
 from pkmcal.files.reading import MOST_TABLE, Input
 from pkmcal.geometry import robot_file
+from pkmcal.loading import urdf_chain
 
 
 class Inputs:
@@ -16,16 +17,23 @@ class Inputs:
         self._files: dict[str, Input] = {}
         self._built_in: list[str] = []
 
-    def file(self, path: str | Path) -> Input:
-        """Take a file; the same for the same name."""
-        return self._files.setdefault(str(path), Input(path))
+    def file(self, path: str | Path, called: str | None = None) -> Input:
+        """Take a file; the same for the same name.
+
+        What is meant may be a part of it, which is then what it is `called`.
+        """
+        return self._files.setdefault(str(path), Input(path, called))
 
     def robot(self, robot: str) -> str | Input:
         """Take a robot file, or a built-in machine by its name."""
         if robot_file.is_built_in(robot):
             self._built_in.append(robot)
             return robot
-        return self.file(robot) if Path(robot).exists() else robot  # `load` refuses what is not
+        chain = urdf_chain(robot)
+        path = robot if chain is None else str(chain[0])
+        if not Path(path).exists():
+            return robot  # `load` refuses it
+        return self.file(path, robot if chain else None)
 
     @property
     def paths(self) -> list[Path]:

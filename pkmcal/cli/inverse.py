@@ -59,7 +59,12 @@ def inverse(
             units = machine.actuator_units
             write_commands(draft / "commands.csv", units, q, comment=read.comment())
     if json:
-        say(as_json({"actuators": q, "units": machine.actuator_units, "ok": allowed.ok}))
+        say(
+            as_json(
+                {"actuators": q, "units": machine.actuator_units, "ok": allowed.ok},
+                schema="inverse",
+            )
+        )
     else:
         heads = [f"q{i + 1}" for i in range(machine.n_actuators)]
         say(table(heads, machine.actuator_units, q))

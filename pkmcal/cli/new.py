@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +18,7 @@ from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.limb_kinds import ALIASES, KINDS
+from pkmcal.geometry.model import CHAIN
 from pkmcal.report.as_json import as_json
 
 _HEAD = """\
@@ -55,6 +56,18 @@ _KEYS = {
     "base_cone": "{{ axis = …, angle = … }}: how far its joint on the base swings",
     "platform_cone": "the same of its joint on the platform",
 }
+_CHAINS = """\
+#   kind           chain: the joints of a limb in a row, from the base to the platform
+#   joints         each with its place at home, in the base frame:
+#                  kind R, P, U, S, C · at: a point; left out, that of the joint before
+#                  axis or axes: left out, across the line to the next point (U) or along it (P)
+#                  actuator: which q moves it; passive without · home_value: what q reads at home
+#                  offset, gain: of its q · stroke, cone: its limits · soft: how it yields
+#                  share: a name, of a joint that several limbs have
+#   copies, about  so many of this limb, turned about z or { axis = …, at = … }
+#   group          limbs that are copied together
+#   errors         of its joints by name: { "joint1.dx" = 0.12, "platform.dz" = -0.03 }
+"""
 _ARM = """\
 # units      of every number below; mm, m or in; deg or rad
 # [tool]     home: pose of the tool with all joints at zero
@@ -82,7 +95,7 @@ def new(
         raise ArgumentError(f"{path} exists already; name another file")
     write_whole(path, text)
     if json:
-        say(as_json({"machine": machine, "file": str(path)}))
+        say(as_json({"machine": machine, "file": str(path)}, schema="new"))
     else:
         say(f"{path}: {machine}; change what differs on your machine")
     return 0
@@ -111,8 +124,15 @@ def template(machine: str) -> str:
         raise ArgumentError(f"unknown machine {machine!r}{did_you_mean(machine, known)}")
     content, place, _ = robot_file.located(machine)
     text, data = content.decode(), Source(content, place).data
-    keys = _ARM if is_arm(data) else _PARALLEL + "".join(_limb_keys(data["limb"]))
+    keys = _ARM if is_arm(data) else _PARALLEL + _of_limbs(data["limb"])
     return f"{_HEAD.format(name=machine)}{keys}#\n{text}"
+
+
+def _of_limbs(limbs: Sequence[dict[str, object]]) -> str:
+    """What explains the keys of these limbs."""
+    if any(limb["kind"] == CHAIN for limb in limbs):
+        return _CHAINS
+    return "".join(_limb_keys(limbs))
 
 
 def _limb_keys(limbs: Iterable[dict[str, object]]) -> Iterable[str]:

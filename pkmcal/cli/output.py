@@ -25,8 +25,8 @@ def say(text: object, err: bool = False) -> None:
 class Output:
     """A folder that a verb writes into.
 
-    Each file is sealed. One that is there is replaced if it has its seal and was not read, or if
-    `force` says so.
+    Each file is sealed, if files of its kind are. One that is there is replaced if it has its seal
+    and was not read, or if `force` says so.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Output:
             raise ArgumentError(f"{path}: this is a folder")
         if self._force:
             return
-        how = "name another folder, or give --force"
+        how = "name another place with --out, or give --force"
         inputs = (each for each in self._read.paths if each.exists())
         if path.exists() and any(map(path.samefile, inputs)):
             raise ArgumentError(f"{path}: would be replaced, and is an input; {how}")

@@ -111,7 +111,7 @@ def plan(
             _write(made, draft, read.comment())
         written = output.paths
     if json:
-        say(as_json(made))
+        say(as_json(made, schema="plan"))
     else:
         say("\n".join([str(made), *([""] if written else []), *map(str, written)]))
     return 0 if np.isfinite(made.predicted) else 1

@@ -90,7 +90,10 @@ def tolerance(
                 shared = pk.allocate_tolerance(
                     machine, at, allowed, samples=samples, seed=seed, executor=executor
                 )
-            found, text = shared.check, as_json(shared) if json else str(shared)
+            found, text = (
+                shared.check,
+                as_json(shared, schema="allocation") if json else str(shared),
+            )
         else:
             assert deviations is not None
             with progress("machines x poses") as moved:
@@ -103,7 +106,7 @@ def tolerance(
                     executor=executor,
                     progress=moved,
                 )
-            text = as_json(found, "position_share") if json else str(found)
+            text = as_json(found, "position_share", schema="tolerance") if json else str(found)
         if output is not None:
             with output.draft() as draft:
                 table = draft / "tolerance.csv"

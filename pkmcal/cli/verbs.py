@@ -35,10 +35,12 @@ class _Verbs(TyperGroup):
 
     def main(self, *args: Any, **settings: Any) -> Any:
         settings["standalone_mode"] = False  # hands over return values and errors
+        given = settings.get("args", args[0] if args else None)
+        json = "--json" in (sys.argv[1:] if given is None else given)
         try:
             code = super().main(*args, **settings)
         except Exception as error:
-            code = ending.code(error)
+            code = ending.code(error, json)
         sys.exit(code)
 
     def invoke(self, ctx: Any) -> Any:
@@ -46,7 +48,7 @@ class _Verbs(TyperGroup):
             with interrupt.IsRaised():
                 return super().invoke(ctx)
         except KeyboardInterrupt as stop:
-            return ending.code(stop)
+            return ending.code(stop, "--json" in sys.argv)
 
     def list_commands(self, ctx: Any) -> list[str]:
         return list(_VERBS)
@@ -80,11 +82,28 @@ def _version(wanted: bool) -> None:
         raise typer.Exit()
 
 
+def _schema(wanted: bool) -> None:
+    if wanted:
+        from importlib.resources import files
+
+        say(files("pkmcal.report").joinpath("schema.json").read_text("utf-8").rstrip())
+        raise typer.Exit()
+
+
 @app.callback(invoke_without_command=True)
 def _start(
     context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+    schema: Annotated[
+        bool,
+        typer.Option(
+            "--json-schema",
+            callback=_schema,
+            is_eager=True,
+            help="Print the JSON Schema of what --json prints.",
+        ),
     ] = False,
 ) -> None:
     """Model, calibrate and compensate parallel kinematic machines.

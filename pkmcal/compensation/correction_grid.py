@@ -170,7 +170,7 @@ def correction_grid(
         Nodes along the coordinates that span the grid, mm or rad, increasing: those that the
         robot moves by itself, as for `workspace`.
     method : {"linear", "cubic"}
-        How to interpolate.
+        How to interpolate; "cubic" needs a correction at every node.
     origin : array_like (6,), optional
         The other coordinates of the pose; the robot's home. Of poses that the robot cannot take,
         the coordinates that its file declares are kept (`Robot.complete`).
@@ -221,6 +221,12 @@ def correction_grid(
         return aims.poses, aims.actuators, to_command - aims.actuators
 
     corrections = wanted(nodes)[2].reshape(*(len(axis) for axis in nodes), -1)
+    unknown = int(np.isnan(corrections).any(axis=-1).sum())
+    if unknown and method == "cubic":  # a spline goes through all nodes
+        raise ArgumentError(
+            f"axes: {unknown} of {corrections[..., 0].size} nodes have no correction and"
+            " method 'cubic' needs all; take fewer nodes, or method 'linear'"
+        )
     between = tuple(np.sort(np.r_[axis, 0.5 * (axis[1:] + axis[:-1])]) for axis in nodes)
     poses, commands, exact = wanted(between)
     places = np.stack(np.meshgrid(*between, indexing="ij"), axis=-1).reshape(-1, len(names))

@@ -41,12 +41,18 @@ class Closure(NamedTuple):
         By the free coordinates, mm and rad.
     by_q : ndarray (N, rows, n)
         By the actuator coordinates.
+    pose : ndarray (N, 6)
+        As the pose map has it: what it does not move follows from the free coordinates.
+    pose_by_free : ndarray (N, 6, m)
+        Its derivatives by the free coordinates.
     """
 
     residual: FloatArray
     by_step: FloatArray
     by_free: FloatArray
     by_q: FloatArray
+    pose: FloatArray
+    pose_by_free: FloatArray
 
 
 class Machine:
@@ -201,10 +207,13 @@ class Machine:
         call("jacobian", self.struct, len(pose), slots, 0, pose, out, isa=self.isa)
         return out
 
-    def forward_jacobian(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
-        """∂pose/∂q at poses (N, 6): (N, 6, n)."""
+    def forward_jacobian(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool = False
+    ) -> FloatArray:
+        """∂pose/∂q at poses (N, 6): (N, 6, n), or of the twist (ω, v) of the platform by them."""
         out = np.empty((len(pose), 6, self.actuators))
-        call("forward_jacobian", self.struct, len(pose), slots, 0, pose, q, out, isa=self.isa)
+        given = (len(pose), slots, 0, pose, q, twists, out)
+        call("forward_jacobian", self.struct, *given, isa=self.isa)
         return out
 
     def error_jacobian(
@@ -256,9 +265,38 @@ class Machine:
             np.empty((n, self.rows, m)),
             np.empty((n, self.rows, m)),
             np.empty((n, self.rows, self.actuators)),
+            np.empty((n, 6)),
+            np.empty((n, 6, m)),
         )
         call("closure", self.struct, n, slots, pose, q, *out, isa=self.isa)
         return out
+
+    def readings(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, columns: Int32Array | None = None
+    ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+        """Closures in units of what was read, at poses (N, 6) and coordinates (N, n).
+
+        Of each limb the coordinate that it needs at the pose less the one read, then its other
+        rows, weighted, in mm: (N, rows). Their derivatives by the map's step, mm and rad,
+        (N, rows, m), and by the numbers at `columns` of the flattened slots (N, rows, columns).
+        NaN where a limb does not reach.
+        """
+        n = len(pose)
+        residual, by_step = np.empty((n, self.rows)), np.empty((n, self.rows, self.m))
+        count = 0 if columns is None else len(columns)
+        by_number = None if columns is None else np.empty((n, self.rows, count))
+        given = (n, slots, pose, q, columns, count, residual, by_step, by_number)
+        call("readings", self.struct, *given, isa=self.isa)
+        return residual, by_step, by_number
+
+    def moved(self, pose: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Poses (N, 6) moved by steps of the map (N, m), mm and rad.
+
+        And the platform's twist (ω, v) by a step at the poses, (N, 6, m).
+        """
+        moved, twist = np.empty((len(pose), 6)), np.empty((len(pose), 6, self.m))
+        call("moved", self.struct, len(pose), pose, step, moved, twist, isa=self.isa)
+        return moved, twist
 
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """What the limbs are at coordinates (N, n): (N, limbs, 7 + 3 AXES).

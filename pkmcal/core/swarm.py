@@ -142,7 +142,7 @@ def minimise_eq18(
     half_width : ndarray (n,)
         The swarm searches between minus and plus this.
     seed : int
-        From 0 to 2⁶⁴ - 1; the swarm of a set is told apart by its number.
+        From 0 to 2⁶⁴ - 1; the swarm of a set is distinguished by its number.
     isa : int
         Index into `pkmcal.core.ISAS`; the bits are the same.
     threads : int, optional

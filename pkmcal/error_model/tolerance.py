@@ -247,8 +247,8 @@ def tolerance(
             stream.quantile(0.997)[6],
             stream.n_failed,
         ])  # fmt: skip
-    lost = np.isnan(at.poses).any(axis=1)
-    for k in np.flatnonzero(lost).tolist():  # no pose to be far from
+    unsolved = np.isnan(at.poses).any(axis=1)
+    for k in np.flatnonzero(unsolved).tolist():  # no pose to be far from
         columns[k][:-1] = [np.full_like(column, np.nan) for column in columns[k][:-1]]
     mean, std, within95, within997, distance_rms, far95, far997, failed = (
         np.array(column).reshape((*at.shape, *np.shape(column[0])))

@@ -1,22 +1,20 @@
-"""A CSV file as columns with a name and a unit, and errors that say where they are.
+"""A table of a file as columns with a name and a unit, and errors that say where they are.
 
-Any of comma, semicolon and tab separates; with the latter two, numbers may have a decimal comma.
-Lines that start with ``#`` and empty lines are skipped; units are converted here and nowhere else.
-A column is headed ``x [mm]``, or as instruments write it: ``x (mm)``, ``x_mm``, ``x/mm``, ``x mm``.
-The first sheet of an Excel workbook is read likewise.
+Tabs, semicolons, commas or spaces separate; with all but commas, numbers may have a decimal comma.
+Empty lines and lines that start with ``#``, ``//`` or ``%`` are skipped, and what lies above the
+column names; units are converted here and nowhere else.
+A column is headed ``x [mm]``, or as instruments write it: ``x (mm)``, ``x_mm``, ``x/mm``, ``x mm``;
+its unit may also stand below it, or above the table as in ``Units: mm``.
+The first sheet of an Excel workbook is read likewise. What was assumed is kept as `Table.notes`.
 """
 
 from __future__ import annotations
 
-import codecs
-import csv
-import io
 import math
 import re
-from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 
@@ -24,60 +22,82 @@ from pkmcal import arguments
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.exceptions import FileError
-from pkmcal.files import reading
+from pkmcal.files import reading, units
+from pkmcal.files.column_names import BESIDE, is_known
+from pkmcal.files.header import Header, find_header
 from pkmcal.files.reading import LONGEST_NAME, MOST_CELLS, MOST_COLUMNS
+from pkmcal.files.text_rows import TextRows, text_rows
 from pkmcal.files.xlsx_rows import xlsx_rows
 
-# What one unit is in mm, in rad: (multiply by, divide by), so that 1 um is 1/1000 mm exactly.
-UNITS: dict[str, dict[str, tuple[float, float]]] = {
-    "mm": {
-        "mm": (1.0, 1.0),
-        "um": (1.0, 1000.0),
-        "µm": (1.0, 1000.0),
-        "cm": (10.0, 1.0),
-        "m": (1000.0, 1.0),
-        "in": (25.4, 1.0),
-    },
-    "rad": {
-        "rad": (1.0, 1.0),
-        "mrad": (1.0, 1000.0),
-        "deg": (math.pi, 180.0),
-        "°": (math.pi, 180.0),
-    },
-}
-# Other spellings of units; a unit may also be in capitals.
-_SPELLINGS = {
-    "millimeter": "mm", "millimeters": "mm", "millimetre": "mm", "millimetres": "mm",
-    "meter": "m", "meters": "m", "metre": "m", "metres": "m", "inch": "in", "inches": "in",
-    "micron": "um", "microns": "um", "degree": "deg", "degrees": "deg", "radians": "rad",
-}  # fmt: skip
-_UNIT = "|".join(
-    sorted((*UNITS["mm"], "\u03bcm", *UNITS["rad"], *_SPELLINGS), key=len, reverse=True)
-)
 _LOOSE = re.compile(
-    rf"(?P<name>.*[^\s_/])\s*(?:\(\s*(?P<in>{_UNIT})\s*\)|[_/ ]\s*(?P<after>{_UNIT}))",
+    rf"(?P<name>.*[^\s_/])\s*"
+    rf"(?:\(\s*(?P<in>{units.PATTERN})\s*\)|[_/ ]\s*(?P<after>{units.PATTERN}))",
     re.IGNORECASE,
 )
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
+_UNSEEN = ("-", "--", "---", "n/a", "na", "nan", "null", "none", "#n/a", "?")
+_SHOWN = 8  # names of columns in a message
+_NUMBERED = re.compile(r"(?P<name>.*)\[(?P<number>[0-9]+)\]\s*")
 
 
 @dataclass(frozen=True)
 class Column:
-    """One column: its name and unit as written (None: no unit), and its cells."""
+    """One column.
+
+    Attributes
+    ----------
+    name : str
+        As written.
+    unit : str or None
+        As written.
+    cells : tuple of str
+    place : str
+        The file it stands in.
+    heading : int
+        The line of its heading; 0 where no line has it.
+    lines : tuple of int
+        The line of each cell.
+    decimal_comma : bool
+        Whether its numbers may have one.
+    stated : mapping of str to (str, int)
+        Units that its file states for all columns, of "mm" and "rad", with their lines.
+    """
 
     name: str
     unit: str | None
     cells: tuple[str, ...]
+    place: str
+    heading: int
+    lines: tuple[int, ...]
+    decimal_comma: bool
+    stated: Mapping[str, tuple[str, int]]
+
+    def take(self, rows: Sequence[int]) -> Column:
+        """The cells of these rows."""
+        cells = tuple(self.cells[row] for row in rows)
+        return replace(self, cells=cells, lines=tuple(self.lines[row] for row in rows))
 
 
 class Table:
-    """The columns of one CSV file.
+    """The columns of one file.
 
     Parameters
     ----------
     path : str or path
-        A file in UTF-8, with or without a byte-order mark, or UTF-16 with one, with any line
-        ends; or an Excel workbook, ``.xlsx``.
+        A text file in UTF-8, UTF-16 with a byte-order mark, or Windows-1252, with any line ends;
+        or an Excel workbook, ``.xlsx``.
+    headings : sequence of str, optional
+        Names of the columns of a file that has no line of them.
+    default_units : mapping of str to str, optional
+        Units of "mm" (lengths) and "rad" (angles) where the file states none.
+
+    Attributes
+    ----------
+    columns : dict of str to Column
+    lines : list of int
+        The line of each row.
+    notes : list of str
+        What was assumed where the file does not say.
 
     Raises
     ------
@@ -88,53 +108,58 @@ class Table:
         The file cannot be read.
     """
 
-    def __init__(self, path: str | PathLike[str]) -> None:
+    def __init__(
+        self,
+        path: str | PathLike[str],
+        headings: Sequence[str] | None = None,
+        default_units: Mapping[str, str] | None = None,
+    ) -> None:
         self.path = arguments.path("path", path)
-        self._separator = ""
-        if self.path.suffix.lower() in (".xlsx", ".xlsm", ".xls"):
-            every = xlsx_rows(path)
+        packed = self.path.suffix.lower() in (".xlsx", ".xlsm", ".xls")
+        if packed:
+            text = TextRows(xlsx_rows(path))
         else:
-            lines = _lines(self.path, reading.content(path, reading.MOST_TABLE))
-            self._separator = max(",;\t", key=lines[0][1].count) if lines else ","
-            every = [(line, self._cells(line, text)) for line, text in lines]
-        if not every:
-            raise FileError(f"{self.path}: the file is empty: expected a line of column names")
-        self._header_line, headings = every[0]
-        if len(headings) > MOST_COLUMNS or len(headings) * len(every) > MOST_CELLS:
+            text = text_rows(self.path, reading.content(path, reading.MOST_TABLE))
+        if headings is not None:
+            header = Header(0, list(headings), text.rows)
+        else:
+            header = find_header(self.path, text, _recognised)
+        self._comma = packed or text.separator != ","
+        self._header_line = header.line
+        self._units = dict(header.units)
+        self.left_out: tuple[str, ...] = ()  # headings of unknown columns
+        self._default_units = dict(default_units or {})
+        self.notes = [*text.notes, *header.notes]
+        names = header.headings
+        if len(names) > MOST_COLUMNS or len(names) * len(text.rows) > MOST_CELLS:
             raise FileError(
-                f"{self.path}: {len(headings)} columns and {len(every) - 1} rows; at most"
+                f"{self.path}: {len(names)} columns and {len(text.rows) - 1} rows; at most"
                 f" {MOST_COLUMNS} columns and {MOST_CELLS} cells are read"
             )
-        rows = [(line, cells) for line, cells in every[1:] if any(cells)]
+        rows = [(line, cells) for line, cells in header.rows if any(cells)]
+        again = [line for line, cells in rows if _fitted(cells, names, packed) == names]
+        if again and header.line:
+            self.notes.append(f"column names once more in line {again[0]}, left out")
+            rows = [(line, cells) for line, cells in rows if line not in again]
         if not rows:
-            raise FileError(
-                f"{self.path}: no rows below the column names of line {self._header_line}"
-            )
+            raise FileError(f"{self.path}: no rows below the column names of line {header.line}")
+        width = len(names)
+        rows = [(line, _fitted(cells, names, packed)) for line, cells in rows]
         for line, cells in rows:
-            if len(cells) != len(headings):
+            if len(cells) != width:
                 hint = ""
-                if self._separator == "," and len(cells) > len(headings):
+                if text.separator == "," and len(cells) > width and not packed:
                     hint = " (a decimal comma needs ';' or tabs between columns)"
                 raise FileError(
-                    f"{self.path}, line {line}: {len(cells)} cells under {len(headings)} column"
-                    f" names{hint}"
+                    f"{self.path}, line {line}: {len(cells)} cells under {width} column names{hint}"
                 )
         self.lines = [line for line, _ in rows]
         self.columns: dict[str, Column] = {}
-        for i, heading in enumerate(headings):
+        for i, heading in enumerate(names):
             self._add(i, heading, tuple(cells[i] for _, cells in rows))
 
     def __len__(self) -> int:
         return len(self.lines)
-
-    def _cells(self, line: int, text: str) -> list[str]:
-        try:
-            (cells,) = csv.reader(
-                [text], delimiter=self._separator, skipinitialspace=True, strict=True
-            )
-        except csv.Error as error:
-            raise FileError(f"{self.path}, line {line}: {error}") from None
-        return [cell.strip() for cell in cells]
 
     def _add(self, i: int, heading: str, cells: tuple[str, ...]) -> None:
         heading = " ".join(heading.split())
@@ -143,30 +168,53 @@ class Table:
                 f"the heading of column {i + 1} has {len(heading)} characters, at most"
                 f" {LONGEST_NAME} are taken"
             )
-        match = _HEADING.fullmatch(heading)
-        loose = _LOOSE.fullmatch(heading)
-        if match is None or not match["name"]:
+        if not heading and not any(cells):
+            return  # what a separator at the ends of lines makes
+        name, unit = parted(heading)
+        if not name:
             raise self.header_error(f"column {i + 1} is headed {heading!r}: expected 'name [unit]'")
-        name, unit = match["name"], match["unit"]
-        if unit is None and loose is not None:
-            name, unit = loose["name"], loose["in"] or loose["after"]
+        if name in self.columns and not is_known(name):
+            name = f"{name} ({i + 1})"
         if name in self.columns:
             first = list(self.columns).index(name) + 1
             raise self.header_error(f"column {name!r} appears twice (columns {first} and {i + 1})")
-        self.columns[name] = Column(name, unit, cells)
+        lines = tuple(self.lines)
+        place = str(self.path)
+        self.columns[name] = Column(
+            name, unit, cells, place, self._header_line, lines, self._comma, self._units
+        )
 
     def leave_out(self, names: Collection[str]) -> None:
         """Forget columns that are not looked at."""
         self.columns = {n: column for n, column in self.columns.items() if n not in names}
 
-    def header_error(self, message: str) -> FileError:
-        """An error in the line of column names."""
-        return FileError(f"{self.path}, line {self._header_line}: {message}")
+    def take(self, rows: Sequence[int]) -> None:
+        """Keep these rows, in this order."""
+        self.lines = [self.lines[row] for row in rows]
+        self.columns = {name: column.take(rows) for name, column in self.columns.items()}
+
+    def put(self, name: str, column: Column) -> None:
+        """Add a column, of another table or made here, with a cell for each row."""
+        self.columns[name] = column
+
+    def written(self, name: str, cells: Sequence[str]) -> Column:
+        """A column that is made of what another says; messages name that one."""
+        return replace(self.columns[name], unit=None, cells=tuple(cells))
+
+    def header_error(self, message: str, column: Column | None = None) -> FileError:
+        """An error in the line of column names; of a column in that of its own file."""
+        place, line = str(self.path), self._header_line
+        if column is not None:
+            place, line = column.place, column.heading
+        return FileError(f"{place}, line {line}: {message}" if line else f"{place}: {message}")
 
     def cell_error(self, name: str, row: int, message: str) -> FileError:
         """An error in one cell; rows count from 0."""
-        written = self.columns[name].name if name in self.columns else name
-        return FileError(f"{self.path}, line {self.lines[row]}, column {written!r}: {message}")
+        column = self.columns.get(name)
+        if column is None:
+            return FileError(f"{self.path}, line {self.lines[row]}, column {name!r}: {message}")
+        where = f"{column.place}, line {column.lines[row]}, column {column.name!r}"
+        return FileError(f"{where}: {message}")
 
     def rename(self, known_as: Callable[[str], str]) -> None:
         """Call columns by other names; messages go on naming them as they are written.
@@ -179,9 +227,10 @@ class Table:
         renamed: dict[str, Column] = {}
         for name, column in self.columns.items():
             other = renamed.setdefault(known_as(name), column)
-            if other is not column:
+            if other is not column and known_as(name) not in BESIDE:
                 raise self.header_error(
-                    f"columns {other.name!r} and {column.name!r} are both {known_as(name)!r}"
+                    f"columns {other.name!r} and {column.name!r} are both {known_as(name)!r};"
+                    " ignore one, as with --ignore"
                 )
         self.columns = renamed
 
@@ -195,9 +244,22 @@ class Table:
         """Raise for the first of `names` that is not a column."""
         for name in names:
             if name not in self.columns:
-                raise self.header_error(f"missing column {name!r}")
+                hint = ""
+                if self.left_out:
+                    named = ", ".join(map(repr, self.left_out[:_SHOWN]))
+                    more = ", …" if len(self.left_out) > _SHOWN else ""
+                    hint = f"; not known: {named}{more}; --rename OLD=NEW says what one is"
+                raise self.header_error(f"missing column {name!r}{hint}")
 
-    def numbers(self, name: str, *quantities: str, blank: bool = False) -> tuple[FloatArray, str]:
+    def numbers(
+        self,
+        name: str,
+        *quantities: str,
+        blank: bool = False,
+        unseen: bool = False,
+        like: str | None = None,
+        expected: str | None = None,
+    ) -> tuple[FloatArray, str]:
         """A column of finite numbers in mm or rad.
 
         Parameters
@@ -205,9 +267,16 @@ class Table:
         name : str
             A column that is there.
         *quantities : str
-            What it may be: "mm" for lengths, "rad" for angles, "mm*mm", "mm*rad"… for products.
+            What it may be: "mm" for lengths, "rad" for angles, "mm*mm", "mm*rad"… for products;
+            "count" for steps and revolutions, "1" for a number without unit.
         blank : bool
             Whether an empty cell is NaN instead of an error.
+        unseen : bool
+            Whether ``---``, ``n/a`` and the like are, too.
+        like : str, optional
+            The column whose unit counts where this one has none.
+        expected : str, optional
+            Which of `quantities` it is, where that decides between units that are stated for all.
 
         Returns
         -------
@@ -215,37 +284,68 @@ class Table:
         quantity : str
             Which of `quantities` its unit belongs to.
         """
-        quantity, (times, over) = self._conversion(self.columns[name], quantities)
+        column = self.columns[name]
+        if column.unit is None and like in self.columns and (unit := self.columns[like].unit):
+            other = self.columns[like].name
+            self._note(f"column {column.name!r} has no unit, taken as [{unit}] like {other!r}")
+            column = replace(column, unit=unit)
+        quantity, (times, over) = self._conversion(column, quantities, expected)
         values = np.empty(len(self))
-        for row, cell in enumerate(self.columns[name].cells):
+        for row, cell in enumerate(column.cells):
+            if unseen and cell.lower() in _UNSEEN:
+                values[row] = math.nan
+                self._note(f"cells with {cell!r} taken as not measured")
+                continue
             values[row] = math.nan if blank and not cell else self._number(name, row, cell)
         with np.errstate(over="ignore"):
             converted = values * times / over
         if (row := int(np.argmax(np.isinf(converted)))) or np.isinf(converted[0]):
-            cell = self.columns[name].cells[row]
+            cell = column.cells[row]
             raise self.cell_error(name, row, f"expected a smaller number, found {cell!r}")
         return converted, quantity
 
     def _conversion(
-        self, column: Column, quantities: tuple[str, ...]
+        self, column: Column, quantities: tuple[str, ...], expected: str | None
     ) -> tuple[str, tuple[float, float]]:
-        units = {unit: q for q in quantities for unit in _factors(q)}
-        usual = ", ".join(unit for unit in units if unit.isascii())
-        if not column.unit:
+        known = {unit: q for q in reversed(quantities) for unit in units.factors(q)}
+        usual = ", ".join(u for q in quantities for u in units.factors(q) if u.isascii())
+        if not column.unit and "1" in quantities:
+            return "1", (1.0, 1.0)
+        stated = column.unit or self._stated(column, (expected,) if expected else quantities)
+        if not stated:
             raise self.header_error(
                 f"column {column.name!r} has no unit: expected '{column.name} [{quantities[0]}]'"
-                f" (or another of {usual})"
+                f" (or another of {usual})",
+                column,
             )
-        unit = _plain(column.unit, units)
-        if unit not in units:
+        unit = units.plain(stated, known)
+        if unit not in known:
             raise self.header_error(
-                f"column {column.name!r} has unit [{column.unit}]: expected one of {usual}"
+                f"column {column.name!r} has unit [{column.unit}]: expected one of {usual}",
+                column,
             )
-        return units[unit], _factors(units[unit])[unit]
+        return known[unit], units.factors(known[unit])[unit]
+
+    def _stated(self, column: Column, quantities: tuple[str, ...]) -> str | None:
+        """The unit of a column without one, as the file or the caller states it for all."""
+        of = [q for q in quantities if q in self._default_units or q in column.stated]
+        if len(of) != 1:
+            return None
+        what = {"mm": "lengths", "rad": "angles"}.get(of[0], of[0])
+        if of[0] in self._default_units:
+            return self._default_units[of[0]]
+        unit, line = column.stated[of[0]]
+        where = f"line {line}" if column.place == str(self.path) else f"{column.place}, line {line}"
+        self._note(f"{what} without a unit in {unit}, as {where} states")
+        return unit
+
+    def _note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes.append(text)
 
     def _number(self, name: str, row: int, cell: str) -> float:
         text = cell
-        if self._separator != "," and "." not in cell:
+        if self.columns[name].decimal_comma and "." not in cell:
             text = cell.replace(",", ".", 1)
         try:
             value = float(text.replace("_", "no number"))  # float() takes 1_000 for 1000
@@ -275,28 +375,28 @@ class Table:
         return np.array([int(cell) for cell in cells], dtype=np.int64)
 
 
-def _factors(quantity: str) -> dict[str, tuple[float, float]]:
-    """Units of a quantity; those of a product are products of mm and rad alone."""
-    return UNITS.get(quantity, {quantity: (1.0, 1.0)})
+def _recognised(heading: str) -> bool:
+    heading = " ".join(heading.split())
+    return len(heading) <= LONGEST_NAME and is_known(parted(heading)[0])
 
 
-def _plain(unit: str, known: Collection[str]) -> str:
-    """A unit as it is known here."""
-    unit = unit.replace("\u03bc", "\u00b5")  # the Greek mu for the micro sign
-    lower = _SPELLINGS.get(unit.lower(), unit.lower())
-    return lower if unit not in known and lower in known else unit
+def parted(heading: str) -> tuple[str, str | None]:
+    """Name and unit of a heading."""
+    match, loose = _HEADING.fullmatch(heading), _LOOSE.fullmatch(heading)
+    if numbered := _NUMBERED.fullmatch(heading):  # actual_q[0], not a unit
+        return f"{numbered['name']}{numbered['number']}", None
+    if match is None:
+        return "", None
+    if match["unit"] is None and loose is not None:
+        return loose["name"], loose["in"] or loose["after"]
+    return match["name"], match["unit"]
 
 
-def _lines(path: Path, content: bytes) -> list[tuple[int, str]]:
-    """Lines that are neither empty nor comments, with their numbers counted from 1."""
-    utf16 = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
-    try:
-        text = content.decode("utf-16" if utf16 else "utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise FileError(f"{path}: not a UTF-8 text file ({error.reason})") from None
-    numbered = enumerate(io.StringIO(text, newline=None), start=1)
-    return [
-        (i, line.rstrip("\n"))
-        for i, line in numbered
-        if not line.isspace() and not line.lstrip().startswith("#")
-    ]
+def _fitted(cells: list[str], names: Sequence[str], packed: bool) -> list[str]:
+    """A row without blank cells beyond the last name; rows of a workbook end where they end."""
+    width = len(names)
+    if len(cells) > width and not any(cells[width:]):
+        return cells[:width]
+    if len(cells) < width and (packed or not any(names[len(cells) :])):
+        return cells + [""] * (width - len(cells))
+    return cells

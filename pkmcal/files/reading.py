@@ -18,7 +18,7 @@ MOST_TABLE = 500 * MB  # bytes of a CSV file
 MOST_WORKBOOK = 50 * MB  # bytes of an Excel workbook, packed and unpacked
 MOST_ROBOT = 1 * MB  # bytes of a TOML file
 MOST_URDF = 10 * MB
-MOST_PRINTER = 1 * MB  # bytes of the configuration of a printer
+MOST_TEXT = 100 * MB  # G-code, and configurations of controllers
 MOST_CELLS = 20_000_000  # of a table
 MOST_COLUMNS = 1_000
 LONGEST_NAME = 200  # characters of a name, a heading or a key
@@ -34,10 +34,13 @@ class Input(PathLike[str]):
     ----------
     path : str or path
         A file, a pipe, or a device such as ``/dev/stdin``.
+    called : str, optional
+        What the user called it, where that also says which part of it is meant.
     """
 
-    def __init__(self, path: str | PathLike[str]) -> None:
+    def __init__(self, path: str | PathLike[str], called: str | None = None) -> None:
         self._path = arguments.path("path", path)
+        self.called = str(self._path) if called is None else called
         self._content: bytes | None = None
 
     def __fspath__(self) -> str:

@@ -1,8 +1,9 @@
 """A file that states the SHA-256 of the rest of itself: whether it is as it was written.
 
 What has no seal, or another content than it states, is somebody's work. The seal stands where the
-format has room for a remark: a comment of CSV, TOML, HTML and SVG, the first key of JSON, a text
-chunk before the end of PNG.
+format has room for a remark: a comment of CSV, TOML, HTML, SVG, XML, URDF, C, ini and hal files,
+the first key of JSON, a text chunk before the end of PNG. Other files, a printer's configuration
+and G-code among them, are their owner's and have no seal.
 """
 
 from __future__ import annotations
@@ -34,6 +35,10 @@ def _line(digest: str) -> bytes:
     return f"# {_WORDS}: {digest}\n".encode()
 
 
+def _remark_in_c(digest: str) -> bytes:
+    return f"/* {_WORDS}: {digest} */\n".encode()
+
+
 def _key(digest: str) -> bytes:
     return f'  "{_WORDS}": "{digest}",\n'.encode()
 
@@ -50,22 +55,28 @@ def _chunk(digest: str) -> bytes:
 _FORMS = {
     ".csv": _Form(_line, after=0),
     ".toml": _Form(_line, after=0),
+    ".ini": _Form(_line, after=0),
+    ".hal": _Form(_line, after=0),
+    ".h": _Form(_remark_in_c, after=0),
+    ".c": _Form(_remark_in_c, after=0),
     ".json": _Form(_key, after=len("{\n")),
     ".html": _Form(_remark),
     ".svg": _Form(_remark),
+    ".xml": _Form(_remark),
+    ".urdf": _Form(_remark),
     ".png": _Form(_chunk, before=_IEND),
 }
 
 
 def sealed(content: bytes, kind: str) -> bytes:
-    r"""A file's content with its seal.
+    r"""A file's content with its seal, if files of its kind have one.
 
     Parameters
     ----------
     content : bytes
         What is written, without a seal; JSON begins with a brace on a line of its own.
-    kind : {".csv", ".toml", ".json", ".html", ".svg", ".png"}
-        The ending of the file's name.
+    kind : str
+        The ending of the file's name, such as ".csv".
 
     Examples
     --------
@@ -75,6 +86,8 @@ def sealed(content: bytes, kind: str) -> bytes:
     1
     <BLANKLINE>
     """
+    if kind not in _FORMS:
+        return content
     form = _FORMS[kind]
     at = form.place(len(content))
     return content[:at] + form.written(hashlib.sha256(content).hexdigest()) + content[at:]
@@ -89,6 +102,8 @@ def is_sealed(content: bytes, kind: str) -> bool:
     >>> is_sealed(written, ".csv"), is_sealed(written + b"2\n", ".csv")
     (True, False)
     """
+    if kind not in _FORMS:
+        return False
     form = _FORMS[kind]
     size = len(form.written("0" * 64))
     at = form.place(len(content) - size)

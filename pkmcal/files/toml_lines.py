@@ -46,6 +46,10 @@ class Source:
     ----------
     data : dict
         What it says, before anything of it is checked.
+    text : str
+        The same as text, with line feeds alone.
+    line_end : str
+        What ended its lines.
 
     Raises
     ------
@@ -62,14 +66,15 @@ class Source:
     def __init__(self, content: bytes, place: str) -> None:
         self.place = place
         try:
-            self._text = content.decode("utf-8-sig").replace("\r\n", "\n")
+            self.text = content.decode("utf-8-sig").replace("\r\n", "\n")
+            self.line_end = "\r\n" if b"\r\n" in content else "\n"
         except UnicodeDecodeError as error:
             raise FileError(f"{place}: not a text file in UTF-8 (byte {error.start})") from None
-        for number, line in enumerate(self._text.split("\n"), 1):
+        for number, line in enumerate(self.text.split("\n"), 1):
             if line.count(".") > _MOST_DOTS:  # the parser's time grows with their square
                 raise FileError(f"{place}, line {number}: more than {_MOST_DOTS} dots on a line")
         try:
-            self.data: dict[str, Any] = tomllib.loads(self._text)
+            self.data: dict[str, Any] = tomllib.loads(self.text)
         except ValueError as error:  # syntax, or an endless number
             raise FileError(f"{place}: not valid TOML: {error}") from None
         except RecursionError:
@@ -129,11 +134,11 @@ class Source:
         A statement ends with the line on which its brackets are closed.
         """
         begin, line, open_brackets = 0, 1, 0
-        for token in _TOKEN.finditer(self._text + "\n"):
+        for token in _TOKEN.finditer(self.text + "\n"):
             found = token[0]
             open_brackets += (found in ("[", "{")) - (found in ("]", "}"))
             if found == "\n" and not open_brackets:
-                text = self._text[begin : token.start()]
+                text = self.text[begin : token.start()]
                 if said := tomllib.loads(text):
                     yield line, text.lstrip(), said
                 line += text.count("\n") + 1

@@ -28,7 +28,12 @@ Array = TypeVar("Array", bound=NDArray[Any])
 class _Layout:
     """What stays the same when values are replaced: names, units, ties, places in the slots."""
 
-    def __init__(self, numbers: Sequence[LimbNumber], parameters: Mapping[str, Unit]) -> None:
+    def __init__(
+        self,
+        numbers: Sequence[LimbNumber],
+        parameters: Mapping[str, Unit],
+        blank: FloatArray | None = None,
+    ) -> None:
         self.numbers = tuple(numbers)
         self.parameters = tuple(parameters)
         self.names = tuple(number.name for number in numbers) + self.parameters
@@ -39,7 +44,14 @@ class _Layout:
         tied[[i for i, _ in self.ties]] = True
         self.tied = _frozen(tied)
         self.n_limbs = 1 + max((number.limb for number in numbers), default=-1)
-        places = [n.limb * len(SLOTS) + SLOTS.index(n.slot) for n in self.numbers]
+        if blank is None:
+            blank = np.zeros((self.n_limbs, len(SLOTS)))
+            blank[:, SLOTS.index("gain")] = 1.0
+        self.blank = _frozen(blank)
+        places = [
+            n.limb * len(SLOTS) + SLOTS.index(n.slot) if n.place is None else n.place
+            for n in self.numbers
+        ]
         self.slot_index = _frozen(np.array(places, dtype=np.intp))
         if len(self.index) != len(self.names):
             twice = next(name for name in self.names if self.names.count(name) > 1)
@@ -64,6 +76,8 @@ class Geometry:
         The named parameters and their units.
     values : mapping of str to float
         The value of every parameter and of every number that is not tied; mm and rad.
+    blank : ndarray, optional
+        What the core takes where no number is; by default (limbs, SLOTS), gains 1 and the rest 0.
 
     Attributes
     ----------
@@ -75,7 +89,7 @@ class Geometry:
         "mm", "rad" or "1" (a ratio).
     tied : ndarray of bool (p,)
         True where a named parameter drives a limb's number.
-    slots : ndarray (n_limbs, len(SLOTS))
+    slots : ndarray (n_limbs, len(SLOTS)), or (1, numbers) of a machine of chains
         The same numbers as the core takes them; an unused gain is 1, other unused slots are 0.
     slot_index : ndarray of int (k,)
         Places in the flattened `slots` of the k limb numbers, which are the first k names.
@@ -94,8 +108,9 @@ class Geometry:
         numbers: Sequence[LimbNumber],
         parameters: Mapping[str, Unit],
         values: Mapping[str, float],
+        blank: FloatArray | None = None,
     ) -> None:
-        layout = _Layout(numbers, parameters)
+        layout = _Layout(numbers, parameters, blank)
         array = np.zeros(len(layout.names))
         for i in np.flatnonzero(~layout.tied):
             array[i] = values[layout.names[i]]
@@ -108,8 +123,7 @@ class Geometry:
             parameters = dict(zip(layout.parameters, values[k:].tolist(), strict=True))
             for i, tie in layout.ties:
                 values[i] = tie.value(parameters)
-        slots = np.zeros((layout.n_limbs, len(SLOTS)))
-        slots[:, SLOTS.index("gain")] = 1.0
+        slots: FloatArray = layout.blank.copy()
         slots.flat[layout.slot_index] = values[:k]
         self._layout = layout
         self._values = _frozen(values)
@@ -158,7 +172,7 @@ class Geometry:
 
     @property
     def slots(self) -> FloatArray:
-        """The limb numbers as the core takes them, (n_limbs, len(SLOTS))."""
+        """The limb numbers as the core takes them, (n_limbs, len(SLOTS)), or (1, numbers)."""
         return self._slots
 
     @property

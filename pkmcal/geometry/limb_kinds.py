@@ -144,6 +144,7 @@ KINDS: dict[str, LimbKind] = {
             axes={"base": "slider", "hinge": "normal"},
             rows=("hinge_plane",),
         ),
+        LimbKind("cable", "length", "a cable or belt from point to point, taut"),
         LimbKind("RUS", "crank", "a crank and a rod", axes={"base": "axis"}),
     )
 }

@@ -9,8 +9,11 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, Unit
 from pkmcal.display import Table, fixed
+from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
+
+CHAIN = "chain"  # the kind of a limb that is a chain of joints: see `pkmcal.geometry.chains`
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +42,10 @@ class Limb:
     Attributes
     ----------
     kind : str
-        A name of `pkmcal.geometry.limb_kinds.KINDS`.
+        A name of `pkmcal.geometry.limb_kinds.KINDS`, or `CHAIN`.
     actuator : int
-        Which actuator drives it, counted from 0; limbs may share one.
+        Which actuator drives it, counted from 0; limbs may share one. Of a chain the first of its
+        actuators, or -1 where it has none.
     branch : int
         +1 or -1, the sign of u·∂c/∂q̃ with u from carriage to platform joint; 0 where the kind
         has no branches.
@@ -90,7 +94,7 @@ class Model:
     name : str
         The robot's name.
     map : str
-        Pose map: "spatial", "translation", "planar" or "2tpr2tps".
+        Pose map: "spatial", "translation", "planar", "2tpr2tps", "spherical" or "xy".
     home : ndarray (6,)
         x y z α β γ; what the map does not leave free is 0.
     match : tuple of str or None
@@ -112,6 +116,8 @@ class Model:
         What more closures than free coordinates may miss, mm; None means 2e-3 of the size.
     file : str or None
         Where the model was read; a built-in machine has none.
+    chains : Chains or None
+        The joints, of a machine whose limbs are chains.
     """
 
     name: str
@@ -126,20 +132,30 @@ class Model:
     tool_frame: FloatArray | None = None
     closure_tolerance: float | None = None
     file: str | None = None
+    chains: Chains | None = None
 
     @property
     def n_actuators(self) -> int:
         """Number of actuators."""
+        if self.chains is not None:
+            return self.chains.n_actuators
         return 1 + max(limb.actuator for limb in self.limbs)
 
     @property
     def actuator_units(self) -> tuple[Unit, ...]:
         """Unit of each actuator coordinate, "mm" or "rad"."""
+        if self.chains is not None:
+            return tuple(joint.unit for _, joint in self.chains.actuated)
         units = {limb.actuator: KINDS[limb.kind].actuator_unit for limb in self.limbs}
         return tuple(units[i] for i in range(self.n_actuators))
 
     def table(self) -> Table:
-        """Kind, actuator and joints of each limb; the joints in the frames of base and platform."""
+        """Kind, actuator and joints of each limb; the joints in the frames of base and platform.
+
+        Of chains every joint, the machine at home.
+        """
+        if self.chains is not None:
+            return self.chains.table()
         rows = [
             [
                 *(str(i), limb.kind, f"q{limb.actuator + 1}"),

@@ -21,13 +21,15 @@ from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import ANGLE_UNITS, LENGTH_UNITS, Table, Units, shown
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import Limb, Model
-from pkmcal.geometry.robot_file_limbs import Parameters, read_limbs
+from pkmcal.geometry.model import CHAIN, Limb, Model
+from pkmcal.geometry.robot_file_chains import chain_limbs, read_chains
+from pkmcal.geometry.robot_file_limbs import Limbs, Parameters, read_limbs
 from pkmcal.geometry.robot_file_writer import text_of
 
 # What a data sheet states beside single numbers: of the circles of the joints, and of the legs at
 # home, which a machine with length limbs has.
 STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_diameter", "length")
+INDEPENDENT = "independent"  # the default free set of a file that names none: found when loaded
 TOP = (
     "name", "units", "closure_tolerance", "frames", "pose", "parameters", "calibration", "stated",
     "limb",
@@ -139,22 +141,30 @@ def parse(source: Source, file: str | None) -> Model:
     described = top.tables("limb", "a robot")
     if len(described) > MAX_LIMBS:
         described[MAX_LIMBS].fail("", f"a robot has at most {MAX_LIMBS} limbs")
-    limbs = read_limbs(described, parameters)
-    values = parameters.finish([number.name for number in limbs.numbers])
-    geometry = Geometry(limbs.numbers, parameters.ordered_units(), limbs.values | values)
-
     pose = top.table("pose")
     pose.only(("map", "home", "match"))
     pose_map = pose.choice("map", MAPS, "pose map")
-    _check_rows(pose, pose_map, limbs.limbs)
+    home = _read_pose(pose, "home", MAPS[pose_map], f"the map {pose_map}")
+    chains = None
+    if any(table.data.get("kind") == CHAIN for table in described):
+        chains, own = read_chains(described, parameters, pose_map, home)
+        limbs = Limbs(chain_limbs(chains), list(chains.numbers), own)
+    else:
+        limbs = read_limbs(described, parameters)
+        _check_rows(pose, pose_map, limbs.limbs)
+    values = parameters.finish([number.name for number in limbs.numbers])
+    units = parameters.ordered_units()
+    blank = None if chains is None else chains.blank
+    geometry = Geometry(limbs.numbers, units, limbs.values | values, blank)
     frames = _section(top, "frames")
     frames.only(("base", "tool"))
     return Model(
         name=top.text("name"),
         map=pose_map,
-        home=_read_pose(pose, "home", MAPS[pose_map], f"the map {pose_map}"),
+        home=home,
         match=_read_match(pose),
         limbs=limbs.limbs,
+        chains=chains,
         geometry=geometry,
         free=_read_free(_section(top, "calibration"), geometry),
         stated=_read_stated(_section(top, "stated"), geometry, limbs.limbs),
@@ -195,7 +205,7 @@ def _check_rows(pose: Table, pose_map: str, limbs: tuple[Limb, ...]) -> None:
 
 
 def _read_pose(table: Table, key: str, known: tuple[str, ...], owner: str = "") -> FloatArray:
-    pose = table.table(key)
+    pose = table.table(key) if key in table or known[0] in "xyz" else Table({}, table.source)
     pose.only(known, owner)
     units: dict[str, Unit] = {name: "mm" if name in "xyz" else "rad" for name in POSE}
     found = np.array([pose.number(name, units[name], 0.0) for name in POSE])
@@ -217,7 +227,7 @@ def _read_match(pose: Table) -> tuple[str, ...] | None:
 
 def _read_free(table: Table, geometry: Geometry) -> tuple[str, ...]:
     table.only(("free",))
-    if "free" not in table:
+    if table.data.get("free", INDEPENDENT) == INDEPENDENT:
         return ()
     patterns = table.texts("free")
     try:
@@ -229,6 +239,8 @@ def _read_free(table: Table, geometry: Geometry) -> tuple[str, ...]:
 def _read_stated(table: Table, geometry: Geometry, limbs: tuple[Limb, ...]) -> Mapping[str, float]:
     units: dict[str, Unit] = dict(zip(geometry.names, geometry.units, strict=True))
     for limb in limbs:
+        if limb.kind not in KINDS:
+            continue
         for _, name, unit in KINDS[limb.kind].numbers("", limb.couple > 0.0):
             if unit == "mm":
                 units.setdefault(name, unit)

@@ -18,6 +18,7 @@ from pkmcal.geometry.model import Cone, Limb
 from pkmcal.geometry.ties import LimbNumber, Term, Tie
 
 PARAMETER_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+CHAIN_HELP = "chain of joints (docs/machines.md)"
 RIGHT_ANGLE = 1e-3  # how far a crank's zero direction may be from a right angle to its axis, rad
 UNIT_WORDS: dict[Unit, str] = {"mm": "a length", "rad": "an angle", "1": "a ratio"}
 
@@ -35,6 +36,7 @@ class Parameters:
     def __init__(self, table: Table) -> None:
         self.table = table
         self.units: dict[str, Unit] = {}
+        self.constants: set[str] = set()
         self._used_at: dict[str, str] = {}
         for name in table.data:
             if not PARAMETER_NAME.fullmatch(name):
@@ -60,6 +62,13 @@ class Parameters:
             )
         return Term(sign, name)
 
+    def constant(self, table: Table, key: str, value: object, unit: Unit) -> float:
+        """Read a number, or a name for its value alone: it is no number of the geometry."""
+        term = self.term(table, key, value, unit)
+        if term.name is not None:
+            self.constants.add(term.name)
+        return self.value(term)
+
     def value(self, term: Term) -> float:
         """The value of a term in mm or rad."""
         return term.factor if term.name is None else term.factor * self[term.name]
@@ -79,11 +88,12 @@ class Parameters:
                 self.table.fail(name, "this is already the name of a limb's own number")
             if name not in self.units:
                 self.table.fail(name, "no limb uses this parameter")
-        return {name: self[name] for name in self.table.data}
+        return {name: self[name] for name in self.table.data if name not in self.constants}
 
     def ordered_units(self) -> dict[str, Unit]:
         """Units in the order of the file."""
-        return {name: self.units[name] for name in self.table.data}
+        own = (name for name in self.table.data if name not in self.constants)
+        return {name: self.units[name] for name in own}
 
 
 class Limbs(NamedTuple):
@@ -112,7 +122,10 @@ def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
 
 
 def _read_limb(table: Table, i: int, parameters: Parameters) -> tuple[Limb, dict[str, Entry]]:
-    name = table.choice("kind", (*KINDS, *ALIASES), "kind of limb")
+    name = table.text("kind")
+    if name not in (known := (*KINDS, *ALIASES)):
+        near = did_you_mean(name, known)
+        table.fail("kind", f"{name!r} is no kind of limb{near}; any other limb is a {CHAIN_HELP}")
     kind = KINDS[ALIASES.get(name, name)]
     table.only(kind.keys(), f"a {name} limb")
     couple = _positive(table, "couple", table.number("couple", "mm")) if "couple" in table else 0.0

@@ -10,6 +10,7 @@ from pkmcal.core.library import AXES, MAPS, POSE
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Cone, Limb, Model
+from pkmcal.geometry.robot_file_chain_writer import chain_tables
 from pkmcal.geometry.ties import LimbNumber, Term
 
 HEADER = "# A robot for pkmcal: lengths in mm, angles in rad.\n"
@@ -22,7 +23,10 @@ def text_of(model: Model) -> str:
         head["closure_tolerance"] = model.closure_tolerance
     blocks = [HEADER, lines(head)]
     blocks += [f"[{key}]\n{lines(table)}" for key, table in _sections(model).items() if table]
-    limbs = (_limb(limb, i, model.geometry) for i, limb in enumerate(model.limbs))
+    if model.chains is not None:
+        limbs = list(chain_tables(model.chains, model.geometry))
+    else:
+        limbs = [_limb(limb, i, model.geometry) for i, limb in enumerate(model.limbs)]
     blocks += [f"[[limb]]\n{lines(limb)}" for limb in limbs]
     return "\n".join(blocks)
 

@@ -73,6 +73,8 @@ class LimbNumber:
         Which of `SLOTS` it is.
     tie : Tie or None
         How it follows from parameters; None where it is its own.
+    place : int or None
+        Where it is among the numbers of the core; None: limb by limb in the order of `SLOTS`.
     """
 
     name: str
@@ -80,3 +82,4 @@ class LimbNumber:
     limb: int
     slot: str
     tie: Tie | None = None
+    place: int | None = None

@@ -7,32 +7,33 @@ are too many: the closures, with the matched coordinates held, determine the res
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from pkmcal.arguments import did_you_mean, words
 from pkmcal.arrays import BoolArray, FloatArray, wrapped
+from pkmcal.core.chains import AnyMachine
 from pkmcal.core.library import MAPS, POSE
-from pkmcal.core.machine import Closure, Machine
+from pkmcal.core.machine import Closure
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.frames import Frames
 
 ITERATIONS = 30
 SETTLED = 1e-12  # of the machine's size
 KEPT = 1e-9  # of the size, or rad: a matched coordinate that is off by more was not kept
 
 
-def matched_coordinates(
-    match: bool | str | Sequence[str], declared: Sequence[str] | None, coordinates: Sequence[str]
-) -> list[int]:
-    """Places of the matched coordinates in x y z α β γ.
+def matched_coordinates(match: bool | str | Sequence[str], moved: Sequence[str]) -> list[int]:
+    """Places of the matched coordinates in x y z α β γ; of those `moved` for True.
 
     Raises
     ------
     ValueError
-        An unknown coordinate, or ``match=True`` where the robot declares none.
+        An unknown coordinate, or one that is named twice.
     """
     if match is True:
-        names = tuple(declared if declared is not None else coordinates)
+        names = tuple(moved)
     elif match is False or match is None:
         raise ArgumentError(f"match must be True or names of coordinates, found {match!r}")
     else:
@@ -45,50 +46,67 @@ def matched_coordinates(
     return [POSE.index(name) for name in names]
 
 
+class Completed(NamedTuple):
+    """Poses on the machine's manifold; NaN where none keeps what is matched.
+
+    Attributes
+    ----------
+    pose : ndarray (N, 6)
+        In the user's frames.
+    own : ndarray (N, 6)
+        In the machine's.
+    q : ndarray (N, n)
+        The actuator coordinates there.
+    """
+
+    pose: FloatArray
+    own: FloatArray
+    q: FloatArray
+
+
 def complete(
-    machine: Machine,
+    machine: AnyMachine,
     map: str,
     slots: FloatArray,
+    frames: Frames,
     pose: FloatArray,
     matched: Sequence[int],
     near: FloatArray | None = None,
-) -> tuple[FloatArray, FloatArray]:
-    """Poses on the machine's manifold that keep the matched coordinates.
+) -> Completed:
+    """Poses on the machine's manifold that keep the matched coordinates, in the user's frames.
 
     Newton's method on the closures and the matched coordinates, in the free coordinates and the
     actuator coordinates together; least squares where there are more rows than needed.
 
     Parameters
     ----------
-    machine : Machine
+    machine : Machine or ChainMachine
         The machine.
     map : str
         Its pose map.
     slots : ndarray (limbs, SLOTS)
         Geometry.
+    frames : Frames
+        The user's.
     pose : ndarray (N, 6)
-        Where to start, and what to keep.
+        Where to start, and what to keep, in the user's frames.
     matched : sequence of int
         Places in x y z α β γ.
     near : ndarray (n,) or (N, n), optional
         Coordinates that angles are given nearest to, as for `Machine.inverse`.
-
-    Returns
-    -------
-    pose : ndarray (N, 6)
-        NaN where no pose was found that keeps what is matched.
-    q : ndarray (N, n)
-        The actuator coordinates there.
     """
     free = [POSE.index(name) for name in MAPS[map]]
+    fixed = [i for i in range(6) if i not in free]
     unknown = [i for i in matched if i not in free]
-    if unknown:
+    if unknown and frames.trivial:
         raise ArgumentError(f"match: {POSE[unknown[0]]} is not free on this machine")
     freedom = len(free) + machine.actuators - machine.rows
     if len(matched) != freedom and machine.rows <= len(free):
         raise ArgumentError(f"match must name {freedom} coordinates here, found {len(matched)}")
-    own = pose.copy()
-    wanted = own[:, matched]
+    wanted = pose[:, matched]
+    own = frames.inward(pose).copy()
+    if not frames.trivial and fixed:
+        _to_map(machine, slots, frames, own, free, matched, wanted)
     q = machine.inverse(slots, own, near)
     size = machine.struct.size
     live: BoolArray = np.asarray(np.isfinite(q).all(axis=1))
@@ -98,8 +116,10 @@ def complete(
         if not rows.size:
             break
         closure = machine.closure(slots, own[rows], q[rows])
-        left = _system(closure, free, matched)
-        missing = own[rows][:, matched] - wanted[rows]
+        own[rows[:, None], fixed] = closure.pose[:, fixed]
+        seen = _seen(frames, own[rows], matched, wanted[rows])
+        left = _system(closure, frames, own[rows], seen, free, matched)
+        missing = _off(seen, matched, wanted[rows])
         right = np.concatenate([closure.residual, missing], axis=1)
         good = np.isfinite(left).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
         live[rows[~good]] = False
@@ -112,54 +132,114 @@ def complete(
     q = machine.nearest_turns(slots, q, near)  # a long step may have gone round
     own = machine.forward(slots, q, own, threads=None)[0]
     if machine.rows > len(free):
-        own, q = _correct_actuators(machine, slots, own, q, matched, wanted)
+        own, q = _correct_actuators(machine, slots, frames, own, q, matched, wanted)
+    seen = _seen(frames, own, matched, wanted)
     if map == "spatial":
-        own = _as_wanted(own, matched, wanted)
-    kept = _missing(own, matched, wanted) <= KEPT * np.where(np.array(matched) < 3, size, 1.0)
-    lost = ~kept.all(axis=1)  # a stationary point of least squares that is no solution, or no pose
-    own[lost], q[lost] = np.nan, np.nan
-    return own, q
+        seen = _as_wanted(seen, matched, wanted)
+    off = np.abs(_off(seen, matched, wanted))
+    kept = off <= KEPT * np.where(np.array(matched) < 3, size, 1.0)
+    unsolved = ~kept.all(axis=1)  # at a stationary point that is no solution, or without a pose
+    seen[unsolved], own[unsolved], q[unsolved] = np.nan, np.nan, np.nan
+    return Completed(seen, own, q)
 
 
-def _missing(own: FloatArray, matched: Sequence[int], wanted: FloatArray) -> FloatArray:
-    """How far the matched coordinates of poses (N, 6) are from those wanted, mm or rad."""
-    off = own[:, matched] - wanted
-    off = np.where(np.array(matched) < 3, off, wrapped(off))
-    return np.asarray(np.abs(off))
+def _to_map(
+    machine: AnyMachine,
+    slots: FloatArray,
+    frames: Frames,
+    own: FloatArray,
+    free: list[int],
+    matched: Sequence[int],
+    wanted: FloatArray,
+) -> None:
+    """Move own poses (N, 6) onto the map, to where the matched coordinates are if limbs allow.
+
+    What the map does not move is some of the user's coordinates, and limbs may not reach there.
+    """
+    fixed = np.setdiff1d(range(6), free)
+    q = np.zeros((len(own), machine.actuators))
+    for _ in range(ITERATIONS):
+        closure = machine.closure(slots, own, q)
+        own[:, fixed] = closure.pose[:, fixed]
+        seen = _seen(frames, own, matched, wanted)
+        missing = _off(seen, matched, wanted)
+        if not np.nanmax(np.abs(missing), initial=0.0) > SETTLED * machine.struct.size:
+            break
+        keep = _kept_by_free(closure, frames, own, seen, free, matched)
+        good = np.isfinite(keep).all(axis=(1, 2)) & np.isfinite(missing).all(axis=1)
+        step = np.linalg.pinv(keep[good]) @ missing[good][..., None]
+        own[np.flatnonzero(good)[:, None], free] -= step[..., 0]
 
 
-def _as_wanted(own: FloatArray, matched: Sequence[int], wanted: FloatArray) -> FloatArray:
+def _off(pose: FloatArray, matched: Sequence[int], wanted: FloatArray) -> FloatArray:
+    """Matched coordinates of poses (N, 6) less those wanted, angles the short way round."""
+    off = np.asarray(pose[:, matched] - wanted)
+    angles = np.array(matched) >= 3
+    off[:, angles] = wrapped(off[:, angles])
+    return off
+
+
+def _seen(
+    frames: Frames, own: FloatArray, matched: Sequence[int], wanted: FloatArray
+) -> FloatArray:
+    """Own poses (N, 6) in the user's frames."""
+    if frames.trivial:
+        return np.array(own)
+    return _as_wanted(frames.outward(own), matched, wanted)
+
+
+def _as_wanted(pose: FloatArray, matched: Sequence[int], wanted: FloatArray) -> FloatArray:
     """Poses with their rotations written as is nearer to what is wanted.
 
     α + π, π - β, γ + π is the same rotation as α, β, γ.
     """
-    other = own.copy()
-    other[:, 3:] = wrapped(own[:, 3:] * [1.0, -1.0, 1.0] + np.pi)
+    other = pose.copy()
+    other[:, 3:] = wrapped(pose[:, 3:] * [1.0, -1.0, 1.0] + np.pi)
     angles = [i for i in matched if i >= 3]
     places = [i >= 3 for i in matched]
     off, other_off = (
-        _missing(each, angles, wanted[:, places]).sum(axis=1) for each in (own, other)
+        np.abs(_off(each, angles, wanted[:, places])).sum(axis=1) for each in (pose, other)
     )
-    return np.where((other_off < off)[:, None], other, own)
+    return np.where((other_off < off)[:, None], other, pose)
 
 
-def _system(closure: Closure, free: list[int], matched: Sequence[int]) -> FloatArray:
+def _system(
+    closure: Closure,
+    frames: Frames,
+    own: FloatArray,
+    seen: FloatArray,
+    free: list[int],
+    matched: Sequence[int],
+) -> FloatArray:
     """Closures and matched coordinates by free and actuator coordinates, (N, rows, m + n)."""
     by_all = np.concatenate([closure.by_free, closure.by_q], axis=-1)
-    keep = np.zeros((len(matched), by_all.shape[-1]))
-    keep[np.arange(len(matched)), [free.index(i) for i in matched]] = 1.0
-    system: FloatArray = np.concatenate(
-        [by_all, np.broadcast_to(keep, (len(by_all), *keep.shape))], axis=1
-    )
+    keep = np.zeros((len(own), len(matched), by_all.shape[-1]))
+    keep[:, :, : len(free)] = _kept_by_free(closure, frames, own, seen, free, matched)
+    system: FloatArray = np.concatenate([by_all, keep], axis=1)
     return system
 
 
+def _kept_by_free(
+    closure: Closure,
+    frames: Frames,
+    own: FloatArray,
+    seen: FloatArray,
+    free: list[int],
+    matched: Sequence[int],
+) -> FloatArray:
+    """Matched coordinates by the free ones, (N, matched, m)."""
+    by_free = closure.pose_by_free
+    by_free[:, free] = np.eye(len(free))  # without rounding
+    kept: FloatArray = frames.rates_outward(own, seen, by_free)[:, matched]
+    return kept
+
+
 def completed_rates(
-    machine: Machine,
+    machine: AnyMachine,
     map: str,
     slots: FloatArray,
-    pose: FloatArray,
-    q: FloatArray,
+    frames: Frames,
+    at: Completed,
     matched: Sequence[int],
     rates: tuple[FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
@@ -167,27 +247,45 @@ def completed_rates(
 
     Parameters
     ----------
-    machine, map, slots, matched
+    machine, map, slots, frames, matched
         As for `complete`.
-    pose, q : ndarray (N, 6), (N, n)
+    at : Completed
         What `complete` found.
     rates : two ndarray (N, matched)
         Velocity and acceleration of the matched coordinates, by time.
     """
-    left = _system(
-        machine.closure(slots, pose, q), [POSE.index(name) for name in MAPS[map]], matched
-    )
+    free = [POSE.index(name) for name in MAPS[map]]
+    left = _system(machine.closure(slots, at.own, at.q), frames, at.own, at.pose, free, matched)
     good = np.isfinite(left).all(axis=(1, 2))
-    inverse = np.full((len(pose), machine.actuators, len(matched)), np.nan)
+    inverse = np.full((len(left), machine.actuators, len(matched)), np.nan)
     inverse[good] = np.linalg.pinv(left[good])[:, -machine.actuators :, machine.rows :]
     velocity = np.einsum("nij,nj->ni", inverse, rates[0])
-    carried = machine.motion(slots, pose, q, velocity, np.zeros_like(velocity))[2][:, matched]
+    motion = machine.motion(slots, at.own, at.q, velocity, np.zeros_like(velocity))[0]
+    carried = _acceleration(frames.motion_outward(motion))[:, matched]
     return velocity, np.einsum("nij,nj->ni", inverse, rates[1] - carried)
 
 
+def _acceleration(motion: FloatArray) -> FloatArray:
+    """Second derivatives of x y z α β γ, (N, 6), of motions (N, 3, 4, 4).
+
+    Of an angle φ with sine s and cosine c up to a factor, n = s² + c²: n φ̇ = c ṡ - s ċ.
+    """
+    R = np.moveaxis(motion[:, :, :3, :3], 1, -1)  # (N, 3, 3) by order
+    out = np.empty((len(motion), 6))
+    out[:, :3] = motion[:, 2, :3, 3]
+    for k, s, c in ((3, R[:, 2, 1], R[:, 2, 2]), (5, R[:, 1, 0], R[:, 0, 0])):
+        n, by_time = s[:, 0] ** 2 + c[:, 0] ** 2, 2 * (s[:, 0] * s[:, 1] + c[:, 0] * c[:, 1])
+        speed = (c[:, 0] * s[:, 1] - s[:, 0] * c[:, 1]) / n
+        out[:, k] = (c[:, 0] * s[:, 2] - s[:, 0] * c[:, 2] - speed * by_time) / n
+    sine, cosine = -R[:, 2, 0], np.hypot(R[:, 0, 0, 0], R[:, 1, 0, 0])
+    out[:, 4] = (sine[:, 2] + sine[:, 0] * (sine[:, 1] / cosine) ** 2) / cosine
+    return out
+
+
 def _correct_actuators(
-    machine: Machine,
+    machine: AnyMachine,
     slots: FloatArray,
+    frames: Frames,
     own: FloatArray,
     q: FloatArray,
     matched: Sequence[int],
@@ -199,11 +297,13 @@ def _correct_actuators(
     above that met the matched coordinates is not quite where the machine goes.
     """
     for _ in range(ITERATIONS):
-        missing = own[:, matched] - wanted
+        seen = _seen(frames, own, matched, wanted)
+        missing = _off(seen, matched, wanted)
         live = np.flatnonzero(np.abs(missing).max(axis=1) > SETTLED * machine.struct.size)
         if not live.size:
             break
-        slope = machine.forward_jacobian(slots, own[live], q[live])[:, matched]
+        slope = machine.forward_jacobian(slots, own[live], q[live])
+        slope = frames.rates_outward(own[live], seen[live], slope)[:, matched]
         good = np.isfinite(slope).all(axis=(1, 2))
         live, slope = live[good], slope[good]
         q[live] -= (np.linalg.pinv(slope) @ missing[live][..., None])[..., 0]

@@ -114,8 +114,25 @@ def _measures(robot: Robot, poses: FloatArray) -> FloatArray:
     out[2, good] = sigma.prod(axis=1)
     if steps.shape[1] == steps.shape[2]:
         out[3, good] = np.linalg.det(steps)
-    out[4, good] = _transmission(robot, closure.by_q[good])
+    if robot.model.chains is None:
+        out[4, good] = _transmission(robot, closure.by_q[good])
+    else:
+        out[4, good] = _chain_transmission(robot, closure.by_q[good])
     return out
+
+
+def _chain_transmission(robot: Robot, by_q: FloatArray) -> FloatArray:
+    """How much of an actuator's motion, at its arm, reaches the closures that it moves."""
+    chains = robot.model.chains
+    assert chains is not None
+    arms = np.array(
+        [
+            abs(float(robot.geometry[f"gain{a + 1}"])) * (1.0 if joint.unit == "mm" else arm)
+            for a, (joint, arm) in enumerate(chains.arms)
+        ]
+    )
+    found: FloatArray = np.linalg.norm(by_q, axis=1) / arms
+    return np.asarray(found.min(axis=1))
 
 
 def _transmission(robot: Robot, by_q: FloatArray) -> FloatArray:

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array
-from pkmcal.core.library import STATUS
+from pkmcal.core.library import POSE, STATUS
 from pkmcal.display import POSE_HEADER, Table, long_table, pose_cells
 from pkmcal.modes.certificate import Certificate
 from pkmcal.modes.find import AssemblyProblem, certify_rows
@@ -25,6 +25,9 @@ class Solved(Protocol):
 
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (N, n)."""
+
+    def passive_joints(self, own: FloatArray, q: FloatArray) -> FloatArray:
+        """What the passive joints turn or slide by from home at own poses (N, 6), (N, passive)."""
 
 
 @dataclass(eq=False, repr=False)  # a frozen one takes a microsecond more to make
@@ -100,6 +103,20 @@ class Forward(RowResult):
         problem = self._machine.assembly_problem(self._q)
         return certify_rows(problem, self._own.reshape(-1, 6)).reshape(self.status.shape)
 
+    @cached_property
+    def passive(self) -> FloatArray:
+        """What passive joints turn or slide by from home (..., passive), computed when asked for.
+
+        rad or mm, in the order of ``robot.passive_names``. NaN where the row was not solved.
+
+        Raises
+        ------
+        ValueError
+            The machine's limbs are no chains of joints.
+        """
+        found = self._machine.passive_joints(self._own.reshape(-1, 6), self._q)
+        return found.reshape(*self.status.shape, found.shape[-1])
+
     def failures(self) -> str:
         """What failed and where, in one line; empty where nothing did."""
         said = super().failures()
@@ -114,6 +131,12 @@ class Forward(RowResult):
         rows = np.ascontiguousarray(np.broadcast_to(own.reshape(-1, 6), (len(self._q), 6)))
         steps = self._machine.closure_by_twist(rows, self._q)
         return steps.reshape(*self.status.shape, *steps.shape[1:])
+
+    def _columns(self) -> dict[str, Any]:
+        """The six numbers of each pose, its status, iterations and residual."""
+        columns = dict(zip(POSE, self.pose.reshape(-1, 6).T, strict=True))
+        others = {name: getattr(self, name) for name in ("status", "iterations", "residual")}
+        return columns | {name: np.ravel(values) for name, values in others.items()}
 
     def _parts(self) -> Iterator[str | Table]:
         yield self._counts()

@@ -11,18 +11,22 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows
+from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import Limb, Model
-from pkmcal.kinematics.complete import complete, matched_coordinates
+from pkmcal.geometry.model import CHAIN, Limb, Model
+from pkmcal.kinematics.chain_limits import drives as chain_drives
+from pkmcal.kinematics.complete import Completed, complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
 from pkmcal.kinematics.limits import stroke_margin
 from pkmcal.modes.find import AssemblyProblem
 
 Match = bool | str | Sequence[str] | None
+
+_FOLLOWS = 0.3  # of what follows the free coordinates most: a coordinate that determines a pose
 
 
 class Kinematics:
@@ -52,11 +56,30 @@ class Kinematics:
         self.slots = np.ascontiguousarray(model.geometry.slots)
         self.frames = Frames(model.base_frame, model.tool_frame)
         self.own_home = np.ascontiguousarray(model.home, dtype=np.float64)
+        self.machine: AnyMachine = self._machine()
+
+    @property
+    def limb_machine(self) -> Machine:
+        """The compiled machine of limbs in closed form.
+
+        Raises
+        ------
+        ValueError
+            The limbs are chains of joints.
+        """
+        if isinstance(self.machine, ChainMachine):
+            raise ArgumentError(f"robot: {self.model.name} has limbs that are chains of joints")
+        return self.machine
+
+    def _machine(self) -> AnyMachine:
+        model = self.model
+        if model.chains is not None:
+            return ChainMachine(model.chains.layout, model.closure_tolerance)
         limbs = [_limb(limb) for limb in model.limbs]
         if sum(len(limb["weights"]) for limb in limbs) == len(self.coordinates):
             for limb in limbs:  # nothing to weigh: all closures hold
                 limb["weights"] = [1.0] * len(limb["weights"])
-        self.machine = Machine(
+        return Machine(
             model.map, limbs, self.length, self.slots, self.own_home, model.closure_tolerance
         )
 
@@ -71,6 +94,34 @@ class Kinematics:
         """The m free coordinates of its pose, in the machine's own frame."""
         return MAPS[self.model.map]
 
+    @cached_property
+    def moved(self) -> tuple[str, ...]:
+        """The coordinates that determine a pose, in the user's frames.
+
+        Those that the robot file declares to match, or else the free ones. Where base and tool
+        frames turn a machine so that these do not determine its pose (a planar machine that stands
+        upright moves along x and z), others take the place of those that hardly follow.
+        """
+        names = tuple(self.model.match or self.coordinates)
+        if self.frames.trivial or self.model.match or len(names) == len(POSE):
+            return names
+        own = self.own_home[None]
+        closure = self.machine.closure(self.slots, own, self.machine.inverse(self.slots, own))
+        rates = self.frames.rates_outward(own, self.home[None], closure.pose_by_free)[0]
+        scale = np.where(np.arange(len(POSE)) < 3, 1.0, self.length)  # angles as arcs
+        rates *= scale[:, None] / scale[[POSE.index(name) for name in names]]
+        if not np.isfinite(rates).all():
+            return names
+        order = [*names, *(name for name in POSE if name not in names)]
+        found: list[str] = []
+        for _ in names:
+            left = np.linalg.norm(rates, axis=1)
+            name = next(n for n in order if left[POSE.index(n)] >= _FOLLOWS * left.max())
+            found.append(name)
+            along = rates[POSE.index(name)] / left[POSE.index(name)]
+            rates -= np.outer(rates @ along, along)
+        return tuple(sorted(found, key=POSE.index))
+
     @property
     def n_actuators(self) -> int:
         """Number of actuator coordinates, n."""
@@ -83,6 +134,8 @@ class Kinematics:
         The root mean square distance of the platform joints from their centre, or of the base
         points where the platform joints coincide.
         """
+        if self.model.chains is not None:
+            return self.model.chains.length
         for joints in (self.slots[:, 3:6], self.slots[:, 0:3]):
             spread = joints - joints.mean(axis=0)
             radius = float(np.sqrt((spread**2).sum(axis=1).mean()))
@@ -101,8 +154,8 @@ class Kinematics:
             x y z in mm, α β γ in rad.
         match : bool or names of coordinates, optional
             By default the six numbers are taken as given. Where limbs constrain the pose, `match`
-            names the coordinates to keep and the machine determines the others (`complete`);
-            True takes those the robot file declares.
+            names the coordinates to keep, in the user's frames, and the machine determines the
+            others (`complete`); True takes those the robot file declares.
         near : array_like (n,) or (..., n), optional
             Coordinates: an actuator that turns is given at the turn nearest to them. By default
             it is the turn nearest to the middle of its stroke, or, where the file states none, to
@@ -123,12 +176,12 @@ class Kinematics:
         -----
         Length limbs: eq. 3 of the 2TPR&2TPS paper, ‖p + R b - base‖.
         """
-        rows, shape = self.own_rows(pose)
+        rows, shape = as_rows("pose", pose, 6)
         about = None if near is None else self._near(near, shape)
         if match is None:
-            q = self.machine.inverse(self.slots, rows, about)
+            q = self.machine.inverse(self.slots, self.frames.inward(rows), about)
         else:
-            q = self._completed(rows, match, about)[1]
+            q = self._completed(rows, match, about).q
         return q.reshape(*shape, self.n_actuators)
 
     @property
@@ -303,11 +356,11 @@ class Kinematics:
 
     def _completed(
         self, rows: FloatArray, match: Match, near: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+    ) -> Completed:
         if match is None:
             raise ArgumentError("match must be True or names of coordinates, found None")
-        places = matched_coordinates(match, self.model.match, self.coordinates)
-        return complete(self.machine, self.model.map, self.slots, rows, places, near)
+        places = matched_coordinates(match, self.moved)
+        return complete(self.machine, self.model.map, self.slots, self.frames, rows, places, near)
 
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (n,) or (N, n), for certificates and searches for modes."""
@@ -315,12 +368,45 @@ class Kinematics:
         return AssemblyProblem(
             self.machine,
             self.model.map,
-            [KINDS[limb.kind].all_rows(limb.couple > 0) for limb in limbs],
+            [
+                () if limb.kind == CHAIN else KINDS[limb.kind].all_rows(limb.couple > 0)
+                for limb in limbs
+            ],
             [limb.couple for limb in limbs],
             self.length,
             self.slots,
             q,
         )
+
+    @property
+    def passive_names(self) -> tuple[str, ...]:
+        """The passive joints of chains, in the order of `Forward.passive`; none of other limbs."""
+        if self.model.chains is None:
+            return ()
+        names = list(self.model.chains.parts)
+        coordinate = self.model.chains.layout.coordinate
+        order = sorted(range(len(names)), key=lambda k: int(coordinate[k]))
+        return tuple(names[k] for k in order if coordinate[k] >= 0)
+
+    def passive_joints(self, own: FloatArray, q: FloatArray) -> FloatArray:
+        """What the passive joints turn or slide by from home at own poses (N, 6), (N, passive).
+
+        Each chain closed for itself, in the posture that is reached from home.
+        """
+        if not isinstance(self.machine, ChainMachine):
+            raise ArgumentError(f"{self.model.name}: its limbs are no chains of joints")
+        return self.machine.frames(self.slots, np.ascontiguousarray(own), q)[0]
+
+    def chain_points(self, own: FloatArray, q: FloatArray) -> list[FloatArray]:
+        """Where the joints of each chain are at own poses (N, 6), in own axes: (N, joints, 3)."""
+        assert isinstance(self.machine, ChainMachine) and self.model.chains is not None
+        frames = self.machine.frames(self.slots, np.ascontiguousarray(own), q)[1]
+        found, start = [], 0
+        for limb, parts in zip(self.model.chains.limbs, self.model.chains.members, strict=True):
+            first = np.cumsum([0, *(joint.parts for joint in limb[:-1])])
+            found.append(frames[:, start + first, 9:])
+            start += len(parts) + 1
+        return found
 
     def closure_by_twist(self, own: FloatArray, q: FloatArray | None = None) -> FloatArray:
         """Closure rows by a scaled twist, (N, rows, m), at own poses (N, 6) and q (N, n).
@@ -329,14 +415,20 @@ class Kinematics:
         """
         if q is None:
             on_map = own.copy()
-            if self.model.map in ("translation", "planar"):  # what these do not move is 0
+            if self.model.map in ("translation", "planar", "xy"):  # what these do not move is 0
                 on_map[:, [i for i, name in enumerate(POSE) if name not in self.coordinates]] = 0.0
             q = self.machine.inverse(self.slots, on_map)
         return self.machine.closure(self.slots, own, q).by_step
 
     def drives(self, q: FloatArray) -> FloatArray:
-        """q̃ of each limb (N, limbs) at actuator coordinates (N, n)."""
+        """q̃ of each limb (N, limbs) at actuator coordinates (N, n).
+
+        Of a chain that of its first actuator, 0 where it has none.
+        """
         actuators = [limb.actuator for limb in self.model.limbs]
+        if isinstance(self.machine, ChainMachine):
+            each = np.hstack([chain_drives(self.machine, self.slots, q), np.zeros((len(q), 1))])
+            return np.asarray(each[:, actuators])
         offset, gain = self.slots[:, SLOTS.index("offset")], self.slots[:, SLOTS.index("gain")]
         found: FloatArray = gain * q[:, actuators] + offset
         return found
@@ -350,6 +442,13 @@ class Kinematics:
     def _in_strokes(self, q: FloatArray) -> BoolArray:
         """Which actuators (n,) keep the strokes of all their limbs at coordinates (n,)."""
         kept = np.ones(self.n_actuators, dtype=bool)
+        if isinstance(self.machine, ChainMachine):
+            assert self.model.chains is not None
+            drive = chain_drives(self.machine, self.slots, q[None])[0]
+            for a, (_, joint) in enumerate(self.model.chains.actuated):
+                low, high = joint.stroke or (-np.inf, np.inf)
+                kept[a] = bool(low <= drive[a] <= high)
+            return kept
         for limb, drive in zip(self.model.limbs, self.drives(q[None])[0], strict=True):
             kept[limb.actuator] &= bool(stroke_margin(limb, drive) >= 0.0)
         return kept

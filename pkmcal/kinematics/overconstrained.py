@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.core.machine import Machine
+from pkmcal.core.chains import AnyMachine
 from pkmcal.screw import from_pose, log
 
 # Of the size, to each side. The step's square is what differences of third order leave out, the
@@ -21,7 +21,7 @@ _STEP = 5e-6
 
 
 def error_jacobian(
-    machine: Machine,
+    machine: AnyMachine,
     slots: FloatArray,
     pose: FloatArray,
     q: FloatArray,
@@ -33,7 +33,7 @@ def error_jacobian(
 
     Parameters
     ----------
-    machine : Machine
+    machine : Machine or ChainMachine
         In the core.
     slots : ndarray (limbs, SLOTS)
         Geometry.

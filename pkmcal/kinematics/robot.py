@@ -11,16 +11,20 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
-from pkmcal.core.machine import Machine
+from pkmcal.core.chains import AnyMachine, ChainMachine
+from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.atomic import write_whole
+from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Model
-from pkmcal.kinematics import overconstrained
+from pkmcal.kinematics import chain_limits, overconstrained
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
@@ -78,8 +82,8 @@ class Robot(Kinematics, Result):
         pose : array_like (..., 6)
             x y z in mm, α β γ in rad; what is not matched is where the search starts.
         match : True or names of coordinates
-            As many as the machine has degrees of freedom; True takes those its file declares, or
-            its free coordinates.
+            As many as the machine has degrees of freedom, in the user's frames; True takes those
+            its file declares, or those that it moves (`moved`).
 
         Returns
         -------
@@ -93,8 +97,8 @@ class Robot(Kinematics, Result):
         >>> bool(abs(pose[0] - 400 * np.tan(0.2)) < 1e-9)
         True
         """
-        rows, shape = self.own_rows(pose)
-        return self.frames.outward(self._completed(rows, match)[0]).reshape(*shape, 6)
+        rows, shape = as_rows("pose", pose, 6)
+        return self._completed(rows, match).pose.reshape(*shape, 6)
 
     def violation(self, pose: ArrayLike) -> FloatArray:
         """How far a pose is from one the machine can take.
@@ -107,13 +111,18 @@ class Robot(Kinematics, Result):
         Returns
         -------
         ndarray (...)
-            The largest closure error that is left with the limbs at their inverse, mm. Near 0
-            where six numbers are free, or where they fit.
+            The largest closure error that is left with the limbs at their inverse, mm, or what its
+            pose map does not move, an angle as its arc at the characteristic length. Near 0 where
+            six numbers are free, or where they fit.
         """
         rows, shape = self.own_rows(pose)
         q = self.machine.inverse(self.slots, rows)
-        residual = self.machine.closure(self.slots, rows, q).residual
-        return np.asarray(np.abs(residual).max(axis=1)).reshape(shape)
+        closure = self.machine.closure(self.slots, rows, q)
+        off = np.abs(rows - closure.pose)
+        off[:, 3:] = self.length * np.abs(wrapped(off[:, 3:]))
+        if self.model.map == "spatial":  # which has every pose, by whatever angles
+            off[:] = 0.0
+        return np.asarray(np.abs(np.hstack([closure.residual, off])).max(axis=1)).reshape(shape)
 
     def feasible(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> Feasibility:
         """Which limits of which limbs a pose keeps.
@@ -132,18 +141,22 @@ class Robot(Kinematics, Result):
             ``.ok`` for each pose; reach, stroke and joint cones for each limb.
         """
         rows, shape = self.own_rows(pose)
-        drive, on_base, on_platform = self.machine.limbs(self.slots, rows)
+        chains = self.model.chains
+        if chains is not None:
+            q = (
+                self.machine.inverse(self.slots, rows)
+                if actuators is None
+                else (self._batch(actuators, shape))
+            )
+            assert isinstance(self.machine, ChainMachine)
+            found = chain_limits.feasibility(chains, self.machine, self.slots, rows, q)
+            return _shaped(found, shape)
+        drive, on_base, on_platform = self.limb_machine.limbs(self.slots, rows)
         if actuators is not None:
             there = self.drives(self._batch(actuators, shape))
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
             drive = np.where(angle, there + wrapped(drive - there), drive)
-        found = feasibility(self.model.limbs, drive, on_base, on_platform)
-        return Feasibility(
-            *(
-                getattr(found, field.name).reshape(*shape, len(self.model.limbs))
-                for field in fields(Feasibility)
-            )
-        )
+        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform), shape)
 
     def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
         """Every assembly mode at given actuator coordinates, with proof.
@@ -261,6 +274,31 @@ class Robot(Kinematics, Result):
         errors = self._through_ties(self.frames.twists_outward(own, errors))
         return errors.reshape(*shape, 6, len(self.geometry))
 
+    def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
+        """How the platform turns and moves by each actuator coordinate.
+
+        Parameters
+        ----------
+        pose, actuators : array_like
+            As for `error_jacobian`.
+
+        Returns
+        -------
+        ndarray (..., 6, n)
+            Twists as by `error_twists`, rad and mm per mm or rad.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")
+        >>> twists = robot.actuator_twists(robot.home, robot.inverse(robot.home))
+        >>> bool(np.allclose(twists[5], twists[5, 0]))  # all legs lift it alike
+        True
+        """
+        _, own, q, shape = self._commanded(pose, actuators)
+        by_q = self.machine.forward_jacobian(self.slots, own, q, twists=True)
+        return self.frames.twists_outward(own, by_q).reshape(*shape, 6, self.n_actuators)
+
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Pose, actuator coordinates and batch shape of poses (..., 6)."""
         rows, _, q, shape = self._commanded(places, None)
@@ -345,7 +383,7 @@ class Robot(Kinematics, Result):
         return changed
 
     @cached_property
-    def _of_any_misfit(self) -> Machine:
+    def _of_any_misfit(self) -> AnyMachine:
         return self.machine.with_tolerance(np.inf)
 
     @property
@@ -371,7 +409,14 @@ class Robot(Kinematics, Result):
             return self
         return Robot(replace(self.model, closure_tolerance=2.0 * missed))
 
-    def save(self, path: str | PathLike[str], comment: str = "") -> None:
+    def save(
+        self,
+        path: str | PathLike[str],
+        comment: str = "",
+        *,
+        like: str | PathLike[str] | None = None,
+        deviations: Mapping[str, float] | None = None,
+    ) -> None:
         """Write the robot file; `load` reads it back to the last bit.
 
         Parameters
@@ -380,8 +425,39 @@ class Robot(Kinematics, Result):
             Where to write; an existing file is replaced, whole or not at all.
         comment : str, optional
             Lines for its head, each with its ``#``.
+        like : str or path, optional
+            The file that the robot came from: its units, order, names and comments are kept, and
+            only the values that changed are others. Numbers are then read back to 1e-13 of the
+            machine's size, for its units are not mm and rad.
+        deviations : mapping of str to float, optional
+            With `like`: standard deviations by name, mm and rad, as comments.
+
+        Raises
+        ------
+        ValueError
+            `like` describes another robot.
         """
-        robot_file.write(self.model, path, comment)
+        if like is None:
+            robot_file.write(self.model, path, comment)
+            return
+        from pkmcal.geometry.robot_file_kept import text_like
+
+        content, place, _ = robot_file.located(like)
+        source = Source(content, place)
+        head = arguments.comment(comment)
+        write_whole(path, text_like(source, self.model, deviations, head))
+
+
+def _shaped(found: Feasibility, shape: tuple[int, ...]) -> Feasibility:
+    """Limits of N rows as those of a batch."""
+    each = (getattr(found, field.name) for field in fields(Feasibility))
+    return Feasibility(*(array.reshape(*shape, array.shape[-1]) for array in each))
+
+
+def determines_others(robot: Robot) -> bool:
+    """Whether the limbs determine coordinates beside the commanded ones, which are not constant."""
+    constant = robot.model.match is None and robot.model.map in ("translation", "planar")
+    return len(robot.moved) < len(POSE) and not constant
 
 
 def require_parallel(robot: object, name: str = "robot") -> None:

@@ -206,10 +206,13 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
         broken = robot.feasible(robot.home[None]).broken()
         why = f"home breaks a limit: {'; '.join(broken)}" if broken else "home is singular"
         raise ArgumentError(f"{robot.name}: {why.replace(' in rows 0', '')}")
-    joints = np.abs(robot.geometry.slots[:, :6]).sum(axis=1)
-    size = float(joints.max() + np.abs(robot.home[:3]).sum())
+    if robot.model.chains is not None:
+        size = robot.model.chains.size
+    else:
+        joints = np.abs(robot.geometry.slots[:, :6]).sum(axis=1)
+        size = float(joints.max() + np.abs(robot.home[:3]).sum())
     found = {}
-    for name in moved_coordinates(robot):
+    for name in robot.moved:
         step = np.radians(90.0) / _STEPS if name in POSE[3:] else 2 * size / _STEPS
         ends = []
         for sign in (-1.0, 1.0):
@@ -220,11 +223,6 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
             ends.append(float(ray[last, POSE.index(name)]))
         found[name] = (ends[0], ends[1])
     return found
-
-
-def moved_coordinates(robot: Robot) -> tuple[str, ...]:
-    """The coordinates that determine a pose."""
-    return tuple(robot.model.match or robot.coordinates)
 
 
 def require_moved(robot: Robot, axes: Mapping[str, object]) -> None:
@@ -241,7 +239,7 @@ def require_moved(robot: Robot, axes: Mapping[str, object]) -> None:
         )
     if not axes:
         raise ArgumentError("axes names no coordinate")
-    moved = moved_coordinates(robot)
+    moved = robot.moved
     for name in axes:
         if name not in moved:
             known = did_you_mean(name, moved)

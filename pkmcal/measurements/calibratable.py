@@ -118,6 +118,9 @@ class Calibratable(Protocol):
     def error_twists(self, pose: FloatArray, actuators: FloatArray) -> FloatArray:
         """Derivative (N, 6, p) of the platform's twist to each number."""
 
+    def actuator_twists(self, pose: FloatArray, actuators: FloatArray) -> FloatArray:
+        """Derivative (N, 6, n) of the platform's twist to each actuator coordinate."""
+
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Poses (N, 6), actuator coordinates (N, n) and batch shape of what a user commands."""
 
@@ -189,6 +192,7 @@ class ArmMachine:
         self.arm = arm
         self.name, self.length = arm.name, arm.length
         self.n_actuators, self.actuator_units = arm.n_joints, arm.actuator_units
+        self.joint_names = arm.joint_names
         joints = range(1, arm.n_joints + 1)
         names = tuple(f"joint{i}.{error}" for i in joints for error in ERRORS)
         units = ("mm", "mm", "mm", "rad", "rad", "rad") * arm.n_joints
@@ -217,6 +221,10 @@ class ArmMachine:
         In base axes, at joint coordinates `actuators` (N, n); an arm needs no pose.
         """
         return self.arm.error_jacobian(actuators, frame="tip")
+
+    def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
+        """The same by each joint coordinate, (N, 6, n)."""
+        return self.arm.jacobian(actuators, frame="tip")
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
         """Pose, coordinates and batch shape of joint coordinates (..., n)."""

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pkmcal.arrays import Unit
 
-Kind = Literal["pose", "position", "height", "distance"]
+Kind = Literal["pose", "position", "height", "distance", "closure"]
 
 _LENGTHS: tuple[tuple[str, Unit], ...] = (("x", "mm"), ("y", "mm"), ("z", "mm"))
 _ANGLES: tuple[tuple[str, Unit], ...] = (("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
@@ -16,4 +16,5 @@ COMPONENTS: dict[Kind, tuple[tuple[str, Unit], ...]] = {
     "position": _LENGTHS,
     "height": (("z", "mm"),),
     "distance": (("distance", "mm"),),
+    "closure": (),  # the actuators alone
 }

@@ -15,11 +15,12 @@ from pkmcal.measurements.tracker import Tracker
 _ROUNDED = 1e-9  # share by which a covariance may miss symmetry, as what was computed or typed does
 
 
-def numbers(name: str, given: ArrayLike) -> FloatArray:
-    """A copy as finite doubles."""
+def numbers(name: str, given: ArrayLike, blank: bool = False) -> FloatArray:
+    """A copy as finite doubles; `blank`: NaN is a number that is not there."""
     array = np.array(as_numbers(name, given, "n"), dtype=np.float64, order="C")
-    if not np.isfinite(array).all():
-        first = tuple(int(i) for i in np.argwhere(~np.isfinite(array))[0])
+    wrong = np.isinf(array) if blank else ~np.isfinite(array)
+    if wrong.any():
+        first = tuple(int(i) for i in np.argwhere(wrong)[0])
         where = f" at index {', '.join(map(str, first))}" if first else ""
         raise ArgumentError(f"{name} must be finite; found {array[first]}{where}")
     return array
@@ -41,6 +42,8 @@ def sigma_array(
 ) -> FloatArray:
     """Standard deviations (N, k) or covariances (N, k, k)."""
     rows, k = shape
+    if not k:
+        raise ArgumentError(f"sigma: nothing was read of kind {kind!r}; see actuator_sigma")
     if isinstance(given, Tracker):
         if kind != "position":
             raise ArgumentError(f"sigma: a tracker measures positions, not values of kind {kind!r}")
@@ -69,12 +72,56 @@ def sigma_array(
     return np.array(np.broadcast_to(sigma, shape))
 
 
+def values_array(given: ArrayLike | None, kind: str, shape: tuple[int, int]) -> FloatArray:
+    """What was read, (N, k) or (N,); NaN where nothing was, of orientations as a whole."""
+    if given is None:
+        if shape[1]:
+            raise ArgumentError(f"values of kind {kind!r} must be given; None goes with 'closure'")
+        return np.empty(shape)
+    values = numbers("values", given, blank=True)
+    expected = shape if shape[1] != 1 else shape[:1]
+    if values.shape != expected:
+        raise ArgumentError(
+            f"values of kind {kind!r} must have shape {expected} for {shape[0]} rows of"
+            f" actuators; found {values.shape}"
+        )
+    if kind == "pose":
+        angles = np.isnan(values[:, 3:])
+        part = angles.any(axis=1) & ~angles.all(axis=1)
+        if part.any():
+            raise ArgumentError(
+                "values: an orientation has three angles or none; found one left out in row"
+                f" {int(np.argmax(part))}"
+            )
+    return values
+
+
+def actuator_sigma_array(given: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None:
+    """Standard deviations of the actuators (N, n), of which some may be 0 in all rows."""
+    if given is None:
+        return None
+    sigma = numbers("actuator_sigma", given)
+    if sigma.shape not in ((), shape[1:], shape):
+        raise ArgumentError(
+            f"actuator_sigma must be a number or have shape {shape[1:]} or {shape}; found"
+            f" {sigma.shape}"
+        )
+    whole = np.array(np.broadcast_to(sigma, shape))
+    if (whole < 0).any() or ((whole == 0).any(axis=0) & (whole > 0).any(axis=0)).any():
+        raise ArgumentError(
+            "actuator_sigma must be positive, or 0 for an actuator in all rows; found"
+            f" {sigma.min():g} (None means not known)"
+        )
+    return whole
+
+
 def target_array(
     given: ArrayLike | None, kind: str, index: Int64Array | None, rows: int
 ) -> FloatArray | None:
     """One target, one per row, or several that an index chooses from; None where none is given."""
-    if kind == "pose" and (given is not None or index is not None):
-        raise ArgumentError("target: a pose is the platform's own and takes no target")
+    if kind in ("pose", "closure") and (given is not None or index is not None):
+        own = "a pose is the platform's own" if kind == "pose" else "a closure reads no point"
+        raise ArgumentError(f"target: {own} and takes no target")
     if index is not None and index.min() < 0:
         raise ArgumentError(f"target_index counts from 0; found {index.min()}")
     if given is None:

@@ -6,71 +6,125 @@ columns                               meaning
 ``q1 [mm]`` … ``qn [mm]``             actuator coordinates, lengths or angles
 ``x [mm], y [mm], z [mm]``            a position; with ``alpha``, ``beta``, ``gamma [deg]`` a pose
 ``z [mm]`` alone                      a height
+``x [mm], y [mm], probe [mm]``        where a printer's probe triggered; or ``q1`` … and ``probe``
 ``distance [mm]``                     from the fixed point ``target`` to the ``attachment``
 ``A.x [mm], A.y [mm], A.z [mm]`` …    positions of several targets A, B, … in one row
 ``sigma [mm]``                        standard deviation of the row, of every component
 ``sigma.x [mm]``, ``sigma.alpha``…    … or of each component
 ``cov.x.y [mm*mm]`` …                 … or their covariances, all on and above the diagonal
+``actuator_sigma [mm]``               standard deviation of what every actuator read
+``actuator_sigma.q1 [mm]`` …          … or of each of them
 ``group``                             a whole number, the same for repeats of one pose
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
 ====================================  =============================================================
 
-`pkmcal.files.column_names` matches headings, also as instruments and controllers write them:
-capitals, ``Joint 1``, ``J1``, ``Axis 1``, ``Leg 1`` for q1, ``Height`` for z, ``Roll``, ``Pitch``,
-``Yaw`` for alpha, beta, gamma, ``Std`` for sigma, ``Reflector`` or ``SMR`` for target, ``Pose`` for
-group. ``Index``, ``Time``, ``Date`` and ``Comment`` are left out. ``Rx`` and the like are not
-taken: makers differ in what they mean. Lengths are in mm, cm, m, um or in; angles in rad, mrad or
-deg; covariances in products of mm and rad. `pkmcal.files.csv_table` says what separates the columns
-and which lines are skipped.
+An empty cell of what was measured says that it was not read there; without any measured column the
+actuators are all that is known.
+
+A pose may also be stated by ``qw qx qy qz``, by a matrix ``r11`` … ``r33``, by ``Rx Ry Rz``, ``A B
+C`` or ``W P R`` where the order of the angles is stated. ``group`` may hold names of poses, and a
+point's name both, as in ``P01_SMR1``. `pkmcal.files.column_names` matches headings, as instruments
+and controllers write them; `pkmcal.files.csv_table` says what separates the columns and which lines
+are skipped. Lengths are in mm, cm, m, um or in; angles in rad, mrad, deg, arcmin, arcsec or rev;
+covariances in products of mm and rad; actuators also in steps where the robot has a gain.
 """
 
 from __future__ import annotations
 
 import itertools
-import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from os import PathLike
-from typing import Any, Protocol
+from typing import Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pkmcal import arguments
+from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentTypeError, FileError
-from pkmcal.files.column_names import BESIDE, RESERVED, known_as
+from pkmcal.files.column_names import SYNONYMS
 from pkmcal.files.csv_table import Table
-from pkmcal.files.reading import LONGEST_NAME
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements import orientation_columns
+from pkmcal.measurements.actuator_columns import ACTUATOR, Actuated, compare, read_actuators
+from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.components import COMPONENTS, Kind
+from pkmcal.measurements.join import JOINS, Join
+from pkmcal.measurements.join import join as joined
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.orientation_columns import checked, names_in
+from pkmcal.measurements.probe import (
+    agreement,
+    apart_from,
+    is_of_a_flat,
+    is_of_trigger,
+    probed,
+)
+from pkmcal.measurements.table_layout import (
+    Layout,
+    layout,
+    leave_out_unknown,
+    number_groups,
+    open_table,
+    split_names,
+)
+from pkmcal.measurements.target_columns import read_several, read_targets, several_targets
 
 _AXES = ("x", "y", "z")
 _ANGLES = ("alpha", "beta", "gamma")
-_ACTUATOR = re.compile(r"q[1-9][0-9]*")
-_OF_A_TARGET = re.compile(r"(?P<target>[^.]+)\.[xyz]")
+_TRIED = 200  # rows by which an order of angles is told
 
 
-class Actuated(Protocol):
-    """A machine whose actuators have units: `Robot`, `SerialArm`."""
-
-    @property
-    def actuator_units(self) -> tuple[str, ...]:
-        """Unit of each actuator, "mm" or "rad"."""
-
-
-def read_measurements(path: str | PathLike[str], robot: Actuated | None = None) -> Measurements:
+def read_measurements(
+    path: str | PathLike[str],
+    robot: Actuated | None = None,
+    *,
+    controller: str | PathLike[str] | None = None,
+    join: Join = "auto",
+    ignore: str | Sequence[str] = (),
+    rename: Mapping[str, str] | None = None,
+    header: Sequence[str] = (),
+    units: str | Sequence[str] = (),
+    rotation: str | None = None,
+    probe_offset: ArrayLike = (0.0, 0.0, 0.0),
+) -> Measurements:
     r"""Read measurements from a CSV file; its module lists the columns.
 
     A row with several targets (``A.x``, ``B.x`` …) yields one measurement per target, in the order
     of the columns, with the same actuators: `target_index` says which, `target_names` the names.
     Where a target was not seen, its three cells are empty and the measurement is left out.
+    Unknown columns are left out. What was assumed is in `Measurements.notes`, a line each.
 
     Parameters
     ----------
     path : str or path
         The file.
     robot : Robot, optional
-        The machine that was measured; its number of actuators and their units are compared.
+        The machine that was measured; its number of actuators and their units are compared. It
+        tells orders of quaternions apart, and its gains say what a step is.
+    controller : str or path, optional
+        A log of the controller that has the actuators where the file has none.
+    join : {"auto", "name", "row", "time"}
+        How a row of the log is found: by the name of the point or of its pose, by the order of
+        the rows, by time-stamp (the last row at or before it). By default the first that works of
+        name, time and row.
+    ignore : str or sequence of str
+        Headings of columns to leave out, or wildcards.
+    rename : mapping of str to str, optional
+        Other headings for columns, ``{"Lg": "q1 [mm]"}``.
+    header : sequence of str
+        The headings of a file without a line of them.
+    units : str or sequence of str
+        Of columns without one: of lengths, of angles, or both, ``("mm", "deg")``.
+    rotation : str, optional
+        How orientations are stated where headings do not say: "ZYX" or another order of axes,
+        each about the turned axis; "xyz", about fixed axes; "rotvec"; "wxyz" or "xyzw".
+    probe_offset : (3,) array
+        Of a column ``probe``: the firmware's offsets of the probe, mm, as in `probed`.
 
     Returns
     -------
@@ -80,8 +134,8 @@ def read_measurements(path: str | PathLike[str], robot: Actuated | None = None) 
     Raises
     ------
     ValueError
-        Naming the file and, as far as there is one, line and column: what is missing, unknown,
-        given twice, without unit or not a number.
+        Naming the file and, as far as there is one, line and column: what is missing, mistyped,
+        given twice, without unit or not a number; tables that cannot be joined.
     OSError
         The file cannot be read.
 
@@ -95,99 +149,183 @@ def read_measurements(path: str | PathLike[str], robot: Actuated | None = None) 
     >>> m.kind, m.actuator_units, m.values
     ('height', ('rad', 'rad'), array([1.5]))
     """
-    table = Table(path)
-    table.rename(known_as)
-    table.leave_out(BESIDE)
-    several = _several_targets(table)
-    _refuse_unknown(table, several)
-    actuators, units = _read_actuators(table)
-    _compare(table, units, robot)
-    kind = _kind(table, several)
-    fields: dict[str, Any] = {"sigma": _read_sigma(table, kind)}
-    if "group" in table.columns:
-        fields["group"] = table.integers("group")
-    if several:
-        actuators, values, fields = _read_several(table, several, actuators, fields)
-    else:
-        columns = [_read(table, *component)[0] for component in COMPONENTS[kind]]
-        values = columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
-        fields |= _read_targets(table, kind)
-    try:
-        return Measurements(actuators, values, kind, actuator_units=units, **fields)
-    except ValueError as error:
-        raise FileError(f"{table.path}: {error}") from None
-
-
-def _several_targets(table: Table) -> tuple[str, ...]:
-    """Names of the targets that have columns of their own, in the order of the columns."""
-    matches = (_OF_A_TARGET.fullmatch(name) for name in table.columns)
-    found = dict.fromkeys(match["target"] for match in matches if match)
-    return tuple(name for name in found if name not in RESERVED)
-
-
-def _refuse_unknown(table: Table, several: tuple[str, ...]) -> None:
-    components = _AXES + _ANGLES
-    names = [*(f"q{i + 1}" for i in range(len(table.columns))), *components, "distance"]
-    names += ["sigma", "group", "target"]
-    names += [f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES]
-    names += [f"{target}.{axis}" for target in several for axis in _AXES]
-    deviations = [f"sigma.{name}" for name in components]
-    pairs = itertools.combinations_with_replacement(components, 2)
-    known = {*names, *deviations, *(f"cov.{a}.{b}" for a, b in pairs)}
-    table.refuse_unknown(lambda name: name in known or bool(_ACTUATOR.fullmatch(name)), names)
-
-
-def _read(table: Table, name: str, *quantities: str, blank: bool = False) -> tuple[Any, str]:
-    table.require([name])
-    return table.numbers(name, *quantities, blank=blank)
-
-
-def _read_actuators(table: Table) -> tuple[FloatArray, tuple[str, ...]]:
-    count = max((int(n[1:]) for n in table.columns if _ACTUATOR.fullmatch(n)), default=1)
-    read = [_read(table, f"q{i + 1}", "mm", "rad") for i in range(count)]
-    return np.stack([values for values, _ in read], axis=1), tuple(unit for _, unit in read)
-
-
-def _compare(table: Table, units: tuple[str, ...], robot: Actuated | None) -> None:
     if robot is not None and not hasattr(robot, "actuator_units"):
         raise ArgumentTypeError(
             f"robot must be a Robot or SerialArm, found {arguments.shown(robot)}"
         )
-    expected = units if robot is None else tuple(robot.actuator_units)
-    if len(expected) != len(units):
-        raise table.header_error(
-            f"{len(units)} actuator columns, q1 to q{len(units)}; the robot has {len(expected)}"
+    how = layout(ignore, rename, header, units)
+    joints: Sequence[str] = getattr(robot, "joint_names", None) or ()
+    table = _table(path, controller, word("join", join, JOINS), how, joints)
+    split_names(table)
+    number_groups(table)
+    several = several_targets(table)
+    leave_out_unknown(table, _known(table, several), SYNONYMS)
+    if "probe" in table.columns:
+        return _read_probe(table, robot, probe_offset)
+    actuators, actuator_units = read_actuators(table, robot)
+    compare(table, actuator_units, robot)
+    kind = _kind(table, several)
+    fields: dict[str, Any] = {"sigma": _read_sigma(table, kind)}
+    fields["actuator_sigma"] = _read_actuator_sigma(table, actuator_units)
+    if "group" in table.columns:
+        fields["group"] = table.integers("group")
+    values: FloatArray | None
+    if several:
+        actuators, values, fields = read_several(table, several, actuators, fields)
+    else:
+        values = _read_values(table, kind, checked(rotation), actuators, robot)
+        fields |= read_targets(table, kind)
+    try:
+        measured = Measurements(
+            actuators, values, kind, actuator_units=actuator_units, notes=_notes(table), **fields
         )
-    for i, (unit, robots) in enumerate(zip(units, expected, strict=True)):
-        if unit != robots:
-            what = {"mm": "a length", "rad": "an angle"}
-            raise table.header_error(
-                f"column 'q{i + 1}' is {what[unit]}; the robot's actuator is {what[robots]}"
+    except ValueError as error:
+        raise FileError(f"{table.path}: {error}") from None
+    if kind == "height" and isinstance(robot, Robot):
+        if said := agreement(robot, measured, str(table.path)):
+            table.notes.append(said)
+        if is_of_a_flat(robot, measured):
+            table.notes.append(
+                "z taken as the measured height of the nozzle, up; what a firmware reported when"
+                " its probe triggered has the opposite sign and is called probe"
             )
+        measured = replace(measured, notes=_notes(table))
+    return measured
+
+
+def _notes(table: Table) -> tuple[str, ...]:
+    return tuple(f"{table.path}: {note}" for note in table.notes)
+
+
+def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Measurements:
+    """Heights of a probe's tip where it triggered: 0, on the bed."""
+    if not isinstance(robot, Robot):
+        raise table.header_error(
+            f"column {table.columns['probe'].name!r}: give the robot, as the firmware had it when"
+            " it probed"
+        )
+    z = _read(table, "probe", "mm")[0]
+    sigma = _read_sigma(table, "height")
+    if any(ACTUATOR.fullmatch(name) for name in table.columns):
+        actuators, units = read_actuators(table, robot)
+        compare(table, units, robot)
+        if not is_of_trigger(robot, actuators, z):
+            row = int(np.argmax(apart_from(robot, actuators, z)))
+            at = robot.forward(actuators[row]).pose[2]
+            raise table.cell_error(
+                "probe",
+                row,
+                f"the robot file gives z = {at:.4g} mm at the actuators of this row, found"
+                f" {z[row]:.4g}: they have to be those at which the probe triggered",
+            )
+        poses = robot.forward(actuators).pose[:, :3]
+    else:
+        poses = np.column_stack([*(_read(table, axis, "mm")[0] for axis in "xy"), z])
+    try:
+        measured = probed(robot, poses, offset=offset, sigma=sigma)
+    except ValueError as error:
+        raise FileError(f"{table.path}: {error}") from None
+    table.notes.append(
+        f"{table.columns['probe'].name!r} taken as the firmware's z when the probe triggered: the"
+        " actuators are those that the robot file has there, and the probe's tip is at 0"
+    )
+    return replace(measured, notes=_notes(table))
+
+
+def _table(
+    path: str | PathLike[str],
+    controller: str | PathLike[str] | None,
+    how: Join,
+    columns: Layout,
+    joints: Sequence[str],
+) -> Table:
+    """The table of a file, with the actuators of a controller's log."""
+    if controller is None:
+        return open_table(path, columns, joints)
+    log_columns = replace(columns, header=())
+    seen = (*columns.ignore, *columns.rename)
+    table = open_table(path, columns, joints, seen, elsewhere=True)
+    log = open_table(controller, log_columns, joints, seen)
+    if any(ACTUATOR.fullmatch(name) for name in table.columns):
+        table.notes.append(f"has actuators of its own; {log.path} is not used")
+        return table
+    for name in seen:
+        if not any(_has(each, name) for each in (table, log)) and name not in columns.ignore:
+            raise table.header_error(f"no column {name!r} to rename, nor in {log.path}")
+    joined(table, log, how)
+    return table
+
+
+def _has(table: Table, name: str) -> bool:
+    return any(column.name == name for column in table.columns.values())
+
+
+def _known(table: Table, several: tuple[str, ...]) -> set[str]:
+    """Names of columns that are read."""
+    components = _AXES + _ANGLES
+    names = {f"q{i + 1}" for i in range(len(table.columns))}
+    names |= {name for name in table.columns if ACTUATOR.fullmatch(name)}
+    names |= {*components, "distance", "sigma", "group", "target", "probe", "actuator_sigma"}
+    names |= {f"actuator_sigma.{name}" for name in names if ACTUATOR.fullmatch(name)}
+    names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
+    names |= {f"{target}.{axis}" for target in several for axis in _AXES}
+    names |= {f"sigma.{name}" for name in components}
+    pairs = itertools.combinations_with_replacement(components, 2)
+    return names | {f"cov.{a}.{b}" for a, b in pairs} | set(names_in(table))
 
 
 def _kind(table: Table, several: tuple[str, ...]) -> Kind:
     """What was measured, by the columns that are there."""
     names = table.columns.keys()
+    turned = set(names_in(table)) | (set(_ANGLES) & names)
     groups = {
         "distance": {"distance"} & names,
-        "x, y, z": {*_AXES, *_ANGLES} & names,
+        "x, y, z": ({*_AXES} & names) | turned,
         f"several targets ({', '.join(several)})": set(several),
     }
     there = [title for title, columns in groups.items() if columns]
     if len(there) > 1:
         raise table.header_error(f"more than one thing measured: {' and '.join(there)}")
     if not there:
-        raise table.header_error(
-            "nothing measured: expected columns x, y, z, or z alone, or distance, or A.x, A.y, A.z"
-        )
+        return "closure"
     if "distance" in names:
         return "distance"
     if several:
         return "position"
-    if names.isdisjoint(("x", "y", *_ANGLES)):
+    if names.isdisjoint(("x", "y", *turned)):
         return "height"
-    return "position" if names.isdisjoint(_ANGLES) else "pose"
+    return "pose" if turned else "position"
+
+
+def _read_values(
+    table: Table,
+    kind: Kind,
+    rotation: str | None,
+    actuators: FloatArray,
+    robot: Actuated | None,
+) -> FloatArray | None:
+    """What was measured, (N, k) or (N,); None without columns of it."""
+    if kind == "pose" and names_in(table) not in ((), _ANGLES):
+        places = [_read(table, axis, "mm")[0] for axis in _AXES]
+        nominal = _nominal(robot, actuators)
+        return np.column_stack([*places, orientation_columns.read(table, rotation, nominal)])
+    columns = [_read(table, *component, blank=True)[0] for component in COMPONENTS[kind]]
+    if not columns:
+        return None
+    return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
+
+
+def _nominal(robot: Actuated | None, actuators: FloatArray) -> FloatArray | None:
+    """Angles (N, 3) of the machine as described, of some rows; NaN for the others."""
+    if robot is None:
+        return None
+    machine = as_machine(cast(Robot, robot))
+    if machine.n_actuators != actuators.shape[1]:
+        return None
+    angles = np.full((len(actuators), 3), np.nan)
+    some = np.unique(np.linspace(0, len(actuators) - 1, _TRIED).astype(int))
+    angles[some] = machine.forward(actuators[some]).pose[:, 3:]
+    return angles
 
 
 def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
@@ -217,7 +355,10 @@ def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
             sigma[:, i, j] = sigma[:, j, i] = table.numbers(name, f"{units[i]}*{units[j]}")[0]
         return sigma
     of = units if form == "each" else units[:1]
-    columns = [table.numbers(n, unit)[0] for n, unit in zip(forms[form], of, strict=True)]
+    columns = [
+        table.numbers(sigma, unit, like=names[0] if form == "one" else name)[0]
+        for sigma, unit, name in zip(forms[form], of, names, strict=False)
+    ]
     for name, column in zip(forms[form], columns, strict=True):
         if not (column > 0).all():
             row = int(np.argmin(column > 0))
@@ -225,77 +366,27 @@ def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
     return np.stack(columns, axis=1)
 
 
-def _read_several(
-    table: Table, targets: tuple[str, ...], actuators: FloatArray, fields: dict[str, Any]
-) -> tuple[FloatArray, FloatArray, dict[str, Any]]:
-    """One measurement per row and target that was seen there, row by row."""
-    for name in table.columns:
-        if name.partition(".")[0] in ("target", "attachment"):
-            raise table.header_error(f"column {name!r} does not go with '{targets[0]}.x'")
-    values = np.empty((len(table), len(targets), 3))
-    for t, target in enumerate(targets):
-        names = [f"{target}.{axis}" for axis in _AXES]
-        table.require(names)
-        for axis, name in enumerate(names):
-            values[:, t, axis] = table.numbers(name, "mm", blank=True)[0]
-        part = np.isnan(values[:, t]).any(axis=1) & ~np.isnan(values[:, t]).all(axis=1)
-        if part.any():
-            row = int(np.argmax(part))
-            name = names[int(np.argmax(np.isnan(values[row, t])))]
-            raise table.cell_error(name, row, "found an empty cell beside ones with numbers")
-    rows, index = np.nonzero(~np.isnan(values).any(axis=2))
-    chosen = {name: None if value is None else value[rows] for name, value in fields.items()}
-    chosen |= {"target_index": index, "target_names": targets}
-    return actuators[rows], values[rows, index], chosen
-
-
-def _read_targets(table: Table, kind: Kind) -> dict[str, Any]:
-    """The target of each row, by name, by place or both."""
-    points = {name: _read_point(table, name) for name in ("target", "attachment")}
-    fields: dict[str, Any] = {name: place for name, place in points.items() if place is not None}
-    named = "target" in table.columns
-    if kind == "pose" and (named or "target" in fields):
-        raise table.header_error("columns of a target do not go with poses")
-    if kind == "distance" and "target" not in fields:
-        raise table.header_error("missing column 'target.x': a distance is measured to a point")
-    if kind != "distance" and "attachment" in fields:
-        raise table.header_error(f"column 'attachment.x' goes with distances, not with {kind}s")
-    if not named:
-        return {name: _one(place) for name, place in fields.items()}
-    names = table.texts("target")
-    long = next((row for row, name in enumerate(names) if len(name) > LONGEST_NAME), None)
-    if long is not None:
-        message = f"a name has at most {LONGEST_NAME} characters, found {len(names[long])}"
-        raise table.cell_error("target", long, message)
-    places_of: dict[str, int] = {}
-    index = np.array([places_of.setdefault(name, len(places_of)) for name in names])
-    order = list(places_of)
-    first = np.unique(index, return_index=True)[1].tolist()
-    for name, places in fields.items():
-        moved = (places != places[first][index]).any(axis=1)
-        if moved.any():
-            row = int(np.argmax(moved))
-            line = table.lines[first[index[row]]]
-            what = "place" if name == "target" else name
-            raise table.cell_error(
-                "target", row, f"{names[row]!r} has another {what} here than in line {line}"
-            )
-    chosen = {name: places[first] for name, places in fields.items()}
-    if "attachment" in chosen:
-        chosen["attachment"] = _one(chosen["attachment"])
-    return chosen | {"target_index": index, "target_names": order}
-
-
-def _read_point(table: Table, name: str) -> FloatArray | None:
-    """A point of each row (rows, 3); None where it has no columns."""
-    columns = [f"{name}.{axis}" for axis in _AXES]
-    if not any(column in table.columns for column in columns):
+def _read_actuator_sigma(table: Table, units: tuple[str, ...]) -> FloatArray | None:
+    """Deviations (rows, n) of what the actuators read."""
+    each = [f"actuator_sigma.q{i + 1}" for i in range(len(units))]
+    given = [name for name in table.columns if name.startswith("actuator_sigma")]
+    if not given:
         return None
-    return np.stack([_read(table, column, "mm")[0] for column in columns], axis=1)
+    if given == ["actuator_sigma"]:
+        if len(set(units)) > 1:
+            raise table.header_error(
+                "column 'actuator_sigma' for lengths and angles: expected"
+                f" {each[0]!r} to {each[-1]!r}"
+            )
+        columns = [table.numbers("actuator_sigma", units[0])[0]] * len(units)
+    else:
+        table.require(each)
+        if len(given) > len(each):
+            raise table.header_error("column 'actuator_sigma' does not go with those of actuators")
+        columns = [table.numbers(name, unit)[0] for name, unit in zip(each, units, strict=True)]
+    return np.stack(columns, axis=1)
 
 
-def _one(places: FloatArray) -> FloatArray:
-    """One point (3,) where all rows have the same, to the last bit: 0.0 is not -0.0."""
-    bits = places.view(np.int64)
-    one: FloatArray = places[0] if (bits == bits[0]).all() else places
-    return one
+def _read(table: Table, name: str, *quantities: str, blank: bool = False) -> tuple[Any, str]:
+    table.require([name])
+    return table.numbers(name, *quantities, blank=blank)

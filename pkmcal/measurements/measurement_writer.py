@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from os import PathLike
 from typing import Protocol
@@ -60,6 +61,10 @@ class Writable(Protocol):
         """The attachment of every row (N, 3)."""
 
     @property
+    def actuator_sigma(self) -> FloatArray | None:
+        """Deviations (N, n) of the actuators."""
+
+    @property
     def group(self) -> Int64Array | None:
         """Which rows repeat one pose."""
 
@@ -97,6 +102,7 @@ def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
     components = COMPONENTS[m.kind]
     for i, (name, unit) in enumerate(components):
         yield f"{name} [{unit}]", _exact(m.values.reshape(len(m.values), -1)[:, i])
+    yield from _actuator_sigma(m)
     if m.sigma is not None and m.sigma.ndim == 3:
         for i, j in itertools.combinations_with_replacement(range(len(components)), 2):
             (a, of_a), (b, of_b) = components[i], components[j]
@@ -118,6 +124,17 @@ def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
         yield "group", [str(number) for number in m.group]
 
 
+def _actuator_sigma(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
+    if m.actuator_sigma is None:
+        return
+    units = m.actuator_units or ("mm",) * m.actuators.shape[1]
+    if len(set(units)) == 1 and (m.actuator_sigma == m.actuator_sigma[:, :1]).all():
+        yield f"actuator_sigma [{units[0]}]", _exact(m.actuator_sigma[:, 0])
+        return
+    for i, unit in enumerate(units):
+        yield f"actuator_sigma.q{i + 1} [{unit}]", _exact(m.actuator_sigma[:, i])
+
+
 def _exact(values: FloatArray) -> list[str]:
-    """The shortest decimals that are read back to the same bits."""
-    return [repr(float(value)) for value in values]
+    """The shortest decimals that are read back to the same bits; nothing where it was not read."""
+    return ["" if math.isnan(value) else repr(float(value)) for value in values]

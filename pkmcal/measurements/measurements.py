@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import display
-from pkmcal.arguments import checked_seed, shown, word
+from pkmcal.arguments import checked_seed, shown, word, words
 from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.components import COMPONENTS, Kind
 from pkmcal.measurements.fields import (
+    actuator_sigma_array,
     attachment_array,
     integers,
     names_of_targets,
@@ -25,6 +26,7 @@ from pkmcal.measurements.fields import (
     sigma_array,
     target_array,
     units_of_actuators,
+    values_array,
 )
 from pkmcal.measurements.measurement_writer import write_measurements
 from pkmcal.measurements.tracker import Tracker
@@ -43,11 +45,12 @@ class Measurements(Result):
         Actuator coordinates as commanded or read, mm or rad as the limbs say.
     values : (N, 6), (N, 3) or (N,) array
         What was measured, in mm and rad, in the base frame (or the instrument's, where
-        `identify` is given ``frame="unknown"``); see `kind`.
-    kind : {"position", "pose", "height", "distance"}
+        `identify` is given ``frame="unknown"``); see `kind`. NaN: not read there.
+    kind : {"position", "pose", "height", "distance", "closure"}
         "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the target,
         (N, 3). "height": z of the target, (N,). "distance": from the target, which here is a
         fixed point of the base frame, to the attachment, a point of the platform, (N,).
+        "closure": nothing, `values` is None; what the actuators read is all that is known.
     sigma : scalar, (k,), (N, 1), (N, k) or (N, k, k) array, or Tracker, optional
         Standard deviation of the values in their own units; k is the number of components of the
         kind. (N, k, k) are covariance matrices. One number for poses counts as mm and as rad.
@@ -73,6 +76,12 @@ class Measurements(Result):
         The point in the platform frame, mm, from which distances are measured: of a wire, a ball
         bar, a leg. One for all rows, one per row, or with `target_index` one for each target.
         None: the platform's origin.
+    actuator_sigma : scalar, (n,) or (N, n) array, optional
+        Standard deviation of what the actuators read, mm or rad. None: they are where they read on
+        a machine with as many closures as free coordinates; on one with more, and with rows that
+        contradict each other, it is estimated from them. Kept as (N, n).
+    notes : sequence of str
+        What was assumed when they were read, a line each.
 
     Raises
     ------
@@ -98,12 +107,14 @@ class Measurements(Result):
     target_names: tuple[str, ...] | None = None
     actuator_units: tuple[str, ...] | None = None
     attachment: FloatArray | None = None
+    actuator_sigma: FloatArray | None = None
+    notes: tuple[str, ...] = ()
 
     # The types above are those of the attributes; anything array-like is taken.
     def __init__(
         self,
         actuators: ArrayLike,
-        values: ArrayLike,
+        values: ArrayLike | None,
         kind: Kind = "position",
         *,
         sigma: ArrayLike | Tracker | None = None,
@@ -113,19 +124,15 @@ class Measurements(Result):
         target_names: Sequence[str] | None = None,
         actuator_units: str | Sequence[str] | None = None,
         attachment: ArrayLike | None = None,
+        actuator_sigma: ArrayLike | None = None,
+        notes: Sequence[str] = (),
     ) -> None:
         word("kind", kind, COMPONENTS)
         q = numbers("actuators", actuators)
         if q.ndim != 2 or 0 in q.shape:
             raise ArgumentError(f"actuators must have shape (N, n), not empty; found {q.shape}")
         shape = (len(q), len(COMPONENTS[kind]))
-        expected = shape if shape[1] > 1 else shape[:1]
-        v = numbers("values", values)
-        if v.shape != expected:
-            raise ArgumentError(
-                f"values of kind {kind!r} must have shape {expected} for {len(q)} rows of"
-                f" actuators; found {v.shape}"
-            )
+        v = values_array(values, kind, shape)
         index = None if target_index is None else integers("target_index", target_index, len(q))
         place = target_array(target, kind, index, len(q))
         targets = None if place is None or index is None else len(place)
@@ -140,6 +147,8 @@ class Measurements(Result):
             "target_names": names_of_targets(target_names, index, place),
             "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
             "attachment": attachment_array(attachment, kind, targets, len(q)),
+            "actuator_sigma": actuator_sigma_array(actuator_sigma, q.shape),
+            "notes": words("notes", notes),
         }
         self.__setstate__(fields)
 
@@ -215,7 +224,7 @@ class Measurements(Result):
         per_row: dict[str, Any] = {
             name: None if value is None else value[picked]
             for name, value in vars(self).items()
-            if name in ("actuators", "values", "sigma", "group", "target_index")
+            if name in ("actuators", "values", "sigma", "group", "target_index", "actuator_sigma")
         }
         for name in ("target", "attachment"):
             place = getattr(self, name)
@@ -274,6 +283,21 @@ class Measurements(Result):
         """
         write_measurements(self, path, comment)
 
+    def _columns(self) -> dict[str, Any]:
+        """As the columns of a file, but for the units, which are mm and rad."""
+        columns: dict[str, Any] = {f"q{i + 1}": q for i, q in enumerate(self.actuators.T)}
+        values = self.values.reshape(len(self), -1)
+        columns |= dict(zip(self.components, values.T, strict=True))
+        deviations = self._deviations()
+        if deviations is not None:
+            names = (f"sigma.{name}" for name in self.components)
+            columns |= dict(zip(names, deviations.T, strict=True))
+        if self.target_index is not None and self.target_names is not None:
+            columns["target"] = [self.target_names[i] for i in self.target_index]
+        if self.group is not None:
+            columns["group"] = self.group
+        return columns
+
     def _parts(self) -> Iterator[str | Table]:
         yield self._title()
         yield self._table()
@@ -310,8 +334,16 @@ class Measurements(Result):
     def _title(self) -> str:
         many = "" if len(self) == 1 else "s"
         n = self.actuators.shape[1]
-        parts = [f"{len(self)} measured {self.kind}{many}", f"{n} actuator{'' if n == 1 else 's'}"]
-        parts.append("sigma " + self._sigma_text())
+        what = f"{len(self)} measured {self.kind}{many}"
+        if self.kind == "closure":
+            what = f"{len(self)} row{many} of actuators alone"
+        elif missing := int(np.isnan(self.values.reshape(len(self), -1)).all(axis=1).sum()):
+            what += f" ({missing} not read)"
+        parts = [what, f"{n} actuator{'' if n == 1 else 's'}"]
+        if self.kind != "closure":
+            parts.append("sigma " + self._sigma_text())
+        if self.actuator_sigma is not None:
+            parts.append("actuator_sigma stated")
         if self.target_names is not None:
             known = "" if self.target is not None else " (places not known)"
             parts.append(f"targets {' '.join(self.target_names)}{known}")
@@ -346,4 +378,7 @@ def _column(values: FloatArray, unit: str, sigma: FloatArray | None) -> list[str
     places = 4
     if sigma is not None:
         places = display.decimals(display.displayed(float(sigma.min()), unit)[0])
-    return [display.fixed(display.displayed(float(value), unit)[0], places) for value in values]
+    return [
+        "" if np.isnan(value) else display.fixed(display.displayed(float(value), unit)[0], places)
+        for value in values
+    ]

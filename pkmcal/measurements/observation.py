@@ -54,8 +54,8 @@ def predict(
 
     Parameters
     ----------
-    kind : {"pose", "position", "height", "distance"}
-        What is read.
+    kind : {"pose", "position", "height", "distance", "closure"}
+        What is read; of a closure nothing.
     pose : ndarray (N, 6)
         Of the platform in the base frame, mm and rad.
     target : ndarray (3,) or (N, 3)
@@ -71,6 +71,8 @@ def predict(
         return _distances(pose, target, anchor)
     if kind == "pose":
         return _poses(pose, frame, origin)
+    if kind == "closure":
+        return Predicted(np.empty((len(pose), 0)), np.empty((len(pose), 0, 6)))
     seen = _points(pose, target, frame, origin)
     return _heights(seen) if kind == "height" else seen
 

@@ -44,7 +44,7 @@ class Assemblies(Result):
         Which mode is this one's mirror image in the plane of the base; -1 where none is.
     paths, far, lost : int
         Complex solutions that were followed, how many of them went to infinity (entries of R
-        beyond 100 000), and how many were lost; 0 where the machine has no start system.
+        beyond 100 000), and how many failed; 0 where the machine has no start system.
     """
 
     poses: FloatArray

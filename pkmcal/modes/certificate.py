@@ -166,6 +166,9 @@ class Closures:
             return _orthonormal(u)
         if self.map == "translation":
             return [_linear(u, {k: 1.0}, float(k % 4 == 0)) for k in range(9)]
+        if self.map == "xy":  # z = 0, R = 1
+            fixed = [_linear(u, {k: 1.0}, float(k % 4 == 0)) for k in range(9)]
+            return [*fixed, _linear(u, {11: 1.0}, 0.0)]
         if self.map == "planar":  # z = 0, R = Rz
             fixed = [_linear(u, {k: 1.0}, float(k == 8)) for k in (2, 5, 6, 7, 8, 11)]
             fixed += [_linear(u, {1: 1.0, 3: 1.0}, 0.0), _linear(u, {0: 1.0, 4: -1.0}, 0.0)]

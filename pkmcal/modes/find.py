@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core import screws
+from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.library import SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.modes.assemblies import Assemblies, Signs
@@ -47,7 +48,7 @@ class AssemblyProblem(NamedTuple):
         Geometry (limbs, SLOTS), and coordinates (n,), or (N, n) for `certify_rows`.
     """
 
-    machine: Machine
+    machine: AnyMachine
     map: str
     rows: list[tuple[str, ...]]
     levers: list[float]
@@ -55,9 +56,16 @@ class AssemblyProblem(NamedTuple):
     slots: FloatArray
     q: FloatArray
 
+    @property
+    def provable(self) -> bool:
+        """Whether the closures are quadratic equations, as many as there are free coordinates."""
+        square = self.machine.rows == self.machine.m
+        return square and not isinstance(self.machine, ChainMachine)
+
     def spheres(self) -> FloatArray:
         """The limbs (limbs, 7 + 3 axes), or of each row."""
         rows = np.ascontiguousarray(self.q.reshape(-1, self.q.shape[-1]))
+        assert isinstance(self.machine, Machine)
         spheres: FloatArray = self.machine.spheres(self.slots, rows)
         return spheres if self.q.ndim > 1 else spheres[0]
 
@@ -101,7 +109,7 @@ def poses_of(map: str, frames: FloatArray) -> FloatArray:
     elif map == "planar":
         poses[:, 2] = 0.0
         poses[:, 5] = np.arctan2(frames[:, 3], frames[:, 0])
-    elif map == "spatial":
+    elif map in ("spatial", "spherical"):
         motions = np.zeros((len(frames), 4, 4))
         motions[:, :3, :3] = frames[:, :9].reshape(-1, 3, 3)
         motions[:, :3, 3], motions[:, 3, 3] = frames[:, 9:], 1.0
@@ -111,6 +119,9 @@ def poses_of(map: str, frames: FloatArray) -> FloatArray:
 
 def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
     """Find all modes by paths; by random starts where paths prove nothing, or with `starts`."""
+    if isinstance(problem.machine, ChainMachine):
+        real = _of_chains(problem.machine, problem, STARTS if starts is None else starts)
+        return Found(*_certified(problem, real), False, "chains of joints: random starts", None)
     square = problem.machine.rows == problem.machine.m
     spheres = problem.spheres()
     start = start_system(problem.map, problem.rows, spheres) if square else None
@@ -127,14 +138,14 @@ def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
         ends = endpoints(problem.machine, start, problem.map, spheres)
         real, all_proven = _real_solutions(problem, ends)
         if ends.lost > 0:
-            reason = f"{ends.lost} of {ends.paths} paths lost"
+            reason = f"{ends.lost} of {ends.paths} paths failed"
         elif ends.lost:
             reason = f"of {ends.paths} paths not as many end alike by two ways around"
     expected = len(real)
     if starts is None:
         starts = STARTS if reason else 0
     if starts:
-        real = np.concatenate([real, _from_random_starts(problem, spheres, starts)])
+        real = np.concatenate([real, from_random_starts(problem, spheres, starts)])
     poses, proof = _certified(problem, real)
     if not reason and not proof.ok.all():
         reason = f"{np.sum(~proof.ok)} modes not certified"
@@ -175,7 +186,7 @@ def _scaled(frames: Any, length: float) -> Any:
     return u
 
 
-def _from_random_starts(problem: AssemblyProblem, spheres: FloatArray, starts: int) -> FloatArray:
+def from_random_starts(problem: AssemblyProblem, spheres: FloatArray, starts: int) -> FloatArray:
     """Frames found by Newton's method from random orientations, on the sphere of some limb."""
     rng = np.random.default_rng(0)
     quaternion = rng.normal(size=(starts, 4))
@@ -196,11 +207,24 @@ def _from_random_starts(problem: AssemblyProblem, spheres: FloatArray, starts: i
     return frames_of(poses[status == 0])
 
 
+def _of_chains(machine: ChainMachine, problem: AssemblyProblem, starts: int) -> FloatArray:
+    """Frames found from random poses of the platform, within the machine's size around home."""
+    rng = np.random.default_rng(0)
+    home = screws.pose(machine.layout.home.reshape(1, 16))
+    guess = np.repeat(home, starts, axis=0)
+    guess[:, :3] += rng.uniform(-1, 1, (starts, 3)) * machine.layout.size
+    guess[:, 3:] = rng.uniform(-np.pi, np.pi, (starts, 3))
+    guess[:1] = home
+    q = np.ascontiguousarray(np.broadcast_to(problem.q, (starts, len(problem.q))))
+    poses, status, _, _ = machine.forward(problem.slots, q, guess, threads=None)
+    return frames_of(poses[status == 0])
+
+
 def _certified(problem: AssemblyProblem, frames: FloatArray) -> tuple[FloatArray, Certificate]:
     """Poses of real frames, each once, and their certificates."""
     poses = poses_of(problem.map, frames[np.isfinite(frames).all(axis=1)])
     u = _scaled(frames_of(poses), problem.length)
-    if problem.machine.rows == problem.machine.m:
+    if problem.provable:
         closures = problem.closures()
         f, _, f_abs, _, _ = closures(u)
         closed = (np.abs(f) <= CLOSED * f_abs).all(axis=1)
@@ -223,7 +247,7 @@ def certify_rows(problem: AssemblyProblem, poses: FloatArray) -> Certificate:
     """Certify poses (N, 6), each at its own coordinates: `problem.q` is (N, n)."""
     ok, error, unique = np.zeros(len(poses), dtype=bool), *np.full((2, len(poses)), np.nan)
     solved = np.isfinite(poses).all(axis=1)
-    if problem.machine.rows == problem.machine.m:
+    if problem.provable:
         for part in np.array_split(np.flatnonzero(solved), 1 + solved.sum() // AT_ONCE):
             u = _scaled(frames_of(poses[part]), problem.length)
             proof = certify(problem._replace(q=problem.q[part]).closures(), u)
@@ -258,15 +282,20 @@ def signs(problem: AssemblyProblem, poses: FloatArray) -> Signs:
         return np.zeros(len(poses), dtype=np.int8)
     q = np.ascontiguousarray(np.broadcast_to(problem.q, (len(poses), len(problem.q))))
     steps = problem.machine.closure(problem.slots, poses, q).by_step
-    return np.asarray(np.sign(np.linalg.det(steps)), dtype=np.int8)
+    known = np.isfinite(steps).all(axis=(1, 2))
+    found = np.zeros(len(poses), dtype=np.int8)
+    found[known] = np.sign(np.linalg.det(steps[known]))
+    return found
 
 
 def mirror_images(problem: AssemblyProblem, poses: FloatArray) -> Int32Array:
     """Index of each pose's mirror image in the plane of the anchors; -1 where none is."""
     none = np.full(len(poses), -1, dtype=np.int32)
+    if isinstance(problem.machine, ChainMachine):
+        return none
     spheres, frames = problem.spheres(), frames_of(poses)
     b, c = spheres[:, 0:3], spheres[:, 3:6]
-    if problem.map == "planar" or not len(poses):
+    if problem.map in ("planar", "xy") or not len(poses):
         return none
     if problem.map == "translation":
         b, c = np.zeros_like(b), c - b

@@ -58,7 +58,7 @@ class Endpoints:
         The finite ones: R row by row and p, mm.
     paths, far, lost : int
         How many there were, how many went to infinity (R or scaled p beyond 100 000 near the
-        end), and how many were lost or ran into another; -1 where two ways did not agree.
+        end), and how many failed or ran into another; -1 where two ways did not agree.
     """
 
     frames: ComplexArray
@@ -123,7 +123,7 @@ def start_system(map: str, rows: list[tuple[str, ...]], spheres: FloatArray) -> 
 
 
 def endpoints(machine: Machine, start: StartSystem, map: str, spheres: FloatArray) -> Endpoints:
-    """Follow every path to the limbs `spheres`; where some are lost, again."""
+    """Follow every path to the limbs `spheres`; where some fail, again."""
     target, scale, middle_b, middle_c = _normalized(map, spheres)
     n, every, before = len(start.states), np.empty((0, 12), dtype=np.complex128), None
     for accuracy, way in ATTEMPTS:
@@ -182,7 +182,7 @@ def _normalized(map: str, spheres: FloatArray) -> tuple[FloatArray, float, Float
     scaled = spheres.copy()
     b, c = spheres[:, 0:3], spheres[:, 3:6]
     middle_b, middle_c = b.mean(axis=0), c.mean(axis=0)
-    if map == "planar":
+    if map in ("planar", "xy"):
         middle_b[2] = middle_c[2] = 0.0
     if map == "2tpr2tps":  # its poses are about the origins
         middle_b, middle_c = np.zeros(3), np.zeros(3)

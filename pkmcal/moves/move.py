@@ -15,11 +15,10 @@ from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.core.library import POSE
 from pkmcal.display import POSE_HEADER, Table, displayed, long_table, pose_cells
 from pkmcal.exceptions import ArgumentError
-from pkmcal.kinematics.complete import complete, completed_rates
+from pkmcal.kinematics.complete import Completed, complete, completed_rates
 from pkmcal.kinematics.dexterity import dexterity
-from pkmcal.kinematics.perturbed import ON_THE_MANIFOLD
+from pkmcal.kinematics.perturbed import ON_THE_MANIFOLD, off
 from pkmcal.kinematics.robot import Robot, require_parallel
-from pkmcal.kinematics.workspace import moved_coordinates
 from pkmcal.moves import derivatives
 from pkmcal.moves.events import Event, events
 from pkmcal.moves.peaks import STEPS, largest, peaks
@@ -170,25 +169,24 @@ class Move(Result):
     def _in_coordinates(self, times: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
         robot, frames, slots = self.robot, self.robot.frames, self.robot.slots
         share, speed, bend = (each[:, None] for each in self.law.sample(times))
-        first, last = frames.inward(np.stack([self.start, self.end]))
-        matched = [POSE.index(name) for name in moved_coordinates(robot)]
-        way = (last - first)[matched]
-        own, q = self._completed(share)
+        matched = [POSE.index(name) for name in robot.moved]
+        way = off(self.end, self.start)[matched]
+        at = self._completed(share)
         near = self._turns_at(share[:, 0])
-        q = q if near is None else robot.nearest_turns(q, near=near)
+        q = at.q if near is None else robot.nearest_turns(at.q, near=near)
+        at = at._replace(q=q)
         velocity, acceleration = completed_rates(
-            robot.machine, robot.model.map, slots, own, q, matched, (speed * way, bend * way)
+            robot.machine, robot.model.map, slots, frames, at, matched, (speed * way, bend * way)
         )
-        motion = robot.machine.motion(slots, own, q, velocity, acceleration)[0]
+        motion = robot.machine.motion(slots, at.own, q, velocity, acceleration)[0]
         return frames.motion_outward(motion), (q, velocity, acceleration)
 
-    def _completed(self, share: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Own poses and actuators at shares (N, 1) of a way that is straight in coordinates."""
+    def _completed(self, share: FloatArray) -> Completed:
+        """Poses and actuators at shares (N, 1) of a way that is straight in coordinates."""
         robot = self.robot
-        first, last = robot.frames.inward(np.stack([self.start, self.end]))
-        matched = [POSE.index(name) for name in moved_coordinates(robot)]
-        way = first + share * (last - first)
-        return complete(robot.machine, robot.model.map, robot.slots, way, matched)
+        matched = [POSE.index(name) for name in robot.moved]
+        way = self.start + share * off(self.end, self.start)
+        return complete(robot.machine, robot.model.map, robot.slots, robot.frames, way, matched)
 
     def _turns_at(self, share: FloatArray) -> FloatArray | None:
         """Coordinates (N, n) near those at shares (N,) of the way, whose angles do not jump."""
@@ -208,7 +206,7 @@ class Move(Result):
             return None
         share = np.linspace(0.0, 1.0, STEPS + 1)
         if self.space == "coordinates":
-            q = self._completed(share[:, None])[1]
+            q = self._completed(share[:, None]).q
         else:
             still = np.zeros_like(share)
             motion = derivatives.straight(self.start, self.end, (share, still, still))
@@ -225,7 +223,7 @@ class Move(Result):
     @property
     def _straight(self) -> str:
         if self.space == "coordinates":
-            return " ".join(moved_coordinates(self.robot))
+            return " ".join(self.robot.moved)
         return f"{self.space} space"
 
 
@@ -255,8 +253,9 @@ def move(
         The last in joint space alone.
     space : {"pose", "coordinates", "joint"}
         "pose": the platform's origin goes straight and the platform turns about one axis (SLERP);
-        "coordinates": those that the robot file declares to match, or else its free coordinates,
-        go straight, and the machine determines the others, as by `Robot.complete`;
+        "coordinates": those that the robot file declares to match, or else those that it moves,
+        go straight, angles the short way round, and the machine determines the others, as by
+        `Robot.complete`;
         "joint": the actuators go straight, those that turn the short way round unless a stroke
         forbids it.
     velocity, acceleration, jerk : array_like () or (n,), optional
@@ -350,17 +349,17 @@ def _followed(made: Move) -> Move:
                 f" {worst:.3g} mm on the way; use space='coordinates' or 'joint'"
             )
     if made.space == "coordinates":
-        names = " ".join(moved_coordinates(made.robot))
+        names = " ".join(made.robot.moved)
         t = np.linspace(0.0, made.duration, 101)
         pose = made.sample(t).pose
-        lost = np.flatnonzero(~np.isfinite(pose).all(axis=1))
-        if lost.size:
+        unreached = np.flatnonzero(~np.isfinite(pose).all(axis=1))
+        if unreached.size:
             raise ArgumentError(
                 f"{made.robot.name} cannot follow the path: no pose has its {names}"
-                f" {t[lost[0]]:.4g} s after the start"
+                f" {t[unreached[0]]:.4g} s after the start"
             )
-        off = np.abs(from_pose(pose[[0, -1]]) - from_pose(np.stack([made.start, made.end]))).max()
-        if off > ON_THE_MANIFOLD:
+        ends = from_pose(pose[[0, -1]]) - from_pose(np.stack([made.start, made.end]))
+        if np.abs(ends).max() > ON_THE_MANIFOLD:
             raise ArgumentError(
                 f"{made.robot.name}: the path of {names} does not"
                 f" lead from start to end but to another assembly mode"

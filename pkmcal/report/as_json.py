@@ -14,8 +14,10 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_machine
 
+VERSION = 1  # of `schema.json`: keys are added to it, never taken away or changed
 
-def as_json(result: Any, *attributes: str) -> str:
+
+def as_json(result: Any, *attributes: str, schema: str | None = None) -> str:
     """A result as JSON, one attribute a line.
 
     Numbers are those of the result, in mm and rad; what is not finite is null.
@@ -26,6 +28,8 @@ def as_json(result: Any, *attributes: str) -> str:
         What to print; attributes that start with ``_`` are left out.
     *attributes : str
         Properties of `result` to print as well.
+    schema : str, optional
+        Which part of ``schema.json`` describes it, with its version: the first key.
 
     Examples
     --------
@@ -35,7 +39,8 @@ def as_json(result: Any, *attributes: str) -> str:
       "noise": [null]
     }
     """
-    plain = _plain(result) | {name: _plain(getattr(result, name)) for name in attributes}
+    head = {} if schema is None else {"schema": f"pkmcal/{schema}/{VERSION}"}
+    plain = head | _plain(result) | {name: _plain(getattr(result, name)) for name in attributes}
     lines = (
         f"  {json.dumps(key)}: {_escaped(json.dumps(value, ensure_ascii=False, allow_nan=False))}"
         for key, value in plain.items()

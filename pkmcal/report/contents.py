@@ -66,11 +66,17 @@ class Slice:
 
 
 def verdict(found: Identification) -> tuple[str, str]:
-    """Judge the calibration: "good", "doubtful" or "bad", and one sentence."""
+    """Rate the calibration: "good", "doubtful" or "bad", and one sentence."""
     if not found.converged:
         return "bad", "Not to be trusted: the least squares did not converge."
     if found.warnings:
         return "bad", f"Not to be trusted: {printable(found.warnings[0], 1000)}"
+    if np.isnan(found.rms):  # nothing was read but the actuators
+        change = f"the misfit of the closures of {len(found.rows)} rows"
+        change = f"{change} {_falls(found, 'closure_rms')}"
+        if found.closure_rms > _GAIN * found.closure_rms_before:
+            return "doubtful", f"Little gained: {change}."
+        return "good", f"Calibrated: {change}; no pose was measured to confirm it."
     if not np.isfinite(found.holdout_rms):
         change = f"the misfit of the {len(found.rows)} fitted points {_falls(found, 'rms')}"
         if found.rms > _GAIN * found.rms_before:
@@ -104,8 +110,9 @@ def directions(found: Identification) -> list[dict[str, Any]]:
         pairs = zip(measured.components, measured.units, strict=True)
         for k, (name, unit) in enumerate(pairs):
             entry = names.setdefault(name, (unit, [], []))
-            entry[1].append(first[:, k])
-            entry[2].append(last[:, k])
+            read = np.isfinite(measured.values.reshape(first.shape)[:, k])
+            entry[1].append(first[read, k])
+            entry[2].append(last[read, k])
     rows = []
     for name, (unit, firsts, lasts) in names.items():
         row: dict[str, Any] = {"name": name, "unit": unit}
@@ -203,9 +210,13 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
     for i, measured in enumerate(equations.sets):
         if measured.kind not in ("position", "pose"):
             continue
-        group, values = groups(measured), measured.values[:, :3]
-        first = performance(values, found.fit.start.predicted[i].values[:, :3], group)
-        last = performance(values, values - found.residuals[i][:, :3], group)
+        read = np.isfinite(measured.values).all(axis=1)
+        if not read.any():
+            continue
+        group = np.unique(groups(measured)[read], return_inverse=True)[1]
+        values = measured.values[read, :3]
+        first = performance(values, found.fit.start.predicted[i].values[read, :3], group)
+        last = performance(values, values - found.residuals[i][read, :3], group)
         scores.append({
             "set": i + 1,
             "poses": len(first.repeats),
@@ -242,6 +253,7 @@ def as_seen(found: Identification, places: FloatArray) -> FloatArray:
     rows = np.zeros(len(q), dtype=np.intp)
     measured = replace(like.measured.select(rows), actuators=q, group=np.arange(len(q)))
     equations = Equations([replace(like, measured=measured, rows=rows)], known.parameters)
+    equations = equations.commanded()
     point = equations.at(found.fit.end.theta)
     jacobian = equations.jacobian(point)[0][:, :3]
     jacobian *= known.parameters.scale

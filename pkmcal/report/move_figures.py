@@ -12,6 +12,7 @@ from pkmcal import display, screw
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.core.library import SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.model import CHAIN
 from pkmcal.kinematics.robot import Robot
 from pkmcal.report.drawing import BLUE, FAINT, ORANGE, empty_figure, in_context
 
@@ -92,7 +93,9 @@ def in_space(robot: Robot, poses: ArrayLike, labels: Sequence[str], title: str) 
     for k, label in enumerate(labels):
         panel = figure.add_subplot(1, len(rows), k + 1, projection="3d")
         for i, limb in enumerate(robot.model.limbs):
-            if KINDS[limb.kind].driver == "slider":
+            if limb.kind == CHAIN:
+                panel.plot(*np.array([base[i], anchors[k, i]]).T, color=FAINT, lw=3)
+            elif KINDS[limb.kind].driver == "slider":
                 way = (anchors[:, i] - base[i]) @ (anchors[0, i] - base[i])
                 rail = anchors[[way.argmin(), way.argmax()], i]
                 panel.plot(*rail.T, color="0.75", lw=3, solid_capstyle="butt")
@@ -117,8 +120,13 @@ def in_space(robot: Robot, poses: ArrayLike, labels: Sequence[str], title: str) 
 
 def places(robot: Robot, own: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return base joints (limbs, 3), anchors and platform joints (N, limbs, 3) at own poses."""
+    if robot.model.chains is not None:
+        chains = robot.chain_points(own, robot.machine.inverse(robot.slots, own))
+        base = np.array([chain[0, 0] for chain in chains])
+        anchors, joints = (np.stack([c[:, k] for c in chains], axis=1) for k in (-2, -1))
+        return base, anchors, joints
     slots = robot.slots
-    drive, direction, _ = robot.machine.limbs(slots, own)
+    drive, direction, _ = robot.limb_machine.limbs(slots, own)
     platform = np.column_stack([slots[:, 3:6], np.ones(len(slots))])
     joints = (screw.from_pose(own) @ platform.T).transpose(0, 2, 1)[..., :3]
     rods = slots[:, SLOTS.index("rod")]

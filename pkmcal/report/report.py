@@ -45,7 +45,7 @@ def write(found: Identification, folder: Path, files: Mapping[str, bytes]) -> li
     facts = gather(found, files)
     page, numbers, robot = (folder / name for name in FILES)
     found.robot.save(robot, comment(files))
-    write_whole(numbers, as_json(_as_data(facts)) + "\n")
+    write_whole(numbers, as_json(_as_data(facts), schema="report") + "\n")
     write_whole(page, html(facts))
     return [page, numbers, robot]
 
@@ -124,8 +124,12 @@ def _figures(facts: Mapping[str, Any]) -> dict[str, str]:
     if held:
         pair = (found.holdout_off_before, found.holdout_off)
         groups = {f"held out, {held} points": pair} | groups
+    groups = {title: pair for title, pair in groups.items() if np.isfinite(pair[1]).any()}
     wanted: dict[str, tuple[Callable[[], Figure | None], str]] = {
-        "points": (lambda: figures.before_after(groups), "Distances before and after"),
+        "points": (
+            lambda: figures.before_after(groups) if groups else None,
+            "Distances before and after",
+        ),
         "residuals": (lambda: residuals(found), "Residuals by row and direction"),
         "machine": (lambda: figures.machine(found), "The nominal and the calibrated machine"),
         "correlation": (

@@ -82,14 +82,18 @@ def _over_the_workspace(panel: Axes, found: Identification, drawn: IntArray) -> 
     at, along, other = [], [], []
     for place, residual in zip(equations.pose_of, found.residuals, strict=True):
         at.append(pose[place, :2])
-        flat = residual.shape[1] == 1  # a height or a distance has no direction across
+        flat = residual.shape[1] <= 1  # a height or a distance has no direction across
         along.append(np.zeros((len(residual), 2)) if flat else residual[:, :2])
-        other.append(residual[:, 0] if flat else residual[:, 2])
+        worst = found.misfit.closures[place]  # where nothing was read
+        last = residual[:, -1 if flat else 2] if residual.shape[1] else worst
+        other.append(last)
     (x, y), (dx, dy) = np.concatenate(at)[drawn].T, np.concatenate(along)[drawn].T
     colour = np.concatenate(other)[drawn]
-    most = max(float(np.abs(colour).max()), 1e-12)
+    read = np.isfinite(colour) & np.isfinite(dx + dy)
+    x, y, dx, dy, colour = x[read], y[read], dx[read], dy[read], colour[read]
+    most = max(float(np.abs(colour).max(initial=0.0)), 1e-12)
     marks = panel.scatter(x, y, c=colour, cmap="coolwarm", vmin=-most, vmax=most, s=26, zorder=3)
-    long = float(np.quantile(np.hypot(dx, dy), 0.9))
+    long = float(np.quantile(np.hypot(dx, dy), 0.9)) if len(dx) else 0.0
     if long > 0:
         arrows = panel.quiver(
             *(x, y, dx, dy),
@@ -113,7 +117,7 @@ def _quantiles(panel: Axes, found: Identification) -> None:
     estimate = found.fit.estimate
     weighted = (
         estimate.jacobian
-        * np.sqrt(np.repeat(estimate.weights, found.fit.equations.components))[:, None]
+        * np.sqrt(np.repeat(estimate.weights, estimate.state.loss.components))[:, None]
     )
     redundancy = 1.0 - propagate(weighted[:, None], estimate.covariance)
     checked = redundancy > 1e-6  # the others are fitted exactly, whatever was measured

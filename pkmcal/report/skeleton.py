@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,8 +60,12 @@ def skeleton(robot: Robot | SerialArm, q: FloatArray, guess: FloatArray) -> Skel
     if not solved.ok:
         return None
     own, _ = robot.own_rows(solved.pose)
+    if robot.model.chains is not None:
+        chains = [points[0] for points in robot.chain_points(own, q[None])]
+        starts, tips = (np.array([chain[k] for chain in chains]) for k in (0, -1))
+        return _placed(robot, chains, starts, tips)
     slots = robot.slots
-    _, towards, _ = robot.machine.limbs(slots, own)
+    _, towards, _ = robot.limb_machine.limbs(slots, own)
     base, platform = np.ascontiguousarray(slots[:, :3]), np.ascontiguousarray(slots[:, 3:6])
     ends = seen_points(own[0], platform)[0]
     lines = []
@@ -71,12 +76,23 @@ def skeleton(robot: Robot | SerialArm, q: FloatArray, guess: FloatArray) -> Skel
             rod = robot.geometry[f"rod{i + 1}"]
             line.insert(1, ends[i] - rod * towards[0, i])
         lines.append(np.array(line))
+    return _placed(robot, lines, base, ends, _around(platform))
+
+
+def _placed(
+    robot: Robot,
+    lines: Sequence[FloatArray],
+    base: FloatArray,
+    ends: FloatArray,
+    order: IntArray | None = None,
+) -> Skeleton:
+    """Limbs and outlines in the robot's base frame; the platform's in the order given."""
     frame = robot.model.base_frame
     outward = np.zeros(6) if frame is None else frame
     return Skeleton(
         tuple(_in_frame(outward, line) for line in lines),
         _in_frame(outward, base[_around(base)]),
-        _in_frame(outward, ends[_around(platform)]),
+        _in_frame(outward, ends[_around(ends) if order is None else order]),
     )
 
 

@@ -259,7 +259,7 @@ def test_what_is_out_of_reach_is_said_and_nan() -> None:
 def test_every_isa_gives_the_same_bits() -> None:
     arm = mixed(7)
     theta, errors = coordinates(arm, 37), errors_of(arm)
-    made = arm._arm
+    made = arm.core
     wanted = [arm.forward(theta, errors)]
     wanted += [arm.jacobian(theta, errors, f) for f in ("space", "body", "tip")]
     wanted += [arm.error_jacobian(theta, errors, f) for f in ("space", "body", "tip")]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -220,3 +221,71 @@ def test_another_library_reads_the_same_joints(source: Path) -> None:
         origin = np.eye(4) if theirs.origin is None else theirs.origin.copy()
         origin[:3, 3] *= 1000.0
         np.testing.assert_allclose(mine.origin, origin, atol=1e-13)
+
+
+# --- on the command line -------------------------------------------------------------------------
+
+
+def test_a_urdf_file_is_loaded_as_other_robots_are(source: Path) -> None:
+    arm = pk.load(f"{source}#base_link:tool0")
+    assert arm.joint_names == ("j1", "j2", "j3")
+    np.testing.assert_array_equal(arm.home, pk.SerialArm.from_urdf(source, tip="tool0").home)
+    with pytest.raises(pk.FileError, match=r"name one of the ends .*: tool0, camera.*#TIP"):
+        pk.load(source)
+
+
+def test_a_calibrated_arm_remembers_its_file(source: Path, tmp_path: Path) -> None:
+    arm = pk.load(f"{source}#tool0").replace(ERRORS)
+    arm.save_urdf(tmp_path / "remembered.urdf")
+    arm.save_urdf(tmp_path / "stated.urdf", source, tip="tool0")
+    written = [(tmp_path / f"{name}.urdf").read_bytes() for name in ("remembered", "stated")]
+    assert written[0] == written[1]
+    with pytest.raises(pk.ArgumentError, match="not read from a URDF file"):
+        pk.load("3r").save_urdf(tmp_path / "new.urdf")
+
+
+def test_names_of_joints_go_through_the_arms_own_file(source: Path, tmp_path: Path) -> None:
+    pk.load(f"{source}#tool0").save(tmp_path / "arm.toml")
+    assert pk.load(tmp_path / "arm.toml").joint_names == ("j1", "j2", "j3")
+    text = (tmp_path / "arm.toml").read_text(encoding="utf-8").replace('"j2"', '"j1"')
+    (tmp_path / "arm.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(pk.FileError, match=r"line \d+: \[\[joint\]\] 2: name: 'j1' is another"):
+        pk.load(tmp_path / "arm.toml")
+
+
+def test_an_arm_is_calibrated_from_its_urdf_and_a_log_with_names_of_joints(
+    run: Any, source: Path, tmp_path: Path
+) -> None:
+    """Joint states by name, mm and deg; the URDF that is written goes where the machine goes."""
+    true = pk.SerialArm.from_urdf(source, tip="tool0").replace(ERRORS)
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-1.5, 1.5, (60, 3)) * [1, 1, 200]
+    points = true.forward(q)[:, :3, 3]
+    lines = ["position.j3 [mm],j1 [deg],j2_position (deg),X,Y,Z,Std"]
+    for (one, two, three), point in zip(q, points, strict=True):
+        cells = [three, np.degrees(one), np.degrees(two), *point, 0.01]
+        lines.append(",".join(repr(float(v)) for v in cells))
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    done = run(
+        "calibrate",
+        f"{source}#tool0",
+        tmp_path / "log.csv",
+        "--units",
+        "mm",
+        "--out",
+        tmp_path / "out",
+    )
+    assert done.exit_code in (0, 1), done.stderr
+    found = pk.SerialArm.from_urdf(tmp_path / "out" / "robot.urdf", tip="tool0")
+    other = rng.uniform(-1.5, 1.5, (20, 3)) * [1, 1, 200]
+    off = np.linalg.norm((found.forward(other) - true.forward(other))[:, :3, 3], axis=1)
+    assert off.max() < 1e-5
+
+
+def test_an_arms_numbers_are_exported_from_the_command_line(
+    run: Any, source: Path, tmp_path: Path
+) -> None:
+    done = run("export", f"{source}#tool0", "--as", "dh", "--out", tmp_path / "dh.csv")
+    assert done.exit_code == 0 and (tmp_path / "dh.csv").exists()
+    done = run("export", "hexapod", "--as", "dh", "--out", tmp_path / "no.csv")
+    assert done.exit_code == 2 and "is for serial arms" in done.stderr

@@ -257,7 +257,7 @@ ROWS = "-330,-330,-330,0.6\n-347,-317,-332,0.8\n"
     [
         ("q1 [mm],q2 [mm],z [mm]\n-330,-330,0.6\n", "m.csv, line 1: 2 actuator columns, q1 to q2"),
         ("q1 [mm],q3 [mm],z [mm]\n-330,-330,0.6\n", "m.csv, line 1: missing column 'q2'"),
-        ("q1 [mm],q2 [mm],q3 [mm]\n-330,-330,-330\n", "m.csv, line 1: nothing measured"),
+        ("q1 [mm],q2 [mm],q3 [mm]\n-330,-330,-330\n", "nothing was read but the actuators"),
         ("q1 [mm],q2 [mm],q3 [mm],z\n-330,-330,-330,0.6\n", "line 1: column 'z' has no unit"),
         ("q1 [mm],q2 [mm],q3 [deg],z [mm]\n-330,-330,-330,0.6\n", "column 'q3' is an angle"),
         (HEADER + "-330,-330,low,0.6\n", "m.csv, line 2, column 'q3': expected a number"),
@@ -304,7 +304,7 @@ def test_mistake_in_a_robot_file_is_named_with_the_file(
         ([], "Missing argument 'ROBOT'"),
         (["linear-delt", PROBE], "unknown machine 'linear-delt'; did you mean 'linear-delta'?"),
         (["none.toml", PROBE], "none.toml"),
-        ([ROBOT, "none.csv"], "none.csv: No such file"),
+        ([ROBOT, "none.csv"], "none.csv: no such file"),
         (["hexapod", PROBE], "3 actuator columns, q1 to q3; the robot has 6"),
         ([ROBOT, PROBE, "--free", "radus"], "--free: no number of the geometry matches 'radus'"),
         ([ROBOT, PROBE, "--free", "base1.x"], "--free: base1.x is driven by the parameters radius"),
@@ -319,7 +319,7 @@ def test_mistake_in_a_robot_file_is_named_with_the_file(
         ([ROBOT, PROBE, "--prior", "1", "--prior", "radius=2"], "--prior 1: a number without"),
         ([ROBOT, PROBE, "--free", "gain*", "--prior", "gain*=1mm"], "unit 'mm'; expected none"),
         ([ROBOT, PROBE, "--holdout", "1.5"], "holdout must be a fraction between 0 and 1"),
-        ([ROBOT, PROBE, "--holdout", "none.csv"], "none.csv: No such file"),
+        ([ROBOT, PROBE, "--holdout", "none.csv"], "none.csv: no such file"),
         ([ROBOT, PROBE, "--loss", "hubr"], "loss must be one of linear, huber, cauchy"),
         ([ROBOT, PROBE, "--frame", "unkown"], "frame must be one of known, unknown"),
         ([ROBOT, PROBE, "--target", "unkown"], "target must be one of known, unknown"),
@@ -353,7 +353,7 @@ def test_mistake_of_the_program_is_not_taken_for_wrong_input(
     run: Any,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def broken(*arguments: Any) -> None:
+    def broken(*arguments: Any, **options: Any) -> None:
         raise ZeroDivisionError
 
     monkeypatch.setattr(pk, "read_measurements", broken)
@@ -364,7 +364,7 @@ def test_mistake_of_the_program_is_not_taken_for_wrong_input(
 def test_ctrl_c_ends_the_command_without_a_traceback(
     run: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def stopped(*arguments: Any) -> None:
+    def stopped(*arguments: Any, **options: Any) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(pk, "read_measurements", stopped)

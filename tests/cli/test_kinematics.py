@@ -78,7 +78,7 @@ def test_match_completes_the_pose_that_the_machine_takes(run: Any) -> None:
     [
         (["inverse", "hexapod", "1,2,3"], "3 numbers, the machine has 6"),
         (["forward", "hexapod", "1,2,3,4,5,nan"], "must be finite"),
-        (["forward", "hexapod", "none.csv"], "none.csv: No such file"),
+        (["forward", "hexapod", "none.csv"], "none.csv: no such file"),
         (["inverse", "hexapod", "1,2,3,4,5,6", "--jsn"], "pkmcal inverse --help"),
     ],
 )

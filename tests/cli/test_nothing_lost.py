@@ -67,7 +67,7 @@ def test_no_verb_replaces_its_input(refused: Any, verb: str) -> None:
     before = path.read_bytes()
     message = refused(*arguments)
     assert message.startswith(f"{path.name}: would be replaced, and is an input")
-    assert message.endswith("name another folder, or give --force")
+    assert message.endswith("name another place with --out, or give --force")
     assert path.read_bytes() == before
     assert [each.name for each in Path().iterdir()] == [path.name]
 

@@ -92,7 +92,7 @@ def test_postures_of_an_arm_are_chosen_from_a_file_of_joint_coordinates(
         (["3r"], "--poses: 3R arm is a serial arm"),
         (["hexapod", "--criterion", "E"], "criterion must be one of prediction, D, A"),
         (["hexapod", "--free", "ofset1"], "did you mean 'offset1'"),
-        (["hexapod", "--poses", "none.csv"], "none.csv: No such file"),
+        (["hexapod", "--poses", "none.csv"], "none.csv: no such file"),
     ],
 )
 def test_wrong_input_is_one_line_and_exit_code_2(

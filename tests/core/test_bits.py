@@ -30,6 +30,7 @@ ELSEWHERE = {
     *("inverse", "forward", "jacobian", "forward_jacobian", "error_jacobian", "closure", "limbs"),
     *("rates", "motion", "compose", "invert", "compose_rates", "compose_twists", "normals"),
     *("swarm_start", "swarm_update_best", "swarm_move", "swarm_eq18"),
+    *("chain_forward", "chain_inverse", "chain_closure", "chain_response", "chain_frames"),
 }
 
 rng = np.random.default_rng(20)
@@ -93,9 +94,28 @@ def spheres(isa: int, part: slice) -> list[np.ndarray]:
     return found
 
 
+def actuators_as_instruments(isa: int, part: slice, call: str) -> list[np.ndarray]:
+    """Of cranks, and of legs with rows beside the sphere's; far poses, which some do not reach."""
+    found = []
+    for name in ("rotary-delta", "2tpr2tps-spatial", "3prs"):
+        robot = pk.load(name)
+        robot.machine.isa = isa
+        draw = np.random.default_rng(24)
+        pose = robot.home + draw.uniform(-1, 1, (ROWS, 6)) * [200, 200, 200, 1, 1, 1]
+        if call == "moved":
+            step = draw.uniform(-1, 1, (ROWS, robot.machine.m))
+            found += [*robot.machine.moved(pose[part].copy(), step[part].copy())]
+        else:
+            q = robot.inverse(robot.home) + draw.uniform(-1, 1, (ROWS, robot.n_actuators))
+            columns = robot.geometry.slot_index[::2].astype(np.int32)
+            given = (robot.slots, pose[part].copy(), q[part].copy(), columns)
+            found += [each for each in robot.machine.readings(*given) if each is not None]
+    return found
+
+
 def arm(isa: int, part: slice, call: str) -> list[np.ndarray]:
     """With links that all rows share, and with links of each row."""
-    made = Arm(*ARM._arm.arrays, isa)
+    made = Arm(*ARM.core.arrays, isa)
     found = []
     for errors in (ERRORS[0], ERRORS[part]):
         links, theta = made.links(errors), THETA[part]
@@ -120,6 +140,8 @@ CASES: dict[str, Case] = {
     "tpr2tps_jacobian": lambda isa, part: closed_forms(isa, part, tpr2tps_jacobian, (4, 4)),
     "closure_cost": closure_cost,
     "spheres": spheres,
+    "readings": lambda isa, part: actuators_as_instruments(isa, part, "readings"),
+    "moved": lambda isa, part: actuators_as_instruments(isa, part, "moved"),
     "exp": by_rows(screws.exp, TWISTS),
     "log": by_rows(screws.log, MOTIONS),
     "adjoint": by_rows(screws.adjoint, MOTIONS),

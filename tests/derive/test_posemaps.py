@@ -18,6 +18,7 @@ POSES = {
     "spatial": ("12", "-25", "410", "0.3", "-0.4", "2.5"),
     "translation": ("12", "-25", "30", "0", "0", "0"),
     "planar": ("12", "-25", "0", "0", "0", "2.5"),
+    "xy": ("12", "-25", "0", "0", "0", "0"),
     "2tpr2tps": ("0", "-25", "410", "0.3", "-0.4", "0"),
 }
 MAPS = [pose_map.name for pose_map in posemaps.MAPS]
@@ -60,8 +61,7 @@ def twist(name: str, state_at: Callable[[mp.mpf], mp.matrix]) -> tuple[mp.matrix
 
 def reported(name: str, state: mp.matrix) -> mp.matrix:
     """The pose x y z α β γ that a state is reported as."""
-    sine, cosine = (call(f"map_{name}_angles", part, state) for part in ("sine", "cosine"))
-    return mp.matrix([*frame(name, state)[1], *map(mp.atan2, sine, cosine)])
+    return mp.matrix([*frame(name, state)[1], *call(f"map_{name}_angles", "angles", state)])
 
 
 def moved(name: str, state: mp.matrix, step: mp.matrix) -> mp.matrix:

@@ -9,7 +9,7 @@ import mpmath as mp
 import pytest
 import sympy as sp
 from pkmcal.derive import screws
-from pkmcal.derive.rotation import quaternion_matrix, rot_x, rot_y, rot_z, skew
+from pkmcal.derive.rotation import quaternion_matrix, rot_x, rot_y, rot_z, rpy, skew
 
 FUNCTIONS = {f.name: f for f in screws.functions()}
 ORDER = 9  # of the power series that are compared
@@ -182,13 +182,14 @@ def test_motions_compose_invert_and_move_twists_as_matrices() -> None:
 
 
 def test_angles_come_back_from_their_rotation() -> None:
-    (ca, sa), (cb, sb), (cg, sg) = circle(), circle(), circle()
-    R = rot_z(cg, sg) * rot_y(cb, sb) * rot_x(ca, sa)
-    gamma = sp.Symbol("gamma", real=True)
-    places = {sp.sin(gamma): sg, sp.cos(gamma): cg}
-    sine = value("rotation_tilts", "sine", R=R).subs(places)
-    cosine = value("rotation_tilts", "cosine", R=R).subs(places)
-    assert (list(sine), list(cosine)) == ([sa, sb], [ca, cb])
+    for cb, sb in (circle(), (0, 1), (0, -1)):  # the last two are β = ±90°
+        (ca, sa), (cg, sg) = circle(), circle()
+        R = rot_z(cg, sg) * rot_y(cb, sb) * rot_x(ca, sa)
+        if cb == 0:  # only α ∓ γ is one of R, and rounding decides on γ
+            R[0, 0], R[1, 0] = sp.Rational(-3, 10**40), sp.Rational(2, 10**40)
+        pose = value("motion_pose", "pose", R=R, p=vector()).evalf(60)
+        back = rpy(*pose[3:]).evalf(60)
+        assert (back - R).applyfunc(abs).norm() < 1e-38
 
 
 # --- arms -----------------------------------------------------------------------------------------

@@ -25,6 +25,12 @@ CONTENTS = {
     ".html": b"<!doctype html>\n<p>text</p>\n",
     ".svg": SVG,
     ".png": PNG,
+    ".xml": b"<a>\n  <b/>\n</a>\n",
+    ".urdf": b"<a>\n  <b/>\n</a>\n",
+    ".h": b"#ifndef A_H\n#define A_H\n#endif\n",
+    ".c": b"int a;\n",
+    ".ini": b"[A]\nB = 1\n",
+    ".hal": b"setp a.b 1\n",
 }
 
 
@@ -46,6 +52,12 @@ def test_what_was_sealed_is_and_what_was_changed_at_any_byte_is_not(kind: str) -
 def test_nothing_that_others_write_is_taken_for_sealed(content: bytes, kind: str) -> None:
     assert not is_sealed(content, kind)
     assert is_sealed(sealed(content, kind), kind) or len(content) < 12
+
+
+def test_files_of_other_kinds_stay_as_they_are_and_are_never_taken_for_ours() -> None:
+    for kind in (".cfg", ".g", ".gcode", ""):
+        assert sealed(b"G1 X1\n", kind) == b"G1 X1\n"
+        assert not is_sealed(b"G1 X1\n", kind)
 
 
 def test_a_seal_with_another_digest_is_none() -> None:

@@ -12,8 +12,9 @@ from pkmcal.core.library import POSE
 
 from .. import dietmaier, generated, twin_rows
 from ..robots import linear_delta
+from ..workspaces import CHAINS
 
-MACHINES = [name for name in pk.machines() if name != "rbt-6t03p-printed"]
+MACHINES = [name for name in pk.machines() if name not in ("rbt-6t03p-printed", *CHAINS)]
 PARALLEL = [name for name in MACHINES if isinstance(pk.load(name), pk.Robot)]
 
 

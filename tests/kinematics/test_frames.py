@@ -10,8 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
+from pkmcal.arrays import wrapped
 from pkmcal.core.library import POSE
 from pkmcal.core.poses import compose, compose_rates, invert
+from pkmcal.screw import to_pose
 
 from .. import robots, twin
 from ..workspaces import WORKSPACE, poses
@@ -51,6 +53,88 @@ def same_poses(found: np.ndarray, expected: np.ndarray, tolerance: float) -> Non
     """The same points and rotations: angles may be others that describe the same turn."""
     for one, other in zip(found, expected, strict=True):
         np.testing.assert_allclose(matrix(one), matrix(other), rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize("beta", [90.0, -90.0])
+def test_rotations_are_kept_near_every_beta(beta: float) -> None:
+    """Where α and γ turn about the same axis, a pose still has the angles of its rotation."""
+    rng = np.random.default_rng(90)
+    for power in range(1, 19):
+        goal = np.array([*rng.uniform(-300, 300, 3), *rng.uniform(-3, 3, 3)])
+        goal[4] = np.radians(beta) - rng.choice([-1, 0, 1]) * 10.0**-power
+        one = np.array([*rng.uniform(-300, 300, 3), *rng.uniform(-3, 3, 3)])
+        other = to_pose(np.linalg.inv(matrix(one)) @ matrix(goal))
+        for found, expected in (
+            (compose(one, other[None])[0], matrix(one) @ matrix(other)),
+            (invert(to_pose(np.linalg.inv(matrix(goal)))), matrix(goal)),
+            (to_pose(matrix(goal)), matrix(goal)),
+        ):
+            np.testing.assert_allclose(twin.rotation(found), expected[:3, :3], rtol=0, atol=2e-15)
+
+
+@framed
+@pytest.mark.parametrize(
+    "name",
+    [
+        "2tpr2tps",
+        "2tpr2tps-spatial",
+        "3rps",
+        "3prs",
+        "linear-delta-6",
+        "3rrr-planar",
+        "linear-delta",
+    ],
+)
+def test_matched_coordinates_are_the_users(name: str, frames: tuple[Frame, Frame]) -> None:
+    plain = pk.load(name)
+    robot = with_frames(plain, frames)
+    own = plain.complete(poses(name, 20, seed=66))
+    taken = outward(frames, own)
+    same_poses(robot.complete(taken), taken, 1e-9)
+    matched = [POSE.index(each) for each in robot.moved]
+    aim = taken + np.random.default_rng(67).uniform(-1, 1, taken.shape) * [
+        5,
+        5,
+        5,
+        0.02,
+        0.02,
+        0.02,
+    ]
+    found = robot.complete(aim)
+    known = np.isfinite(found).all(axis=1)
+    assert known.mean() > 0.9
+    off = found - aim
+    off[:, 3:] = wrapped(off[:, 3:])
+    assert np.abs(off[known][:, matched]).max() < 1e-8
+    assert robot.violation(found[known]).max() < 1e-8
+    driven = robot.forward(robot.inverse(aim, match=True)[known], guess=found[known])
+    same_poses(driven.pose, found[known], 1e-8)
+
+
+def test_upright_planar_machines_move_along_the_axes_they_stand_in() -> None:
+    upright = np.array([0.0, 0.0, 0.0, np.pi / 2, 0.0, 0.0])
+    robot = with_frames(pk.load("3rrr-planar"), (upright, None))
+    assert robot.moved == ("x", "z", "beta")
+    with pytest.raises(ValueError, match="'y' is no coordinate"):
+        pk.workspace(robot, {"x": (-1, 1, 2), "y": (-1, 1, 2)})
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 60.0, 90.0])
+def test_a_workspace_runs_along_the_users_axes(degrees: float) -> None:
+    """Of a planar machine in a tilted plane it is the area's shadow on the plane of the axes."""
+    base = np.array([0.0, 0.0, 0.0, np.radians(degrees), 0.0, 0.0])
+    plain = pk.load("3rrr-planar")
+    robot = with_frames(plain, (base, None))
+    x, y, _ = robot.moved
+    share = max(np.cos(base[3]), np.sin(base[3]) if y == "z" else 0.0)
+    flat = pk.workspace(plain, {"x": (-150, 150, 30), "y": (-150, 150, 30)})
+    found = pk.workspace(robot, {x: (-150, 150, 30), y: (-150 * share, 150 * share, 30)})
+    reached = found.inside
+    assert np.array_equal(reached, flat.inside) and reached.any() and not reached.all()
+    axes = np.stack(np.meshgrid(*found.values, indexing="ij"), axis=-1)
+    seen = found.poses[..., [POSE.index(x), POSE.index(y)]]
+    np.testing.assert_allclose(seen[reached], axes[reached], rtol=0, atol=1e-6)
+    assert robot.violation(found.poses[reached]).max() < 1e-6
 
 
 @framed
@@ -112,22 +196,6 @@ def test_jacobians_are_of_the_free_coordinates_in_the_machines_own_frame(
     np.testing.assert_allclose(robot.jacobian(wanted), plain.jacobian(at), rtol=1e-8, atol=1e-8)
     by_q = plain.forward_jacobian(at)
     np.testing.assert_allclose(robot.forward_jacobian(wanted), by_q, rtol=1e-8, atol=1e-8)
-
-
-@pytest.mark.parametrize("name", ["3rps", "3prs", "2tpr2tps-spatial", "linear-delta-6"])
-@framed
-def test_completed_poses_keep_what_is_matched_in_the_machines_own_frame(
-    name: str, frames: tuple[Frame, Frame]
-) -> None:
-    plain, at = pk.load(name), poses(name, 10, seed=65)
-    matched = [POSE.index(each) for each in plain.model.match]
-    off = at.copy()
-    others = np.setdiff1d(range(6), matched)
-    off[:, others] += np.random.default_rng(66).uniform(-0.01, 0.01, (10, len(others)))
-    robot = with_frames(plain, frames)
-    same_poses(robot.complete(outward(frames, off)), outward(frames, plain.complete(off)), 1e-9)
-    q = robot.inverse(outward(frames, off), match=True)
-    np.testing.assert_allclose(q, plain.inverse(off, match=True), rtol=0, atol=1e-9)
 
 
 @framed

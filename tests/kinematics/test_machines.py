@@ -13,9 +13,9 @@ from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Model
 
 from .. import twin
-from ..workspaces import WORKSPACE, poses
+from ..workspaces import CHAINS, WORKSPACE, poses
 
-MACHINES = robot_file.builtin_names()
+MACHINES = tuple(name for name in robot_file.builtin_names() if name not in CHAINS)
 # The print of the RBT-6T03P is singular everywhere: it has no workspace and nothing to calibrate.
 WORKING = tuple(name for name in MACHINES if name != "rbt-6t03p-printed")
 # The paper's 28 errors hold two that do nothing: platform3.x and platform4.x leave their legs'
@@ -90,7 +90,7 @@ def test_default_free_set_is_independent(name: str) -> None:
     assert np.sum(strength > 1e-7 * strength[0]) == len(free) - DEPENDENT.get(name, 0)
 
 
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("name", (*MACHINES, *CHAINS))
 def test_built_in_machines_are_untied_with_offset_0_and_gain_1(name: str) -> None:
     geometry = robot_file.read(name).geometry
     assert not geometry.tied.any() and not geometry.parameters
@@ -99,7 +99,7 @@ def test_built_in_machines_are_untied_with_offset_0_and_gain_1(name: str) -> Non
             assert geometry[number.name] == (1.0 if number.slot == "gain" else 0.0)
 
 
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("name", (*MACHINES, *CHAINS))
 def test_built_in_machines_say_where_their_numbers_are_from(name: str) -> None:
     text = robot_file.located(name)[0].decode()
     comment = [line for line in text.splitlines() if line.startswith("#")]

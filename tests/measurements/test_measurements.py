@@ -17,7 +17,7 @@ from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
 KINDS = tuple(COMPONENTS)
-SHAPES = {"pose": (5, 6), "position": (5, 3), "height": (5,), "distance": (5,)}
+SHAPES = {"pose": (5, 6), "position": (5, 3), "height": (5,), "distance": (5,), "closure": (5, 0)}
 
 
 def make(kind: str = "position", **fields: Any) -> Measurements:
@@ -56,12 +56,12 @@ def test_sigma_of_any_stated_shape_is_one_per_component_and_row(shape: tuple[int
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_measurements_pickle_and_stay_read_only(kind: str) -> None:
-    m = make(kind, sigma=0.1, group=[1, 1, 2, 3, 4])
+    m = make(kind, sigma=0.1 if COMPONENTS[kind] else None, group=[1, 1, 2, 3, 4])
     again = pickle.loads(pickle.dumps(m))
     assert str(again) == str(m)
     assert (again.actuators == m.actuators).all() and (again.group == m.group).all()
     with pytest.raises(ValueError, match="read-only"):
-        again.values[0] = 0.0
+        again.actuators[0] = 0.0
 
 
 def test_sigma_of_heights_may_be_one_per_row() -> None:
@@ -114,7 +114,17 @@ BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"actuators": [["1", "2"]] * 2}, TypeError, "actuators must be an array of numbers"),
     ({"actuators": None}, TypeError, "actuators must be an array of numbers, found None"),
     ({"values": [[1, 2], [3, 4]]}, ValueError, r"values of kind 'position' .*\(2, 3\).*\(2, 2\)"),
-    ({"values": [[1, 2, 3], [4, np.nan, 6]]}, ValueError, "values must be finite.* at index 1, 1"),
+    ({"values": [[1, 2, 3], [4, np.inf, 6]]}, ValueError, "values must be finite.* at index 1, 1"),
+    ({"values": None}, ValueError, "values of kind 'position' must be given; None goes with"),
+    ({"kind": "closure", "sigma": 0.1, "values": None}, ValueError, "sigma: nothing was read"),
+    ({"kind": "closure", "target": [0, 0, 1], "values": None}, ValueError, "target: a closure"),
+    (
+        {"kind": "pose", "values": [[1, 2, 3, 0, np.nan, 0], [1, 2, 3, 0, 0, 0]]},
+        ValueError,
+        "values: an orientation has three angles or none; found one left out in row 0",
+    ),
+    ({"actuator_sigma": -1.0}, ValueError, "actuator_sigma must be positive"),
+    ({"actuator_sigma": [1, 2, 3, 4]}, ValueError, r"actuator_sigma must be .*found \(4,\)"),
     ({"values": np.ones((2, 3)) * 1j}, TypeError, "values must be an array of numbers"),
     ({"sigma": 0.0}, ValueError, "sigma must be positive; found 0.0"),
     ({"sigma": [1, 2]}, ValueError, r"sigma for 2 measurements .*found \(2,\)"),

@@ -106,7 +106,7 @@ def test_derivatives_of_residuals_are_their_differences(name: str, framed: bool)
     data = FitData(pk.Measurements(robot.inverse(at), values, "pose"), np.arange(6), framed, False)
     chosen = parameters(robot, [data], "offset*", None, None)
     equations = Equations([data], chosen)
-    equations._guess[:] = at
+    equations.start_from(np.arange(len(at)), at)
     theta = chosen.start.copy()
     if framed:
         theta[chosen.frame : chosen.frame + 6] = [40, -20, 9, 0.4, np.pi / 2, 2.0]

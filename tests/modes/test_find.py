@@ -130,7 +130,7 @@ def test_a_lost_path_is_never_complete(monkeypatch, path):
 
     lose(monkeypatch, change)
     modes = dietmaier.hexapod().forward_all(dietmaier.LENGTHS, starts=0)
-    assert not modes.complete and modes.lost == 1 and "lost" in modes.reason
+    assert not modes.complete and modes.lost == 1 and "paths failed" in modes.reason
     assert len(modes) == 39 and modes.certified.all()
 
 

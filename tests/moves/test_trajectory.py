@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -130,6 +131,39 @@ def test_machines_whose_limbs_constrain_the_pose_go_straight_in_their_own_coordi
     np.testing.assert_allclose(at.pose[:, matched], expected, atol=1e-10)
     np.testing.assert_allclose(at.pose[[0, -1]], [start, end], atol=1e-8)
     assert f"straight in {' '.join(robot.model.match or robot.coordinates)}," in repr(move)
+
+
+@pytest.mark.parametrize("name", [*CONSTRAINED, "hexapod", "3rrr-planar"])
+def test_straight_is_what_is_straight_in_the_users_frames(name: str) -> None:
+    base, tool = [120.0, -45.0, 300.0, 0.4, -0.7, 2.1], [10.0, 25.0, -80.0, -0.3, 0.5, 1.1]
+    model = replace(pk.load(name).model, base_frame=np.array(base), tool_frame=np.array(tool))
+    robot = pk.Robot(model)
+    start = robot.home
+    end = robot.complete(start + np.array([8.0, -6.0, 5.0, 0.03, -0.02, 0.04]))
+    move = pk.trajectory.move(robot, start, end, duration=2.0, space="coordinates")
+    times = np.linspace(0.2, 1.8, 7)
+    at = move.sample(times)
+    matched = [POSE.index(each) for each in robot.moved]
+    share = pk.trajectory.quintic([0.0], [1.0], 2.0).sample(times)[0]
+    way = (end - start)[matched]
+    np.testing.assert_allclose((at.pose - start)[:, matched], share * way, rtol=0, atol=1e-8)
+    for values, rates in (("actuators", "velocities"), ("velocities", "accelerations")):
+        found = slope(lambda t, values=values: getattr(move.sample(t), values), times)
+        np.testing.assert_allclose(getattr(at, rates), found, rtol=0, atol=1e-6)
+
+
+def test_coordinates_turn_the_short_way_round() -> None:
+    robot = pk.load("hexapod")
+    cos, sin = np.cos(np.radians(177.0)), np.sin(np.radians(177.0))
+    turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1]])
+    limbs = robot.geometry.slots
+    drawn = [{"kind": "UPS", "base": turn @ row[:3], "platform": row[3:6]} for row in limbs]
+    turned = made("spatial", {"z": float(robot.home[2]), "gamma": np.radians(177.0)}, drawn)
+    start, end = turned.home, turned.home
+    end[5] = np.radians(-177.0)
+    move = pk.trajectory.move(turned, start, end, duration=1.0, space="coordinates")
+    gamma = np.degrees(move.sample(np.linspace(0.0, 1.0, 11)).pose[:, 5])
+    assert (np.abs(gamma) > 176.99).all()
 
 
 def test_coordinates_that_no_pose_has_on_the_way_are_refused() -> None:

@@ -1,0 +1,284 @@
+"""What the closures say of each pose: how it follows from actuators, exactly, nearly, or not alone.
+
+An estimator that gives every row a pose of its own needs three things of a machine: unknowns of the
+pose, equations between them and what the actuators read, and how the pose moves with the unknowns
+and with the numbers of the geometry. There are three cases:
+
+* `Commanded`: as many closures as free coordinates, actuators without error. No unknowns: the pose
+  is that of the forward kinematics.
+* `NoisyActuators`: the same closures, actuators with a stated deviation. The unknowns are where the
+  actuators really are; closures hold exactly, for the pose is that of the forward kinematics there.
+* `FreePoses`: more closures than free coordinates, which no pose can meet at once. The unknowns are
+  the free coordinates; each closure is an equation in units of the actuator that it is read by.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, mm_per_unit
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics import pose_steps
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.calibratable import Calibratable
+
+
+@dataclass(frozen=True, eq=False)
+class RowStates:
+    """Where the machine is at each distinct row of actuators.
+
+    Attributes
+    ----------
+    pose : ndarray (K, 6)
+        mm and rad; NaN where there is none.
+    actuators : ndarray (K, n)
+        Where the actuators are.
+    status : ndarray of int (K,)
+        Of the forward kinematics.
+    """
+
+    pose: FloatArray
+    actuators: FloatArray
+    status: Int32Array
+
+    def chosen(self, rows: BoolArray, others: RowStates) -> RowStates:
+        """These where `rows` (K,), else the others."""
+        return RowStates(
+            np.where(rows[:, None], self.pose, others.pose),
+            np.where(rows[:, None], self.actuators, others.actuators),
+            np.where(rows, self.status, others.status),
+        )
+
+
+class Closures(Protocol):
+    """What the closures of a machine say of its poses."""
+
+    unknowns: int
+    equations: int
+    sigma: FloatArray | None
+
+    def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
+        """The states of a robot with other numbers, near those given."""
+
+    def moved(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
+        """States after steps (K, unknowns) of the unknowns."""
+
+    def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
+        """The equations (K, equations), whitened, and their derivative by the unknowns."""
+
+    def lengths(self, robot: Calibratable) -> FloatArray:
+        """Factors (equations,) to mm of the equations times their sigma."""
+
+    def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
+        """How the platform moves with the unknowns: twists (K, 6, unknowns)."""
+
+    def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
+        """Derivative of the equations by numbers of the geometry, (K, equations, p)."""
+
+    def twists_by_numbers(
+        self, robot: Calibratable, states: RowStates, places: IntArray
+    ) -> FloatArray | None:
+        """How the platform moves with them while the unknowns are held, (K, 6, p); None: not."""
+
+
+class Commanded:
+    """Poses that follow from what the actuators read."""
+
+    unknowns = equations = 0
+
+    def __init__(self, read: FloatArray) -> None:
+        self.read = read
+        self.sigma: FloatArray | None = None
+
+    def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
+        """Solve the forward kinematics."""
+        solved = robot.forward(self.read, states.pose)
+        return RowStates(solved.pose, self.read, solved.status)
+
+    def moved(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
+        """Nothing moves."""
+        return states
+
+    def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
+        """No equations."""
+        return np.empty((len(self.read), 0)), np.empty((len(self.read), 0, 0))
+
+    def lengths(self, robot: Calibratable) -> FloatArray:
+        """No equations."""
+        return np.empty(0)
+
+    def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
+        """No unknowns."""
+        return np.empty((len(self.read), 6, 0))
+
+    def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
+        """No equations."""
+        return np.empty((len(self.read), 0, len(places)))
+
+    def twists_by_numbers(
+        self, robot: Calibratable, states: RowStates, places: IntArray
+    ) -> FloatArray | None:
+        """Twists, actuators held."""
+        return robot.error_twists(states.pose, states.actuators)[:, :, places]
+
+
+class NoisyActuators:
+    """Poses that follow from where the actuators are, which is near what they read.
+
+    Parameters
+    ----------
+    read : ndarray (K, n)
+        What they read.
+    sigma : ndarray (K, n)
+        Its standard deviation, mm or rad; an actuator whose deviations are 0 has no unknown.
+    """
+
+    def __init__(self, read: FloatArray, sigma: FloatArray) -> None:
+        self.read = read
+        self._free = np.flatnonzero(sigma.any(axis=0))
+        self.sigma: FloatArray | None = sigma[:, self._free]
+        self._white = 1.0 / self.sigma
+        self.unknowns = self.equations = len(self._free)
+
+    def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
+        """Solve the forward kinematics where the actuators are."""
+        solved = robot.forward(states.actuators, states.pose)
+        return RowStates(solved.pose, states.actuators, solved.status)
+
+    def moved(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
+        """Move the actuators."""
+        actuators = states.actuators.copy()
+        actuators[:, self._free] += step
+        return self.settled(robot, RowStates(states.pose, actuators, states.status))
+
+    def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
+        """Where they are less what they read."""
+        off = (states.actuators - self.read)[:, self._free]
+        return off * self._white, self._white[:, :, None] * np.eye(self.unknowns)
+
+    def lengths(self, robot: Calibratable) -> FloatArray:
+        """Of the actuators' units."""
+        return mm_per_unit(robot.actuator_units, robot.length)[self._free]
+
+    def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
+        """Twists by the actuators."""
+        return robot.actuator_twists(states.pose, states.actuators)[:, :, self._free]
+
+    def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
+        """Nothing: what actuators read is not of the geometry."""
+        return np.zeros((len(self.read), self.equations, len(places)))
+
+    def twists_by_numbers(
+        self, robot: Calibratable, states: RowStates, places: IntArray
+    ) -> FloatArray | None:
+        """Twists, actuators held."""
+        return robot.error_twists(states.pose, states.actuators)[:, :, places]
+
+
+class FreePoses:
+    """Poses of a machine with more closures than free coordinates.
+
+    Parameters
+    ----------
+    robot : Robot
+        The machine.
+    read : ndarray (K, n)
+        What the actuators read.
+    sigma : ndarray (K, n)
+        Its standard deviation, mm or rad.
+    """
+
+    def __init__(self, robot: Robot, read: FloatArray, sigma: FloatArray) -> None:
+        self.read = read
+        self.unknowns, self.equations = robot.machine.m, robot.machine.rows
+        # rows beside a limb's own are as sure as the file weighs them against the actuators
+        of_rows = pose_steps.sphere_actuators(robot)
+        common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
+        self.sigma: FloatArray | None = np.stack(
+            [sigma[:, a] if a >= 0 else common for a in of_rows], axis=1
+        )
+        self._white = 1.0 / self.sigma
+
+    def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
+        """Poses stay where they are until they are fitted."""
+        known = np.isfinite(states.pose).all(axis=1)
+        return RowStates(states.pose, self.read, np.where(known, 0, states.status))
+
+    def moved(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
+        """Move the poses."""
+        pose = pose_steps.moved(_machine(robot), states.pose, step)
+        return RowStates(pose, self.read, states.status)
+
+    def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
+        """What the limbs would read at the poses less what they read."""
+        off, by_step = pose_steps.readings(_machine(robot), states.pose, self.read)
+        off *= self._white
+        by_step *= self._white[:, :, None]
+        return off, by_step
+
+    def lengths(self, robot: Calibratable) -> FloatArray:
+        """Of the actuators' units; the other rows are in mm."""
+        of_actuators = mm_per_unit(robot.actuator_units, robot.length)
+        of_rows = pose_steps.sphere_actuators(_machine(robot))
+        return np.array([of_actuators[a] if a >= 0 else 1.0 for a in of_rows])
+
+    def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
+        """Twists by steps of the pose."""
+        return pose_steps.step_twists(_machine(robot), states.pose)
+
+    def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
+        """What the limbs would read, poses held."""
+        by_free = pose_steps.readings_by_numbers(_machine(robot), states.pose, self.read, places)
+        by_free *= self._white[:, :, None]
+        return by_free
+
+    def twists_by_numbers(
+        self, robot: Calibratable, states: RowStates, places: IntArray
+    ) -> FloatArray | None:
+        """Poses are held."""
+        return None
+
+
+def _machine(robot: Calibratable) -> Robot:
+    assert isinstance(robot, Robot)  # arms have no surplus closures
+    return robot
+
+
+def has_equations(robot: Calibratable, sigmas: Sequence[FloatArray | None]) -> bool:
+    """Whether closures are equations, for these deviations of the actuators."""
+    noisy = any(sigma is not None and bool(sigma.any()) for sigma in sigmas)
+    return noisy or (isinstance(robot, Robot) and pose_steps.surplus(robot) > 0)
+
+
+def closures_of(
+    robot: Calibratable, read: FloatArray, sigma: FloatArray | None
+) -> Commanded | NoisyActuators | FreePoses:
+    """What the closures of a machine say, for actuators that read so (K, n).
+
+    Parameters
+    ----------
+    robot : Calibratable
+        The machine.
+    read : ndarray (K, n)
+        Distinct rows.
+    sigma : ndarray (K, n) or None
+        Standard deviations of what was read. None: nothing is stated, which is 0 where the
+        closures are as many as the free coordinates, and 1 mm, to be estimated, where they are
+        more.
+    """
+    if isinstance(robot, Robot) and pose_steps.surplus(robot) > 0:
+        if sigma is not None and not sigma.all():
+            raise ArgumentError(
+                f"measurements: {robot.name} has more closures than free coordinates, which"
+                " actuators without noise cannot meet: actuator_sigma must be positive, or None"
+            )
+        if sigma is None:
+            sigma = np.tile(1.0 / mm_per_unit(robot.actuator_units, robot.length), (len(read), 1))
+        return FreePoses(robot, read, sigma)
+    if sigma is None or not has_equations(robot, [sigma]):
+        return Commanded(read)
+    return NoisyActuators(read, sigma)

@@ -1,0 +1,203 @@
+"""The readings of a calibration: what instruments should show at given poses, whitened."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, mm_per_unit
+from pkmcal.calibration.parameters import POINTS, FitData, Parameters
+from pkmcal.measurements import orientation
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.observation import Predicted, difference, predict
+
+ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
+
+
+class Readings:
+    """What was read of all sets of measurements, pose by pose, beside what is predicted there.
+
+    Parameters
+    ----------
+    datasets : sequence of FitData
+        The rows; those with the same actuators, and the same noise of these, are one pose.
+    parameters : Parameters
+        The parameter vector.
+
+    Attributes
+    ----------
+    sets : tuple of Measurements
+        The rows of each set.
+    rows : ndarray of int (N,)
+        Their numbers in what the user gave.
+    actuators : ndarray (K, n)
+        Distinct rows of what the actuators read.
+    actuator_sigma : ndarray (K, n) or None
+        Its stated deviations.
+    pose_of : list of ndarray of int
+        Which pose each row of each set is at.
+    set_of : ndarray of int (N,)
+        Which set each row is of.
+    count : ndarray of int (N,)
+        How many numbers were read in each row.
+    """
+
+    def __init__(self, datasets: Sequence[FitData], parameters: Parameters) -> None:
+        self.sets = tuple(data.measured for data in datasets)
+        self.rows = np.concatenate([data.rows for data in datasets])
+        self.parameters = parameters
+        self._framed = [data.framed for data in datasets]
+        self._columns = [  # of the points that are sought, by what `predict` calls them
+            {
+                name: parameters.columns_of(role, data.measured)
+                for name, role in POINTS[data.measured.kind].items()
+                if role in data.sought
+            }
+            for data in datasets
+        ]
+        self._known = [
+            {
+                name: m.attachments if role == "attachment" else m.targets
+                for name, role in POINTS[m.kind].items()
+                if name not in columns
+            }
+            for m, columns in zip(self.sets, self._columns, strict=True)
+        ]
+        # several targets or repeats at the same actuators are one pose
+        actuators = np.concatenate([m.actuators for m in self.sets])
+        noises = [m.actuator_sigma for m in self.sets]
+        stated = [sigma for sigma in noises if sigma is not None]
+        key = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
+        distinct, inverse = np.unique(key, axis=0, return_inverse=True)
+        n = actuators.shape[1]
+        self.actuators = np.ascontiguousarray(distinct[:, :n])
+        self.actuator_sigma = np.ascontiguousarray(distinct[:, n:]) if stated else None
+        edges = np.cumsum([0, *map(len, self.sets)])
+        self.pose_of = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
+        self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
+        self._present = np.concatenate([np.isfinite(m.values).reshape(-1) for m in self.sets])
+        self._whole = bool(self._present.all())
+        self.set_of = np.repeat(np.arange(len(self.sets)), np.diff(edges))
+        self.count = np.concatenate([
+            np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in self.sets
+        ])  # fmt: skip
+
+    def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
+        """Readings of each set at poses (K, 6)."""
+        frame = self.parameters.frame_at(theta)
+        return tuple(
+            predict(
+                measured.kind,
+                pose[self.pose_of[i]],
+                frame=frame if self._framed[i] else None,
+                origin=self.parameters.origin,
+                **self._known[i],
+                **{name: theta[columns] for name, columns in self._columns[i].items()},
+            )
+            for i, measured in enumerate(self.sets)
+        )
+
+    def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
+        """Measured less predicted of each set."""
+        return tuple(
+            difference(measured.kind, measured.values, seen.values)
+            for measured, seen in zip(self.sets, predicted, strict=True)
+        )
+
+    def misfit(self, pose: FloatArray, theta: FloatArray) -> FloatArray:
+        """How far off the worst reading at each pose (K, 6) is, mm (K,); inf without a pose.
+
+        Angles count as their arc. NaN where nothing was read.
+        """
+        worst = np.full(len(pose), np.nan)
+        residuals = self.residuals(self.predicted(pose, theta))
+        for measured, place, residual in zip(self.sets, self.pose_of, residuals, strict=True):
+            arcs = mm_per_unit(measured.units, self.parameters.robot.length)
+            known = np.where(np.isfinite(measured.values.reshape(residual.shape)), residual, 0.0)
+            off = np.linalg.norm(known * arcs, axis=1)
+            off = np.where(np.isfinite(off), off, np.inf)
+            read = np.isfinite(measured.values.reshape(residual.shape)).any(axis=1)
+            np.fmax.at(worst, place[read], off[read])
+        return worst
+
+    def whitened(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
+        """Parts (N, k, ...) of all sets in units of their standard deviation, stacked: (M, ...).
+
+        `noise` (G,) multiplies what `Measurements.sigma` says. What was not read is left out.
+        """
+        stacked = []
+        for part, white, factor in zip(parts, self._whiten, noise[: len(parts)], strict=True):
+            if not self._whole:
+                part = np.nan_to_num(part, nan=0.0)
+            if white.ndim == 3:
+                scaled = np.einsum("nij,nj...->ni...", white, part)
+            else:
+                scaled = white.reshape(*white.shape, *(1,) * (part.ndim - 2)) * part
+            stacked.append((scaled / factor).reshape(-1, *part.shape[2:]))
+        whole = np.concatenate(stacked)
+        return whole if self._whole else whole[self._present]
+
+    def unwhiten(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:
+        """Invert `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad."""
+        parts, rest = [], whitened
+        for measured, white, factor in zip(self.sets, self._whiten, noise, strict=True):
+            mine, rest = np.split(rest, [len(measured) * white.shape[1]])
+            part = factor * mine.reshape(len(measured), -1)
+            if white.ndim == 3:
+                parts.append(np.linalg.solve(white, part[:, :, None])[:, :, 0])
+            else:
+                parts.append(part / white)
+        return parts
+
+    def white(self, i: int) -> FloatArray:
+        """Matrices (N, k, k) that make the noise of set `i` one, as its sigma says."""
+        white = self._whiten[i]
+        return white if white.ndim == 3 else white[:, :, None] * np.eye(white.shape[1])
+
+    def rounding(self, noise: FloatArray) -> float:
+        """Length of the whitened rounding errors of what is predicted."""
+        parts = [_rounded(m, self.parameters.robot.length) for m in self.sets]
+        return float(np.linalg.norm(self.whitened(parts, noise)))
+
+
+def _rounded(measured: Measurements, length: float) -> FloatArray:
+    """Rounding errors (N, k) of what is predicted, mm and rad."""
+    values = measured.values.reshape(len(measured), -1)
+    lengths = np.array([unit == "mm" for unit in measured.units], dtype=bool)
+    size = np.max(np.nan_to_num(np.abs(values[:, lengths])), initial=0.0) + length
+    return np.broadcast_to(ROUNDING * size / mm_per_unit(measured.units, length), values.shape)
+
+
+def of_read(measured: Measurements, residual: FloatArray) -> FloatArray:
+    """Residuals (N, k) of what was read, 0 beside it; NaN in rows where nothing was."""
+    read = np.isfinite(measured.values.reshape(residual.shape))
+    if not residual.shape[1]:
+        return np.full((len(residual), 1), np.nan)
+    if read.all():
+        return residual
+    known = np.where(read, residual, 0.0)
+    known[~read.any(axis=1)] = np.nan
+    return known
+
+
+def _whitening(measured: Measurements, length: float) -> FloatArray:
+    """Factors (N, k) or matrices (N, k, k) that make the noise one; 1 mm where it is not known."""
+    sigma = measured.sigma
+    if sigma is None:
+        return np.tile(mm_per_unit(measured.units, length), (len(measured), 1))
+    if measured.kind == "pose" and not _same_turnings(sigma):
+        sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, 3:]))
+    if sigma.ndim == 2:
+        return 1.0 / sigma
+    missing = np.isnan(measured.values)
+    if missing.any():  # what was read has its marginal covariance
+        apart = missing[:, :, None] | missing[:, None, :]
+        sigma = np.where(apart, np.eye(sigma.shape[1]), sigma)
+    return np.linalg.inv(np.linalg.cholesky(sigma))
+
+
+def _same_turnings(sigma: FloatArray) -> bool:
+    """Whether standard deviations (N, 6) are the same about every axis."""
+    return sigma.ndim == 2 and bool((sigma[:, 4:] == sigma[:, 3:4]).all())

@@ -1,0 +1,130 @@
+"""Mistakes in files of chains: too few actuators, home values, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.checks.finding import Finding, named
+from pkmcal.checks.function import singular
+from pkmcal.kinematics.robot import Robot
+
+_NONE = 1e-7  # of the largest: a singular value that is none
+_NEAR = 0.1  # of the distance: a home value that is meant to be it
+_EXACT = 1e-3  # mm
+_AXIS = 0.02  # entries of a direction that are shown as 0
+
+
+def mobility(robot: Robot) -> Iterator[Finding]:
+    """Machines whose platform moves though the actuators are held, near home too."""
+    away = _away(robot)
+    ways = [_free_ways(robot, own, q) for own, q in (_home(robot), away)]
+    free = min(ways, key=len)  # home may be special
+    if not len(free):
+        return
+    n = robot.n_actuators
+    yield Finding(
+        "mobility",
+        (),
+        f"{n} actuators, {n + len(free)} ways to move: with the actuators held the platform still"
+        f" {' and '.join(_named_motion(robot, twist) for twist in free)}",
+        "give an actuator to one more joint, or take a passive joint out of a limb",
+    )
+
+
+def home_values(robot: Robot) -> Iterator[Finding]:
+    """Home values that are nearly the distance of the joints beside them."""
+    assert robot.model.chains is not None
+    for i, joint in robot.model.chains.actuated:
+        limb = robot.model.chains.limbs[i]
+        k = limb.index(joint)
+        if joint.unit != "mm" or not 0 < k < len(limb) - 1 or joint.home_value == 0.0:
+            continue
+        apart = float(np.linalg.norm(limb[k + 1].at - limb[k - 1].at))
+        off = abs(joint.home_value - apart)
+        if _EXACT < off < _NEAR * apart:
+            yield Finding(
+                "home",
+                (i + 1,),
+                f"at home actuator {(joint.actuator or 0) + 1} reads {joint.home_value:.6g} mm, but"
+                f" the joints beside it are {apart:.6g} mm apart",
+                "check home_value, the joints' points and the home pose",
+            )
+
+
+def strokes(robot: Robot) -> Iterator[Finding]:
+    """Home beyond a stroke or a cone."""
+    home = robot.feasible(robot.home)
+    for name in ("stroke", "base_cone", "platform_cone"):
+        limbs = np.flatnonzero(~getattr(home, name))
+        if limbs.size:
+            yield Finding(
+                "stroke",
+                tuple(int(i) + 1 for i in limbs),
+                f"at home {named(limbs)} breaks a {name.replace('_', ' ')}",
+                "check the limits of its joints, the home values and the home pose",
+            )
+
+
+CHAIN_CHECKS = (mobility, home_values, strokes, singular)
+
+
+def surplus(robot: Robot) -> str:
+    """What is remarkable of a machine of chains though it is no mistake; empty where nothing is."""
+    over = robot.machine.rows - robot.machine.m
+    if over <= 0:
+        return ""
+    return (
+        f"over-constrained by {over}: {robot.machine.rows} closures for {robot.machine.m}"
+        " coordinates; with errors the joints yield, each by its `soft`"
+    )
+
+
+def _home(robot: Robot) -> tuple[FloatArray, FloatArray]:
+    own = np.ascontiguousarray(robot.own_home[None])
+    return own, robot.machine.inverse(robot.slots, own)
+
+
+def _away(robot: Robot) -> tuple[FloatArray, FloatArray]:
+    """Another pose near home that the machine takes; home itself where none is found."""
+    own, q = _home(robot)
+    random = np.random.default_rng(0)
+    step = np.array([0.1 * robot.length if unit == "mm" else 0.1 for unit in robot.actuator_units])
+    there = q + step * random.uniform(-1, 1, q.shape)
+    found, status, _, _ = robot.machine.forward(robot.slots, there, own[0], 1)
+    return (found, there) if status[0] == 0 else (own, q)
+
+
+def _free_ways(robot: Robot, own: FloatArray, q: FloatArray) -> FloatArray:
+    """Twists (k, m) of the platform, as the pose map counts them, that no closure resists."""
+    steps = robot.machine.closure(robot.slots, own, q).by_step[0]
+    if not np.isfinite(steps).all():
+        return np.empty((0, robot.machine.m))
+    _, sigma, axes = np.linalg.svd(steps)
+    rank = int((sigma > _NONE * max(float(sigma[0]), 1.0)).sum())
+    return np.asarray(axes[rank:])
+
+
+def _named_motion(robot: Robot, step: FloatArray) -> str:
+    """A motion in words, from a step of the pose map with angles as arcs."""
+    parts = dict(zip(robot.coordinates, step, strict=True))
+    v = np.array([parts.get(name, 0.0) for name in ("x", "y", "z")])
+    w = np.array([parts.get(name, 0.0) for name in ("alpha", "beta", "gamma")])
+    turns, slides = float(np.linalg.norm(w)), float(np.linalg.norm(v))
+    if turns < _AXIS * slides:
+        return f"slides along {_direction(v / slides)}"
+    w, v = w / turns, v / turns * robot.length
+    point = (robot.own_home[:3] + np.cross(w, v)).round(6) + 0.0
+    pitch = float(w @ v)
+    said = f"turns about {_direction(w)} through ({', '.join(f'{x:.4g}' for x in point)}) mm"
+    return said if abs(pitch) < _AXIS * robot.length else f"{said}, sliding along it"
+
+
+def _direction(axis: FloatArray) -> str:
+    shown = np.where(np.abs(axis) < _AXIS, 0.0, axis)
+    for k, name in enumerate("xyz"):
+        if np.count_nonzero(shown) == 1 and shown[k]:
+            return name
+    return f"({', '.join(f'{x:.2f}' for x in shown)})"

@@ -1,0 +1,143 @@
+"""Files of measurements as the command line gives them, and what was assumed in reading them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import pkmcal as pk
+from pkmcal.cli.inputs import Inputs
+from pkmcal.cli.output import say
+from pkmcal.exceptions import ArgumentError, FileError
+from pkmcal.files.reading import MOST_ROBOT
+from pkmcal.files.toml_lines import Source
+from pkmcal.files.toml_table import Table
+from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.measurements.measurements import Measurements
+
+_KEYS = ("header", "ignore", "rename", "units", "rotation")
+
+Controller = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="LOG", help="A log with the actuators, where the instrument's file has none."
+    ),
+]
+JoinBy = Annotated[
+    str,
+    typer.Option(
+        "--join", metavar="WORD", help="How rows of the log are found: name, row, time; or auto."
+    ),
+]
+Ignore = Annotated[
+    list[str] | None,
+    typer.Option(metavar="COLUMN", help="Leave this column out. Repeat it for others."),
+]
+Rename = Annotated[
+    list[str] | None,
+    typer.Option(metavar="OLD=NEW", help="Read column OLD as NEW, such as 'Lg=q1 \\[mm]'."),
+]
+Columns = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="A TOML file with header, ignore, rename, units and rotation of the columns.",
+    ),
+]
+Units = Annotated[
+    str | None,
+    typer.Option(metavar="UNITS", help="Of columns without a unit: 'mm', or 'mm,deg'."),
+]
+Rotation = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ORDER",
+        help="How orientations are stated where headings do not say: ZYX or another order, each"
+        " about the turned axis; xyz, about fixed axes; rotvec; wxyz or xyzw.",
+    ),
+]
+
+
+ProbeOffset = Annotated[
+    str | None,
+    typer.Option(
+        metavar="X,Y,Z",
+        help="Of a column probe: the firmware's offsets of the probe from the nozzle, mm.",
+    ),
+]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """The options of reading: what `pkmcal.read_measurements` takes beside file and robot."""
+
+    controller: Path | None = None
+    join: str = "auto"
+    ignore: Sequence[str] = ()
+    rename: Sequence[str] = ()
+    columns: Path | None = None
+    units: str | None = None
+    rotation: str | None = None
+    probe_offset: str | None = None
+
+    def measurements(self, path: str | Path, read: Inputs, robot: Calibratable) -> Measurements:
+        """The measurements of a file; what was assumed is printed to stderr, a line each."""
+        stated: dict[str, Any] = {} if self.columns is None else _stated(self.columns, read)
+        stated["ignore"] = [*stated.get("ignore", ()), *self.ignore]
+        stated["rename"] = stated.get("rename", {}) | dict(map(_renamed, self.rename))
+        if self.units is not None:
+            stated["units"] = [unit.strip() for unit in self.units.split(",")]
+        if self.rotation is not None:
+            stated["rotation"] = self.rotation
+        if self.probe_offset is not None:
+            stated["probe_offset"] = _offset(self.probe_offset)
+        log = None if self.controller is None else read.file(self.controller)
+        join: Any = self.join
+        measured = pk.read_measurements(read.file(path), robot, controller=log, join=join, **stated)
+        for note in measured.notes:
+            say(f"pkmcal: {note}", err=True)
+        return measured
+
+
+def _offset(text: str) -> list[float]:
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 3:
+        raise ArgumentError(f"--probe-offset {text}: expected X,Y,Z in mm")
+    return numbers
+
+
+def _renamed(text: str) -> tuple[str, str]:
+    old, equals, new = text.partition("=")
+    if not equals or not old.strip() or not new.strip():
+        raise ArgumentError(f"--rename {text}: expected OLD=NEW, such as 'Lg=q1 [mm]'")
+    return old.strip(), new.strip()
+
+
+def _stated(path: Path, read: Inputs) -> dict[str, Any]:
+    """What the file of ``--columns`` says.
+
+    Raises
+    ------
+    ValueError
+        No TOML, an unknown key, a value that is no text.
+    """
+    table = Table((source := Source(read.file(path).content(MOST_ROBOT), str(path))).data, source)
+    table.only(_KEYS, "columns")
+    found: dict[str, Any] = {
+        key: table.texts(key) for key in ("header", "ignore", "units") if key in table
+    }
+    if "rename" in table:
+        renamed = table.table("rename")
+        found["rename"] = {old: renamed.text(old) for old in renamed.data}
+    if "rotation" in table:
+        found["rotation"] = table.text("rotation")
+    if found.get("header") == []:
+        raise FileError(f"{path}: header: names of the columns, in their order")
+    return found

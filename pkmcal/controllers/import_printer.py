@@ -1,0 +1,227 @@
+"""A robot, and stored measurements, out of the configuration of a printer's firmware."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+
+from pkmcal.arguments import path as as_path
+from pkmcal.arguments import word
+from pkmcal.controllers import rotary_delta, rotary_gcode
+from pkmcal.controllers.delta_gcode import of_marlin, of_reprap
+from pkmcal.controllers.hangprinter import as_robot as robot_of_anchors
+from pkmcal.controllers.hangprinter import of_text, robot_text
+from pkmcal.controllers.linear_delta import FirmwareDelta, as_robot, text_of
+from pkmcal.controllers.printer_config import (
+    ANGLES,
+    STEPPERS,
+    PrinterConfig,
+    kinematics,
+    positive,
+    read,
+    step_of,
+    text_in,
+)
+from pkmcal.controllers.rotary_delta import RotaryDelta, elbow_at
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.result import Result
+
+_HEAD = """\
+# Imported from {file} by pkmcal: the firmware's numbers of a linear delta.
+# An actuator coordinate is the motor's steps down from its end stop; `offset` is the height of the
+# carriage there, position_endstop + sqrt(arm_length^2 - delta_radius^2).
+"""
+_ROTARY_HEAD = """\
+# Imported from {file} by pkmcal: the firmware's numbers of a rotary delta.
+# An actuator coordinate is the motor's steps down from its end stop; `offset` is the angle of the
+# crank there, below the horizontal. Radius and height are those of the shoulders less the
+# effector's.
+"""
+_DEGREES_HEAD = """\
+# Imported from {file} by pkmcal: M669 and M666 of a rotary delta.
+# An actuator coordinate is the crank's way down from its end stop; `offset` is the angle of the
+# crank there, below the horizontal.
+"""
+_GCODE_HEAD = """\
+# Imported from {file} by pkmcal: M665 and M666 of a linear delta.
+# An actuator coordinate is the carriage's way down from its end stop, in mm; `offset` is the height
+# of the carriage there.
+"""
+_ANCHORS_HEAD = """\
+# Imported from {file} by pkmcal: the anchors of M669.
+# An actuator coordinate is the line let out since the origin, mm; `offset` is its length there.
+"""
+Firmware = Literal["klipper", "reprap", "marlin", "hangprinter"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Printer(Result):
+    """What a printer.cfg says.
+
+    Attributes
+    ----------
+    robot : Robot
+        The printer with the firmware's numbers. Its actuator coordinates are steps down from the
+        end stops.
+    measurements : Measurements or None
+        Heights of the nozzle that the firmware has stored: the probe's offset, and heights
+        entered by hand.
+    distances : int
+        How many distances of a printed part are stored, which are not among the measurements.
+    text : str
+        The robot file.
+    """
+
+    robot: Robot
+    measurements: Measurements | None
+    distances: int
+    text: str
+
+    def _parts(self) -> Iterator[str]:
+        stored = "no" if self.measurements is None else str(len(self.measurements))
+        kinds = {"PUS": "linear delta", "RUS": "rotary delta", "UPS": "Hangprinter"}
+        kind = kinds[self.robot.model.limbs[0].kind]
+        yield f"{self.robot.name}: a {kind}, {stored} stored heights"
+        if self.distances:
+            yield (
+                f"{self.distances} distances of a printed part are left out: a distance between two"
+                " poses is no kind of measurement here"
+            )
+
+
+def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") -> Printer:
+    r"""Read a linear or rotary delta from its firmware's configuration, with stored probe results.
+
+    Parameters
+    ----------
+    path : str or path
+        A printer.cfg of Klipper or Kalico: the block of SAVE_CONFIG at its end is read too,
+        included files are not. Or a file with the M665 and M666 of the other firmwares; actuator
+        coordinates are then mm down from the end stops. Or the M669 of a Hangprinter.
+    firmware : {"klipper", "reprap", "marlin", "hangprinter"}
+        Whose file it is.
+
+    Raises
+    ------
+    ValueError
+        Other kinematics, or a number that is missing or wrong: the message names file and line.
+    OSError
+        A file that cannot be read.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> import pathlib, tempfile
+    >>> text = "[printer]\nkinematics: delta\ndelta_radius: 174.75\n"
+    >>> for axis in "abc":
+    ...     text += f"[stepper_{axis}]\nrotation_distance: 40\nmicrosteps: 16\n"
+    ...     text += "position_endstop: 297\narm_length: 333\n"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     _ = pathlib.Path(folder, "printer.cfg").write_text(text)
+    ...     pk.import_printer(f"{folder}/printer.cfg")
+    <Printer: printer: a linear delta, no stored heights>
+    """
+    word("firmware", firmware, get_args(Firmware))
+    if firmware == "hangprinter":
+        where = as_path("path", path)
+        anchors = of_text(text_in(path), str(where))
+        text = robot_text(anchors, where.stem, _ANCHORS_HEAD.format(file=where.name))
+        return Printer(robot_of_anchors(anchors, where.stem), None, 0, text)
+    if firmware != "klipper":
+        where, text = as_path("path", path), text_in(path)
+        if firmware == "reprap" and rotary_gcode.is_rotary(text):
+            crank = rotary_gcode.of_reprap(text, str(where))
+            return _turning(where, crank, _DEGREES_HEAD, None, 0)
+        parse = of_reprap if firmware == "reprap" else of_marlin
+        found = parse(text, str(where))
+        return _printer(where, found, [-1.0] * 3, _GCODE_HEAD, None, 0)
+    printer = read(path)
+    where, measured = Path(printer.place), (_heights(printer), _count(printer, "distance"))
+    if kinematics(printer) == "rotary_delta":
+        return _turning(where, _rotary(printer), _ROTARY_HEAD, *measured)
+    radius = positive(printer, "printer", "delta_radius")
+    arms, angles, carriages, steps = [], [], [], []
+    for section in STEPPERS:
+        arm = _first(printer, section, "arm_length")
+        if arm <= radius:
+            raise printer.wrong(section, "arm_length", f"must be above delta_radius {radius:g}")
+        arms.append(arm)
+        angles.append(printer.number(section, "angle", ANGLES["delta"][section]))
+        height = float(np.sqrt(arm**2 - radius**2))
+        carriages.append(_first(printer, section, "position_endstop") + height)
+        steps.append(-step_of(printer, section))
+    delta = FirmwareDelta(radius, tuple(angles), tuple(arms), tuple(carriages))
+    return _printer(where, delta, steps, _HEAD, *measured)
+
+
+def _turning(
+    file: Path, delta: RotaryDelta, head: str, measurements: Measurements | None, distances: int
+) -> Printer:
+    home = round(0.5 * max(delta.endstops), 3)
+    text = rotary_delta.text_of(delta, home, file.stem, head.format(file=file.name))
+    robot = rotary_delta.as_robot(delta, home, file.stem)
+    return Printer(robot, measurements, distances, text)
+
+
+def _rotary(printer: PrinterConfig) -> RotaryDelta:
+    """The numbers of a rotary delta; the end stops are above, steps lead down from there."""
+    radius = positive(printer, "printer", "shoulder_radius")
+    height = positive(printer, "printer", "shoulder_height")
+    numbers: list[list[float]] = []
+    for section in STEPPERS:
+        crank = _first(printer, section, "upper_arm_length")
+        rod = _first(printer, section, "lower_arm_length")
+        endstop = _first(printer, section, "position_endstop")
+        way = float(np.hypot(radius, height - endstop))
+        if min(crank, rod) <= 0.0 or not abs(crank - rod) < way < crank + rod:
+            raise printer.wrong(
+                section, "position_endstop", f"{endstop:g} is nowhere the arms can reach"
+            )
+        elbow = elbow_at(endstop, radius, height, crank, rod)
+        angle = printer.number(section, "angle", ANGLES["rotary_delta"][section])
+        numbers.append([angle, crank, rod, elbow, step_of(printer, section)])
+    parts = [tuple(part) for part in zip(*numbers, strict=True)]
+    return RotaryDelta(radius, (height,) * 3, *parts)
+
+
+def _printer(
+    file: Path,
+    delta: FirmwareDelta,
+    gains: list[float],
+    head: str,
+    measurements: Measurements | None,
+    distances: int,
+) -> Printer:
+    text = text_of(delta, gains, file.stem, head.format(file=file.name))
+    return Printer(as_robot(delta, gains, file.stem), measurements, distances, text)
+
+
+def _first(printer: PrinterConfig, section: str, option: str) -> float:
+    """A tower's number, or the first tower's where it has none."""
+    return printer.number(section if printer.has(section, option) else STEPPERS[0], option)
+
+
+def _count(printer: PrinterConfig, name: str) -> int:
+    count = 0
+    while printer.has("delta_calibrate", f"{name}{count}"):
+        count += 1
+    return count
+
+
+def _heights(printer: PrinterConfig) -> Measurements | None:
+    """The stored heights of the probe and of the hand."""
+    names = [
+        f"{kind}{i}" for kind in ("height", "manual_height") for i in range(_count(printer, kind))
+    ]
+    if not names:
+        return None
+    section = "delta_calibrate"
+    steps = [printer.numbers(section, f"{name}_pos", 3) for name in names]
+    values = [printer.number(section, name) for name in names]
+    return Measurements(steps, values, "height")

@@ -1,0 +1,202 @@
+"""A linear delta as printer firmware has it: one radius, vertical towers, arms and end stops.
+
+Klipper, RepRapFirmware and Marlin all have this model: towers at (r cos θ, r sin θ), and with the
+nozzle at x, y, z the carriage of a tower at z + √(arm² - ‖(x, y) - tower‖²). What they call the
+position of an end stop is the height of the *nozzle*, in the middle, with the carriage there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.controllers.loss import Loss, loss, nearest
+from pkmcal.core.library import SLOTS
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.toml_lines import Source
+from pkmcal.geometry import robot_file
+from pkmcal.geometry.robot_file_writer import lines
+from pkmcal.kinematics.robot import Robot, require_parallel
+
+_TOWERS = 3
+_POSES = 300
+
+
+@dataclass(frozen=True)
+class FirmwareDelta:
+    """The numbers of a linear delta.
+
+    Attributes
+    ----------
+    radius : float
+        Distance of each tower from the middle, less the joint offsets of carriage and effector; mm.
+    angles : tuple of float
+        Of each tower, deg from x.
+    arms : tuple of float
+        Length of each tower's rods, mm.
+    carriages : tuple of float
+        Height of each carriage's joint at its end stop, over the effector's joints with the
+        nozzle on the bed; mm. The `offset` of a robot file.
+    """
+
+    radius: float
+    angles: tuple[float, ...]
+    arms: tuple[float, ...]
+    carriages: tuple[float, ...]
+
+    @property
+    def endstops(self) -> tuple[float, ...]:
+        """Height of the nozzle in the middle with each carriage at its end stop, mm."""
+        pairs = zip(self.carriages, self.arms, strict=True)
+        return tuple(at - float(np.sqrt(arm**2 - self.radius**2)) for at, arm in pairs)
+
+
+def of_robot(robot: Robot, project: bool) -> tuple[FirmwareDelta, Loss]:
+    """The firmware's numbers of a robot, and what they lose.
+
+    Raises
+    ------
+    ValueError
+        No linear delta; or one that the firmware cannot hold, unless `project`.
+    """
+    require_delta(robot)
+    firmware = as_built(robot)
+    poses, over = _workspace(firmware)
+    q = robot.inverse(poses)
+    if not np.isfinite(q).all():
+        raise ArgumentError(f"robot: {robot.name} does not reach its bed: no pose for some {over}")
+    lost = loss(as_robot(firmware, gains(robot)), q, poses, over)
+    if not lost.exact:
+        firmware = _projected(firmware, robot, q, poses)
+        lost = loss(as_robot(firmware, gains(robot)), q, poses, over)
+        if not project:
+            raise ArgumentError(
+                f"robot: {robot.name}: the firmware has one radius and vertical towers, this robot"
+                f" has not; its numbers can be projected onto that, {lost}"
+            )
+    if min(firmware.endstops) <= 0.0:
+        raise ArgumentError(
+            f"robot: {robot.name}: the end stops would be {min(firmware.endstops):.6g} mm over the"
+            " bed; q must be 0 at the end stops, so that `offset` is their height"
+        )
+    return firmware, lost
+
+
+def require_delta(robot: Robot) -> None:
+    """Refuse what is no linear delta with three carriages of its own."""
+    require_parallel(robot)
+    if not _is_linear(robot):
+        raise ArgumentError(
+            f"robot: {robot.name} is no linear delta of three PUS limbs that only translates"
+        )
+    if not is_delta(robot):
+        raise ArgumentError(
+            f"robot: {robot.name}: a firmware has no base and tool frames, and its carriages are"
+            " above the nozzle"
+        )
+
+
+def is_delta(robot: Robot) -> bool:
+    """Whether three carriages of their own, above it, move a platform that only translates."""
+    above = all(limb.branch <= 0 for limb in robot.model.limbs)
+    return _is_linear(robot) and robot.frames.trivial and above
+
+
+def _is_linear(robot: Robot) -> bool:
+    kinds = [(limb.kind, limb.actuator) for limb in robot.model.limbs]
+    return robot.model.map == "translation" and kinds == [("PUS", i) for i in range(_TOWERS)]
+
+
+def gains(robot: Robot) -> tuple[float, ...]:
+    """Mm a carriage rises for a unit of its actuator."""
+    return tuple(robot.slots[:, SLOTS.index("gain")].tolist())
+
+
+def as_built(robot: Robot) -> FirmwareDelta:
+    """The same towers, as if they were vertical and equally far: exact where they are."""
+    slots = robot.slots
+    towers = slots[:, 0:3] - slots[:, 3:6]
+    angles = np.degrees(np.arctan2(towers[:, 1], towers[:, 0])) % 360.0
+    return FirmwareDelta(
+        float(np.hypot(towers[:, 0], towers[:, 1]).mean()),
+        tuple(angles.tolist()),
+        tuple(slots[:, SLOTS.index("rod")].tolist()),
+        tuple((slots[:, SLOTS.index("offset")] + towers[:, 2]).tolist()),
+    )
+
+
+def _workspace(firmware: FirmwareDelta) -> tuple[FloatArray, str]:
+    """Poses over the bed, and what to call them."""
+    across = 0.8 * firmware.radius
+    high = max(0.0, 0.5 * min(firmware.endstops))
+    rng = np.random.default_rng(0)
+    r, angle = across * np.sqrt(rng.random(_POSES)), 2.0 * np.pi * rng.random(_POSES)
+    poses = np.zeros((_POSES, 6))
+    poses[:, 0], poses[:, 1] = r * np.cos(angle), r * np.sin(angle)
+    poses[:, 2] = high * rng.random(_POSES)
+    return poses, f"within {across:.0f} mm of the middle and {high:.0f} mm of the bed"
+
+
+def _projected(
+    firmware: FirmwareDelta, robot: Robot, q: FloatArray, poses: FloatArray
+) -> FirmwareDelta:
+    """The numbers whose model is nearest to the robot, by least squares over the poses."""
+
+    def of(x: FloatArray) -> FirmwareDelta:
+        angles, arms, carriages = (tuple(part.tolist()) for part in x[1:].reshape(3, _TOWERS))
+        return FirmwareDelta(float(x[0]), angles, arms, carriages)
+
+    start = np.array(
+        [firmware.radius, *firmware.angles, *firmware.arms, *firmware.carriages], dtype=float
+    )
+    return of(nearest(lambda x: as_robot(of(x), gains(robot)), start, q, poses))
+
+
+def as_robot(
+    firmware: FirmwareDelta, gains: Sequence[float], name: str = "linear delta", head: str = ""
+) -> Robot:
+    """The robot with the firmware's numbers; `gains` as in `text_of`."""
+    text = text_of(firmware, gains, name, head)
+    return Robot(robot_file.parse(Source(text.encode(), "the firmware's numbers"), None))
+
+
+def text_of(firmware: FirmwareDelta, gains: Sequence[float], name: str, head: str) -> str:
+    """A robot file with the firmware's numbers.
+
+    Parameters
+    ----------
+    firmware : FirmwareDelta
+        The numbers.
+    gains : sequence of float
+        Mm a carriage rises for a unit of its actuator, which is 0 at the end stop.
+    name, head : str
+        The robot's name; lines of comment.
+    """
+    parameters = {"radius": firmware.radius}
+    parameters |= {f"angle{i}": angle for i, angle in enumerate(firmware.angles, 1)}
+    blocks = [
+        head,
+        lines({"name": name, "units": {"length": "mm", "angle": "deg"}}),
+        "[pose]\n"
+        + lines({"map": "translation", "home": {"z": round(0.5 * max(firmware.endstops), 3)}}),
+        "[parameters]\n" + lines(parameters),
+        "# Heights do not determine which way x is, so angle3 stays, and hardly the rods.\n"
+        "[calibration]\n"
+        + lines({"free": ["radius", "angle1", "angle2", "offset1", "offset2", "offset3"]}),
+    ]
+    for i, (arm, carriage, gain) in enumerate(
+        zip(firmware.arms, firmware.carriages, gains, strict=True), 1
+    ):
+        base = {"radius": "radius", "angle": f"angle{i}", "z": 0.0}
+        limb: dict[str, object] = {
+            "kind": "PUS",
+            "base": base,
+            "platform": [0.0, 0.0, 0.0],
+            "slider": [0, 0, 1],
+        }
+        limb |= {"rod": arm, "offset": carriage, "gain": gain, "branch": -1}
+        blocks.append("[[limb]]\n" + lines(limb))
+    return "\n".join(block for block in blocks if block)

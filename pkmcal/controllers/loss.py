@@ -1,0 +1,61 @@
+"""How far a controller's model is from a robot, and which numbers of it are nearest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from pkmcal.arrays import FloatArray
+from pkmcal.kinematics.robot import Robot
+
+EXACT = 1e-6  # mm: firmware numbers have six decimals
+
+
+@dataclass(frozen=True)
+class Loss:
+    """How far a firmware's model is from the robot at the same actuators, over a workspace.
+
+    Attributes
+    ----------
+    rms, worst : float
+        Mm.
+    over : str
+        Over which workspace.
+    """
+
+    rms: float
+    worst: float
+    over: str
+
+    @property
+    def exact(self) -> bool:
+        """Whether the firmware holds the robot."""
+        return self.worst <= EXACT
+
+    def __str__(self) -> str:
+        return f"off by {self.rms:.2g} mm rms, {self.worst:.2g} mm at most, {self.over}"
+
+
+def off_by(model: Robot, q: FloatArray, poses: FloatArray) -> FloatArray:
+    """How far (N, 3) a model of a machine that only translates is from poses (N, 6)."""
+    found: FloatArray = model.forward(q, guess=poses).pose[:, :3] - poses[:, :3]
+    return found
+
+
+def loss(model: Robot, q: FloatArray, poses: FloatArray, over: str) -> Loss:
+    """How far a model is from poses; infinitely where it has none."""
+    off = np.nan_to_num(np.linalg.norm(off_by(model, q, poses), axis=1), nan=np.inf)
+    return Loss(float(np.sqrt((off**2).mean())), float(off.max()), over)
+
+
+def nearest(
+    model: Callable[[FloatArray], Robot], start: FloatArray, q: FloatArray, poses: FloatArray
+) -> FloatArray:
+    """The numbers whose model is nearest to poses at the same actuators, by least squares."""
+    found: FloatArray = least_squares(
+        lambda x: off_by(model(x), q, poses).ravel(), start, x_scale="jac", xtol=1e-12
+    ).x
+    return found

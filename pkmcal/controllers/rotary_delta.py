@@ -1,0 +1,210 @@
+"""A rotary delta as controllers have it: shoulders on one circle, cranks in radial planes.
+
+Klipper and LinuxCNC both have this model: a shoulder at (r cos θ, r sin θ, height), a crank that
+turns in the vertical plane through it and the z axis, and from its elbow a rod to the effector,
+whose joints stand on the z axis: only shoulder less effector counts, in radius and in height.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.controllers.c_header import prepared
+from pkmcal.controllers.loss import Loss, loss, nearest
+from pkmcal.core.library import SLOTS
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.toml_lines import Source
+from pkmcal.geometry import robot_file
+from pkmcal.geometry.robot_file_writer import lines
+from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.kinematics.workspace import sample_poses
+
+OVER = "over half of its workspace"
+_TOWERS = 3
+_POSES = 200
+
+
+@dataclass(frozen=True)
+class RotaryDelta:
+    """The numbers of a rotary delta.
+
+    Attributes
+    ----------
+    radius : float
+        Distance of each shoulder from the middle, less that of the effector's joints, mm.
+    heights : tuple of float
+        Of each shoulder over the pose z = 0, less that of the effector's joints, mm.
+    angles : tuple of float
+        Of each shoulder, deg from x.
+    cranks, rods : tuple of float
+        Upper and lower arms, mm.
+    elbows : tuple of float
+        Angle of each crank at q = 0, rad from horizontal and outward, downwards positive.
+    gains : tuple of float
+        Rad by which a crank goes down for a unit of its actuator.
+    """
+
+    radius: float
+    heights: tuple[float, ...]
+    angles: tuple[float, ...]
+    cranks: tuple[float, ...]
+    rods: tuple[float, ...]
+    elbows: tuple[float, ...]
+    gains: tuple[float, ...]
+
+    @property
+    def endstops(self) -> tuple[float, ...]:
+        """Height of the pose in the middle with each crank at its end stop, q = 0; mm."""
+        found = []
+        limbs = zip(self.heights, self.cranks, self.rods, self.elbows, strict=True)
+        for height, crank, rod, elbow in limbs:
+            across = self.radius + crank * np.cos(elbow)
+            down = crank * np.sin(elbow) + np.sqrt(max(rod**2 - across**2, 0.0))
+            found.append(float(height - down))
+        return tuple(found)
+
+
+def elbow_at(endstop: float, radius: float, height: float, crank: float, rod: float) -> float:
+    """Angle of a crank below the horizontal with the pose in the middle, its knee outward; rad."""
+    down = height - endstop
+    way = np.hypot(radius, down)
+    inner = np.arccos((crank**2 + way**2 - rod**2) / (2.0 * crank * way))
+    return float(np.arctan2(down, -radius) - inner)
+
+
+def of_robot(robot: Robot, project: bool, one_height: bool) -> tuple[RotaryDelta, Loss]:
+    """The numbers of a robot, with one height or three, and what they lose.
+
+    Raises
+    ------
+    ValueError
+        No rotary delta; or one that the model cannot hold, unless `project`.
+    """
+    require_rotary_delta(robot)
+    home = float(robot.home[2])
+    delta = as_built(robot, one_height)
+    poses = sample_poses(robot, _POSES)
+    q = robot.inverse(poses)
+    lost = loss(as_robot(delta, home), q, poses, OVER)
+    if not lost.exact:
+
+        def of(x: FloatArray) -> RotaryDelta:
+            heights = x[13:] if len(x) > 14 else np.repeat(x[13:], _TOWERS)
+            angles, cranks, rods, elbows = map(tuple, x[1:13].reshape(4, _TOWERS).tolist())
+            numbers = (float(x[0]), tuple(heights.tolist()), angles, cranks, rods, elbows)
+            return RotaryDelta(*numbers, delta.gains)
+
+        heights = delta.heights[: 1 if one_height else _TOWERS]
+        start = [delta.radius, *delta.angles, *delta.cranks, *delta.rods, *delta.elbows, *heights]
+        delta = of(nearest(lambda x: as_robot(of(x), home), np.array(start), q, poses))
+        lost = loss(as_robot(delta, home), q, poses, OVER)
+        if not project:
+            raise ArgumentError(
+                f"robot: {robot.name}: the firmware has one radius{' and one height' * one_height},"
+                f" and cranks that turn in radial planes, this robot has not; its numbers can be"
+                f" projected onto that, {lost}"
+            )
+    if min(delta.endstops) <= 0.0:
+        raise ArgumentError(
+            f"robot: {robot.name}: the end stops would be {min(delta.endstops):.6g} mm over the"
+            " bed; the pose must be that of the nozzle over it, and q 0 at the end stops"
+        )
+    return delta, lost
+
+
+def require_rotary_delta(robot: Robot) -> None:
+    """Refuse what is no rotary delta with three cranks of its own."""
+    require_parallel(robot)
+    if not is_rotary_delta(robot):
+        raise ArgumentError(
+            f"robot: {robot.name} is no rotary delta of three RUS limbs that only translates, or"
+            " has base and tool frames"
+        )
+
+
+def is_rotary_delta(robot: Robot) -> bool:
+    """Whether three cranks of their own move a platform that only translates."""
+    limbs = robot.model.limbs
+    kinds = [(limb.kind, limb.actuator) for limb in limbs]
+    cranks = kinds == [("RUS", i) for i in range(_TOWERS)]
+    return robot.model.map == "translation" and cranks and robot.frames.trivial
+
+
+def as_built(robot: Robot, one_height: bool = True) -> RotaryDelta:
+    """The same cranks, as if they were alike and turned in radial planes: exact where they do."""
+    slots = robot.slots
+    shoulders = slots[:, 0:3] - slots[:, 3:6]
+    heights = shoulders[:, 2]
+    radius = np.hypot(shoulders[:, 0], shoulders[:, 1])
+    first, second, _, _ = prepared(robot)
+    drive = slots[:, SLOTS.index("offset")]
+    elbows, gains = [], []
+    for i, outward in enumerate(shoulders / radius[:, None]):
+        plane = np.array([[outward[0], outward[1], 0.0], [0.0, 0.0, -1.0]])
+        zero, turned = plane @ first[i], plane @ second[i]
+        sense = float(np.sign(zero[0] * turned[1] - zero[1] * turned[0])) or 1.0
+        angle = np.arctan2(zero[1], zero[0]) + sense * drive[i]
+        elbows.append(float(np.arctan2(np.sin(angle), np.cos(angle))))
+        gains.append(sense * float(slots[i, SLOTS.index("gain")]))
+    return RotaryDelta(
+        float(radius.mean()),
+        tuple((np.full(_TOWERS, heights.mean()) if one_height else heights).tolist()),
+        tuple((np.degrees(np.arctan2(shoulders[:, 1], shoulders[:, 0])) % 360.0).tolist()),
+        tuple(slots[:, SLOTS.index("crank")].tolist()),
+        tuple(slots[:, SLOTS.index("rod")].tolist()),
+        tuple(elbows),
+        tuple(gains),
+    )
+
+
+def as_robot(delta: RotaryDelta, home: float, name: str = "rotary delta", head: str = "") -> Robot:
+    """The robot with these numbers, as it is in `text_of`."""
+    source = Source(text_of(delta, home, name, head).encode(), "the firmware's numbers")
+    return Robot(robot_file.parse(source, None))
+
+
+def text_of(delta: RotaryDelta, home: float, name: str, head: str) -> str:
+    """A robot file with these numbers.
+
+    Parameters
+    ----------
+    delta : RotaryDelta
+        The numbers.
+    home : float
+        Height of the home pose, mm.
+    name, head : str
+        The robot's name; lines of comment.
+    """
+    alike = len(set(delta.heights)) == 1
+    parameters = {"radius": delta.radius} | ({"height": delta.heights[0]} if alike else {})
+    parameters |= {f"angle{i}": angle for i, angle in enumerate(delta.angles, 1)}
+    heights = ["height"] if alike else ["base*.z"]
+    free = ["radius", *heights, "offset1", "offset2", "offset3"]
+    blocks = [
+        head,
+        lines({"name": name, "units": {"length": "mm", "angle": "deg"}}),
+        "[pose]\n" + lines({"map": "translation", "home": {"z": home}}),
+        "[parameters]\n" + lines(parameters),
+        "# The angles stay: the axes of the cranks would not turn with them.\n"
+        "[calibration]\n" + lines({"free": free}),
+    ]
+    for i in range(_TOWERS):
+        angle = np.radians(delta.angles[i])
+        base: dict[str, object] = {"radius": "radius", "angle": f"angle{i + 1}", "z": "height"}
+        if not alike:
+            base["z"] = delta.heights[i]
+        limb: dict[str, object] = {"kind": "RUS", "base": base, "platform": [0.0, 0.0, 0.0]}
+        limb |= {"axis": _point(-np.sin(angle), np.cos(angle))}
+        limb |= {"zero": _point(np.cos(angle), np.sin(angle))}
+        limb |= {"crank": delta.cranks[i], "rod": delta.rods[i]}
+        limb |= {"offset": float(np.degrees(delta.elbows[i])), "branch": 1}
+        limb |= {"gain": delta.gains[i]}
+        blocks.append("[[limb]]\n" + lines(limb))
+    return "\n".join(block for block in blocks if block)
+
+
+def _point(x: float, y: float) -> list[float]:
+    return [float(x), float(y), 0.0]

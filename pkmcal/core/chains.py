@@ -1,0 +1,344 @@
+"""A machine of chains in the compiled core: limbs as joints in a row, passive ones eliminated."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from pkmcal._core import ffi, lib
+from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.core.chain_rates import actuator_rates, platform_motion
+from pkmcal.core.library import ISA, MAPS, call, in_threads, part, pointer
+from pkmcal.core.machine import CLOSURE_TOLERANCE, Closure, Machine
+
+MAX_CHAIN: int = lib.PKM_MAX_CHAIN
+MAX_JOINTS: int = lib.PKM_MAX_JOINTS
+MAX_SHARED: int = lib.PKM_MAX_SHARED
+MAX_CHAIN_ROWS: int = lib.PKM_MAX_CHAIN_ROWS
+MAX_NUMBERS: int = lib.PKM_MAX_NUMBERS
+GROUPS = {"spatial": 6, "planar": 3, "spherical": 3}  # pose maps of chains, and the rows of a chain
+
+
+@dataclass(frozen=True, eq=False)
+class ChainLayout:
+    """What of a machine of chains does not change with its numbers.
+
+    Joints count once where chains share them. Places are those of numbers in the geometry.
+
+    Attributes
+    ----------
+    map : str
+        A key of `GROUPS`.
+    home : ndarray (4, 4)
+        The platform's frame at home.
+    size, length : float
+        Of the machine, and at which radius a rotation counts as its arc, mm.
+    numbers : int
+        How many the geometry has.
+    first : ndarray of int (chains + 1)
+        Where each chain begins in `member`.
+    member : ndarray of int
+        Joints from base to platform, chain after chain.
+    ball : ndarray of int (chains)
+        Whether the chain ends in a ball, behind its joints.
+    end_place, ball_place : ndarray of int (chains)
+        Of the six errors on the platform's side, and of the ball's three.
+    end : ndarray (chains, 3)
+        The point on the platform, at home.
+    prismatic, actuator, coordinate, place : ndarray of int (joints)
+        Whether it slides, its actuator or -1, which of the passive ones it is or -1 (those that
+        chains share first), and where its six errors are.
+    axes : ndarray (joints, 3, 3)
+        At home; the third column is the joint's own.
+    point : ndarray (joints, 3)
+        At home.
+    soft : ndarray (joints)
+        Compliance beside that of the others.
+    drive_place : ndarray of int (actuators)
+        Of the offset; the gain follows.
+    zero : ndarray (actuators)
+        What the actuators read at home.
+    near : ndarray (actuators)
+        The coordinate that an angle is given nearest to.
+    """
+
+    map: str
+    home: FloatArray
+    size: float
+    length: float
+    numbers: int
+    first: Int32Array
+    member: Int32Array
+    ball: Int32Array
+    end_place: Int32Array
+    ball_place: Int32Array
+    end: FloatArray
+    prismatic: Int32Array
+    actuator: Int32Array
+    coordinate: Int32Array
+    place: Int32Array
+    axes: FloatArray
+    point: FloatArray
+    soft: FloatArray
+    drive_place: Int32Array
+    zero: FloatArray
+    near: FloatArray
+
+    @property
+    def shared(self) -> int:
+        """How many passive joints are in several chains."""
+        chains = np.diff(self.first)
+        of = np.repeat(np.arange(len(chains)), chains)
+        users = [len(set(of[self.member == joint])) for joint in range(len(self.place))]
+        return int(((np.array(users) > 1) & (self.coordinate >= 0)).sum())
+
+    @property
+    def passive(self) -> int:
+        """How many joints no actuator moves."""
+        return int((self.coordinate >= 0).sum())
+
+    @property
+    def rows(self) -> int:
+        """How many rows the chains leave when each has eliminated the passive joints of its own."""
+        own = self.coordinate[self.member] >= self.shared
+        most = np.where(self.ball != 0, 3, GROUPS[self.map])
+        return int(most.sum() - own.sum())
+
+
+class ChainMachine:
+    """A machine of chains in the core, with the calls of `pkmcal.core.machine.Machine`.
+
+    Parameters
+    ----------
+    layout : ChainLayout
+        The machine.
+    closure_tolerance : float, optional
+        What more rows than unknowns may miss, mm; by default `CLOSURE_TOLERANCE` of the size.
+    isa : int
+        Index into `ISAS`.
+    """
+
+    def __init__(
+        self, layout: ChainLayout, closure_tolerance: float | None = None, isa: int = ISA
+    ) -> None:
+        struct = ffi.new("pkm_chains *")
+        self.layout = layout
+        self._kept = {  # C has pointers to these
+            each.name: np.ascontiguousarray(value)
+            for each in fields(layout)
+            if isinstance(value := getattr(layout, each.name), np.ndarray)
+        }
+        for name, array in self._kept.items():
+            if name == "home":
+                struct.home[0:12] = array[:3].ravel().tolist()
+            elif name != "near":
+                setattr(struct, name, pointer(array))
+        struct.map = list(MAPS).index(layout.map)
+        struct.chains = len(layout.ball)
+        struct.joints, struct.actuators = len(layout.place), len(layout.zero)
+        struct.passive, struct.shared = layout.passive, layout.shared
+        struct.numbers = layout.numbers
+        struct.size, struct.length = layout.size, layout.length
+        if closure_tolerance is None:
+            closure_tolerance = CLOSURE_TOLERANCE * layout.size
+        struct.closure_tolerance = closure_tolerance
+        self.m = len(MAPS[layout.map])
+        self.rows = layout.rows - layout.shared
+        struct.over = int(self.rows > self.m)
+        self.struct, self.isa = struct, isa
+        self.actuators: int = struct.actuators
+        turning = {
+            a for a, slides in zip(layout.actuator, layout.prismatic, strict=True) if not slides
+        }
+        self._angles = sorted(int(a) for a in turning if a >= 0)
+
+    def with_tolerance(self, closure_tolerance: float) -> ChainMachine:
+        """The same with another `closure_tolerance`, mm."""
+        other = copy(self)
+        other.struct = ffi.new("pkm_chains *", self.struct[0])
+        other.struct.closure_tolerance = closure_tolerance
+        return other
+
+    def inverse(
+        self, slots: FloatArray, pose: FloatArray, near: FloatArray | None = None
+    ) -> FloatArray:
+        """Poses (N, 6) to actuator coordinates (N, n), each chain alone from its home.
+
+        Angles as `pkmcal.core.machine.Machine.inverse` gives them.
+        """
+        q = np.empty((len(pose), self.actuators))
+        call("chain_inverse", self.struct, len(pose), slots, 0, pose, q, isa=self.isa)
+        return self.nearest_turns(slots, q, near)
+
+    def turns(self, slots: FloatArray) -> FloatArray:
+        """How far each actuator goes in a whole turn, (n,); infinite where it is no angle."""
+        out = np.full(self.actuators, np.inf)
+        gain = slots.ravel()[self.layout.drive_place + 1]
+        out[self._angles] = 2 * np.pi / np.abs(gain[self._angles])
+        return out
+
+    def nearest_turns(
+        self, slots: FloatArray, q: FloatArray, near: FloatArray | None = None
+    ) -> FloatArray:
+        """Coordinates (N, n) with whole turns added, as `inverse` gives them."""
+        if not self._angles:
+            return q
+        out: FloatArray = q.copy()
+        turns = self.turns(slots)
+        about = np.broadcast_to(self.layout.near if near is None else near, q.shape)
+        for a in self._angles:
+            out[:, a] -= turns[a] * np.rint((q[:, a] - about[:, a]) / turns[a])
+        return out
+
+    def forward(
+        self,
+        slots: FloatArray,
+        q: FloatArray,
+        guess: FloatArray,
+        threads: int | None,
+        shape: tuple[int, ...] | None = None,
+    ) -> tuple[FloatArray, Int32Array, Int32Array, FloatArray]:
+        """Actuator coordinates (N, n) to pose, status, iterations and residual.
+
+        As `pkmcal.core.machine.Machine.forward`.
+        """
+        n, shape = len(q), (len(q),) if shape is None else shape
+        pose, residual = np.empty((n, 6)), np.empty(n)
+        passive = np.empty((n, self.struct.passive))
+        status, iterations = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
+        stride = slots[0].size if slots.ndim == 3 else 0
+        guess_stride = 6 if guess.ndim == 2 else 0
+
+        def run(start: int, stop: int) -> None:
+            geometry = part(slots, start, stop) if stride else slots
+            begin = part(guess, start, stop) if guess_stride else guess
+            whole = (pose, passive, status, iterations, residual)
+            found = [part(each, start, stop) for each in whole]
+            given = (geometry, stride, part(q, start, stop), begin, guess_stride)
+            call("chain_forward", self.struct, stop - start, *given, *found, isa=self.isa)
+
+        in_threads(run, n, threads)
+        return (
+            pose.reshape(*shape, 6),
+            status.reshape(shape),
+            iterations.reshape(shape),
+            residual.reshape(shape),
+        )
+
+    def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """∂q/∂free at poses (N, 6): (N, n, m); the least squares of the closures."""
+        closure = self.closure(slots, pose, self.inverse(slots, pose))
+        out = np.full((len(pose), self.actuators, self.m), np.nan)
+        good = np.isfinite(closure.by_q).all(axis=(1, 2)) & np.isfinite(closure.by_free).all((1, 2))
+        out[good] = -np.linalg.pinv(closure.by_q[good]) @ closure.by_free[good]
+        return out
+
+    def forward_jacobian(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool = False
+    ) -> FloatArray:
+        """∂pose/∂q at poses (N, 6): (N, 6, n), or of the twist (ω, v) of the platform by them."""
+        out = np.empty((len(pose), 6, self.actuators))
+        given = (len(pose), slots, 0, pose, q, None, self.actuators, twists)
+        call("chain_response", self.struct, *given, out, isa=self.isa)
+        return out
+
+    def error_jacobian(
+        self,
+        slots: FloatArray,
+        pose: FloatArray,
+        q: FloatArray,
+        columns: Int32Array,
+        twists: bool = False,
+    ) -> FloatArray:
+        """∂pose/∂(numbers at `columns` of the geometry): (N, 6, columns).
+
+        Or of the twist (ω, v) of the platform by them.
+        """
+        out = np.empty((len(pose), 6, len(columns)))
+        given = (len(pose), slots, 0, pose, q, columns, len(columns), twists)
+        call("chain_response", self.struct, *given, out, isa=self.isa)
+        return out
+
+    def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
+        """The rows that the passive joints leave, and their derivatives.
+
+        As `pkmcal.core.machine.Machine.closure`. A chain whose passive joints hold 6 - k directions
+        of the platform has k rows, in mm.
+        """
+        n, rows, shared = len(pose), self.layout.rows, self.struct.shared
+        out = Closure(
+            np.empty((n, rows)),
+            np.empty((n, rows, self.m + shared)),
+            np.empty((n, rows, self.m)),
+            np.empty((n, rows, self.actuators)),
+            np.empty((n, 6)),
+            np.empty((n, 6, self.m)),
+        )
+        stride = slots[0].size if slots.ndim == 3 else 0
+        call("chain_closure", self.struct, n, slots, stride, pose, q, *out, isa=self.isa)
+        return _without_shared(out, self.m) if shared else out
+
+    def frames(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Passive joints (N, passive) at poses (N, 6) and coordinates (N, n), and all frames.
+
+        Of each chain those of its joints before they move and that of its end, (N, joints + 1 of
+        each chain, 12): R row by row and p.
+        """
+        layout = self.layout
+        passive = np.empty((len(pose), self.struct.passive))
+        frames = np.empty((len(pose), len(layout.member) + len(layout.ball), 12))
+        given = (len(pose), slots, 0, pose, q)
+        call("chain_frames", self.struct, *given, passive, frames, isa=self.isa)
+        return passive, frames
+
+    def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Velocity and acceleration of the actuators, as `pkmcal.core.machine.Machine.rates`."""
+
+        def inverse(pose: FloatArray) -> FloatArray:
+            return self.inverse(slots, pose)
+
+        return actuator_rates(inverse, self.turns(slots), self.layout.size, motion)
+
+    def motion(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, q1: FloatArray, q2: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The platform's motion, as `pkmcal.core.machine.Machine.motion`."""
+
+        def forward(at: FloatArray) -> FloatArray:
+            return self.forward(slots, at, pose, threads=None)[0]
+
+        scale = np.full(self.actuators, 1.0 / self.layout.size)
+        scale[self._angles] = 1.0
+        return platform_motion(forward, pose, q, q1, q2, scale)
+
+    def closure_cost(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
+        """Sum of the squared closures over poses (M, 6) and coordinates (M, n), mm².
+
+        For each of N geometries (N, 1, numbers); (N,).
+        """
+        costs = [(self.closure(each, pose, q).residual ** 2).sum() for each in slots]
+        return np.array(costs)
+
+
+AnyMachine = Machine | ChainMachine
+
+
+def _without_shared(closure: Closure, m: int) -> Closure:
+    """Rows that the joints which chains share leave: those across their columns."""
+    by_step, shared = closure.by_step[..., :m], closure.by_step[..., m:]
+    good = np.isfinite(shared).all(axis=(1, 2))
+    rows, count = shared.shape[1:]
+    across = np.full((len(shared), rows - count, rows), np.nan)
+    across[good] = np.linalg.qr(shared[good], mode="complete")[0][..., count:].swapaxes(1, 2)
+    return Closure(
+        (across @ closure.residual[..., None])[..., 0],
+        across @ by_step,
+        across @ closure.by_free,
+        across @ closure.by_q,
+        closure.pose,
+        closure.pose_by_free,
+    )

@@ -1,0 +1,27 @@
+"""Robots for controllers, and back: `pk.export`."""
+
+from pkmcal.controllers.arm_dh import dh, universal_robots
+from pkmcal.controllers.c_header import c_header
+from pkmcal.controllers.delta_gcode import marlin, reprap
+from pkmcal.controllers.hangprinter import hangprinter
+from pkmcal.controllers.import_printer import Printer
+from pkmcal.controllers.klipper import klipper
+from pkmcal.controllers.linuxcnc import linuxcnc
+from pkmcal.controllers.loss import Loss
+from pkmcal.controllers.mjcf import mjcf
+from pkmcal.controllers.urdf import urdf
+
+__all__ = [
+    "Loss",
+    "Printer",
+    "c_header",
+    "dh",
+    "hangprinter",
+    "klipper",
+    "linuxcnc",
+    "marlin",
+    "mjcf",
+    "reprap",
+    "universal_robots",
+    "urdf",
+]

@@ -1,0 +1,163 @@
+"""Which line of a table names its columns, and what the lines above it say."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pkmcal.exceptions import FileError
+from pkmcal.files import units
+from pkmcal.files.text_rows import TextRows, cells, is_number
+
+Row = tuple[int, list[str]]
+POINTS = ("collection", "group", "name")  # names before the coordinates, where no line names them
+
+
+@dataclass
+class Header:
+    """The headings of a table, its rows, and what was said or assumed about them.
+
+    Attributes
+    ----------
+    line : int
+        Where the headings stand; 0 where no line holds them.
+    headings : list of str
+        One for each column, each different where the file tells them apart.
+    rows : list of (int, list of str)
+        What is below.
+    units : dict of str to (str, int)
+        Units of lengths ("mm") and angles ("rad") that lines above state, with those lines.
+    notes : list of str
+        What was assumed.
+    """
+
+    line: int
+    headings: list[str]
+    rows: list[Row]
+    units: dict[str, tuple[str, int]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def find_header(path: Path, text: TextRows, recognised: Callable[[str], bool]) -> Header:
+    """Find the line of column names: of those above the first numbers the one most recognised.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    text : TextRows
+        The lines of the file.
+    recognised : callable
+        Whether a heading is one of a column that is known.
+
+    Raises
+    ------
+    ValueError
+        The file is empty, or no line names the columns.
+    """
+    rows = text.rows
+    if not rows:
+        raise FileError(f"{path}: the file is empty: expected a line of column names")
+    first = _first_data(rows)
+    stated = units.stated_in([*text.comments, *((n, " ".join(r)) for n, r in rows[:first])])
+    if first == 0:
+        header = _without(path, text, recognised)
+        header.units = stated
+        return header
+    above = rows[: first or 1]
+    counts = [sum(recognised(cell) for cell in row) for _, row in above]
+    best = max(range(len(above)), key=lambda i: (counts[i], i if counts[i] else -i))
+    line, headings = above[best]
+    below = rows[best + 1 :]
+    header = Header(line, list(headings), below, stated)
+    if below and _are_units(below[0][1]):
+        _give_units(header, below[0][1])
+        header.rows = below[1:]
+    _tell_apart(header.headings, [row for _, row in above[:best]])
+    if best:
+        lines = f"lines {above[0][0]} to {above[best - 1][0]}" if best > 1 else "line 1"
+        what = "lie" if best > 1 else "lies"
+        lines = lines if best > 1 else f"line {above[0][0]}"
+        header.notes.append(f"column names in line {line}; {lines} above {what} outside the table")
+    return header
+
+
+def _first_data(rows: Sequence[Row]) -> int | None:
+    """The first row of numbers; None where there is none."""
+    width = Counter(len(row) for _, row in rows).most_common(1)[0][0]
+    for i, (_, row) in enumerate(rows):
+        filled = [cell for cell in row if cell]
+        numbers = sum(map(is_number, filled))
+        if len(row) == width and numbers and (numbers > 1 or 2 * numbers >= len(filled)):
+            return i
+    return None
+
+
+def _are_units(row: Sequence[str]) -> bool:
+    filled = [cell.strip("[]() ") for cell in row if cell]
+    return bool(filled) and all(units.quantity_of(cell) or _is_other(cell) for cell in filled)
+
+
+def _is_other(cell: str) -> bool:
+    """A unit of time, temperature or nothing, beside those of lengths and angles."""
+    return cell.lower() in ("s", "sec", "ms", "hz", "-", "°c", "c", "degc", "k")
+
+
+def _give_units(header: Header, row: Sequence[str]) -> None:
+    for i, cell in enumerate(row[: len(header.headings)]):
+        bare = cell.strip("[]() ")
+        if bare and "[" not in header.headings[i]:
+            header.headings[i] += f" [{bare}]"
+
+
+def _tell_apart(headings: list[str], above: Sequence[Sequence[str]]) -> None:
+    """Put before headings that are alike what stands above them, one line after the other.
+
+    A blank heading is called what stands above it.
+    """
+    for row in reversed(above):
+        groups = Counter(heading for heading in headings)
+        if all(count == 1 or not heading for heading, count in groups.items()) and "" not in groups:
+            return
+        filled, last = [], ""
+        for cell in [*row, *[""] * len(headings)][: len(headings)]:
+            last = cell or last
+            filled.append(last)
+        put: set[int] = set()
+        for name in {h for h, count in groups.items() if count > 1 and h}:
+            places = [i for i, heading in enumerate(headings) if heading == name]
+            if len({filled[i] for i in places}) > 1:
+                parents = {filled[i] for i in places} - {""}
+                put |= {i for i, parent in enumerate(filled) if parent in parents and headings[i]}
+        for i in put:
+            headings[i] = f"{filled[i]} {headings[i]}"
+        for i, heading in enumerate(headings):
+            if not heading and i < len(row):
+                headings[i] = row[i]
+
+
+def _without(path: Path, text: TextRows, recognised: Callable[[str], bool]) -> Header:
+    """A table whose first line holds numbers: the names are in a comment, or names and x y z."""
+    line, first = text.rows[0]
+    for number, comment in reversed(text.comments):
+        names = cells(path, number, comment, text.separator) if comment else []
+        if (
+            ":" not in comment
+            and len(names) == len(first)
+            and 2 * sum(map(recognised, names)) >= len(names)
+        ):
+            note = f"column names in line {number}, a comment"
+            return Header(number, names, text.rows, notes=[note])
+    words = sum(not is_number(cell) for cell in first)
+    leads = all(not is_number(cell) for cell in first[:words])
+    if leads and 0 < words <= len(POINTS) and len(first) == words + 3:
+        named = [*POINTS[-words:], "x", "y", "z"]
+        note = f"no line of column names; taken as {', '.join(named)}"
+        return Header(0, named, text.rows, notes=[note])
+    raise FileError(
+        f"{path}, line {line}: found {len(first)} cells with numbers, expected a line of column"
+        " names above them; write one, such as q1 [mm],x [mm], or name the columns with header ="
+        " [...] in the file of --columns"
+    )

@@ -1,0 +1,149 @@
+"""The text of a table as lines and cells: its encoding, what separates its columns, its comments.
+
+Python's csv splits a line; its Sniffer guesses the separator from letters and would take a decimal
+comma for one, so that the separator is found here, by which most lines have equally many cells.
+"""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+import re
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pkmcal.exceptions import FileError
+
+SEPARATORS = ("\t", ";", ",", " ")  # the first of those that fit equally well
+_LOOKED_AT = 200  # lines
+_COMMENT = re.compile(r"\s*(?:#|//|%)+")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
+_TRIGGER = re.compile(  # Klipper and Kalico; Marlin
+    r"probe at (-?[0-9.]+),(-?[0-9.]+) is z=(-?[0-9.]+)"
+    r"|Bed X: ?(-?[0-9.]+) Y: ?(-?[0-9.]+) Z: ?(-?[0-9.]+)"
+)
+_REPORTS = ("probe at ", "Bed X:")  # what such lines hold
+_GAP = re.compile(r" {2,}")
+_BRACKET = re.compile(r"\s+(?=[\[(])")
+
+
+@dataclass
+class TextRows:
+    """Lines of a text, numbered from 1.
+
+    Attributes
+    ----------
+    rows : list of (int, list of str)
+        Cells of the lines that are neither empty nor comments.
+    comments : list of (int, str)
+        Comments, without what begins them.
+    separator : str
+        What separates cells.
+    notes : list of str
+        What had to be assumed.
+    """
+
+    rows: list[tuple[int, list[str]]] = field(default_factory=list)
+    comments: list[tuple[int, str]] = field(default_factory=list)
+    separator: str = ","
+    notes: list[str] = field(default_factory=list)
+
+
+def is_number(cell: str) -> bool:
+    """Whether a cell holds a number, with a point or a comma."""
+    return _NUMBER.fullmatch(cell) is not None
+
+
+def text_rows(path: Path, content: bytes) -> TextRows:
+    """Split a text into lines and cells."""
+    text, notes = _decoded(path, content)
+    found = TextRows(notes=notes)
+    lines: list[tuple[int, str]] = []
+    for number, line in enumerate(io.StringIO(text, newline=None), start=1):
+        if line.isspace() or line.startswith("\x1a"):  # the end of a file, once
+            continue
+        if match := _COMMENT.match(line):
+            found.comments.append((number, line[match.end() :].strip()))
+        else:
+            lines.append((number, line.rstrip("\n")))
+    if any(words in text for words in _REPORTS):
+        triggers = [
+            (n, m) for n, line in enumerate(text.splitlines(), 1) if (m := _TRIGGER.search(line))
+        ]
+        if triggers:
+            _take_triggers(found, triggers)
+            return found
+    found.separator = _separator([line for _, line in lines[:_LOOKED_AT]])
+    found.rows = [(number, cells(path, number, line, found.separator)) for number, line in lines]
+    if found.separator == " ":
+        _widen_headings(found, lines)
+    return found
+
+
+def _take_triggers(found: TextRows, triggers: list[tuple[int, re.Match[str]]]) -> None:
+    """Make a table of the lines in which a firmware reports its probe."""
+    found.rows = [(triggers[0][0], ["x [mm]", "y [mm]", "probe [mm]"])]
+    found.rows += [(n, [part for part in m.groups() if part is not None]) for n, m in triggers]
+    found.notes.append(f"{len(triggers)} lines in which a firmware reports its probe")
+
+
+def cells(path: Path, line: int, text: str, separator: str) -> list[str]:
+    """The cells of one line."""
+    try:
+        (found,) = csv.reader([text], delimiter=separator, skipinitialspace=True, strict=True)
+    except csv.Error as error:
+        raise FileError(f"{path}, line {line}: {error}") from None
+    if separator == " ":
+        found = [cell for cell in found if cell]
+    return [cell.strip() for cell in found]
+
+
+def _decoded(path: Path, content: bytes) -> tuple[str, list[str]]:
+    if content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        encoding = "utf-16"
+    else:
+        encoding = "utf-8-sig"
+    try:
+        return content.decode(encoding), []
+    except UnicodeDecodeError as error:
+        reason = error.reason
+    try:
+        text = content.decode("cp1252" if encoding == "utf-8-sig" else encoding)
+    except UnicodeDecodeError:
+        text = "\0"
+    if any(c < " " and c not in "\t\n\r\f\x1a" for c in text):
+        raise FileError(f"{path}: not a UTF-8 text file ({reason})")
+    return text, ["not UTF-8, read as Windows-1252"]
+
+
+def _separator(lines: list[str]) -> str:
+    """What gives most lines equally many cells."""
+    best, most = ",", 0
+    for separator in SEPARATORS:
+        counts: Counter[int] = Counter()
+        for line in lines:
+            try:
+                (split,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
+            except (csv.Error, ValueError):
+                continue
+            counts[len([c for c in split if c] if separator == " " else split)] += 1
+        del counts[1], counts[0]
+        fitting = max(counts.values(), default=0)
+        if separator == " " and fitting < 2:
+            continue
+        if fitting > most:
+            best, most = separator, fitting
+    return best
+
+
+def _widen_headings(found: TextRows, lines: list[tuple[int, str]]) -> None:
+    """Names of several words between spaces: two spaces part them, or a bracket belongs to one."""
+    width = Counter(len(row) for _, row in found.rows).most_common(1)[0][0]
+    for i, (number, line) in enumerate(lines):
+        if len(found.rows[i][1]) > width:
+            for split in (_GAP.split(line.strip()), _BRACKET.sub("", line).split()):
+                if len(split) == width:
+                    found.rows[i] = (number, split)
+                    break

@@ -1,0 +1,395 @@
+"""Limbs as chains of joints: what a robot file says of them, and the machine the core makes of it.
+
+A joint of several axes (U, S, C) is listed once and stands for a row of R and P, its parts: the
+second and third have the letters b and c behind their number. A ball, an S without axes of its
+own, has no orientation to be wrong: behind all other joints it closes in a point, elsewhere it is
+three R of which only the place can be wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, Unit
+from pkmcal.core.chains import ChainLayout
+from pkmcal.display import Table, fixed
+from pkmcal.geometry.ties import LimbNumber
+from pkmcal.screw import from_pose
+
+ERRORS = ("dx", "dy", "dz", "dphi", "dtheta", "dpsi")  # as of serial arms
+BY_MAP: dict[str, tuple[str, ...]] = {  # what can be wrong in a group
+    "spatial": ERRORS,
+    "planar": ("dx", "dy", "dpsi"),
+    "spherical": ("dphi", "dtheta", "dpsi"),
+}
+PARTS = ("", "b", "c")
+_DEPENDENT = 1e-7  # of the largest singular value: the least is none
+JointKind = Literal["R", "P", "U", "S", "C"]
+KINDS: dict[str, str] = {
+    "R": "revolute", "P": "prismatic", "U": "universal", "S": "spherical", "C": "cylindrical",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint as the file lists it, the machine at home; mm and rad.
+
+    Attributes
+    ----------
+    kind : {"R", "P", "U", "S", "C"}
+        What it is.
+    at : ndarray (3,)
+        Its point, in the base frame.
+    axes : tuple of ndarray (3,)
+        Unit vectors: of R, P and C one, of U two, of S three, or none of a ball.
+    actuator : int or None
+        Which actuator moves it, counted from 0.
+    share : str or None
+        What limbs call it that have it in common.
+    home_value : float
+        What its actuator reads at home.
+    stroke : tuple of float or None
+        Limits of what it turns or slides: of an actuated joint the drive, else from home.
+    cone : float or None
+        How far U and S bend from home, rad.
+    soft : float
+        Compliance beside that of other joints.
+    """
+
+    kind: JointKind
+    at: FloatArray
+    axes: tuple[FloatArray, ...]
+    actuator: int | None = None
+    share: str | None = None
+    home_value: float = 0.0
+    stroke: tuple[float, float] | None = None
+    cone: float | None = None
+    soft: float = 1.0
+
+    @property
+    def ball(self) -> bool:
+        """Whether it is an S that has no axes of its own."""
+        return self.kind == "S" and not self.axes
+
+    @property
+    def parts(self) -> int:
+        """How many axes it has."""
+        return {"R": 1, "P": 1, "U": 2, "C": 2, "S": 3}[self.kind]
+
+    @property
+    def unit(self) -> Unit:
+        """Of what it turns or slides."""
+        return "mm" if self.kind == "P" else "rad"
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One axis of a joint, once where limbs share it."""
+
+    name: str
+    slides: bool
+    axis: FloatArray
+    joint: Joint
+    limb: int
+    errors: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Chains:
+    """The limbs of a machine of chains.
+
+    Attributes
+    ----------
+    map : str
+        Pose map.
+    home : ndarray (6,)
+        Of the platform.
+    limbs : tuple of tuple of Joint
+        Of each limb its joints from the base to the platform.
+    """
+
+    map: str
+    home: FloatArray
+    limbs: tuple[tuple[Joint, ...], ...]
+
+    @property
+    def n_actuators(self) -> int:
+        """Number of actuators."""
+        return 1 + max(
+            (j.actuator for limb in self.limbs for j in limb if j.actuator is not None), default=-1
+        )
+
+    @cached_property
+    def actuated(self) -> tuple[tuple[int, Joint], ...]:
+        """Of each actuator the first limb that has it, and the joint it moves."""
+        found: dict[int, tuple[int, Joint]] = {}
+        for i, limb in enumerate(self.limbs):
+            for joint in limb:
+                if joint.actuator is not None:
+                    found.setdefault(joint.actuator, (i, joint))
+        return tuple(found[a] for a in sorted(found))
+
+    def table(self) -> Table:
+        """Every joint, from the base to the platform, in the base frame, the machine at home."""
+        rows = []
+        for i, limb in enumerate(self.limbs, 1):
+            for k, joint in enumerate(limb, 1):
+                drive = "" if joint.actuator is None else f"q{joint.actuator + 1}"
+                place = [fixed(float(x), 3) for x in joint.at]
+                rows.append([str(i), joint.share or str(k), joint.kind, drive, *place])
+        return Table(
+            ["limb", "joint", "kind", "actuator", "x [mm]", "y [mm]", "z [mm]"], rows, left=4
+        )
+
+    @property
+    def arms(self) -> tuple[tuple[Joint, float], ...]:
+        """Of each actuator its joint, and how far from its axis the next joint elsewhere is, mm."""
+        found = []
+        for i, joint in self.actuated:
+            limb = self.limbs[i]
+            arm = self.length
+            for other in limb[limb.index(joint) + 1 :]:
+                way = np.cross(other.at - joint.at, joint.axes[0])
+                if np.linalg.norm(way) > 1e-9 * self.size:
+                    arm = float(np.linalg.norm(way))
+                    break
+            found.append((joint, arm))
+        return tuple(found)
+
+    @cached_property
+    def members(self) -> tuple[tuple[str, ...], ...]:
+        """Of each limb the names of its parts, without a last ball."""
+        return tuple(
+            tuple(
+                (joint.share or f"limb{i + 1}.joint{k}") + suffix
+                for k, joint in enumerate(limb, 1)
+                if not _closes(limb, joint)
+                for suffix in PARTS[: joint.parts]
+            )
+            for i, limb in enumerate(self.limbs)
+        )
+
+    @cached_property
+    def parts(self) -> dict[str, Part]:
+        """Every axis by its name, the first of each shared joint's limbs."""
+        found: dict[str, Part] = {}
+        for i, limb in enumerate(self.limbs):
+            for k, joint in enumerate(limb, 1):
+                if _closes(limb, joint):
+                    continue
+                name = joint.share or f"limb{i + 1}.joint{k}"
+                errors = BY_MAP[self.map]
+                axes = joint.axes
+                if joint.ball:
+                    axes, errors = _ball_axes(limb, k - 1), BY_MAP[self.map][:3]
+                if joint.kind == "C":
+                    axes = axes * 2
+                for n, (suffix, axis) in enumerate(zip(PARTS, axes, strict=False)):
+                    own = errors if n == 0 or not joint.ball else ()
+                    slides = joint.kind == "P" or (joint.kind == "C" and n == 1)
+                    found.setdefault(
+                        name + suffix, Part(name + suffix, slides, axis, joint, i, own)
+                    )
+        return found
+
+    @cached_property
+    def numbers(self) -> tuple[LimbNumber, ...]:
+        """Every number: of each limb its errors, then those of its actuators."""
+        made: list[LimbNumber] = []
+        places = self._places
+        seen: set[str] = set()
+        for i, names in enumerate(self.members):
+            ball = _ends_in_ball(self.limbs[i])
+            for name in names:
+                if name not in seen:
+                    made += _errors(name, self.parts[name].errors, i, places[name])
+                seen.add(name)
+            if ball:
+                name = f"limb{i + 1}.joint{len(self.limbs[i])}"
+                made += _errors(name, ERRORS[:3], i, places[name])
+            name = f"limb{i + 1}.platform"
+            if places[name] not in {n.place for n in made}:
+                made += _errors(name, ERRORS[:3] if ball else BY_MAP[self.map], i, places[name])
+            for a, (first, joint) in enumerate(self.actuated):
+                if first == i:
+                    place = places[f"drive{a + 1}"]
+                    made.append(LimbNumber(f"offset{a + 1}", joint.unit, i, "offset", None, place))
+                    made.append(LimbNumber(f"gain{a + 1}", "1", i, "gain", None, place + 1))
+        return tuple(made)
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        """Where the six errors of each part and end begin, and offset and gain of each actuator."""
+        names: list[tuple[str, int]] = [(name, 6) for name in self.parts]
+        ends: dict[str, int] = {}
+        for i, limb in enumerate(self.limbs):
+            if _ends_in_ball(limb):
+                names.append((f"limb{i + 1}.joint{len(limb)}", 6))
+            names.append((f"limb{i + 1}.platform", 6))
+        names += [(f"drive{a + 1}", 2) for a in range(self.n_actuators)]
+        place = 0
+        for name, count in names:
+            ends[name] = place
+            place += count
+        for i, limb in enumerate(self.limbs):  # limbs that end in the same joint have one end
+            first = next(k for k, other in enumerate(self.limbs) if _same_end(other, limb))
+            ends[f"limb{i + 1}.platform"] = ends[f"limb{first + 1}.platform"]
+        return ends
+
+    @property
+    def count(self) -> int:
+        """How many numbers the core has of the machine, those that are always 0 included."""
+        return self._places["drive1"] + 2 * self.n_actuators
+
+    @cached_property
+    def blank(self) -> FloatArray:
+        """The numbers of the core without errors, (1, count): gains are 1."""
+        blank = np.zeros((1, self.count))
+        for a in range(self.n_actuators):
+            blank[0, self._places[f"drive{a + 1}"] + 1] = 1.0
+        return blank
+
+    @cached_property
+    def length(self) -> float:
+        """Characteristic length, mm: root mean square distance of the ends from their centre.
+
+        Of the joints at the base, and then of all, where the ends are in one point.
+        """
+        ends = np.array([limb[-1].at for limb in self.limbs])
+        first = np.array([limb[0].at for limb in self.limbs])
+        every = np.array([joint.at for limb in self.limbs for joint in limb])
+        for points in (ends, first, every):
+            spread = points - points.mean(axis=0)
+            radius = float(np.sqrt((spread**2).sum(axis=1).mean()))
+            if radius > 1e-9 * (1.0 + float(np.abs(every).max())):
+                return radius
+        return 100.0
+
+    @property
+    def size(self) -> float:
+        """What rounding is measured against, mm."""
+        every = np.array([joint.at for limb in self.limbs for joint in limb])
+        return float(max(np.abs(every).sum(axis=1).max(), np.abs(self.home[:3]).sum(), self.length))
+
+    def dependent(self, limb: int) -> bool:
+        """Whether passive joints of a limb can move at home while the platform stands still."""
+        joints = self.limbs[limb]
+        end = joints[-1].at if joints[-1].ball else self.home[:3]
+        columns = []
+        for name in self.members[limb]:
+            part = self.parts[name]
+            if part.joint.actuator is not None:
+                continue
+            turns = np.zeros(3) if part.slides else part.axis
+            arm = (end - part.joint.at) / self.length
+            moves = part.axis if part.slides else np.cross(part.axis, arm)
+            columns.append(np.concatenate([turns, moves]))
+        if not columns:
+            return False
+        closing = {"planar": slice(2, 5), "spherical": slice(0, 3)}.get(self.map, slice(0, 6))
+        J = np.array(columns).T[slice(3, 6) if joints[-1].ball else closing]
+        sigma = np.linalg.svd(J, compute_uv=False)
+        return bool(len(sigma) < J.shape[1] or sigma[-1] < _DEPENDENT * max(sigma[0], 1.0))
+
+    @cached_property
+    def layout(self) -> ChainLayout:
+        """The machine as the core takes it."""
+        parts, places = self.parts, self._places
+        index = {name: k for k, name in enumerate(parts)}
+        member = [index[name] for limb in self.members for name in limb]
+        chains = [set(limb) for limb in self.members]
+        passive = [n for n, part in parts.items() if part.joint.actuator is None]
+        passive.sort(key=lambda name: sum(name in limb for limb in chains) < 2)  # shared first
+        coordinate = {name: k for k, name in enumerate(passive)}
+        ends = [limb[-1] for limb in self.limbs]
+        names = [f"limb{i + 1}" for i in range(len(ends))]
+        balls = [f"{n}.joint{len(limb)}" for n, limb in zip(names, self.limbs, strict=True)]
+        first = np.cumsum([0, *(len(limb) for limb in self.members)])
+        zero = np.array([joint.home_value for _, joint in self.actuated])
+        middle = [z if j.stroke is None else sum(j.stroke) / 2
+                  for z, (_, j) in zip(zero, self.actuated, strict=True)]  # fmt: skip
+
+        def ints(values: object) -> np.ndarray[tuple[int, ...], np.dtype[np.int32]]:
+            return np.array(values, dtype=np.int32)
+
+        every = list(parts.values())
+        return ChainLayout(
+            map=self.map,
+            home=from_pose(self.home),
+            size=self.size,
+            length=self.length,
+            numbers=self.count,
+            first=ints(first),
+            member=ints(member),
+            ball=ints([_ends_in_ball(limb) for limb in self.limbs]),
+            end_place=ints([places[f"{name}.platform"] for name in names]),
+            ball_place=ints([places.get(ball, 0) for ball in balls]),
+            end=np.array([joint.at for joint in ends]),
+            prismatic=ints([part.slides for part in every]),
+            actuator=ints([-1 if p.joint.actuator is None else p.joint.actuator for p in every]),
+            coordinate=ints([coordinate.get(part.name, -1) for part in every]),
+            place=ints([places[part.name] for part in every]),
+            axes=np.array([_frame(part.axis) for part in every]),
+            point=np.array([part.joint.at for part in every]),
+            soft=np.array([part.joint.soft for part in every]),
+            drive_place=ints([places[f"drive{a + 1}"] for a in range(self.n_actuators)]),
+            zero=zero,
+            near=np.array(middle),
+        )
+
+
+def _errors(name: str, errors: tuple[str, ...], limb: int, place: int) -> list[LimbNumber]:
+    found = []
+    for error in errors:
+        unit: Unit = "mm" if error in ERRORS[:3] else "rad"
+        slot = name.partition(".")[2] or name
+        at = place + ERRORS.index(error)
+        found.append(LimbNumber(f"{name}.{error}", unit, limb, f"{slot}.{error}", None, at))
+    return found
+
+
+def _ends_in_ball(limb: tuple[Joint, ...]) -> bool:
+    return limb[-1].ball
+
+
+def _closes(limb: tuple[Joint, ...], joint: Joint) -> bool:
+    return joint is limb[-1] and joint.ball
+
+
+def _same_end(a: tuple[Joint, ...], b: tuple[Joint, ...]) -> bool:
+    return a is b or (a[-1].share is not None and a[-1].share == b[-1].share)
+
+
+def across(direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit vectors at right angles to a unit vector, and to each other."""
+    least = np.eye(3)[int(np.argmin(np.abs(direction)))]
+    one = np.cross(direction, least)
+    one /= np.linalg.norm(one)
+    return one, np.cross(direction, one)
+
+
+def towards(limb: tuple[Joint, ...], k: int) -> FloatArray | None:
+    """Unit vector from joint k to the next that is elsewhere, or from the last that was."""
+    at = limb[k].at
+    for other, sign in [(j, 1.0) for j in limb[k + 1 :]] + [(j, -1.0) for j in limb[:k][::-1]]:
+        way = sign * (other.at - at)
+        length = float(np.linalg.norm(way))
+        if length > 1e-9 * (1.0 + float(np.abs(at).max())):
+            return way / length
+    return None
+
+
+def _ball_axes(limb: tuple[Joint, ...], k: int) -> tuple[FloatArray, ...]:
+    """Of a ball that is not the last joint: along the limb and across it, never near its lock."""
+    way = towards(limb, k)
+    along = np.array([0.0, 0.0, 1.0]) if way is None else way
+    return (along, *across(along))
+
+
+def _frame(axis: FloatArray) -> FloatArray:
+    one, other = across(axis)
+    return np.column_stack([one, other, axis])

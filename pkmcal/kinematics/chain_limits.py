@@ -1,0 +1,116 @@
+"""Strokes and cones of the joints of chains, at poses: `pkmcal.kinematics.limits` of any joint."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.core.chains import ChainMachine
+from pkmcal.geometry.chains import PARTS, Chains, Joint, towards
+from pkmcal.kinematics.limits import ROUNDING, Feasibility
+from pkmcal.screw import from_pose
+
+
+def feasibility(
+    chains: Chains, machine: ChainMachine, slots: FloatArray, own: FloatArray, q: FloatArray
+) -> Feasibility:
+    """Compare the joints at N poses with their limits.
+
+    Parameters
+    ----------
+    chains : Chains
+        The joints.
+    machine : ChainMachine
+        The machine in the core.
+    slots : ndarray (1, numbers)
+        Geometry.
+    own, q : ndarray (N, 6), (N, n)
+        Poses and coordinates; NaN out of reach.
+    """
+    passive, frames = machine.frames(slots, own, q)
+    drive = drives(machine, slots, q)
+    shape = (len(own), len(chains.limbs))
+    stroke, before, last = (np.full(shape, np.inf) for _ in range(3))
+    room = np.zeros((3, shape[1]))
+    turned, platform = _turned(machine, frames), _platform(machine, own)
+    for i, limb in enumerate(chains.limbs):
+        at = 0
+        for k, joint in enumerate(limb):
+            count = 0 if joint.ball and joint is limb[-1] else joint.parts
+            if joint.stroke is not None:
+                value = _value(chains, machine, i, k, passive, drive)
+                low, high = joint.stroke
+                stroke[:, i] = np.fmin(stroke[:, i], np.minimum(value - low, high - value))
+                room[0, i] = max(room[0, i], abs(low) + abs(high))
+            if joint.cone is not None:
+                start = machine.layout.first[i] + i + at
+                behind = turned[:, start + count] if count else platform
+                bend = _bend(limb, k, turned[:, start], behind)
+                where, row = (last, 2) if joint is limb[-1] else (before, 1)
+                where[:, i] = np.fmin(where[:, i], joint.cone - bend)
+                room[row, i] = max(room[row, i], joint.cone)
+            at += count
+    margins = (stroke, before, last)
+    kept = [
+        np.asarray(margin >= -ROUNDING * size) for margin, size in zip(margins, room, strict=True)
+    ]
+    reach = np.asarray(np.isfinite(q).all(axis=1) & np.isfinite(frames).all(axis=(1, 2)))
+    first = np.array([_first_actuator(limb) for limb in chains.limbs])
+    shown = np.where(first >= 0, drive[:, np.maximum(first, 0)], 0.0)
+    return Feasibility(
+        np.broadcast_to(reach[:, None], shape).copy(), kept[0], kept[1], kept[2],
+        np.where(reach[:, None], shown, np.nan), stroke, before, last,
+    )  # fmt: skip
+
+
+def drives(machine: ChainMachine, slots: FloatArray, q: FloatArray) -> FloatArray:
+    """What the actuators read with gain and offset, (N, n)."""
+    place, numbers = machine.layout.drive_place, slots.ravel()
+    found: FloatArray = numbers[place + 1] * q + numbers[place]
+    return found
+
+
+def _first_actuator(limb: tuple[Joint, ...]) -> int:
+    return next((j.actuator for j in limb if j.actuator is not None), -1)
+
+
+def _value(
+    chains: Chains, machine: ChainMachine, i: int, k: int, passive: FloatArray, drive: FloatArray
+) -> FloatArray:
+    joint = chains.limbs[i][k]
+    if joint.actuator is not None:
+        return drive[:, joint.actuator]
+    name = joint.share or f"limb{i + 1}.joint{k + 1}"
+    index = list(chains.parts).index(name + PARTS[0])
+    return passive[:, machine.layout.coordinate[index]]
+
+
+def _turned(machine: ChainMachine, frames: FloatArray) -> FloatArray:
+    """What the bodies have turned by since home: before each joint, and of each end."""
+    layout = machine.layout
+    home = np.empty((frames.shape[1], 3, 3))
+    for i, (first, end) in enumerate(zip(layout.first[:-1], layout.first[1:], strict=True)):
+        home[first + i : end + i] = layout.axes[layout.member[first:end]]
+        home[end + i] = np.eye(3) if layout.ball[i] else layout.home[:3, :3]
+    R = frames[..., :9].reshape(*frames.shape[:2], 3, 3)
+    found: FloatArray = R @ home.swapaxes(1, 2)
+    return found
+
+
+def _platform(machine: ChainMachine, own: FloatArray) -> FloatArray:
+    """What the platform has turned by since home, (N, 3, 3)."""
+    found: FloatArray = from_pose(np.nan_to_num(own))[:, :3, :3] @ machine.layout.home[:3, :3].T
+    return found
+
+
+def _bend(limb: tuple[Joint, ...], k: int, before: FloatArray, after: FloatArray) -> FloatArray:
+    """How far a joint bends from home, rad: a U its normal, an S the limb."""
+    joint = limb[k]
+    if joint.kind == "U":
+        direction = np.cross(joint.axes[0], joint.axes[1])
+        direction /= np.linalg.norm(direction)
+    else:
+        way = towards(limb, k)
+        direction = np.array([0.0, 0.0, 1.0]) if way is None else way
+    a, b = before @ direction, after @ direction
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))

@@ -1,0 +1,73 @@
+"""A set of numbers of a machine whose effects on the pose are independent."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.kinematics.robot import Robot
+
+INDEPENDENT = 1e-7  # least part of a number's effect that the others cannot have
+POSES = 40
+SHARE = 0.2  # of the characteristic length, and rad: how far from home the actuators go
+ERRORS = {"mm": 0.1, "rad": 1e-3, "1": 1e-4}  # sizes at which effects are compared
+
+
+def independent_numbers(robot: Robot) -> tuple[str, ...]:
+    """Names of numbers that poses of the workspace tell apart, as many as there are.
+
+    The gains are not among them: they are known better than what an arm of a machine is. Chosen by
+    QR with exchanges of columns, in which the largest effect that is left comes next.
+
+    Parameters
+    ----------
+    robot : Robot
+        The machine.
+
+    Returns
+    -------
+    tuple of str
+        In the order of ``geometry.names``.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> len(independent_numbers(pk.load("five-bar")))
+    13
+    """
+    from scipy.linalg import qr
+
+    geometry = robot.geometry
+    places = np.array(
+        [
+            i
+            for i, (name, tied) in enumerate(zip(geometry.names, geometry.tied, strict=True))
+            if not tied and not name.startswith("gain")
+        ]
+    )
+    effects = near_home(robot)[:, :, places]
+    effects[:, 3:] *= robot.length
+    scale = np.array([ERRORS[geometry.units[i]] for i in places])
+    columns = effects.reshape(-1, len(places)) * scale
+    R, order = qr(columns, mode="r", pivoting=True)
+    diagonal = np.abs(np.diag(R))
+    rank = int((diagonal > INDEPENDENT * diagonal[0]).sum())
+    return tuple(geometry.names[places[i]] for i in sorted(order[:rank]))
+
+
+def near_home(robot: Robot) -> FloatArray:
+    """Effects (N, 6, p) of every number at random coordinates near home, as twists (v, ω).
+
+    By the linear model, also where there are more closures than coordinates: which effects are
+    independent does not hang on what is missed.
+    """
+    random = np.random.default_rng(0)
+    home = robot.inverse(robot.home)
+    way = np.array([SHARE * (robot.length if u == "mm" else 1.0) for u in robot.actuator_units])
+    q = home + random.uniform(-way, way, (POSES, robot.n_actuators))
+    solved = robot.forward(q)
+    good = np.asarray(solved.ok)
+    own, _ = robot.own_rows(solved.pose[good])
+    columns = robot.geometry.slot_index.astype(np.int32)
+    given = (robot.slots, own, np.ascontiguousarray(q[good]), columns, True)
+    return robot.machine.error_jacobian(*given)[:, [3, 4, 5, 0, 1, 2]]

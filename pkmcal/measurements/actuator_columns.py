@@ -1,0 +1,89 @@
+"""Columns q1, q2 … of a table: the actuators of the machine, as lengths, angles or steps."""
+
+from __future__ import annotations
+
+import re
+from typing import Protocol
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.files.csv_table import Table
+from pkmcal.kinematics.robot import Robot
+
+ACTUATOR = re.compile(r"q[1-9][0-9]*")
+
+
+class Actuated(Protocol):
+    """A machine whose actuators have units: `Robot`, `SerialArm`."""
+
+    @property
+    def actuator_units(self) -> tuple[str, ...]:
+        """Unit of each actuator, "mm" or "rad"."""
+
+
+def read_actuators(table: Table, robot: Actuated | None) -> tuple[FloatArray, tuple[str, ...]]:
+    """Actuator coordinates (N, n), and the unit of each, "mm" or "rad"."""
+    count = max((int(n[1:]) for n in table.columns if ACTUATOR.fullmatch(n)), default=1)
+    expected = () if robot is None else tuple(robot.actuator_units)
+    columns, units = [], []
+    for i in range(count):
+        of_robot = expected[i] if i < len(expected) else None
+        quantities = ("mm", "rad", "count") if of_robot != "mm" else ("mm", "count", "rad")
+        values, unit = _numbers(table, f"q{i + 1}", *quantities, expected=of_robot)
+        if unit == "count":
+            unit = _counted(table, i, of_robot, robot)
+        columns.append(values)
+        units.append(unit)
+    return np.stack(columns, axis=1), tuple(units)
+
+
+def _counted(table: Table, i: int, of_robot: str | None, robot: Actuated | None) -> str:
+    """The unit of an actuator that counts steps: its limb's gain says how much one is."""
+    column = table.columns[f"q{i + 1}"]
+    if of_robot is None:
+        raise table.header_error(
+            f"column {column.name!r} has unit [{column.unit}]: give the robot, whose gain says"
+            " how much one is"
+        )
+    gain = _gain(robot, i)
+    if gain is None or abs(gain) == 1.0:
+        raise table.header_error(
+            f"column {column.name!r} has unit [{column.unit}], and the robot does not state how"
+            f" much one is: set the gain of the limb, in {of_robot} each"
+        )
+    note = f"actuators in {column.unit}, converted by the robot's gain ({gain:.6g} {of_robot} each)"
+    if note not in table.notes:
+        table.notes.append(note)
+    return of_robot
+
+
+def _gain(robot: object, actuator: int) -> float | None:
+    """The gain of the first limb of an actuator; None where there is none."""
+    if not isinstance(robot, Robot):
+        return None
+    limbs = robot.model.limbs
+    limb = next((k for k, limb in enumerate(limbs) if limb.actuator == actuator), None)
+    return None if limb is None else float(robot.geometry[f"gain{limb + 1}"])
+
+
+def compare(table: Table, units: tuple[str, ...], robot: Actuated | None) -> None:
+    """Raise where the robot has other actuators: as many, each with its unit."""
+    expected = units if robot is None else tuple(robot.actuator_units)
+    if len(expected) != len(units):
+        raise table.header_error(
+            f"{len(units)} actuator columns, q1 to q{len(units)}; the robot has {len(expected)}"
+        )
+    for i, (unit, robots) in enumerate(zip(units, expected, strict=True)):
+        if unit != robots:
+            what = {"mm": "a length", "rad": "an angle"}
+            raise table.header_error(
+                f"column 'q{i + 1}' is {what[unit]}; the robot's actuator is {what[robots]}"
+            )
+
+
+def _numbers(
+    table: Table, name: str, *quantities: str, expected: str | None
+) -> tuple[FloatArray, str]:
+    table.require([name])
+    return table.numbers(name, *quantities, expected=expected)

@@ -1,0 +1,206 @@
+"""Two tables as one: what an instrument measured, and the actuators that the controller logged."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from pkmcal.arrays import IntArray
+from pkmcal.exceptions import FileError
+from pkmcal.files.csv_table import Table
+from pkmcal.measurements.point_names import split
+from pkmcal.measurements.time_stamps import seconds
+
+Join = Literal["auto", "name", "row", "time"]
+JOINS: tuple[Join, ...] = ("auto", "name", "row", "time")
+_ENOUGH = 0.5  # of the points have to be found by a key for it to be one
+_NUMBER = re.compile(r"([0-9]+)\D*$")
+_LISTED = 3
+_EPOCH = 1e8  # s: seconds since 1970 are more
+
+Rows = list[int | None]  # of the log, for each row of the instrument
+
+
+def join(table: Table, log: Table, how: Join) -> None:
+    """Give the rows of an instrument the actuators of a controller's log; what was done is a note.
+
+    By name: the point's name, its pose or its group is that of a row of the log. By time: each
+    point takes the last row of the log at or before it. By row: as many rows, in the same order,
+    or a row of the log for each pose. Points without a row are left out.
+
+    Raises
+    ------
+    ValueError
+        The tables cannot be joined so; the message says why for each way that was tried.
+    """
+    actuators = [name for name in log.columns if re.fullmatch(r"q[0-9]+", name)]
+    if not actuators:
+        raise log.header_error(f"no actuators: expected columns q1, q2 …{_columns(log)}")
+    tries = {"name": _by_name, "time": _by_time, "row": _by_row}
+    refused = []
+    for way, pair in tries.items():
+        if how not in ("auto", way):
+            continue
+        found = pair(table, log)
+        if how == "auto" and way == "time" and not isinstance(found, str) and _relative(table):
+            found = "seconds may count from different starts; --join time takes them as they are"
+        if isinstance(found, str):
+            refused.append(f"by {way}: {found}")
+            continue
+        rows, said = found
+        _put(table, log, actuators, rows, f"joined with {log.path} by {way}: {said}")
+        return
+    raise FileError(f"{table.path}: cannot be joined with {log.path}; {'; '.join(refused)}")
+
+
+def _put(table: Table, log: Table, actuators: Sequence[str], rows: Rows, said: str) -> None:
+    kept = [i for i, row in enumerate(rows) if row is not None]
+    lost = [i for i, row in enumerate(rows) if row is None]
+    unused = len(log) - len({row for row in rows if row is not None})
+    if lost:
+        lines = ", ".join(str(table.lines[i]) for i in lost[:_LISTED])
+        more = ", …" if len(lost) > _LISTED else ""
+        said += f"; {len(lost)} of {len(rows)} points without a row left out: lines {lines}{more}"
+    if unused:
+        said += f"; {unused} of its {len(log)} rows not used"
+    table.take(kept)
+    chosen = [row for row in rows if row is not None]
+    for name in actuators:
+        table.put(name, log.columns[name].take(chosen))
+    table.notes += [*(f"{log.path}: {note}" for note in log.notes), said]
+
+
+def _by_name(table: Table, log: Table) -> tuple[Rows, str] | str:
+    theirs = {n: log.columns[n] for n in ("name", "group", "target") if n in log.columns}
+    mine: dict[str, Sequence[str]] = {}
+    for name in ("name", "target"):
+        if name in table.columns:
+            points = table.columns[name].cells
+            written = table.columns[name].name
+            parts = split(points)
+            if parts:
+                mine[f"the pose in {written!r}"] = parts[0]
+            mine[f"{written!r}"] = points
+    if "group" in table.columns:
+        mine[f"{table.columns['group'].name!r}"] = table.columns["group"].cells
+    if not theirs or not mine:
+        who = log.path if mine else table.path
+        return f"{who} has no column of names"
+    best: tuple[int, Rows, str] | None = None
+    for loose in (False, True):
+        for what, cells in mine.items():
+            for column in theirs.values():
+                rows = _found(cells, column.cells, loose)
+                count = 0 if rows is None else sum(row is not None for row in rows)
+                if rows is not None and count and (best is None or count > best[0]):
+                    said = f"{what} is {column.name!r}" + (" by its number" if loose else "")
+                    best = count, rows, said
+    if best is not None and best[0] >= _ENOUGH * len(table):
+        return best[1], best[2]
+    some = next(iter(mine.values()))[0]
+    other = next(iter(theirs.values())).cells[0]
+    return f"names such as {some!r} and {other!r} are not the same"
+
+
+def _found(names: Sequence[str], logged: Sequence[str], loose: bool) -> Rows | None:
+    """Rows of the log by name; None where names of both do not stand for the same."""
+    keys, others = ([_key(each, loose) for each in cells] for cells in (names, logged))
+    place = {key: row for row, key in enumerate(others) if key}
+    if len(place) < sum(key != "" for key in others) or len(set(keys)) < len(set(names)):
+        return None
+    numbered = all(key.isdigit() for key in (*keys, *place))
+    if numbered and set(keys) - set(place) and set(place) - set(keys):
+        return None  # 1 to 20 and 0 to 19 count differently
+    return [place.get(key) if key else None for key in keys]
+
+
+def _key(name: str, loose: bool) -> str:
+    if not loose:
+        return " ".join(name.lower().split())
+    match = _NUMBER.search(name)
+    return str(int(match[1])) if match else ""
+
+
+def _by_time(table: Table, log: Table) -> tuple[Rows, str] | str:
+    times = []
+    for each in (table, log):
+        if "time" not in each.columns:
+            return f"{each.path} has no time-stamps"
+        cells = each.columns["time"].cells
+        found = seconds(_with_date(each, cells))
+        if found is None:
+            return f"the time-stamps of {each.path}, such as {cells[0]!r}, are not of one form"
+        times.append(found)
+    (mine, since), (theirs, start) = times
+    if since != start:
+        return f"time-stamps count from {since} in one and from {start} in the other"
+    if (np.diff(theirs) < 0).any():
+        row = int(np.argmax(np.diff(theirs) < 0)) + 1
+        return f"{log.path}, line {log.lines[row]}: time goes back"
+    rows = np.searchsorted(theirs, mine, side="right") - 1
+    inside = (rows >= 0) & (mine <= theirs[-1] + max(np.diff(theirs).max(initial=0.0), 1.0))
+    if inside.mean() < _ENOUGH:
+        return "the time-stamps do not overlap"
+    moving = _moving(log, rows[inside])
+    late = (mine - theirs[np.maximum(rows, 0)])[inside]
+    said = (
+        "each point has the last row at or before it,"
+        f" {late.min():.3g} to {late.max():.3g} s earlier"
+    )
+    if moving:
+        said += f"; at {moving} of them the actuators change until the next row"
+    return [int(r) if ok else None for r, ok in zip(rows, inside, strict=True)], said
+
+
+def _moving(log: Table, rows: IntArray) -> int:
+    """How many rows of a sampled log the next one differs from; 0 of a log of single poses."""
+    used = np.unique(rows)
+    if len(log) < 2 * len(used):
+        return 0
+    cells = [c.cells for n, c in log.columns.items() if re.fullmatch(r"q[0-9]+", n)]
+    here = list(zip(*cells, strict=True))
+    return sum(here[i] != here[min(i + 1, len(here) - 1)] for i in rows)
+
+
+def _relative(table: Table) -> bool:
+    """Whether time-stamps are small numbers, as of seconds since a start."""
+    found = seconds(table.columns["time"].cells)
+    return found is not None and found[1] == "a start" and float(found[0].max()) < _EPOCH
+
+
+def _with_date(table: Table, cells: Sequence[str]) -> Sequence[str]:
+    """Times of day after the date that another column has."""
+    dates = table.columns.get("date")
+    if dates is None or any(len(cell) > 15 for cell in cells):
+        return cells
+    return [f"{date} {cell}" for date, cell in zip(dates.cells, cells, strict=True)]
+
+
+def _by_row(table: Table, log: Table) -> tuple[Rows, str] | str:
+    if len(table) == len(log):
+        return list(range(len(log))), f"{len(log)} rows in the same order"
+    for name in ("group", "name", "target"):
+        if name not in table.columns:
+            continue
+        logged = table.columns[name].cells
+        parts = split(logged)
+        poses = parts[0] if parts else list(logged)
+        order = {pose: i for i, pose in enumerate(dict.fromkeys(poses))}
+        if len(order) == len(log):
+            what = f"{len(log)} poses of {table.columns[name].name!r} in the same order"
+            return [order[pose] for pose in poses], what
+    if "target" in table.columns and len(table) % len(log) == 0:
+        cells = table.columns["target"].cells
+        each = len(table) // len(log)
+        if all(cells[i] == cells[i % each] for i in range(len(cells))) and len(set(cells)) == each:
+            what = f"{each} targets for each of its {len(log)} rows, in the same order"
+            return [i // each for i in range(len(cells))], what
+    return f"{len(table)} and {len(log)} rows"
+
+
+def _columns(table: Table) -> str:
+    names = [column.name for column in table.columns.values()]
+    return f"; found {', '.join(names[:8])}" + (", …" if len(names) > 8 else "")

@@ -1,0 +1,120 @@
+"""Denavit–Hartenberg numbers of any arm give the arm again, by matrices written out here."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.arrays import FloatArray
+
+
+def link(convention: str, a: float, alpha: float, d: float, theta: float) -> FloatArray:
+    """One link by the textbook: Rz(θ) Tz(d) Tx(a) Rx(α), or Rx(α) Tx(a) Rz(θ) Tz(d)."""
+    c, s, k, w = np.cos(theta), np.sin(theta), np.cos(alpha), np.sin(alpha)
+    if convention == "standard":
+        rows = [[c, -s * k, s * w, a * c], [s, c * k, -c * w, a * s], [0, w, k, d], [0, 0, 0, 1]]
+    else:
+        rows = [
+            [c, -s, 0, a],
+            [s * k, c * k, -w, -w * d],
+            [s * w, c * w, k, k * d],
+            [0, 0, 0, 1],
+        ]
+    return np.array(rows)
+
+
+def forward(table: pk.DHTable, kinds: tuple[str, ...], q: FloatArray) -> FloatArray:
+    tool = table.base
+    for i, kind in enumerate(kinds):
+        turn, slide = (q[i], 0.0) if kind == "revolute" else (0.0, q[i])
+        theta, d = table.theta[i] + turn, table.d[i] + slide
+        tool = tool @ link(table.convention, table.a[i], table.alpha[i], d, theta)
+    return tool @ table.tool
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+@pytest.mark.parametrize("seed", range(40))
+def test_an_arm_of_any_axes_is_its_table(convention: str, seed: int) -> None:
+    """Skew, crossing, parallel and equal axes, either way round, with errors and without."""
+    rng = np.random.default_rng(seed)
+    n = int(rng.integers(1, 8))
+    kinds = list(rng.choice(["revolute", "prismatic"], n))
+    square = np.eye(3)[rng.integers(0, 3, n)] * rng.choice([-1, 1], (n, 1))
+    axes = rng.normal(size=(n, 3)) if seed % 3 else square
+    points = rng.normal(size=(n, 3)).round(seed % 2 * 8) * 200
+    errors = rng.normal(size=(n, 6)) * [1, 1, 1, 0.01, 0.01, 0.01] * (seed % 5 > 0)
+    home = [*rng.normal(size=3) * 300, *rng.normal(size=3)]
+    arm = pk.SerialArm(axes, points, home, kinds=kinds, joint_errors=errors)
+    table = arm.dh(convention)  # type: ignore[arg-type]
+    q = rng.normal(size=n)
+    far = max(1.0, np.abs(table.d).max(), np.abs(table.a).max())
+    np.testing.assert_allclose(forward(table, arm.kinds, q), arm.forward(q), atol=1e-11 * far)
+
+
+UR10E = {
+    "a": [0, -612.7, -571.55, 0, 0, 0],
+    "alpha": [np.pi / 2, 0, 0, np.pi / 2, -np.pi / 2, 0],
+    "d": [180.7, 0, 0, 174.15, 119.85, 116.55],
+}
+
+
+def test_the_table_that_an_arm_was_made_of_is_found_again() -> None:
+    table = pk.SerialArm.from_dh(**UR10E).dh()  # type: ignore[arg-type]
+    for name, values in (*UR10E.items(), ("theta", np.zeros(6))):
+        np.testing.assert_allclose(getattr(table, name), values, atol=1e-9)
+    np.testing.assert_allclose([table.base, table.tool], [np.eye(4)] * 2, atol=1e-12)
+
+
+def test_a_written_table_says_order_base_and_tool(tmp_path: Path) -> None:
+    arm = pk.SerialArm.from_dh(**UR10E, tool=[0, 0, 50, 0.1, 0, 0])  # type: ignore[arg-type]
+    table = pk.export.dh(arm, tmp_path / "dh.csv", "modified")
+    text = (tmp_path / "dh.csv").read_text()
+    assert "modified Denavit-Hartenberg numbers, Rx(alpha) Tx(a) Rz(theta) Tz(d) a row" in text
+    rows = [line.split(",") for line in text.splitlines() if not line.startswith("#")]
+    assert rows[0] == ["joint", "kind", "a [mm]", "alpha [deg]", "d [mm]", "theta [deg]"]
+    numbers = np.array([row[2:] for row in rows[1:]], dtype=float)
+    np.testing.assert_allclose(numbers[:, 0], table.a)
+    np.testing.assert_allclose(np.radians(numbers[:, 3]), table.theta)
+
+
+def lists_of(path: Path) -> dict[str, FloatArray]:
+    lines = [line.partition("=") for line in path.read_text().splitlines() if "delta" in line]
+    return {name.strip(): np.fromstring(v.strip(" []"), sep=",") for name, _, v in lines}
+
+
+def test_the_lists_of_universal_robots_added_to_nominal_numbers_are_the_calibrated_arm(
+    tmp_path: Path,
+) -> None:
+    """In m and rad; axes 2, 3, 4 are no longer parallel, so d2, d3, d4 are metres that cancel."""
+    rng = np.random.default_rng(4)
+    nominal = pk.SerialArm.from_dh(**UR10E)  # type: ignore[arg-type]
+    arm = nominal.replace(rng.normal(size=(6, 6)) * [0.5, 0.5, 0.5, 1e-3, 1e-3, 1e-3])
+    pk.export.universal_robots(arm, tmp_path / "calibration.conf")
+    delta = lists_of(tmp_path / "calibration.conf")
+    real = arm.dh()
+    table = pk.DHTable(
+        np.array(UR10E["a"]) + 1000 * delta["delta_a"],
+        np.array(UR10E["alpha"]) + delta["delta_alpha"],
+        np.array(UR10E["d"]) + 1000 * delta["delta_d"],
+        delta["delta_theta"],
+        "standard",
+        real.base,
+        real.tool,
+    )
+    q = rng.uniform(-2, 2, 6)
+    np.testing.assert_allclose(forward(table, arm.kinds, q), arm.forward(q), atol=1e-6)
+    assert np.abs(delta["delta_d"][1:4]).max() > 0.1 > abs(delta["delta_d"][1:4].sum())
+    assert (
+        "not in these lists: the base frame moves by" in (tmp_path / "calibration.conf").read_text()
+    )
+
+
+def test_an_arm_of_another_maker_is_no_universal_robot(tmp_path: Path) -> None:
+    with pytest.raises(pk.ArgumentError, match="six turning joints"):
+        pk.export.universal_robots(pk.load("3r"), tmp_path / "c.conf")
+    turned = pk.SerialArm.from_dh(**UR10E, theta=[0, 1, 0, 0, 0, 0])  # type: ignore[arg-type]
+    with pytest.raises(pk.ArgumentError, match="offsets theta of these robots are 0"):
+        pk.export.universal_robots(turned, tmp_path / "c.conf")

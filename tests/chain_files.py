@@ -1,0 +1,137 @@
+"""Robot files of chains for tests: machines of reference digits, and other limbs as chains."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import pkmcal as pk
+from pkmcal import Robot
+from pkmcal.geometry.chains import ERRORS
+from pkmcal.geometry.limb_kinds import KINDS
+
+FloatArray = NDArray[np.float64]
+
+
+def described(machine: dict[str, Any]) -> str:
+    """A robot file of joints given one by one, every axis on its own; q counts from home."""
+    users = [sum(j in limb for limb in machine["limbs"]) for j in range(len(machine["joints"]))]
+    home = np.array(machine["home"])[:3, 3]
+    free = {"spatial": "xyz", "planar": "xy", "spherical": ""}[machine["group"]]
+    place = ", ".join(f"{c} = {float(home['xyz'.index(c)])!r}" for c in free)
+    lines = [f'name = "{machine["name"]}"', 'units = { length = "mm", angle = "rad" }', "[pose]"]
+    lines += [f'map = "{machine["group"]}"', f"home = {{ {place} }}"]
+    for limb in machine["limbs"]:
+        lines += ["[[limb]]", 'kind = "chain"', "joints = ["]
+        for j in limb:
+            joint = machine["joints"][j]
+            said = f'kind = "{joint["kind"]}", at = {joint["point"]}, axis = {joint["axis"]}'
+            if joint["actuator"] >= 0:
+                said += f", actuator = {joint['actuator'] + 1}"
+            if users[j] > 1:
+                said += f', share = "joint{j}"'
+            lines.append(f"  {{ {said} }},")
+        lines.append("]")
+    return "\n".join(lines) + "\n"
+
+
+def all_errors(machine: dict[str, Any], robot: Robot) -> dict[str, float]:
+    """Its errors by their public names."""
+    found = {}
+    for i, limb in enumerate(machine["limbs"]):
+        for k, j in enumerate(limb, 1):
+            for name in (f"limb{i + 1}.joint{k}", f"joint{j}"):
+                for error, value in zip(ERRORS, machine["errors"][j], strict=True):
+                    if f"{name}.{error}" in robot.geometry:
+                        found[f"{name}.{error}"] = value
+        for error, value in zip(ERRORS, machine["platform_errors"][i], strict=True):
+            if f"limb{i + 1}.platform.{error}" in robot.geometry:
+                found[f"limb{i + 1}.platform.{error}"] = value
+    return found
+
+
+def as_chains(robot: Robot) -> str:
+    """The robot file of the same machine with its limbs as chains, actuators reading the same."""
+    home, q = robot.home, robot.inverse(robot.home)
+    places = pk.screw.from_pose(home)
+    lines = ['name = "chains"', 'units = { length = "mm", angle = "rad" }', "[pose]"]
+    free = ", ".join(
+        f"{name} = {float(home[i])!r}"
+        for i, name in enumerate(("x", "y", "z", "alpha", "beta", "gamma"))
+        if name in robot.coordinates
+    )
+    lines += [f'map = "{robot.model.map}"', f"home = {{ {free} }}"]
+    for i, limb in enumerate(robot.model.limbs):
+        base, platform = (
+            np.array([robot.geometry[f"{side}{i + 1}.{c}"] for c in "xyz"])
+            for side in ("base", "platform")
+        )
+        tip = (places @ [*platform, 1.0])[:3]
+        drive = f"actuator = {limb.actuator + 1}, home_value = {float(q[limb.actuator])!r}"
+        joints = []
+        kind, frame = KINDS[limb.kind], limb.frame
+        if kind.driver == "length":
+            first = '"R", axis = ' + str(frame[:, 2].tolist()) if limb.kind == "RPS" else '"U"'
+            joints += [f"kind = {first}, at = {base.tolist()}", f'kind = "P", {drive}']
+        elif kind.driver == "slider":
+            carriage = base + q[limb.actuator] * frame[:, 2]
+            axis = frame[:, 2].tolist()
+            joints.append(f'kind = "P", at = {base.tolist()}, axis = {axis}, {drive}')
+            joints.append(f'kind = "U", at = {carriage.tolist()}')
+        else:
+            joint = "R" if robot.model.map == "planar" else "U"
+            end = base + robot.geometry[f"crank{i + 1}"] * crank_direction(robot, i, q)
+            axis = frame[:, 2].tolist()
+            joints.append(f'kind = "R", at = {base.tolist()}, axis = {axis}, {drive}')
+            joints.append(f'kind = "{joint}", at = {end.tolist()}')
+        last = "R" if robot.model.map == "planar" else "S"
+        joints.append(f'kind = "{last}", at = {tip.tolist()}')
+        lines += ["[[limb]]", 'kind = "chain"', "joints = ["]
+        lines += [f"  {{ {joint} }}," for joint in joints] + ["]"]
+    return "\n".join(lines) + "\n"
+
+
+def crank_direction(robot: Robot, limb: int, q: FloatArray) -> FloatArray:
+    """From the crank's axis to its end at coordinates (n,)."""
+    model = robot.model.limbs[limb]
+    e1, e2, _ = model.frame.T
+    angle = q[model.actuator]
+    return np.asarray(np.cos(angle) * e1 + np.sin(angle) * e2)
+
+
+def same_errors(robot: Robot, limb_errors: dict[str, float]) -> dict[str, float]:
+    """Errors of base, platform, offset, rod and crank as errors of the joints of `as_chains`."""
+    q = robot.inverse(robot.home)
+    found: dict[str, float] = {}
+
+    def add(name: str, value: float) -> None:
+        found[name] = found.get(name, 0.0) + float(value)
+
+    for i, limb in enumerate(robot.model.limbs):
+        kind = KINDS[limb.kind]
+        n = f"limb{i + 1}"
+        for c in "xyz":
+            add(f"{n}.joint1.d{c}", limb_errors.get(f"base{i + 1}.{c}", 0.0))
+            add(f"{n}.platform.d{c}", limb_errors.get(f"platform{i + 1}.{c}", 0.0))
+        if f"offset{i + 1}" in limb_errors:
+            add(f"offset{limb.actuator + 1}", limb_errors[f"offset{i + 1}"])
+        if kind.driver == "length":
+            continue
+        base, platform = (
+            np.array([robot.geometry[f"{side}{i + 1}.{c}"] for c in "xyz"])
+            for side in ("base", "platform")
+        )
+        tip = (pk.screw.from_pose(robot.home) @ [*platform, 1.0])[:3]
+        if kind.driver == "slider":
+            start = base + q[limb.actuator] * limb.frame[:, 2]
+        else:
+            way = crank_direction(robot, i, q)
+            start = base + robot.geometry[f"crank{i + 1}"] * way
+            for c, part in zip("xyz", way, strict=True):
+                add(f"{n}.joint2.d{c}", part * limb_errors.get(f"crank{i + 1}", 0.0))
+        rod = (tip - start) / np.linalg.norm(tip - start)
+        for c, part in zip("xyz", rod, strict=True):
+            add(f"{n}.joint3.d{c}", part * limb_errors.get(f"rod{i + 1}", 0.0))
+    return found

@@ -1,0 +1,80 @@
+"""C headers of robots, compiled and called; toolchains for other processors, where installed."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+
+from ..workspaces import CHAINS
+
+STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror", "-O2"]
+PARALLEL = [
+    name for name in pk.machines() if name not in CHAINS and isinstance(pk.load(name), pk.Robot)
+]
+
+_LIBRARY = """\
+#include "robot.h"
+int inverse(const {real} *pose, {real} *q);
+int forward(const {real} *q, {real} *pose);
+int jacobian(const {real} *pose, {real} *by_free);
+int inverse(const {real} *pose, {real} *q) {{ return robot_inverse(pose, q); }}
+int forward(const {real} *q, {real} *pose) {{ return robot_forward(q, pose); }}
+int jacobian(const {real} *pose, {real} *by_free) {{ return robot_jacobian(pose, by_free); }}
+"""
+
+
+def needed(*programs: str) -> None:
+    """Skip the test that needs programs which are not installed."""
+    missing = [program for program in programs if not shutil.which(program)]
+    if missing:
+        pytest.skip(f"not installed: {', '.join(missing)}")
+
+
+def compiled(robot: pk.Robot, folder: Path, number: Any = "double", compiler: str = "gcc") -> Any:
+    """The functions of a robot's header, in a shared library."""
+    needed(compiler)
+    pk.export.c_header(robot, folder / "robot.h", number)
+    (folder / "robot.c").write_text(_LIBRARY.format(real=number))
+    built = folder / f"robot-{compiler}-{number}.so"
+    command = [compiler, *STRICT, "-shared", "-fPIC", "-o", built, folder / "robot.c", "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    return Library(ctypes.CDLL(str(built)), robot, number)
+
+
+class Library:
+    """Rows through a compiled header; where it refuses a row, what was there stays."""
+
+    def __init__(self, library: ctypes.CDLL, robot: pk.Robot, number: str) -> None:
+        self._library = library
+        self._type = {"double": np.float64, "float": np.float32}[number]
+        self._n, self._m = robot.n_actuators, len(robot.coordinates)
+
+    def inverse(self, poses: Any, before: float = np.nan) -> tuple[Any, Any]:
+        return self._rows("inverse", poses, np.full((len(poses), self._n), before))
+
+    def jacobian(self, poses: Any) -> tuple[Any, Any]:
+        size = self._n * self._m
+        status, found = self._rows("jacobian", poses, np.full((len(poses), size), np.nan))
+        return status, found.reshape(-1, self._n, self._m)
+
+    def forward(self, q: Any, guess: Any) -> tuple[Any, Any]:
+        return self._rows("forward", q, np.broadcast_to(guess, (len(q), 6)))
+
+    def _rows(self, name: str, given: Any, written: Any) -> tuple[Any, Any]:
+        call = getattr(self._library, name)
+        given = np.ascontiguousarray(given, dtype=self._type)
+        written = np.array(written, dtype=self._type)
+        status = [
+            call(one.ctypes.data_as(ctypes.c_void_p), other.ctypes.data_as(ctypes.c_void_p))
+            for one, other in zip(given, written, strict=True)
+        ]
+        return np.array(status), written

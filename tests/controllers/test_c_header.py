@@ -1,0 +1,199 @@
+"""A robot's C header does what the robot does: the same bits, the same refusals."""
+
+from __future__ import annotations
+
+import subprocess
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+
+from .. import robots
+from .c_headers import PARALLEL, STRICT, compiled, needed
+
+FRAMES = {
+    "base": {"x": 10.0, "y": -20.0, "z": 30.0, "alpha": 0.1, "beta": -0.2, "gamma": 2.5},
+    "tool": {"x": 1.0, "y": 2.0, "z": -40.0, "alpha": -0.3, "beta": 0.1, "gamma": 0.2},
+}
+
+
+def poses_of(robot: pk.Robot, count: int = 200) -> Any:
+    """Poses near home; on the machine's map where it constrains them."""
+    rng = np.random.default_rng(1)
+    moved = robot.home + rng.uniform(-1, 1, (count, 6)) * [20, 20, 20, 0.1, 0.1, 0.1]
+    if robot.model.match is None and len(robot.coordinates) == 6:
+        return moved
+    poses = robot.complete(moved)
+    assert np.isfinite(poses).all()
+    return poses
+
+
+def mixed() -> pk.Robot:
+    """Three kinds of limbs, errors in every axis, and frames of base and tool."""
+    rail = {"kind": "PUS", "slider": [0.1, 0.2, 1.0], "rod": 800.0, "branch": -1}
+    crank = {"kind": "RUS", "axis": [0.3, 1.0, 0.0], "zero": [1.0, -0.3, 0.2], "branch": 1}
+    crank |= {"crank": 250.0, "rod": 700.0, "axis_tilt": [0.01, -0.02], "gain": -1.01}
+    rail |= {"slider_tilt": [0.02, 0.03], "offset": 3.0, "gain": 0.5}
+    return robots.hexapod(rail, crank, {"offset": 20.0}, rail, frames=FRAMES)
+
+
+CASES = {name: lambda name=name: pk.load(name) for name in PARALLEL}
+CASES |= {"mixed, framed": mixed}
+# every driver, row and pose map
+SOME = [
+    "2tpr2tps",
+    "2tpr2tps-spatial",
+    "3rps",
+    "3prs",
+    "3rrr-planar",
+    "linear-delta",
+    "mixed, framed",
+]
+
+
+@pytest.fixture(scope="module")
+def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """Return a function that gives the header of a case as compiled by gcc, once."""
+
+    @cache
+    def of_case(case: str, number: str) -> Any:
+        return compiled(CASES[case](), tmp_path_factory.mktemp("header"), number)
+
+    return of_case
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_inverse_and_jacobian_have_the_bits_of_python(case: str, library: Any) -> None:
+    robot = CASES[case]()
+    poses = poses_of(robot) if case != "rbt-6t03p-printed" else robot.home[None]
+    for name in ("inverse", "jacobian"):
+        status, found = getattr(library(case, "double"), name)(poses)
+        want = getattr(robot, name)(poses)
+        known = np.isfinite(want).all(axis=tuple(range(1, want.ndim)))
+        assert known.mean() > 0.9
+        np.testing.assert_array_equal(status == 0, known)
+        np.testing.assert_array_equal(found, want)
+
+
+@pytest.mark.parametrize("case", [case for case in CASES if case != "rbt-6t03p-printed"])
+def test_forward_agrees_with_python_and_with_the_inverse(case: str, library: Any) -> None:
+    robot = CASES[case]()
+    poses = poses_of(robot)
+    q = robot.inverse(poses)
+    known = np.isfinite(q).all(axis=1)
+    guess = poses[known] + [3.0, -2.0, 1.0, 0.01, -0.02, 0.01]
+    status, found = library(case, "double").forward(q[known], guess)
+    assert (status == 0).all()
+    np.testing.assert_allclose(found, robot.forward(q[known], guess).pose, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(found, poses[known], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("case", SOME)
+def test_floats_lose_no_more_than_floats_must(case: str, library: Any) -> None:
+    robot = CASES[case]()
+    poses = poses_of(robot)
+    q = robot.inverse(poses)
+    known = np.isfinite(q).all(axis=1)
+    poses, q = poses[known], q[known]
+    floats = library(case, "float")
+    size = np.abs(robot.slots).sum(axis=1).max()
+    assert np.abs(floats.inverse(poses)[1] - q).max() < 1e-6 * size
+    status, found = floats.forward(q, poses)
+    assert (status == 0).all()
+    assert np.abs(found - poses)[:, :3].max() < 5e-6 * size
+
+
+@pytest.mark.parametrize("number", ["double", "float"])
+@pytest.mark.parametrize("case", SOME)
+def test_clang_too_has_nothing_to_say(case: str, number: str, tmp_path: Path) -> None:
+    compiled(CASES[case](), tmp_path, number, "clang")  # gcc: in every test here
+
+
+def test_what_is_refused_leaves_the_numbers_alone(tmp_path: Path) -> None:
+    robot = pk.load("linear-delta")
+    library = compiled(robot, tmp_path)
+    far = np.array([[1000.0, 0, 0, 0, 0, 0], [np.nan, 0, 0, 0, 0, 0], [0, 0, np.inf, 0, 0, 0]])
+    status, found = library.inverse(far, before=7.0)
+    assert status.tolist() == [3, 4, 4] and (found == 7.0).all()
+    status, found = library.forward([[0, 0, 1000.0], [np.nan, 0, 0]], robot.home)
+    assert status[0] in (1, 2) and status[1] == 4  # no such pose; no number
+    np.testing.assert_array_equal(found, np.tile(robot.home, (2, 1)))
+    (tmp_path / "legs").mkdir()  # a library is loaded once from one place
+    legs = compiled(pk.load("hexapod"), tmp_path / "legs")
+    home = pk.load("hexapod").home
+    assert legs.forward(np.zeros((1, 6)), home)[0].tolist() == [3]  # before homing
+    status, found = legs.forward(np.full((1, 6), 500.0), np.zeros(6))
+    np.testing.assert_array_equal(found[status != 0], np.zeros((len(found[status != 0]), 6)))
+
+
+def test_a_singular_pose_is_not_called_good(tmp_path: Path) -> None:
+    """Griffis and Duffy's platform moves by itself: its lengths do not say where it is."""
+    robot = robots.griffis_duffy()
+    status, _ = compiled(robot, tmp_path).forward(robot.inverse(robot.home)[None], robot.home)
+    assert status[0] == 2
+
+
+def test_machine_with_more_closures_than_coordinates_is_refused(tmp_path: Path) -> None:
+    revolute = {"kind": "UPR", "revolute": [1.0, 0.0, 0.0]}
+    robot = robots.hexapod(revolute, revolute)
+    with pytest.raises(pk.ArgumentError, match="8 closures for 6 free coordinates"):
+        pk.export.c_header(robot, tmp_path / "robot.h")
+    assert not (tmp_path / "robot.h").exists()
+
+
+def test_machine_of_chains_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(pk.ArgumentError, match="chains of joints; a header holds other limbs"):
+        pk.export.c_header(pk.load("trivariant"), tmp_path / "robot.h")
+    assert not (tmp_path / "robot.h").exists()
+
+
+def test_names_come_from_the_file(tmp_path: Path) -> None:
+    needed("gcc")
+    pk.export.c_header(pk.load("2tpr2tps"), tmp_path / "2tpr-2tps.h")
+    pk.export.c_header(pk.load("hexapod"), tmp_path / "other.h", "float")
+    (tmp_path / "both.c").write_text(
+        '#include "2tpr-2tps.h"\n#include "other.h"\nint main(void)\n'
+        "{ double q[4]; float l[6]; return robot_2tpr_2tps_inverse(robot_2tpr_2tps_home, q)\n"
+        "    + other_inverse(other_home, l) + (ROBOT_2TPR_2TPS_STEPS - OTHER_STEPS); }\n"
+    )
+    command = ["gcc", *STRICT, "-o", tmp_path / "both", tmp_path / "both.c", "-lm"]
+    subprocess.run(command, check=True)
+    subprocess.run([tmp_path / "both"], check=True)
+
+
+def test_only_the_square_root_and_the_absolute_value_are_of_the_library(tmp_path: Path) -> None:
+    needed("gcc", "nm")
+    for number in ("double", "float"):
+        compiled(mixed(), tmp_path, number)
+        source = str(tmp_path / "robot.c")
+        subprocess.run(["gcc", "-c", "-O0", "-o", tmp_path / "o", source], check=True)
+        undefined = subprocess.run(
+            ["nm", "-u", tmp_path / "o"], capture_output=True, text=True, check=True
+        ).stdout
+        names = {line.split()[-1] for line in undefined.splitlines()}
+        allowed = {"sqrt", "fabs", "sqrtf", "fabsf", "_GLOBAL_OFFSET_TABLE_", "__stack_chk_fail"}
+        assert names <= allowed
+        writable = subprocess.run(["size", tmp_path / "o"], capture_output=True, text=True)
+        assert writable.stdout.splitlines()[1].split()[1:3] == ["0", "0"]  # data, bss
+
+
+def test_a_hexapod_takes_four_kilobytes_of_a_controller(tmp_path: Path) -> None:
+    """Code and numbers of inverse and forward on a Cortex-M7, without the C library."""
+    needed("arm-none-eabi-gcc", "arm-none-eabi-size")
+    pk.export.c_header(pk.load("hexapod"), tmp_path / "robot.h")
+    (tmp_path / "robot.c").write_text(
+        '#include "robot.h"\nint both(double *pose, double *q);\n'
+        "int both(double *pose, double *q)\n"
+        "{ return robot_inverse(pose, q) || robot_forward(q, pose); }\n"
+    )
+    command = "arm-none-eabi-gcc -std=c99 -O2 -mcpu=cortex-m7 -mthumb -mfpu=fpv5-d16"
+    command += " -mfloat-abi=hard -c -o robot.o robot.c"
+    subprocess.run(command.split(), cwd=tmp_path, check=True)
+    size = ["arm-none-eabi-size", tmp_path / "robot.o"]
+    text = subprocess.run(size, capture_output=True, text=True, check=True).stdout
+    code, data, bss = map(int, text.splitlines()[1].split()[:3])
+    assert code <= 4096 and data == bss == 0

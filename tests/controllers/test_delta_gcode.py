@@ -1,0 +1,203 @@
+"""M665 and M666 of RepRapFirmware and of Marlin: their published models go where the robot goes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+
+from .. import robots
+
+
+def delta() -> pk.Robot:
+    """Every number of its own that the firmwares have."""
+    limbs: list[dict[str, Any]] = []
+    for angle, rod, offset in ((210.4, 339.0, 600.0), (329.5, 340.0, 601.5), (90.2, 340.6, 600.7)):
+        limbs.append(
+            {"base": robots.ring(160.0, angle), "rod": rod, "offset": offset, "gain": -1.0}
+        )
+    return robots.linear_delta(*limbs)
+
+
+def words(text: str, command: str) -> dict[str, list[float]]:
+    (line,) = re.findall(rf"^{command} (.*)", text, re.MULTILINE)
+    pairs = re.findall(r"([A-Z])(\S+)", line)
+    return {letter: [float(each) for each in value.split(":")] for letter, value in pairs}
+
+
+def towers_of(size: dict[str, list[float]]) -> Any:
+    """As in Recalc() of RepRapFirmware; Marlin's recalc_delta_settings() says the same."""
+    (r,) = size["R"]
+    x, y, z = (np.radians(size[letter][0]) for letter in "XYZ")
+    third = np.pi / 6
+    return np.array(
+        [
+            [-r * np.cos(third + x), -r * np.sin(third + x)],
+            [r * np.cos(third - y), -r * np.sin(third - y)],
+            [-r * np.sin(z), r * np.cos(z)],
+        ]
+    )
+
+
+def reprap_model(text: str, nozzle: Any) -> Any:
+    """How far each carriage stands below its switch: homed carriage heights less Transform()."""
+    size, ends = words(text, "M665"), words(text, "M666")
+    arms, (r,), (homed,) = np.array(size["L"]), size["R"], size["H"]
+    adjustment = np.array([ends[letter][0] for letter in "XYZ"])
+    assert abs(adjustment.mean()) < 1e-6  # as the firmware normalizes them
+    switch = homed + np.sqrt(arms**2 - r**2) + adjustment
+    across = ((nozzle[:, None, :2] - towers_of(size)) ** 2).sum(axis=2)
+    return switch - (np.sqrt(arms**2 - across) + nozzle[:, 2:3])
+
+
+def marlin_model(text: str, nozzle: Any) -> Any:
+    """The same of Marlin: homing moves each carriage from its switch by its adjustment."""
+    size, ends = words(text, "M665"), words(text, "M666")
+    (rod,), (r,), (height,) = size["L"], size["R"], size["H"]
+    arms = rod + np.array([size[letter][0] for letter in "ABC"])
+    adjustment = np.array([ends[letter][0] for letter in "XYZ"])
+    assert adjustment.max() <= 0.0  # it cannot go beyond the switch
+    after_homing = height + np.sqrt(arms**2 - r**2)
+    across = ((nozzle[:, None, :2] - towers_of(size)) ** 2).sum(axis=2)
+    return after_homing - adjustment - (np.sqrt(arms**2 - across) + nozzle[:, 2:3])
+
+
+MODELS = {"reprap": reprap_model, "marlin": marlin_model}
+
+
+@pytest.mark.parametrize("firmware", MODELS)
+def test_published_model_moves_the_carriages_as_the_robot(firmware: str, tmp_path: Path) -> None:
+    robot, out = delta(), tmp_path / "config.g"
+    loss = getattr(pk.export, firmware)(robot, out)
+    assert loss.exact
+    nozzle = np.random.default_rng(1).uniform([-80, -80, 0], [80, 80, 200], (50, 3))
+    down = MODELS[firmware](out.read_text(), nozzle)
+    want = robot.inverse(np.pad(nozzle, ((0, 0), (0, 3))))
+    np.testing.assert_allclose(down, want, rtol=0, atol=1e-5)  # six decimals
+
+
+@pytest.mark.parametrize("firmware", MODELS)
+def test_what_is_written_is_read_back(firmware: str, run: Any, tmp_path: Path) -> None:
+    robot, out = delta(), tmp_path / "config.g"
+    robot.save(tmp_path / "delta.toml")
+    arguments = ("--as", firmware, "--out", out)
+    assert run("export", tmp_path / "delta.toml", *arguments).exit_code == 0
+    done = run("import", out, "--from", firmware, "--out", tmp_path / "made")
+    assert done.exit_code == 0 and "no stored heights" in done.stdout
+    again = pk.load(tmp_path / "made" / "robot.toml")
+    poses = np.zeros((20, 6))
+    poses[:, :3] = np.random.default_rng(2).uniform([-80, -80, 0], [80, 80, 200], (20, 3))
+    found = again.forward(robot.inverse(poses)).pose
+    np.testing.assert_allclose(found, poses, rtol=0, atol=1e-5)
+
+
+def test_lines_are_found_as_firmwares_print_them(tmp_path: Path) -> None:
+    """Marlin's M503 and a commented config.g; the last command counts, one rod stands for three."""
+    (tmp_path / "m503").write_text("echo:  M665 L250.00 R125.00 H300.00 X0.5\necho:  M666 X-0.20\n")
+    g = pk.import_printer(tmp_path / "m503", "marlin").robot.geometry
+    assert (g["rod2"], g["radius"]) == (250.0, 125.0)
+    assert g["offset1"] - g["offset2"] == pytest.approx(0.2, abs=1e-12)
+    assert np.degrees(g["angle1"]) == pytest.approx(210.5)
+    (tmp_path / "config.g").write_text("M665 L1 R2 H3\nM665 L250 R125 H300 B90 ; X9\nM666 Y0.2\n")
+    g = pk.import_printer(tmp_path / "config.g", "reprap").robot.geometry
+    assert (g["rod1"], g["rod3"]) == (250.0, 250.0)
+    assert g["offset2"] - g["offset1"] == pytest.approx(0.2, abs=1e-12)
+    assert np.degrees(g["angle1"]) == pytest.approx(210.0)
+
+
+def test_a_rod_among_three_that_is_no_number_is_named(tmp_path: Path) -> None:
+    (tmp_path / "config.g").write_text("M665 L250:25..0:250 R125 H300\nM666 X0\n")
+    with pytest.raises(pk.FileError, match=r"L must be a number, found '25\.\.0'"):
+        pk.import_printer(tmp_path / "config.g", "reprap")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("M666 X0\n", "M665 is missing"),
+        ("M665 L250 H300\nM666 X0\n", "R of M665 is missing"),
+        ("M665 L100 R125 H300\nM666 X0\n", "longer than R"),
+        ("M665 L250 R1.2.3 H300\nM666 X0\n", "R must be a number"),
+    ],
+)
+def test_mistakes_are_named(text: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "config.g").write_text(text)
+    for firmware in ("reprap", "marlin"):
+        with pytest.raises(pk.FileError, match=message):
+            pk.import_printer(tmp_path / "config.g", firmware)  # type: ignore[arg-type]
+
+
+def test_leaning_towers_are_refused(tmp_path: Path) -> None:
+    for firmware in MODELS:
+        leaning = delta().replace({"slider2.tilt2": 0.004})
+        with pytest.raises(pk.ArgumentError, match="vertical towers"):
+            getattr(pk.export, firmware)(leaning, tmp_path / "x")
+        assert not (tmp_path / "x").exists()
+        assert not getattr(pk.export, firmware)(leaning, tmp_path / "x", project=True).exact
+        (tmp_path / "x").unlink()
+
+
+def rotary(**changes: float) -> pk.Robot:
+    """Heights of its own for every shoulder, end stops above the horizontal, angles upwards."""
+    limbs: list[dict[str, Any]] = []
+    for angle, crank, rod, z, zero in (
+        (210.5, 170.0, 400.0, 520.0, 0.6),
+        (329.0, 170.5, 401.0, 521.0, 0.61),
+        (90.0, 169.5, 399.5, 519.5, 0.59),
+    ):
+        limbs.append(
+            {
+                "kind": "RUS",
+                "base": robots.ring(180.0, angle, z),
+                "platform": [0.0, 0.0, 0.0],
+                "crank": crank,
+            }
+            | {"rod": rod, "offset": zero, "axis": robots.ring(-1.0, angle + 90.0), "gain": -1.0}
+            | {"zero": robots.ring(1.0, angle), "branch": -1}
+        )
+    return robots.made("translation", {"z": 150.0}, limbs).replace(changes)
+
+
+def reprap_rotary_model(text: str, nozzle: Any) -> Any:
+    """How far each crank stands below its switch, deg: Transform() of RepRapFirmware."""
+    size, ends = words(text, "M669"), words(text, "M666")
+    (radius,), (_, greatest) = size["R"], size["A"]
+    arms, rods, heights = (np.array(size[letter]) for letter in "ULH")
+    towers = np.radians([-150.0, -30.0, 90.0]) + np.radians([size[axis][0] for axis in "XYZ"])
+    x = nozzle[:, :1] * np.cos(towers) + nozzle[:, 1:2] * np.sin(towers)
+    y = nozzle[:, 1:2] * np.cos(towers) - nozzle[:, :1] * np.sin(towers)
+    out, up = radius - x, heights - nozzle[:, 2:]
+    a, b = 2.0 * arms * out, 2.0 * arms * up
+    c = rods**2 - arms**2 - up**2 - out**2 - y**2
+    sine = (b * c - a * np.sqrt(a**2 + b**2 - c**2)) / (a**2 + b**2)
+    adjustment = np.array([ends[axis][0] for axis in "XYZ"])
+    return greatest + adjustment - np.degrees(np.arcsin(sine))
+
+
+def test_cranks_go_where_the_model_of_reprap_says_and_are_read_back(tmp_path: Path) -> None:
+    robot = rotary()
+    loss = pk.export.reprap(robot, tmp_path / "delta.g")
+    assert loss.exact
+    text = (tmp_path / "delta.g").read_text()
+    assert text.startswith("M669 K10 U170.000000:170.500000:169.500000 L400.000000:")
+    nozzle = np.random.default_rng(1).uniform([-60, -60, 100], [60, 60, 200], (40, 3))
+    poses = np.pad(nozzle, ((0, 0), (0, 3)))
+    down = np.degrees(robot.inverse(poses))
+    np.testing.assert_allclose(reprap_rotary_model(text, nozzle), down, rtol=0, atol=1e-5)
+    again = pk.import_printer(tmp_path / "delta.g", "reprap")
+    assert str(again) == "delta: a rotary delta, no stored heights"
+    np.testing.assert_allclose(again.robot.inverse(poses), robot.inverse(poses), atol=1e-7)
+    with pytest.raises(pk.ArgumentError, match="one radius and one height"):
+        pk.export.klipper(robot, tmp_path / "x.cfg")
+    with pytest.raises(pk.ArgumentError, match="one radius, and cranks"):
+        pk.export.reprap(rotary(**{"axis1.tilt2": 0.003}), tmp_path / "x.g")
+    with pytest.raises(pk.ArgumentError, match="no linear delta"):
+        pk.export.marlin(robot, tmp_path / "x.g")
+    (tmp_path / "delta.g").write_text(text.replace("R180", "P180"))
+    with pytest.raises(pk.FileError, match="R of M669 must be a number"):
+        pk.import_printer(tmp_path / "delta.g", "reprap")

@@ -1,0 +1,296 @@
+"""printer.cfg in and out: the numbers of Klipper's model, and not a character more."""
+
+from __future__ import annotations
+
+import difflib
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+
+from .. import robots
+
+ROOT = Path(__file__).resolve().parents[2]
+CONFIG = ROOT / "examples" / "linear-delta" / "printer.cfg"
+LOGS = ROOT.parent / "shared" / "data" / "klipper" / "logs.json"
+
+OWN = """\
+# mine
+[include other.cfg]
+[gcode_macro PARK]
+gcode:
+    G1 Z{printer.toolhead.position.z + 5}   # arm_length: 1
+[stepper_a]
+rotation_distance = 40 ; a belt
+microsteps: 16
+full_steps_per_rotation: 400
+gear_ratio: 57:19, 2:1
+position_endstop: 297.05 # by hand
+arm_length: 333.0
+[stepper_b]
+rotation_distance: 40
+microsteps: 32
+[stepper_c]
+rotation_distance: 40
+microsteps: 16
+position_endstop: 296.9
+[printer]
+kinematics: delta
+delta_radius: 174.75
+
+#*# <---------------------- SAVE_CONFIG ---------------------->
+#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.
+#*#
+#*# [printer]
+#*# delta_radius = 170.000000
+#*#
+#*# [stepper_a]
+#*# angle = -149.500000
+#*#
+#*# [stepper_b]
+#*# arm_length = 334.250000
+#*#
+#*# [delta_calibrate]
+#*# height0 = 1.250000
+#*# height0_pos = 1000.500,2000.250,3000.000
+#*# manual_height0 = -0.100
+#*# manual_height0_pos = 4000.000,5000.000,6000.000
+#*# distance0 = 65.5
+#*# distance0_pos1 = 1,2,3
+#*# distance0_pos2 = 4,5,6
+"""
+
+
+def own(folder: Path, text: str = OWN) -> Path:
+    (folder / "mine.cfg").write_text(text)
+    return folder / "mine.cfg"
+
+
+def in_the_middle(radius: float, arm: float, endstop: float) -> float:
+    """Height of a carriage whose nozzle is in the middle at the end stop's height."""
+    return float(endstop + np.sqrt(arm**2 - radius**2))
+
+
+def firmware_inverse(config: dict[str, Any], nozzle: Any) -> Any:
+    """Klipper's published model: height of each carriage, (N, 3)."""
+    angle = np.radians(config["angle"])
+    towers = config["radius"] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    across = ((nozzle[:, None, :2] - towers) ** 2).sum(axis=2)
+    return nozzle[:, 2:3] + np.sqrt(np.square(config["arm_length"]) - across)
+
+
+def changed_lines(before: str, after: str) -> list[str]:
+    diff = difflib.ndiff(before.splitlines(keepends=True), after.splitlines(keepends=True))
+    return [line for line in diff if line[0] in "+-"]
+
+
+def test_what_the_firmware_reads_is_what_is_imported(tmp_path: Path) -> None:
+    """An option goes before the saved one; towers b and c take what a says; gears count."""
+    printer = pk.import_printer(own(tmp_path))
+    g = printer.robot.geometry
+    assert (g["radius"], g["rod1"], g["rod2"], g["rod3"]) == (174.75, 333.0, 334.25, 333.0)
+    angles = np.degrees([g[f"angle{i}"] for i in (1, 2, 3)])
+    np.testing.assert_allclose(angles, [-149.5, 330.0, 90.0], rtol=1e-15)
+    steps = [-40 / (16 * 400 * 6), -40 / (32 * 200), -40 / (16 * 200)]
+    np.testing.assert_allclose([g[f"gain{i}"] for i in (1, 2, 3)], steps, rtol=1e-15)
+    for i, (arm, endstop) in enumerate(((333.0, 297.05), (334.25, 297.05), (333.0, 296.9)), 1):
+        assert g[f"offset{i}"] == pytest.approx(in_the_middle(174.75, arm, endstop), rel=1e-15)
+    assert printer.measurements is not None and printer.measurements.kind == "height"
+    np.testing.assert_array_equal(printer.measurements.values, [1.25, -0.1])
+    np.testing.assert_array_equal(printer.measurements.actuators[0], [1000.5, 2000.25, 3000.0])
+    assert printer.distances == 1 and "1 distances" in str(printer)
+
+
+def test_imported_printer_goes_where_the_firmware_goes(tmp_path: Path) -> None:
+    robot = pk.import_printer(own(tmp_path)).robot
+    config = {"radius": 174.75, "angle": [-149.5, 330.0, 90.0], "arm_length": [333, 334.25, 333]}
+    nozzle = np.random.default_rng(1).uniform([-90, -90, 0], [90, 90, 200], (50, 3))
+    heights = firmware_inverse(config, nozzle)
+    g = robot.geometry
+    q = robot.inverse(np.pad(nozzle, ((0, 0), (0, 3))))
+    for i in (1, 2, 3):
+        rising = q[:, i - 1] * g[f"gain{i}"] + g[f"offset{i}"]
+        np.testing.assert_allclose(rising, heights[:, i - 1], rtol=0, atol=1e-10)
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_nothing_but_changed_numbers_is_touched(tmp_path: Path, newline: str) -> None:
+    file = tmp_path / "mine.cfg"
+    file.write_bytes(OWN.replace("\n", newline).encode())
+    robot = pk.import_printer(file).robot
+    out = tmp_path / "new.cfg"
+    pk.export.klipper(robot, out, config=file)
+    assert out.read_bytes() == file.read_bytes()
+    pk.export.klipper(robot.replace({"rod2": 334.5, "angle1": np.radians(-149.0)}), out, file)
+    endstop = in_the_middle(174.75, 334.25, 297.05) - in_the_middle(174.75, 334.5, 0.0)
+    end = newline.replace("\r", "\\r").replace("\n", "\\n")
+    found = changed_lines(file.read_bytes().decode(), out.read_bytes().decode())
+    assert sorted(ascii(line)[1:-1].replace(end, "") for line in found) == sorted(
+        [
+            f"+ position_endstop: {endstop:.6f}",
+            "- #*# angle = -149.500000",
+            "+ #*# angle = -149.000000",
+            "- #*# arm_length = 334.250000",
+            "+ #*# arm_length = 334.500000",
+        ]
+    )
+
+
+def test_comments_stay_and_a_gain_becomes_a_rotation_distance(tmp_path: Path) -> None:
+    file = own(tmp_path)
+    robot = pk.import_printer(file).robot
+    gain = robot.geometry["gain1"] * 1.01
+    pk.export.klipper(robot.replace({"gain1": gain, "radius": 175.0}), tmp_path / "n", file)
+    text = (tmp_path / "n").read_text()
+    assert "rotation_distance = 40.400000 ; a belt\n" in text
+    assert "delta_radius: 175.000000\n" in text and "delta_radius = 170.000000\n" in text
+    assert " # by hand\n" in text
+    again = pk.import_printer(tmp_path / "n").robot
+    assert again.geometry["gain1"] == pytest.approx(gain, rel=1e-9)
+    far = robot.replace({"gain2": -3.0})
+    with pytest.raises(pk.ArgumentError, match=r"moves a carriage by 3 mm.*\[stepper_b\]"):
+        pk.export.klipper(far, tmp_path / "far", file)
+    assert not (tmp_path / "far").exists()
+
+
+def test_exported_numbers_are_the_robot(tmp_path: Path) -> None:
+    """Joints of the platform, heights of joints and all: read back, the same motion."""
+    limbs = [
+        {"platform": robots.ring(20.0, a, -7.0), "offset": 600.0 + a / 100} for a in (210, 330)
+    ]
+    limbs += [{"platform": robots.ring(20.0, 90, -7.0), "offset": 601.0}]
+    robot = robots.linear_delta(*[limb | {"gain": -1.0, "rod": 340.5} for limb in limbs])
+    loss = pk.export.klipper(robot, tmp_path / "lines")
+    assert loss.exact
+    steppers = "".join(f"[stepper_{a}]\nmicrosteps: 1\nrotation_distance: 200\n" for a in "abc")
+    file = own(tmp_path, "[printer]\nkinematics: delta\n" + steppers)
+    pk.export.klipper(robot, file, config=file)
+    again = pk.import_printer(file).robot
+    poses = np.zeros((20, 6))
+    poses[:, :3] = np.random.default_rng(2).uniform([-60, -60, 0], [60, 60, 99], (20, 3))
+    found = again.forward(robot.inverse(poses)).pose
+    np.testing.assert_allclose(found, poses, rtol=0, atol=1e-5)  # six decimals in the file
+
+
+def test_what_the_firmware_cannot_hold_is_refused_or_projected(tmp_path: Path) -> None:
+    robot = pk.import_printer(own(tmp_path)).robot
+    leaning = robot.replace({"slider1.tilt1": 0.003})
+    with pytest.raises(pk.ArgumentError, match=r"one radius and vertical towers.*off by 0\.\d+ mm"):
+        pk.export.klipper(leaning, tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+    file = own(tmp_path)
+    loss = pk.export.klipper(leaning, file, config=file, project=True)
+    nearest = pk.import_printer(file).robot
+    poses = np.zeros((400, 6))
+    poses[:, :3] = np.random.default_rng(3).uniform([-95, -95, 0], [95, 95, 140], (400, 3))
+    q = leaning.inverse(poses)
+    off = np.linalg.norm((nearest.forward(q).pose - poses)[:, :3], axis=1)
+    before = np.linalg.norm((robot.forward(q).pose - poses)[:, :3], axis=1)
+    assert np.sqrt((off**2).mean()) < min(1.2 * loss.rms, 0.3 * np.sqrt((before**2).mean()))
+    assert off.max() < 1.2 * loss.worst
+
+
+def test_other_machines_are_refused(tmp_path: Path) -> None:
+    for name in ("hexapod", "linear-delta-6"):
+        with pytest.raises(pk.ArgumentError, match="no linear delta"):
+            pk.export.klipper(pk.load(name), tmp_path / "x")
+    with pytest.raises(pk.ArgumentError, match="q must be 0 at the end stops"):
+        pk.export.klipper(pk.load("linear-delta"), tmp_path / "x")
+    with pytest.raises(pk.ArgumentError, match="and q 0 at the end stops"):
+        pk.export.klipper(pk.load("rotary-delta"), tmp_path / "x")
+    assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "kinematics: delta",
+            "kinematics: corexy",
+            "line 21: [printer] kinematics must be delta or rotary",
+        ),
+        ("microsteps: 32", "", "[stepper_b] microsteps is missing"),
+        (
+            "arm_length: 333.0",
+            "arm_length: long",
+            "line 12: [stepper_a] arm_length must be a number",
+        ),
+        ("arm_length: 333.0", "arm_length: 150", "line 12: [stepper_a] arm_length must be above"),
+        ("57:19", "57/19", "line 10: [stepper_a] gear_ratio must be like"),
+        ("microsteps: 32", "microsteps: 0", "line 15: [stepper_b] microsteps must be above 0"),
+        ("1000.500,2000.250,3000.000", "1,2", "[delta_calibrate] height0_pos must be 3 numbers"),
+    ],
+)
+def test_mistakes_are_named_with_their_line(
+    old: str, new: str, message: str, tmp_path: Path
+) -> None:
+    with pytest.raises(pk.FileError) as caught:
+        pk.import_printer(own(tmp_path, OWN.replace(old, new)))
+    assert message in str(caught.value)
+
+
+@pytest.mark.skipif(not LOGS.exists(), reason=f"{LOGS} is not here")
+def test_real_logs_lead_to_what_the_firmware_found(tmp_path: Path) -> None:
+    """Four printers: from numbers that are off, the stored heights lead to the saved ones."""
+    logs = [log for log in json.loads(LOGS.read_text()) if not log.get("distance")]
+    assert logs
+    for log in logs:
+        text = f"[printer]\nkinematics: delta\ndelta_radius: {log['radius'] + 1.5}\n"
+        for i, axis in enumerate("abc"):
+            text += f"[stepper_{axis}]\nrotation_distance: {log['stepdist'][i] * 3200!r}\n"
+            text += f"microsteps: 16\narm_length: {log['arm_length'][i]}\n"
+            text += f"angle: {log['angle'][i] + 0.3 * (i - 2)}\n"
+            text += f"position_endstop: {log['position_endstop'][i] - 1 + i}\n"
+        text += "[delta_calibrate]\n"
+        for i, (height, pos) in enumerate(zip(log["height"], log["pos"], strict=True)):
+            text += f"height{i}: {height}\nheight{i}_pos: {','.join(map(str, pos))}\n"
+        file = own(tmp_path, text)
+        printer = pk.import_printer(file)
+        assert printer.measurements is not None
+        found = pk.identify(printer.robot, printer.measurements)
+        pk.export.klipper(found.robot, file, config=file)
+        lines = file.read_text()
+
+        def written(option: str, lines: str = lines) -> list[float]:
+            named = (line.split(": ") for line in lines.splitlines() if line.startswith(option))
+            return [float(value) for name, value in named if name == option]
+
+        np.testing.assert_allclose(written("delta_radius"), log["radius"], atol=1e-3)
+        np.testing.assert_allclose(written("angle"), log["angle"], atol=1e-3)
+        endstops, saved = written("position_endstop"), np.array(log["position_endstop"])
+        shift = endstops - saved  # of all three alike: the first layer, set by hand afterwards
+        assert abs(shift).max() < 0.1
+        np.testing.assert_allclose(shift, shift.mean(), rtol=0, atol=1e-3)
+
+
+def test_three_commands_lead_from_a_config_to_its_changed_lines(run: Any, tmp_path: Path) -> None:
+    folder = str(tmp_path / "made")
+    assert run("import", CONFIG, "--out", folder).exit_code == 0
+    robot, probe = f"{folder}/robot.toml", f"{folder}/probe.csv"
+    assert run("calibrate", robot, probe, "--report", f"{folder}/report").exit_code == 0
+    out = tmp_path / "new.cfg"
+    calibrated = f"{folder}/report/robot.toml"
+    done = run("export", calibrated, "--as", "klipper", "--config", CONFIG, "--out", out)
+    assert (done.exit_code, done.stdout) == (0, f"{out}: printer\n")
+    names = {line[2:].split(":")[0] for line in changed_lines(CONFIG.read_text(), out.read_text())}
+    assert names == {"position_endstop", "angle", "delta_radius"}
+    probed = pk.import_printer(out)
+    assert probed.measurements is not None
+    z = probed.robot.forward(probed.measurements.actuators).pose[:, 2]
+    assert np.sqrt(np.mean((z - probed.measurements.values) ** 2)) < 0.03
+    assert run("import", CONFIG, "--out", folder).exit_code == 0  # nobody has touched it
+    Path(robot).write_text(Path(robot).read_text() + "# mine\n")
+    again = run("import", CONFIG, "--out", folder)
+    assert again.exit_code == 2 and "would be replaced" in again.stderr
+
+
+def test_options_of_another_target_are_refused(refused: Any, tmp_path: Path) -> None:
+    arguments = ("export", "hexapod", "--out", tmp_path / "x", "--as")
+    assert "--config says nothing of --as c" in refused(*arguments, "c", "--config", CONFIG)
+    assert "--number says nothing" in refused(*arguments, "klipper", "--number", "float")
+    assert "--number must be double or float" in refused(*arguments, "c", "--number", "half")
+    assert "--as" in refused(*arguments, "basic")

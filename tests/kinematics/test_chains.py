@@ -1,0 +1,261 @@
+"""Machines whose limbs are chains of joints: forward, inverse, errors."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.core.chains import ChainMachine
+from pkmcal.core.library import ISAS
+from pkmcal.geometry import robot_file
+from pkmcal.kinematics import overconstrained
+from pkmcal.screw import from_pose
+from tests.chain_files import all_errors, as_chains, described, same_errors
+from tests.chain_twin import Twin
+
+DIGITS = Path(__file__).parents[3] / "shared" / "design" / "chains.json"
+SQUARE = (
+    "five-bar",
+    "agile-eye",
+    "tricept",
+    "trivariant",
+    "eclipse",
+    "4ups-ps",
+    "delta-parallelograms",
+)
+OVER = {"exechon": 2, "tripteron": 3, "2tpr2tps-chains": 2}
+FAST = ("hexapod", "rbt-6t03p", "6-rus", "3rps", "3rrr-planar", "linear-delta-6")
+
+
+def loaded(text: str, folder: Path) -> pk.Robot:
+    file = folder / "robot.toml"
+    file.write_text(text, encoding="utf-8")
+    return pk.load(file)
+
+
+def reference() -> list[Any]:
+    if not DIGITS.exists():
+        return [pytest.param(None, marks=pytest.mark.skip(reason="no reference digits here"))]
+    machines = json.loads(DIGITS.read_text(encoding="utf-8"))["machines"]
+    return [pytest.param(machine, id=machine["name"]) for machine in machines]
+
+
+def commands(robot: pk.Robot, count: int, seed: int = 0, share: float = 1.0) -> np.ndarray:
+    random = np.random.default_rng(seed)
+    way = np.array([30.0 if unit == "mm" else 0.2 for unit in robot.actuator_units]) * share
+    return robot.inverse(robot.home) + random.uniform(-way, way, (count, robot.n_actuators))
+
+
+def disturbed(robot: pk.Robot, size: float = 1.0, seed: int = 0) -> pk.Robot:
+    random = np.random.default_rng(seed)
+    sigma = {"mm": 0.3 * size, "rad": 1e-3 * size, "1": 0.0}
+    values = robot.geometry.values + [random.normal(0, 1) * sigma[u] for u in robot.geometry.units]
+    return robot.replace(values)
+
+
+@pytest.mark.parametrize("machine", reference())
+def test_poses_are_those_of_the_reference(machine: dict[str, Any], tmp_path: Path) -> None:
+    robot = loaded(described(machine), tmp_path)
+    answers = machine["answers"]
+    nominal = robot.forward(machine["q"])
+    assert np.abs(from_pose(nominal.pose) - answers["nominal"]["T"]).max() < 1e-9
+    assert robot.machine.rows - robot.machine.m == machine["over"]
+    if machine["over"] == 0:  # others give way in the reference by other weights
+        wrong = robot.replace(all_errors(machine, robot)).forward(machine["q"])
+        assert np.abs(from_pose(wrong.pose) - answers["errors"]["T"]).max() < 1e-9
+        assert np.abs(wrong.pose - nominal.pose).max() > 1e-4
+
+
+@pytest.mark.parametrize("name", SQUARE)
+def test_poses_are_those_of_products_of_exponentials(name: str) -> None:
+    robot = disturbed(pk.load(name))
+    for q in commands(robot, 1):
+        T, theta, missed = Twin(robot).forward(q)
+        found = robot.forward(q)
+        assert missed < 1e-9
+        assert np.abs(from_pose(found.pose) - T).max() < 1e-9
+        twin = dict(zip(Twin(robot).passive, theta, strict=True))
+        there = [twin[passive] for passive in robot.passive_names]
+        off = (found.passive - there + np.pi) % (2 * np.pi) - np.pi
+        assert np.abs(off).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", FAST)
+def test_limbs_of_other_kinds_are_chains_too(name: str, tmp_path: Path) -> None:
+    robot = pk.load(name)
+    chained = loaded(as_chains(robot), tmp_path)
+    random = np.random.default_rng(0)
+    prefixes = ("base", "platform", "rod", "crank") + ("offset",) * (name != "linear-delta-6")
+    moved = [n for n in robot.geometry.names if n.startswith(prefixes)]
+    moved = [n for n in moved if not (robot.model.map == "planar" and n.endswith(".z"))]
+    units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
+    errors = {n: random.normal(0, 0.3 if units[n] == "mm" else 1e-3) for n in moved}
+    wrong = robot.replace({n: robot.geometry[n] + e for n, e in errors.items()})
+    joints = {n: e for n, e in same_errors(robot, errors).items() if n in chained.geometry}
+    same = chained.replace(joints)
+    q = commands(robot, 100, share=0.5)
+    for one, other in ((robot, chained), (wrong, same)):
+        a, b = one.forward(q), other.forward(q)
+        assert a.ok.all() and b.ok.all()
+        assert np.abs(a.pose - b.pose).max() < 1e-10
+    a, b = (each.forward(q[:5]).pose for each in (wrong, same))
+    by_numbers, by_joints = wrong.error_jacobian(a, q[:5]), same.error_jacobian(b, q[:5])
+    for n in moved:
+        effect = sum(
+            value * by_joints[..., same.geometry.names.index(joint)]
+            for joint, value in same_errors(robot, {n: 1.0}).items()
+            if joint in same.geometry
+        )
+        at = by_numbers[..., wrong.geometry.names.index(n)]
+        assert np.abs(effect - at).max() < 1e-9 * max(1.0, np.abs(at).max()), n
+
+
+def test_the_paper_s_poses_come_out_of_joints(tmp_path: Path) -> None:
+    """Paper A's forward kinematics, with d = 292.4: no constraint of it is assumed."""
+    text = robot_file.located("2tpr2tps-chains")[0].decode().replace("294.2", "292.4")
+    legs = {"home_value = 454.9": np.sqrt(152.4**2 + 152.35**2 + 400.0**2)}
+    for old, new in legs.items():
+        text = re.sub(re.escape(old) + r"\d*", f"home_value = {float(new)!r}", text)
+    robot = loaded(text, tmp_path)
+    found = robot.forward([450.0, 452.0, 400.0, 405.0])
+    x, y, z, alpha, beta, gamma = found.pose
+    printed = [6.000920020714, -6.205857532186, 400.479518293888, -0.031217451630, 0.014983215564]
+    assert np.abs(np.array([x, y, z, alpha, beta]) - printed).max() < 2e-12 * 400
+    assert abs(gamma) < 1e-13
+    assert abs(x - z * np.tan(beta)) < 1e-10
+
+
+@pytest.mark.parametrize("name", SQUARE)
+def test_errors_act_as_solving_again_says(name: str) -> None:
+    robot = disturbed(pk.load(name))
+    q = commands(robot, 4)
+    own = robot.forward(q).pose
+    columns = robot.geometry.slot_index.astype(np.int32)
+    units = robot.geometry.units
+    for twists in (False, True):
+        given = (robot.machine, robot.slots, own, q, columns, units, twists)
+        solved = overconstrained.error_jacobian(*given)
+        exact = robot.machine.error_jacobian(robot.slots, own, q, columns, twists)
+        assert np.abs(exact - solved).max() < 2e-8 * np.abs(solved).max()
+
+
+@pytest.mark.parametrize("name", (*SQUARE, *OVER))
+def test_commands_come_back(name: str) -> None:
+    robot = pk.load(name)
+    q = commands(robot, 50)
+    found = robot.forward(q)
+    assert found.ok.all()
+    assert found.iterations.mean() < 5.5
+    assert np.abs(robot.inverse(found.pose) - q).max() < 1e-8
+    assert robot.violation(found.pose).max() < 1e-9
+    step = 1e-5
+    for k in range(robot.n_actuators):
+        side = [
+            robot.forward(q[:5] + s * step * np.eye(robot.n_actuators)[k]).pose for s in (1, -1)
+        ]
+        slope = (side[0] - side[1]) / (2 * step)
+        exact = robot.machine.forward_jacobian(robot.slots, found.pose[:5], q[:5])[..., k]
+        assert np.abs(exact - slope).max() < 1e-5
+
+
+@pytest.mark.parametrize("name", ("tricept", "exechon", "agile-eye", "five-bar"))
+def test_every_isa_gives_the_same_bits(name: str) -> None:
+    robot = disturbed(pk.load(name), 0.3)
+    layout = robot.machine.layout
+    q = commands(robot, 37)
+    found = []
+    for isa in range(len(ISAS)):
+        try:
+            machine = ChainMachine(layout, isa=isa)
+            poses = machine.forward(robot.slots, q, robot.own_home, None)[0]
+        except ValueError:
+            continue  # this processor has it not
+        columns = robot.geometry.slot_index.astype(np.int32)
+        by = machine.error_jacobian(robot.slots, poses, q, columns)
+        looked = (*machine.closure(robot.slots, poses, q), *machine.frames(robot.slots, poses, q))
+        found.append((poses, machine.inverse(robot.slots, poses), by, *looked))
+    assert len(found) > 1
+    for other in found[1:]:
+        for a, b in zip(found[0], other, strict=True):
+            assert np.array_equal(a, b)
+
+
+def test_rows_fail_alone_and_say_why() -> None:
+    robot = pk.load("tricept")
+    q = commands(robot, 6)
+    q[1], q[3, 0], q[4] = np.nan, np.inf, [2000.0, -3000.0, 0.0]
+    found = robot.forward(q)
+    assert found.status.tolist()[:4] == [0, 4, 0, 4]
+    assert found.status[4] in (1, 2) and found.status[5] == 0
+    assert np.isnan(found.pose[[1, 3, 4]]).all()
+    assert np.isfinite(found.pose[[0, 2, 5]]).all()
+    far = robot.home + np.array([1e6, 0, 0, 0, 0, 0])
+    assert not robot.feasible([robot.home, far]).ok.all()
+    turned = pk.load("eclipse")
+    assert np.isnan(turned.inverse([5000.0, 0, 0, 0, 0, 0])).all()
+
+
+def test_a_geometry_for_each_row_is_as_one_by_one() -> None:
+    robot = pk.load("tricept")
+    machines = [disturbed(robot, seed=k) for k in range(11)]
+    q = commands(robot, 11)
+    slots = np.stack([m.slots for m in machines])
+    together = robot.machine.forward(slots, q, robot.own_home, 1)[0]
+    alone = np.array([m.forward(each).pose for m, each in zip(machines, q, strict=True)])
+    assert np.abs(together - alone).max() < 1e-11
+
+
+@pytest.mark.parametrize(("name", "modes"), (("five-bar", 2), ("agile-eye", 8), ("tripteron", 1)))
+def test_assembly_modes_are_counted(name: str, modes: int) -> None:
+    robot = pk.load(name)
+    found = robot.forward_all(commands(robot, 1)[0])
+    assert len(found) == modes
+    assert not found.complete and not found.certified.any()
+
+
+def test_moves_follow_the_platform() -> None:
+    robot = pk.load("tricept")
+    random = np.random.default_rng(0)
+    q, q1, q2 = commands(robot, 5), random.normal(0, 20, (5, 3)), random.normal(0, 50, (5, 3))
+    own = robot.forward(q).pose
+    motion, velocity, _ = robot.machine.motion(robot.slots, own, q, q1, q2)
+    jacobian = robot.machine.forward_jacobian(robot.slots, own, q)
+    assert np.abs(velocity - (jacobian @ q1[..., None])[..., 0]).max() < 1e-7
+    back, bent = robot.rates(motion)
+    assert np.abs(back - q1).max() < 1e-7
+    assert np.abs(bent - q2).max() < 1e-4
+
+
+@pytest.mark.parametrize("name", OVER)
+def test_surplus_closures_settle_where_elastic_joints_would(name: str) -> None:
+    robot = pk.load(name)
+    assert robot.machine.rows - robot.machine.m == OVER[name]
+    wrong = disturbed(robot, 1 / 3)
+    q = commands(robot, 1)[0]
+    rest, found = Twin(wrong).settled(q), wrong.forward(q)
+    assert found.residual > 0.05
+    off = np.abs(from_pose(found.pose) - rest)
+    assert off[:3, 3].max() < max(1e-4, 3e-3 * found.residual)
+    assert off[:3, :3].max() < 3e-6
+
+
+def test_a_soft_joint_takes_more_of_what_is_missed(tmp_path: Path) -> None:
+    robot = pk.load("tripteron")
+    wrong = {"limb1.joint1.dpsi": 1e-3}
+    stiff = robot.replace(wrong).forward(robot.inverse(robot.home)).pose
+    robot.save(tmp_path / "saved.toml")
+    saved = (tmp_path / "saved.toml").read_text(encoding="utf-8")
+    head, one, two, three = saved.split("[[limb]]")
+    one = one.replace("gain = 1.0", "gain = 1.0, soft = 1000.0")
+    soft = loaded("[[limb]]".join([head, one, two, three]), tmp_path)
+    found = soft.replace(wrong).forward(soft.inverse(soft.home)).pose
+    assert 0.0 < found[5] < 0.1 * stiff[5]
+    again = tmp_path / "again.toml"
+    soft.save(again)
+    assert "soft = 1000.0" in again.read_text(encoding="utf-8")

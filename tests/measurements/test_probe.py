@@ -1,0 +1,124 @@
+"""A printer's probe: the right sign finds the machine, and the wrong ones are not silent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.arrays import FloatArray
+
+EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "linear-delta" / "robot.toml"
+FIRMWARE = pk.load(EXAMPLE)
+TRUE = FIRMWARE.replace({
+    "radius": 171.35, "angle1": np.radians(209.8), "offset1": 624.4, "offset2": 625.5,
+})  # fmt: skip
+GRID = [(x, y) for x in range(-80, 81, 40) for y in range(-80, 81, 40) if x * x + y * y < 1e4]
+OFFSET = np.array([12.0, -7.0, 1.5])
+
+
+def nozzle(robot: pk.Robot, q: FloatArray) -> FloatArray:
+    return robot.forward(q).pose[0, :3]
+
+
+def triggers(offset: FloatArray) -> FloatArray:
+    """What the firmware reports: its own z at which the true nozzle is z_offset above the bed."""
+    found = []
+    for x, y in GRID:
+        low, high = -10.0, 10.0
+        for _ in range(60):
+            z = (low + high) / 2
+            q = FIRMWARE.inverse([[x, y, z, 0, 0, 0]])
+            low, high = (z, high) if nozzle(TRUE, q)[2] < offset[2] else (low, z)
+        found.append((x, y, z))
+    return np.array(found)
+
+
+def off(found: pk.Identification) -> float:
+    """How much the true nozzle leaves a plane when the calibrated robot commands one, mm."""
+    heights = []
+    for x, y in GRID:
+        q = found.robot.inverse([[x, y, 20.0, 0, 0, 0]])
+        heights.append(nozzle(TRUE, q)[2])
+    return float(np.ptp(heights))
+
+
+def file(folder: Path, heads: str, rows: FloatArray) -> Path:
+    path = folder / "probe.csv"
+    lines = [heads, *(",".join(f"{v:.6f}" for v in row) for row in rows)]
+    path.write_text("\n".join(lines))
+    return path
+
+
+@pytest.mark.parametrize("offset", [np.zeros(3), OFFSET], ids=["at the nozzle", "beside it"])
+def test_the_points_of_a_probe_find_the_machine(offset: FloatArray, tmp_path: Path) -> None:
+    path = file(tmp_path, "x [mm],y [mm],probe [mm]", triggers(offset))
+    m = pk.read_measurements(path, FIRMWARE, probe_offset=offset)
+    assert "taken as the firmware's z when the probe triggered" in m.notes[0]
+    assert off(pk.identify(FIRMWARE, m)) < 1e-3
+    assert off(pk.identify(FIRMWARE, m.select(slice(0, 1)), prior=0.001)) > 0.3  # as it was
+
+
+def test_the_lines_of_a_log_are_read_as_they_stand(tmp_path: Path) -> None:
+    points = triggers(np.zeros(3))
+    path = tmp_path / "klippy.log"
+    lines = [f"// probe at {x:.3f},{y:.3f} is z={z:.6f}" for x, y, z in points]
+    path.write_text("Send: PROBE\n" + "\necho: something\n".join(lines))
+    m = pk.read_measurements(path, FIRMWARE)
+    np.testing.assert_allclose(m.actuators, pk.probed(FIRMWARE, points).actuators, atol=1e-5)
+    path.write_text("\n".join(f"Bed X: {x:.3f} Y: {y:.3f} Z: {z:.6f}" for x, y, z in points))
+    np.testing.assert_array_equal(pk.read_measurements(path, FIRMWARE).actuators, m.actuators)
+
+
+def test_actuators_beside_a_probe_have_to_be_those_of_the_trigger(tmp_path: Path) -> None:
+    """The second trap: actuators of the flat x, y, 0 beside the height of the mesh."""
+    points = triggers(np.zeros(3))
+    heads = "q1 [mm],q2 [mm],q3 [mm],probe [mm]"
+    poses = np.column_stack([points, np.zeros_like(points)])
+    right = np.column_stack([FIRMWARE.inverse(poses), points[:, 2]])
+    m = pk.read_measurements(file(tmp_path, heads, right), FIRMWARE)
+    assert off(pk.identify(FIRMWARE, m)) < 1e-3
+    flat = poses * [1, 1, 0, 1, 1, 1]
+    wrong = np.column_stack([FIRMWARE.inverse(flat), points[:, 2]])
+    with pytest.raises(pk.FileError, match="have to be those at which the probe triggered"):
+        pk.read_measurements(file(tmp_path, heads, wrong), FIRMWARE)
+
+
+def test_heights_that_the_robot_file_gives_itself_are_warned_of(tmp_path: Path) -> None:
+    """The first trap: actuators of the trigger, and the firmware's z there as a height."""
+    points = triggers(np.zeros(3))
+    q = FIRMWARE.inverse(np.column_stack([points, np.zeros_like(points)]))
+    path = file(tmp_path, "q1 [mm],q2 [mm],q3 [mm],z [mm]", np.column_stack([q, points[:, 2]]))
+    with pytest.warns(pk.CalibrationWarning, match="those that the robot file itself gives"):
+        pk.read_measurements(path, FIRMWARE)
+
+
+def test_the_sign_of_a_height_over_a_flat_command_is_said(tmp_path: Path) -> None:
+    """Nothing in the numbers tells it: a dial indicator that reads up is right."""
+    x, y = np.array(GRID, dtype=float).T
+    q = FIRMWARE.inverse(np.column_stack([x, y, *np.zeros((4, len(x)))]))
+    heights = [nozzle(TRUE, row[None])[2] for row in q]
+    path = file(tmp_path, "q1 [mm],q2 [mm],q3 [mm],z [mm]", np.column_stack([q, heights]))
+    m = pk.read_measurements(path, FIRMWARE)
+    assert "measured height of the nozzle, up" in m.notes[0]
+    assert off(pk.identify(FIRMWARE, m)) < 1e-3
+
+
+def test_a_probe_without_its_machine_is_refused(tmp_path: Path) -> None:
+    path = file(tmp_path, "x [mm],y [mm],probe [mm]", triggers(np.zeros(3)))
+    with pytest.raises(pk.FileError, match="give the robot, as the firmware had it"):
+        pk.read_measurements(path)
+    with pytest.raises(pk.ArgumentError, match="does not reach"):
+        pk.probed(FIRMWARE, [[0, 0, 0], [1000, 0, 0]])
+    with pytest.raises(pk.ArgumentError, match="offset must"):
+        pk.probed(FIRMWARE, [[0, 0, 0]], offset=[1, 2])
+
+
+def test_heights_that_a_file_was_calibrated_with_are_not_warned_of(tmp_path: Path) -> None:
+    """They agree with it as well as the probe repeats; carriages of a firmware, to its steps."""
+    measured = pk.read_measurements(EXAMPLE.parent / "probe.csv", FIRMWARE)
+    calibrated = pk.identify(FIRMWARE, measured).robot
+    again = pk.read_measurements(EXAMPLE.parent / "probe.csv", calibrated)  # no warning
+    assert "unless it was calibrated with them" in again.notes[0] and not measured.notes
