@@ -48,6 +48,7 @@ OF_FILE = {  # before those
     "rates.py": "tests/derive/test_limbs.py",
     "screws.py": "tests/derive/test_screws.py",
     "serial.h": "tests/arms/test_arm.py",
+    "solve.h": "tests/kinematics/test_forward.py",
     "tpr2tps.py": "tests/published/test_kinematics_2tpr2tps.py",
 }
 NOT_MEANT = {"csrc": ("core_v3.c", "core_v4.c", "build.py"), "derive": ("modes.py", "__init__.py")}
