@@ -8,7 +8,7 @@
 #include "poses.h"
 #include "pso.h"
 #include "serial.h"
-#include "chain_calls.h"
+#include "chain_response.h"
 #include "measured.h"
 #include "tpr2tps.h"
 #include "row_loops.h"
