@@ -53,13 +53,14 @@ int pkm_closure_count(const pkm_machine *machine)
 
 int pkm_prepared(const pkm_machine *machine)
 {
+    _Static_assert(PKM_MAX_ROWS < 64, "rows are bits of a word");
     const int rows = pkm_closure_count(machine);
-    unsigned seen = 0;
+    uint64_t seen = 0; /* PKM_MAX_ROWS bits */
     for (int r = 0; r < rows; r++) {
         if (machine->order[r] < 0 || machine->order[r] >= rows) return 0;
-        seen |= 1u << machine->order[r];
+        seen |= UINT64_C(1) << machine->order[r];
     }
-    return seen == (1u << rows) - 1 ? rows : 0;
+    return seen == (UINT64_C(1) << rows) - 1 ? rows : 0;
 }
 
 ptrdiff_t pkm_swarm_size(const pkm_swarm *swarm)

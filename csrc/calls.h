@@ -47,7 +47,8 @@ int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
 /* pose (n, 6), q (n, actuators) -> actuators as instruments, limb by limb: of the sphere row the
  * coordinate that the limb needs at the pose less the one read, nearest turn, of the other rows the
  * weighted closure [mm] (n, rows); by the map's step [mm, rad] (n, rows, m) and by the numbers (n, rows,
- * columns; NULL: not wanted); columns are indices into limbs x SLOTS. NaN out of reach. */
+ * columns; NULL: not wanted); columns are indices into limbs x SLOTS. Of a
+ * limb out of reach, the closure at q over its slope there. */
 int CALL(readings)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                    const double *pose, const double *q, const int32_t *column, int columns,
                    double *residual, double *by_step, double *by_number);

@@ -6,7 +6,7 @@
 #include "chain_system.h"
 #include "newton.h"
 
-enum { MAX_ASSEMBLY = 40, PATH_PARTS = 8, PATH_STEPS = 5 };
+enum { MAX_ASSEMBLY = 40, FEW_ASSEMBLY = 14, PATH_PARTS = 8, PATH_STEPS = 5 };
 #define CHAIN_CLOSED 2e-13 /* residual at which chains close, relative to the machine's size */
 #define LEAST_COLUMN 1e-6  /* of a passive joint beside the others: below, they do not say where it is */
 
@@ -196,28 +196,42 @@ SHARED void chain_begin(const pkm_chains *machine, const chain_prediction *start
     chain_move(machine, &step, running & finite(step.longest), at);
 }
 
+/* What the end of a chain misses with its joints there; infinite where that is no number, and beyond a
+ * quarter turn, where vee falls again and is 0 after half a turn. */
+INLINE real chain_missed(const pkm_chains *machine, int l, const chain_numbers *numbers,
+                         const real *R, const real *p, const real *theta, const real *drive)
+{
+    const int k = machine->first[l + 1] - machine->first[l];
+    const int *which, rows = machine->ball[l] ? 3 : group_rows(machine->map, &which);
+    motion frame[PKM_MAX_CHAIN + 1];
+    real r[6], lever[3], worst = fill(0.0);
+    chain_walk(machine, l, numbers, theta, drive, frame);
+    chain_misses(machine, l, numbers, &frame[k], R, p, r, lever);
+    for (int i = 0; i < rows; i++) worst = larger(worst, absolute(r[i]));
+    if (!machine->ball[l]) {
+        real trace = fill(0.0);
+        for (int i = 0; i < 9; i++) trace += frame[k].R[i] * R[i];
+        worst = select(trace > fill(1.0), worst, fill(INFINITY));
+    }
+    return select(finite(worst), worst, fill(INFINITY));
+}
+
 /* What closures miss at a state. */
 SHARED real chain_worst(const pkm_chains *machine, const chain_numbers *numbers,
                         const chain_state *at, const real *drive)
 {
     real R[9], p[3], worst = fill(0.0);
     FN(map_frame)(machine->map, at->state, R, p);
-    for (int l = 0; l < machine->chains; l++) {
-        const int k = machine->first[l + 1] - machine->first[l];
-        const int *which, rows = machine->ball[l] ? 3 : group_rows(machine->map, &which);
-        motion frame[PKM_MAX_CHAIN + 1];
-        real r[6], lever[3];
-        chain_walk(machine, l, numbers, at->theta, drive, frame);
-        chain_misses(machine, l, numbers, &frame[k], R, p, r, lever);
-        for (int i = 0; i < rows; i++) worst = larger(worst, absolute(r[i]));
-    }
+    for (int l = 0; l < machine->chains; l++)
+        worst = larger(worst, chain_missed(machine, l, numbers, R, p, at->theta, drive));
     return worst;
 }
 
-/* A chain alone: its joints to a frame of the platform, by Gauss and Newton. With `drive` the
+/* A chain alone: its joints to a frame of the platform, by Gauss and Newton in `most` steps. With `drive` the
  * actuated joints stay there, else they follow and `own` gets them. Returns where it settled. */
 SHARED mask chain_assemble(const pkm_chains *machine, int l, const chain_numbers *numbers,
-                           const real *R, const real *p, const real *drive, real *theta, real *own)
+                           const real *R, const real *p, const real *drive, int most, real *theta,
+                           real *own)
 {
     const int first = machine->first[l], k = machine->first[l + 1] - first;
     const int *which, rows = machine->ball[l] ? 3 : group_rows(machine->map, &which);
@@ -226,7 +240,7 @@ SHARED mask chain_assemble(const pkm_chains *machine, int l, const chain_numbers
     mask running = fill_mask(-1), good = fill_mask(0);
     for (int j = 0; j < k; j++)
         if (!drive || machine->actuator[machine->member[first + j]] < 0) movable[count++] = j;
-    for (int step = 0; step < MAX_ASSEMBLY && any(running) && count; step++) {
+    for (int step = 0; step < most && any(running) && count; step++) {
         motion frame[PKM_MAX_CHAIN + 1];
         real J[PKM_MAX_CHAIN][6], r[6], lever[3], A[36], x[PKM_MAX_CHAIN], pivot, y[6];
         real longest = fill(0.0), turn = fill(0.0), worst = fill(0.0);
@@ -274,8 +288,36 @@ SHARED mask chain_assemble(const pkm_chains *machine, int l, const chain_numbers
     return count ? good : fill_mask(-1);
 }
 
-/* Every chain alone, and the mean of what they share. With `q` NULL the actuators follow, into
- * `drive`; else they are there already. */
+/* The passive joints of a chain with its actuators at `drive`, from `theta`. Where that does not close,
+ * from home and two turned postures, of which one that closes is taken: a leg that points the other
+ * way is a place where Gauss and Newton rest too. */
+SHARED mask chain_reclose(const pkm_chains *machine, int l, const chain_numbers *numbers,
+                          const real *R, const real *p, const real *drive, real *theta)
+{
+    static const double turned[] = {0.0, 2.0, -2.0};
+    const real closed = fill(1e-9 * machine->size);
+    real trial[PKM_MAX_JOINTS], own[PKM_MAX_LIMBS];
+    memcpy(own, drive, sizeof(real) * machine->actuators);
+    mask good = chain_assemble(machine, l, numbers, R, p, drive, MAX_ASSEMBLY, theta, own);
+    mask open = ~(chain_missed(machine, l, numbers, R, p, theta, drive) <= closed);
+    for (int attempt = 0; attempt < 3 && any(open) && !machine->over; attempt++) {
+        memcpy(trial, theta, sizeof(real) * machine->passive);
+        for (int j = machine->first[l]; j < machine->first[l + 1]; j++) {
+            const int joint = machine->member[j], c = machine->coordinate[joint];
+            if (c >= 0) trial[c] = fill(machine->prismatic[joint] ? 0.0 : turned[attempt]);
+        }
+        const mask settled = chain_assemble(machine, l, numbers, R, p, drive, FEW_ASSEMBLY, trial, own);
+        const mask found = open & settled
+                           & (chain_missed(machine, l, numbers, R, p, trial, drive) <= closed);
+        for (int c = 0; c < machine->passive; c++) theta[c] = select(found, trial[c], theta[c]);
+        good |= found;
+        open &= ~found;
+    }
+    return good;
+}
+
+/* Every chain alone, and the mean of what they share. Where the actuators are not `given` they
+ * follow, into `drive`. */
 SHARED mask chains_assembled(const pkm_chains *machine, const chain_numbers *numbers, const real *R,
                              const real *p, int given, real *theta, real *drive)
 {
@@ -289,11 +331,9 @@ SHARED mask chains_assembled(const pkm_chains *machine, const chain_numbers *num
         real own[PKM_MAX_LIMBS];
         for (int a = 0; a < machine->actuators; a++) own[a] = given ? drive[a] : fill(0.0);
         for (int s = 0; s < machine->shared; s++) theta[s] = fill(0.0);
-        good &= chain_assemble(machine, l, numbers, R, p, NULL, theta, own);
-        if (given) {
-            for (int a = 0; a < machine->actuators; a++) own[a] = drive[a];
-            good &= chain_assemble(machine, l, numbers, R, p, drive, theta, own);
-        }
+        const mask settled = chain_assemble(machine, l, numbers, R, p, NULL, MAX_ASSEMBLY, theta, own);
+        if (!given) good &= settled;
+        if (given) good &= chain_reclose(machine, l, numbers, R, p, drive, theta);
         for (int j = machine->first[l]; j < machine->first[l + 1]; j++) {
             const int joint = machine->member[j], a = machine->actuator[joint];
             const int c = machine->coordinate[joint];

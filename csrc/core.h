@@ -9,7 +9,7 @@
 #include "pso.h"
 #include "readings.h"
 #include "serial.h"
-#include "chain_calls.h"
+#include "chain_response.h"
 #include "measured.h"
 #include "tpr2tps.h"
 #include "row_loops.h"

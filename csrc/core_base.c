@@ -39,7 +39,7 @@ static void set_near(pkm_machine *machine, const double *geometry, const double 
 {
     limb_numbers limb[PKM_MAX_LIMBS];
     ptrdiff_t zero[LANES] = {0};
-    real pose[6], R[9], p[3], h[3], q, qt;
+    real pose[6], R[9], p[3], h[3], q, qt, at_home[PKM_MAX_LIMBS];
     int seen = 0;
     prepare_limbs(machine, geometry, 0, zero, limb);
     for (int k = 0; k < 6; k++) pose[k] = fill(home[k]);
@@ -50,7 +50,8 @@ static void set_near(pkm_machine *machine, const double *geometry, const double 
         seen |= 1 << a;
         int s = f; /* the first limb of the actuator with a stroke, or else the first */
         while (s < machine->limbs && (machine->actuator[s] != a || isnan(machine->near[s]))) s++;
-        if (s == machine->limbs) {
+        const int unstated = s == machine->limbs;
+        if (unstated) {
             s = f;
             FN(limb_joint)(R, p, limb[s].g + PLATFORM_X, limb[s].g + BASE_X, h);
             qt = limb_drive_at(machine, s, &limb[s], h);
@@ -62,6 +63,13 @@ static void set_near(pkm_machine *machine, const double *geometry, const double 
         for (int i = f; i < machine->limbs; i++)
             if (machine->actuator[i] == a && isnan(machine->near[i])) {
                 FN(limb_drive)(q, limb[i].g, &qt);
+                machine->near[i] = qt[0];
+            }
+        if (!unstated || !geared(machine, limb, f)) continue;
+        inverse_once(machine, limb, R, p, at_home); /* the turn at home where all its limbs agree */
+        for (int i = f; i < machine->limbs; i++)
+            if (machine->actuator[i] == a && isfinite(at_home[a][0])) {
+                FN(limb_drive)(at_home[a], limb[i].g, &qt);
                 machine->near[i] = qt[0];
             }
     }

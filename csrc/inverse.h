@@ -41,6 +41,54 @@ INLINE real limb_inverse(const pkm_machine *machine, int i, const limb_numbers *
     return q;
 }
 
+/* Does a whole turn of limb i leave another limb of its actuator elsewhere? */
+INLINE int geared(const pkm_machine *machine, const limb_numbers *limb, int i)
+{
+    mask apart = fill_mask(0);
+    if (!machine->angle[i]) return 0;
+    for (int j = 0; j < machine->limbs; j++)
+        if (machine->actuator[j] == machine->actuator[i]) {
+            if (!machine->angle[j]) return 1;
+            apart |= absolute(limb[j].g[GAIN]) != absolute(limb[i].g[GAIN]);
+        }
+    return any(apart);
+}
+
+#define MOST_TURNS 8  /* either way, in search of one where all limbs of an actuator agree */
+#define AGREE 1e-7    /* [rad] of the first limb: rounding of a pose that the machine takes */
+#define PER_TURN 1e-2 /* [rad] that limbs have to agree better for each turn that is farther */
+
+/* Of the commands of limb i a whole number of its turns from `own`, the one where the other limbs of
+ * its actuator stand as well: of those that agree the nearest to `near`, its drive; else the least
+ * apart, with a turn's worth. */
+INLINE real agreed_turn(const pkm_machine *machine, const limb_numbers *limb, int i, const real *R,
+                        const real *p, real near, real own)
+{
+    const real gain = absolute(limb[i].g[GAIN]), turn = TWO_PI / gain;
+    real about, best = own, least = fill(INFINITY), others[PKM_MAX_LIMBS];
+    FN(limb_command)(near, limb[i].per_gain, limb[i].g, &about);
+    for (int j = i + 1; j < machine->limbs; j++)
+        if (machine->actuator[j] == machine->actuator[i])
+            others[j] = limb_inverse(machine, j, &limb[j], R, p, fill(0.0));
+    for (int k = MOST_TURNS; k >= -MOST_TURNS; k--) {
+        const real at = own + k * turn;
+        real apart = fill(0.0);
+        for (int j = i + 1; j < machine->limbs; j++)
+            if (machine->actuator[j] == machine->actuator[i]) {
+                const real period = TWO_PI / absolute(limb[j].g[GAIN]);
+                const real there = machine->angle[j] ? nearest_turn(others[j], at, period) : others[j];
+                const real miss = gain * absolute(there - at);
+                apart = select(miss > apart, miss, apart);
+            }
+        const real cost = select(apart <= fill(AGREE), 1e-12 * absolute(at - about),
+                                 apart + PER_TURN * (1 + (k < 0 ? -k : k)));
+        const mask better = cost < least - 1e-15; /* of turns equally far the upper one */
+        best = select(better, at, best);
+        least = select(better, cost, least);
+    }
+    return best;
+}
+
 /* Limbs that share an actuator are averaged, angles at the turn nearest to the first limb's; one limb
  * out of reach makes the whole row NaN. `near` (NULL: the machine's own) says which turn that is. */
 INLINE void inverse_at(const pkm_machine *machine, const limb_numbers *limb, const real *R,
@@ -54,7 +102,9 @@ INLINE void inverse_at(const pkm_machine *machine, const limb_numbers *limb, con
         real about = fill(machine->near[i]);
         if (machine->angle[i] && (others || near))
             FN(limb_drive)(others ? first[a] : near[a], limb[i].g, &about);
-        const real own = limb_inverse(machine, i, &limb[i], R, p, about);
+        real own = limb_inverse(machine, i, &limb[i], R, p, about);
+        if (!others && machine->sharing[a] > 1.0 && geared(machine, limb, i))
+            own = agreed_turn(machine, limb, i, R, p, about, own);
         if (!others) first[a] = own;
         seen |= 1 << a;
         q[a] += own;

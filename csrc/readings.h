@@ -11,7 +11,8 @@ typedef struct {
     double *by_number; /* (n, rows, columns), NULL where nobody asks */
 } readings_out;
 
-/* The sphere row of limb i, solved for the actuator coordinate: zero where the pose needs `read`. */
+/* The sphere row of limb i, solved for the actuator coordinate: zero where the pose needs `read`. Where
+ * the limb does not reach, the closure at `read` over its slope by the actuator. */
 INLINE real actuator_row(int map, const pkm_machine *machine, int i, const limb_numbers *limb,
                          const real *state, const real *R, const real *p, real read, real *by_step,
                          real *by_g)
@@ -21,14 +22,16 @@ INLINE real actuator_row(int map, const pkm_machine *machine, int i, const limb_
     mask reachable = fill_mask(-1);
     FN(limb_drive)(read, limb->g, &about);
     const real own = limb_inverse(machine, i, limb, R, p, about);
+    const mask reaches = finite(own);
+    const real at = select(reaches, own, read);
     sphere_of_numbers(machine->driver[i], limb, &sphere);
-    sphere_at(machine->driver[i], limb, own, &sphere, &reachable);
+    sphere_at(machine->driver[i], limb, at, &sphere, &reachable);
     FN(sphere_row)(R, p, limb->g + PLATFORM_X, sphere.c, sphere.rho * sphere.rho, &phi, omega, v);
     FN(map_pull)(map, state, omega, v, by_step);
-    sphere_derivatives_called(machine, i, limb, R, p, own, &by_q, by_g);
+    sphere_derivatives_called(machine, i, limb, R, p, at, &by_q, by_g);
     for (int j = 0; j < map_m(map); j++) by_step[j] /= -by_q;
     for (int s = 0; s < SLOTS; s++) by_g[s] /= -by_q;
-    return own - read;
+    return select(reaches, own - read, -phi / by_q);
 }
 
 INLINE void readings_map(int map, const pkm_machine *machine, ptrdiff_t n, const double *geometry,

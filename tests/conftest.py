@@ -7,9 +7,14 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
 from pkmcal.cli.verbs import app
+
+# No test is of wall time: other work may take all cores.
+settings.register_profile("pkmcal", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("pkmcal")
 
 
 @pytest.fixture(scope="session")

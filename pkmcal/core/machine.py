@@ -25,6 +25,8 @@ from pkmcal.core.library import (
 
 CLOSURE_TOLERANCE = 2e-3  # of a machine's size
 FAR_HOME = 10.0  # times the limbs' numbers: a home beyond is that of another geometry
+_MOST_TURNS = 16  # of the first limb of an actuator, until the others have turned as well
+_WHOLE = 5e-3  # of a turn: by so much gains that were identified differ from one another
 _OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 
 
@@ -118,8 +120,10 @@ class Machine:
         self.actuators: int = struct.actuators
         self.m = len(MAPS[map])
         self.rows = len(weights)
-        first = {limb["actuator"]: i for i, limb in reversed(list(enumerate(limbs)))}
-        self._angles = {a: i for a, i in first.items() if limbs[i]["angle"]}
+        driven: dict[int, list[int]] = {}
+        for i, limb in enumerate(limbs):
+            driven.setdefault(limb["actuator"], []).append(i)
+        self._angles = {a: each for a, each in driven.items() if limbs[each[0]]["angle"]}
 
     def with_tolerance(self, closure_tolerance: float) -> Machine:
         """The same with another `closure_tolerance`, mm."""
@@ -142,10 +146,17 @@ class Machine:
         return q
 
     def turns(self, slots: FloatArray) -> FloatArray:
-        """How far each actuator goes in a whole turn, (n,); infinite where it is no angle."""
+        """How far each actuator goes until all its limbs are where they were, (n,).
+
+        Infinite where it is no angle, or no such way is known.
+        """
         out = np.full(self.actuators, np.inf)
-        for a, i in self._angles.items():
-            out[a] = 2 * np.pi / abs(slots[i, _GAIN])
+        for a, limbs in self._angles.items():
+            turns = np.abs(slots[limbs, _GAIN] / slots[limbs[0], _GAIN])
+            turns = turns[:, None] * np.arange(1, _MOST_TURNS + 1)  # of each limb, of the first
+            whole = (np.abs(turns - np.rint(turns)) <= _WHOLE).all(axis=0)
+            if whole.any() and all(self.struct.angle[i] for i in limbs):
+                out[a] = (1 + int(np.argmax(whole))) * 2 * np.pi / abs(slots[limbs[0], _GAIN])
         return out
 
     def nearest_turns(
@@ -156,7 +167,8 @@ class Machine:
             return q
         out: FloatArray = q.copy()
         turns = self.turns(slots)
-        for a, i in self._angles.items():
+        for a in np.flatnonzero(np.isfinite(turns)).tolist():
+            i = self._angles[a][0]
             own = (self.struct.near[i] - slots[i, _OFFSET]) / slots[i, _GAIN]
             about = own if near is None else near[..., a]
             out[:, a] -= turns[a] * np.rint((q[:, a] - about) / turns[a])
@@ -279,7 +291,7 @@ class Machine:
         Of each limb the coordinate that it needs at the pose less the one read, then its other
         rows, weighted, in mm: (N, rows). Their derivatives by the map's step, mm and rad,
         (N, rows, m), and by the numbers at `columns` of the flattened slots (N, rows, columns).
-        NaN where a limb does not reach.
+        Of a limb that does not reach, the closure at q over its slope by q.
         """
         n = len(pose)
         residual, by_step = np.empty((n, self.rows)), np.empty((n, self.rows, self.m))

@@ -12,11 +12,13 @@ from typing import Any
 from zipfile import ZipFile
 
 from pkmcal import arguments
+from pkmcal.display import printable
 from pkmcal.exceptions import FileError
 from pkmcal.files import reading
 
 _MOST_CELLS = 1_000_000  # a cell takes 10 microseconds
 _MOST_ROWS = 1_048_576  # Excel's own limit
+_LONGEST_SAID = 200  # letters
 _CELL = re.compile(rb"<(?:\w+:)?c[\s/>]")
 
 
@@ -55,7 +57,8 @@ def xlsx_rows(path: str | PathLike[str]) -> list[tuple[int, list[str]]]:
     except (FileError, MemoryError):
         raise
     except Exception as error:  # openpyxl has no error of its own for what is damaged
-        raise FileError(f"{place}: not an Excel workbook ({error})") from None
+        said = printable(str(error), _LONGEST_SAID)  # it may quote a whole part of the file
+        raise FileError(f"{place}: not an Excel workbook ({said})") from None
 
 
 def _rows(path: Path, content: bytes) -> Iterator[tuple[int, list[str]]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.core.chains import ChainMachine
 from pkmcal.geometry.chains import PARTS, Chains, Joint, towards
 from pkmcal.kinematics.limits import ROUNDING, Feasibility
@@ -68,6 +68,16 @@ def drives(machine: ChainMachine, slots: FloatArray, q: FloatArray) -> FloatArra
     place, numbers = machine.layout.drive_place, slots.ravel()
     found: FloatArray = numbers[place + 1] * q + numbers[place]
     return found
+
+
+def in_strokes(
+    chains: Chains, machine: ChainMachine, slots: FloatArray, q: FloatArray
+) -> BoolArray:
+    """Which actuators (n,) keep the strokes of their joints at coordinates (n,)."""
+    limits = [joint.stroke or (-np.inf, np.inf) for _, joint in chains.actuated]
+    low, high = np.array(limits).T
+    drive = drives(machine, slots, q[None])[0]
+    return np.asarray((low <= drive) & (drive <= high))
 
 
 def _first_actuator(limb: tuple[Joint, ...]) -> int:

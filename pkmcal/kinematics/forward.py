@@ -45,7 +45,9 @@ class Forward(RowResult):
     iterations : ndarray of int (...)
         Newton steps taken.
     residual : ndarray (...)
-        Largest closure error, mm; NaN where `status` is not 0 or 5.
+        Largest closure error, mm; NaN where `status` is not 0 or 5. Of a limb of length ρ whose
+        joints are d apart it is (d² - ρ²)/(2ρ): d - ρ but for (d - ρ)²/(2ρ), so that a miss of
+        8 mm on 1000 mm reads 8.03.
     """
 
     STATUS = STATUS

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows
-from pkmcal.core.chains import AnyMachine, ChainMachine
+from pkmcal.core.chains import ChainMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import CHAIN, Limb, Model
+from pkmcal.geometry.model import CHAIN, Model
 from pkmcal.kinematics.chain_limits import drives as chain_drives
+from pkmcal.kinematics.chain_limits import in_strokes
 from pkmcal.kinematics.complete import Completed, complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
 from pkmcal.kinematics.limits import stroke_margin
+from pkmcal.kinematics.machines import machine_of
 from pkmcal.modes.find import AssemblyProblem
 
 Match = bool | str | Sequence[str] | None
@@ -56,7 +57,7 @@ class Kinematics:
         self.slots = np.ascontiguousarray(model.geometry.slots)
         self.frames = Frames(model.base_frame, model.tool_frame)
         self.own_home = np.ascontiguousarray(model.home, dtype=np.float64)
-        self.machine: AnyMachine = self._machine()
+        self.machine = machine_of(model, self.slots, self.length)
 
     @property
     def limb_machine(self) -> Machine:
@@ -70,18 +71,6 @@ class Kinematics:
         if isinstance(self.machine, ChainMachine):
             raise ArgumentError(f"robot: {self.model.name} has limbs that are chains of joints")
         return self.machine
-
-    def _machine(self) -> AnyMachine:
-        model = self.model
-        if model.chains is not None:
-            return ChainMachine(model.chains.layout, model.closure_tolerance)
-        limbs = [_limb(limb) for limb in model.limbs]
-        if sum(len(limb["weights"]) for limb in limbs) == len(self.coordinates):
-            for limb in limbs:  # nothing to weigh: all closures hold
-                limb["weights"] = [1.0] * len(limb["weights"])
-        return Machine(
-            model.map, limbs, self.length, self.slots, self.own_home, model.closure_tolerance
-        )
 
     @property
     def home(self) -> FloatArray:
@@ -441,14 +430,10 @@ class Kinematics:
 
     def _in_strokes(self, q: FloatArray) -> BoolArray:
         """Which actuators (n,) keep the strokes of all their limbs at coordinates (n,)."""
-        kept = np.ones(self.n_actuators, dtype=bool)
         if isinstance(self.machine, ChainMachine):
             assert self.model.chains is not None
-            drive = chain_drives(self.machine, self.slots, q[None])[0]
-            for a, (_, joint) in enumerate(self.model.chains.actuated):
-                low, high = joint.stroke or (-np.inf, np.inf)
-                kept[a] = bool(low <= drive[a] <= high)
-            return kept
+            return in_strokes(self.model.chains, self.machine, self.slots, q)
+        kept = np.ones(self.n_actuators, dtype=bool)
         for limb, drive in zip(self.model.limbs, self.drives(q[None])[0], strict=True):
             kept[limb.actuator] &= bool(stroke_margin(limb, drive) >= 0.0)
         return kept
@@ -469,19 +454,3 @@ def _for_each(
             f"{name} must be ({width},) or broadcast to {wanted}, found {found}"
         ) from None
     return np.ascontiguousarray(each).reshape(-1, width)
-
-
-def _limb(limb: Limb) -> dict[str, Any]:
-    kind = KINDS[limb.kind]
-    rows = kind.all_rows(limb.couple > 0)
-    return {
-        "driver": kind.driver,
-        "rows": rows,
-        "actuator": limb.actuator,
-        "branch": limb.branch,
-        "angle": kind.actuator_unit == "rad",
-        "near": np.nan if limb.stroke is None else sum(limb.stroke) / 2,
-        "frames": limb.frames,
-        "lever": limb.couple,
-        "weights": [1.0, *(limb.weights or [1.0] * len(rows))],
-    }

@@ -247,7 +247,7 @@ def certify_rows(problem: AssemblyProblem, poses: FloatArray) -> Certificate:
     """Certify poses (N, 6), each at its own coordinates: `problem.q` is (N, n)."""
     ok, error, unique = np.zeros(len(poses), dtype=bool), *np.full((2, len(poses)), np.nan)
     solved = np.isfinite(poses).all(axis=1)
-    if problem.provable:
+    if problem.provable and solved.any():
         for part in np.array_split(np.flatnonzero(solved), 1 + solved.sum() // AT_ONCE):
             u = _scaled(frames_of(poses[part]), problem.length)
             proof = certify(problem._replace(q=problem.q[part]).closures(), u)

@@ -279,7 +279,8 @@ def move(
     position or the velocity changes by more from one to the next than these can explain, in ever
     smaller steps; each maximum is then closed in on to rounding. What can be missed is shorter than
     a step, 1/2000 of the duration, and changes the position (a velocity) or the velocity (an
-    acceleration) there by less than the largest of them does in a step.
+    acceleration) there by less than the largest of them does in a step. Steps end at 5e-10 of the
+    duration, and a change of less than 1e-11 of the largest position or velocity is rounding.
 
     Examples
     --------

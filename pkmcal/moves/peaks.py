@@ -4,7 +4,9 @@ Own code, since optimisers of one variable look for one extremum in a bracket, a
 of every actuator must be found before it can be bracketed. By the mean value theorem a speed
 between two times is at least the mean there, what the position changes by over the time it takes;
 an acceleration likewise from the speeds. Where that is more than any sample shows, a peak hides
-between two samples and the step is halved. Then every local maximum is closed in on.
+between two samples and the step is halved. Then every local maximum is closed in on. What a
+position or a speed changes by is known to its rounding alone, and over ever shorter steps that is
+any mean: it is taken off, and the halvings end.
 """
 
 from __future__ import annotations
@@ -14,14 +16,15 @@ from typing import Protocol
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import FloatArray
 
 STEPS = 2000  # along a move
-_HALVINGS = 40  # of a step, to where rounding ends it
+_HALVINGS = 20  # of a step: to 5e-10 of the duration
+_PLACES = 2000  # that are halved at once, those of the largest means
 _THIRDS = 80  # taken off two steps around a local maximum
 _RISE = 4.0  # times what a size rises by in a step: no peak between samples is higher
 _HIDDEN = 1e-9  # relative: by so much a mean must exceed all samples
-_FINEST = 1e-13  # of the duration: what rounding leaves of a step
+_ROUNDING = 1e-11  # of the largest position or speed: what a completed pose leaves open of it
 
 
 class Sample(Protocol):
@@ -44,17 +47,20 @@ def peaks(sample: Callable[[FloatArray], Sample], duration: float) -> tuple[Floa
     """Largest speed and acceleration (n,) of each actuator on the way; NaN where one is not finite.
 
     What can be missed between two of 2001 samples changes the position (of a speed), or the speed
-    (of an acceleration), there by less than the largest sample of it would in a step.
+    (of an acceleration), there by less than the largest sample of it would in a step, or by less
+    than 1e-11 of the largest position or speed, or is shorter than 5e-10 of the duration.
     """
     times = np.linspace(0.0, duration, STEPS + 1)
     at = sample(times)
     q, v, a = at.actuators, at.velocities, at.accelerations
     for _ in range(_HALVINGS):
         steps = np.diff(times)
-        hidden = _hides(q, v, steps) | _hides(v, a, steps)
-        places = np.flatnonzero(hidden & (steps > _FINEST * duration))
+        hidden = np.maximum(_hides(q, v, steps), _hides(v, a, steps))
+        places = np.flatnonzero(hidden > 1 + _HIDDEN)
         if not places.size:
             break
+        if places.size > _PLACES:
+            places = np.sort(places[np.argsort(-hidden[places], kind="stable")[:_PLACES]])
         middle = 0.5 * (times[places] + times[places + 1])
         more = sample(middle)
         q, v, a = (
@@ -68,11 +74,12 @@ def peaks(sample: Callable[[FloatArray], Sample], duration: float) -> tuple[Floa
     )
 
 
-def _hides(values: FloatArray, rates: FloatArray, steps: FloatArray) -> BoolArray:
-    """Steps (N - 1,) whose mean rate is larger than every rate sampled."""
-    mean = np.abs(np.diff(values, axis=0)) / steps[:, None]
-    most = np.abs(rates).max(axis=0)
-    found: BoolArray = (mean > (1 + _HIDDEN) * most).any(axis=1)
+def _hides(values: FloatArray, rates: FloatArray, steps: FloatArray) -> FloatArray:
+    """Mean rate in each step (N - 1,), by the largest sampled: above 1 where a larger one hides."""
+    change = np.abs(np.diff(values, axis=0)) - _ROUNDING * np.abs(values).max(axis=0)
+    mean, most = change / steps[:, None], np.abs(rates).max(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        found: FloatArray = np.where(mean > 0.0, mean / most, 0.0).max(axis=1)
     return found
 
 

@@ -132,3 +132,12 @@ def test_a_grid_that_the_machines_cannot_span_is_refused(robot: Robot) -> None:
     delta = pk.load("linear-delta")
     with pytest.raises(ValueError, match="cannot take the poses half-way"):
         correction_grid(delta, delta, {"x": [-9000.0, 9000.0, 9001.0]})
+
+
+def test_a_cubic_table_without_all_nodes_is_refused_in_words() -> None:
+    robot = pk.load("3rrr-planar")
+    calibrated = robot.replace({"rod3": robot.geometry["rod3"] - 1})
+    axes = {"x": np.linspace(-50, 50, 11), "y": np.linspace(-50, 50, 11)}
+    failed = int(correction_grid(robot, calibrated, axes).failed.sum())
+    with pytest.raises(pk.exceptions.ArgumentError, match=f"{failed} of 121 nodes have no corr"):
+        correction_grid(robot, calibrated, axes, method="cubic")

@@ -20,6 +20,7 @@ from pkmcal.core import library
 from pkmcal.core import poses as core_poses
 from pkmcal.core.library import ISAS, MOST_THREADS, SLOTS, ffi, in_threads, lib
 
+from .. import robots
 from ..workspaces import WORKSPACE, poses
 
 AVAILABLE = range(lib.pkm_best_isa() + 1)
@@ -227,6 +228,24 @@ def test_the_core_refuses_a_machine_whose_order_of_elimination_is_none(order: li
     ):
         with pytest.raises(ValueError, match="refused"):
             refused()
+
+
+def test_the_core_takes_a_machine_with_as_many_rows_as_it_has_room_for() -> None:
+    """More of them than an int has bits."""
+    limb = {"kind": "UPS", "base": [300.0, 0.0, 0.0], "platform": [100.0, 0.0, -10.0]}
+    turned = [
+        limb | {"base": robots.ring(300.0, 15.0 * k), "platform": robots.ring(100.0, 14.0 * k)}
+        for k in range(lib.PKM_MAX_LIMBS)
+    ]
+    struct = robots.made("spatial", {"z": 800.0}, turned).machine.struct
+    assert lib.pkm_prepared(struct) == lib.PKM_MAX_LIMBS
+    for i in range(lib.PKM_MAX_LIMBS):  # a row more each
+        struct.rows[i] = 1
+    for row in range(lib.PKM_MAX_ROWS):
+        struct.order[row] = row
+    assert lib.pkm_closure_count(struct) == lib.pkm_prepared(struct) == lib.PKM_MAX_ROWS
+    struct.order[40] = 8  # 40 less the bits of an int
+    assert lib.pkm_prepared(struct) == 0
 
 
 @pytest.mark.parametrize("many", ["particles", "dims"])

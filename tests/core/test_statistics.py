@@ -19,7 +19,7 @@ def streamed(values: np.ndarray, cuts: list[int], bins: Bins | None = None) -> S
     return stream
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 1000), cuts=st.lists(st.integers(0, 500), max_size=5))
 def test_moments_do_not_depend_on_the_batches(seed: int, cuts: list[int]) -> None:
     rng = np.random.default_rng(seed)
@@ -31,7 +31,7 @@ def test_moments_do_not_depend_on_the_batches(seed: int, cuts: list[int]) -> Non
     np.testing.assert_allclose(stream.mean_square, (values**2).mean(axis=1), rtol=1e-13)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 1000), share=st.sampled_from(SHARES), power=st.sampled_from([1, 3]))
 def test_quantiles_are_off_by_less_than_a_bin(seed: int, share: float, power: int) -> None:
     values = np.random.default_rng(seed).normal(size=(3, 2000)) ** power

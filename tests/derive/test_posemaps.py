@@ -9,6 +9,7 @@ from typing import Any
 import mpmath as mp
 import pytest
 import sympy as sp
+
 from pkmcal.derive import posemaps
 
 FUNCTIONS = {f.name: f for f in posemaps.functions()}
@@ -20,6 +21,7 @@ POSES = {
     "planar": ("12", "-25", "0", "0", "0", "2.5"),
     "xy": ("12", "-25", "0", "0", "0", "0"),
     "2tpr2tps": ("0", "-25", "410", "0.3", "-0.4", "0"),
+    "spherical": ("0", "0", "0", "0.3", "-0.4", "2.5"),
 }
 MAPS = [pose_map.name for pose_map in posemaps.MAPS]
 

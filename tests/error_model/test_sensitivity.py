@@ -49,7 +49,7 @@ def test_linear_prediction_is_the_limit_of_the_exact_error(name: str) -> None:
     assert gaps[1] < 0.3 * gaps[0] + 1e-10  # a quarter: the gap is of second order
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(step=st.floats(-5.0, 5.0).filter(lambda s: abs(s) > 1e-3), axis=st.sampled_from("xyz"))
 def test_all_base_joints_moved_alike_move_the_platform_alike(step: float, axis: str) -> None:
     robot = pk.load("hexapod")

@@ -116,7 +116,7 @@ def test_linear_propagation_contributions_and_worst_case_are_those_of_the_error_
     assert found.position_share.sum() == pytest.approx(100.0)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000))
 def test_no_errors_within_three_sigma_are_worse_than_the_worst_case(seed: int) -> None:
     robot = pk.load("2tpr2tps")

@@ -198,9 +198,16 @@ def marked(book: bytes, offset: int, bits: int) -> bytes:
     return bytes(data)
 
 
+def edited_name_length(book: bytes) -> bytes:
+    """A part of which the file says that its name goes on for a thousand letters."""
+    at = book.index(b"xl/workbook.xml") - 4
+    return book[:at] + (1000).to_bytes(2, "little") + book[at + 2 :]
+
+
 DAMAGED: dict[str, Callable[[bytes], bytes]] = {
     "half": lambda book: book[: len(book) // 2],
     "cut sheet": lambda book: edited(book, lambda xml: xml[: len(xml) // 2]),
+    "long file name": edited_name_length,
     "encrypted": lambda book: marked(book, 6, 1),
     "unknown compression": lambda book: marked(book, 8, 99),
     "doctype": lambda book: edited(

@@ -180,7 +180,7 @@ static int small(int most)
 static void some_machine(pkm_machine *machine, unsigned strange)
 {
     memset(machine, 0, sizeof *machine);
-    machine->map = small(3);
+    machine->map = small(7);
     machine->limbs = small(PKM_MAX_LIMBS);
     machine->actuators = byte() < 200 ? machine->limbs : small(PKM_MAX_LIMBS);
     machine->size = fabs(number(strange));
@@ -234,17 +234,20 @@ static void of_machine(ptrdiff_t n, unsigned strange, int isas)
     for (int k = 0; k < 8; k++) column[k] = (int32_t)(byte() < 250 && size ? byte() % size : bits());
     const pkm_machine *is = &machine;
     const int twists = byte() & 1;
-    one_of(11);
+    one_of(13);
 
     EACH_ISA(inverse, is, n, geometry, stride, pose, near, about, D(0, n * q));
     EACH_ISA(forward, is, n, geometry, stride, drives, guess, some, D(0, 6 * n), I(1, n), I(2, n),
              D(3, n));
     EACH_ISA(jacobian, is, n, geometry, stride, pose, D(0, n * q * m));
-    EACH_ISA(forward_jacobian, is, n, geometry, stride, pose, drives, D(0, 6 * n * q));
+    EACH_ISA(forward_jacobian, is, n, geometry, stride, pose, drives, twists, D(0, 6 * n * q));
     EACH_ISA(error_jacobian, is, n, geometry, stride, pose, drives, column, 8, twists,
              D(0, 6 * n * 8));
     EACH_ISA(closure, is, n, geometry, pose, drives, D(0, n * rows), D(1, n * rows * m),
-             D(2, n * rows * m), D(3, n * rows * q));
+             D(2, n * rows * m), D(3, n * rows * q), D(4, 6 * n), D(5, 6 * n * m));
+    EACH_ISA(readings, is, n, geometry, pose, drives, column, 8, D(0, n * rows),
+             D(1, n * rows * m), D(2, n * rows * 8));
+    EACH_ISA(moved, is, n, pose, guess, D(0, 6 * n), D(1, 6 * n * m));
     EACH_ISA(spheres, is, n, geometry, drives, D(0, n * limbs * PKM_SPHERE));
     EACH_ISA(limbs, is, n, geometry, pose, D(0, n * limbs), D(1, 3 * n * limbs), D(2, 3 * n * limbs));
     EACH_ISA(rates, is, n, geometry, motion, D(0, n * q), D(1, n * q));

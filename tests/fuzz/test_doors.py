@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 
 from .damage import inputs
 from .doors import DOORS, ROOT, emptied
@@ -26,8 +26,6 @@ def test_a_damaged_input_is_refused_by_name_or_can_be_used(name: str, tmp_path: 
 
     @settings(
         max_examples=INPUTS.get(name, LINES),
-        deadline=None,
-        suppress_health_check=[HealthCheck.too_slow],
     )
     @given(inputs(door))
     def enter(content: bytes) -> None:

@@ -6,7 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from pkmcal.geometry.geometry import SLOTS, Geometry, LimbNumber, Term, Tie
@@ -143,7 +143,6 @@ def test_a_geometry_survives_pickling() -> None:
 # ties ---------------------------------------------------------------------------------------------
 
 
-@settings(deadline=None)
 @given(geometries())
 def test_chain_is_the_derivative_of_the_slots(geometry: Geometry) -> None:
     k = len(geometry.numbers)

@@ -164,7 +164,6 @@ def documents(draw: st.DrawFn) -> dict[str, Any]:
 
 
 @settings(
-    deadline=None,
     max_examples=60,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )

@@ -259,3 +259,14 @@ def test_a_soft_joint_takes_more_of_what_is_missed(tmp_path: Path) -> None:
     again = tmp_path / "again.toml"
     soft.save(again)
     assert "soft = 1000.0" in again.read_text(encoding="utf-8")
+
+
+def test_modes_of_chains_are_those_that_are_proven_of_legs(tmp_path: Path) -> None:
+    """3-RPS: all sixteen, each on its side of the singularities, by two other closures."""
+    robot = pk.load("3rps")
+    chained = loaded(as_chains(robot), tmp_path)
+    q = robot.inverse(robot.home) + np.array([5.0, -3.0, 2.0])
+    proven, found = robot.forward_all(q, starts=0), chained.forward_all(q)
+    assert len(proven) == len(found) == 16 and proven.complete
+    assert np.abs(proven.poses[:, :3] - found.poses[:, :3]).max() < 1e-7
+    assert np.abs(proven.sign - proven.sign[0] * found.sign[0] * found.sign).max() == 0

@@ -168,3 +168,10 @@ def test_rows_that_failed_are_named() -> None:
     assert (found.ok == ~found.failed).all() and (found.success == found.ok).all()
     assert found.failures() == "3 of 12 rows invalid input (rows 4, 5, 6)"
     assert robot.forward(q[0]).failures() == ""
+
+
+def test_a_batch_without_rows_or_without_solved_ones_has_certificates() -> None:
+    robot = pk.load("hexapod")
+    assert robot.forward(np.empty((0, 6))).certificate.ok.shape == (0,)
+    unreached = robot.forward(np.full((3, 6), 1e6))
+    assert unreached.failed.all() and not unreached.certificate.ok.any()

@@ -187,7 +187,7 @@ def measurements(draw: st.DrawFn) -> Measurements:
     )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(m=measurements())
 def test_what_is_written_is_read_back_to_the_last_bit(
     m: Measurements, tmp_path_factory: Any

@@ -408,6 +408,40 @@ def test_printed_peaks_are_not_exceeded_anywhere(name: str, space: Any) -> None:
         np.testing.assert_allclose(found, most, rtol=1e-4, atol=1e-9)
 
 
+@pytest.mark.parametrize("space", ["pose", "coordinates", "joint"])
+@pytest.mark.parametrize("noise", [1e-13, 1e-9, 1e-5])
+def test_the_search_for_peaks_ends_whatever_rounding_does(space: str, noise: float) -> None:
+    """A line at 1 mm/s whose positions are rounded: no step is short enough to be free of that."""
+    robot = pk.load("hexapod")
+    move = pk.trajectory.move(robot, robot.home, robot.home, duration=1.0, space=space)
+    asked = 0
+
+    def sample(t: np.ndarray) -> Any:
+        nonlocal asked
+        asked += t.size
+        rounded = 800.0 + t[:, None] + noise * np.sin(1e9 * t[:, None])
+        at = move.sample(np.zeros(1))
+        return replace(at, actuators=rounded, velocities=0 * rounded + 1, accelerations=0 * rounded)
+
+    speed, _ = peaks(sample, 1.0)
+    assert speed == pytest.approx([1.0]) and asked < 1_000_000
+
+
+@pytest.mark.slow
+def test_a_redundant_machine_moves_straight_in_its_coordinates() -> None:
+    limbs = [
+        {"kind": "UPS", "base": ring(325.0, a), "platform": ring(125.0, a + 35 * (-1) ** i, -10.0)}
+        for i, a in enumerate((10, 60, 100, 140, 190, 230, 280))
+    ]
+    robot = made("spatial", {"z": 800.0}, limbs)
+    end = robot.home + np.array([40, -30, 50, 0.1, -0.05, 0.08])
+    durations = [
+        pk.trajectory.move(robot, robot.home, end, velocity=20.0, space=space).duration
+        for space in ("joint", "coordinates")
+    ]
+    assert durations[1] == pytest.approx(durations[0], rel=0.1)
+
+
 # --- limits and singularities on the way ---------------------------------------------------------
 
 
