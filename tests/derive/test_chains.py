@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sympy as sp
-
 from pkmcal.derive import chains
 from pkmcal.derive.rotation import rpy, skew
 

@@ -9,7 +9,6 @@ from typing import Any
 import mpmath as mp
 import pytest
 import sympy as sp
-
 from pkmcal.derive import posemaps
 
 FUNCTIONS = {f.name: f for f in posemaps.functions()}
