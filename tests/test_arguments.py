@@ -488,7 +488,16 @@ def test_every_public_call_is_among_them() -> None:
         *("Allocation", "ArmInverse", "Assemblies", "Bootstrap", "Certificate", "Compensation"),
         *("CorrectionGrid", "Dexterity", "Event", "Feasibility", "Finding", "Forward"),
         *("Geometry", "GeometryCheck", "Identification", "Move", "MoveSample", "Plan"),
-        *("DHTable", "Sensitivity", "SwarmResult", "Tolerance", "Workspace"),
+        *(
+            "DHTable",
+            "Distances",
+            "Moved",
+            "Sensitivity",
+            "Verdict",
+            "SwarmResult",
+            "Tolerance",
+            "Workspace",
+        ),
     }
     raised = {"ArgumentError", "ArgumentTypeError", "CalibrationWarning", "Error", "FileError"}
     no_calls = {"machines", "CONSTRICTION", "export", "screw", "trajectory"}

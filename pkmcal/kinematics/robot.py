@@ -118,7 +118,8 @@ class Robot(Kinematics, Result):
         rows, shape = self.own_rows(pose)
         q = self.machine.inverse(self.slots, rows)
         closure = self.machine.closure(self.slots, rows, q)
-        off = np.abs(rows - closure.pose)
+        with np.errstate(invalid="ignore"):  # rows that are no poses
+            off = np.abs(rows - closure.pose)
         off[:, 3:] = self.length * np.abs(wrapped(off[:, 3:]))
         if self.model.map == "spatial":  # which has every pose, by whatever angles
             off[:] = 0.0
@@ -428,7 +429,7 @@ class Robot(Kinematics, Result):
         like : str or path, optional
             The file that the robot came from: its units, order, names and comments are kept, and
             only the values that changed are others. Numbers are then read back to 1e-13 of the
-            machine's size, for its units are not mm and rad.
+            machine's size, for its units are not mm and rad. A file of chains is written anew.
         deviations : mapping of str to float, optional
             With `like`: standard deviations by name, mm and rad, as comments.
 
@@ -437,7 +438,7 @@ class Robot(Kinematics, Result):
         ValueError
             `like` describes another robot.
         """
-        if like is None:
+        if like is None or self.model.chains is not None:
             robot_file.write(self.model, path, comment)
             return
         from pkmcal.geometry.robot_file_kept import text_like

@@ -76,7 +76,9 @@ def values_array(given: ArrayLike | None, kind: str, shape: tuple[int, int]) -> 
     """What was read, (N, k) or (N,); NaN where nothing was, of orientations as a whole."""
     if given is None:
         if shape[1]:
-            raise ArgumentError(f"values of kind {kind!r} must be given; None goes with 'closure'")
+            raise ArgumentError(
+                f"values of kind {kind!r} must be given, found None: that goes with 'closure'"
+            )
         return np.empty(shape)
     values = numbers("values", given, blank=True)
     expected = shape if shape[1] != 1 else shape[:1]

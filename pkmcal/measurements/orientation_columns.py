@@ -27,6 +27,8 @@ _ORDERS = [
 _QUATERNIONS = ("wxyz", "xyzw")
 _WORDS = (*_QUATERNIONS, "rotvec")
 _UNIT = 0.02  # by so much the length of a quaternion or of a row of a matrix may differ from 1
+_ALIKE = 1.01  # of misfits that do not tell two conventions apart
+_ROUNDED = 1e-9  # rad
 _FITS = np.radians(3.0)  # what errors of a machine do not turn it by
 _BETTER = 0.2  # of the misfit that another convention may leave to be named
 
@@ -175,9 +177,11 @@ def _refuse_wrong(
     off = {word: misfit(turns, nominal) for word, turns in forms.items()}
     best = min(off, key=lambda word: off[word])
     if off[chosen] > _FITS and off[best] < min(_BETTER * off[chosen], _FITS):
+        # xyzw read as wxyz is the inverse, up to a frame and a tool: what fits alike is named
+        alike = [word for word in off if off[word] < _ALIKE * off[best] + _ROUNDED]
         raise table.header_error(
             f"columns {said}: off by {_deg(off[chosen])} from this machine as {chosen}, by"
-            f" {_deg(off[best])} as {best}"
+            f" {_deg(off[best])} as {' or '.join(alike)}"
         )
 
 

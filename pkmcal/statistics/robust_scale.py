@@ -51,6 +51,6 @@ def robust_ratio(design: FloatArray, residual: FloatArray, components: IntArray)
             break
         scale = revised
         weights = np.repeat(1.0 / (1.0 + squares / (scale * _LIMIT) ** 2 / components), components)
-        weighted = design * weights[:, None]
-        left = residual - design @ np.linalg.solve(design.T @ weighted, weighted.T @ residual)
+        root = np.sqrt(weights)
+        left = residual - design @ np.linalg.lstsq(design * root[:, None], residual * root)[0]
     return float(np.sqrt(residual @ residual / (m - p)) / scale)

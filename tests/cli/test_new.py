@@ -75,4 +75,4 @@ def test_a_path_is_no_machine(run: Any, tmp_path: Path) -> None:
 
 def test_json_names_the_file(run: Any) -> None:
     said = json.loads(run("new", "3rps", "mine.toml", "--json").stdout)
-    assert said == {"machine": "3rps", "file": "mine.toml"}
+    assert said == {"schema": "pkmcal/new/1", "machine": "3rps", "file": "mine.toml"}

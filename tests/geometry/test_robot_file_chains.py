@@ -114,7 +114,7 @@ def test_parameters_of_places_are_values_and_no_numbers() -> None:
          "must not lie on one line"),
         ('kind = "P", axis = [0, 0, 1]', 'kind = "R"', "the key 'axis' is missing"),
         ("copies = 3", "copies = 0", "must be 1 or more"),
-        ("copies = 3", "copies = 13", "at most 12 limbs"),
+        ("copies = 3", "copies = 25", "at most 24 limbs"),
         ("copies = 3", 'copies = 3\nerrors = { "joint9.dx" = 1 }', "'limb1.joint9.dx' is no error"),
         ('kind = "S"', 'actuator = 9, kind = "S"', "has several axes: list the actuated one"),
     ],
