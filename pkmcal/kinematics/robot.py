@@ -120,7 +120,7 @@ class Robot(Kinematics, Result):
         closure = self.machine.closure(self.slots, rows, q)
         with np.errstate(invalid="ignore"):  # rows that are no poses
             off = np.abs(rows - closure.pose)
-        off[:, 3:] = self.length * np.abs(wrapped(off[:, 3:]))
+            off[:, 3:] = self.length * np.abs(wrapped(off[:, 3:]))
         if self.model.map == "spatial":  # which has every pose, by whatever angles
             off[:] = 0.0
         return np.asarray(np.abs(np.hstack([closure.residual, off])).max(axis=1)).reshape(shape)
