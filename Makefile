@@ -20,8 +20,8 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-all test-kalico test-linuxcnc test-lowest fuzz fuzz-abi mutants check regenerate \
-	bench docs lint sanitize clean
+.PHONY: help demo test test-all test-kalico test-linuxcnc test-lowest
+.PHONY: fuzz fuzz-abi mutants check regenerate bench docs lint sanitize clean
 
 help:
 	@echo "make demo        calibrate a simulated machine from beginning to end"
