@@ -54,6 +54,8 @@ WRONG: dict[str, list[Any]] = {
 # Each call with arguments that fit, and of which kind they are.
 Call = tuple[Callable[..., Any], dict[str, Any], dict[str, str]]
 PRINTER = Path(__file__).parents[1] / "examples" / "linear-delta" / "printer.cfg"
+BELTS = pk.load(Path(__file__).parents[1] / "examples" / "belts" / "robot.toml")
+PLACES = np.random.default_rng(0).uniform(-200, 200, (12, 6)) * [1, 1, 0, 0, 0, 0]
 CALLS: dict[str, Call] = {
     "load": (pk.load, {"robot": "hexapod"}, {"robot": "path"}),
     "import_printer": (pk.import_printer, {"path": PRINTER}, {"path": "path"}),
@@ -231,6 +233,16 @@ CALLS: dict[str, Call] = {
         pk.probed,
         {"robot": pk.load("linear-delta"), "points": [[0.0, 0.0, 0.2]], "offset": [0.0, 0.0, 0.0]},
         {"robot": "robot", "points": "numbers", "offset": "numbers"},
+    ),
+    "locate_anchors": (
+        pk.locate_anchors,
+        {"robot": BELTS, "actuators": BELTS.inverse(BELTS.home + PLACES)},
+        {"robot": "robot", "actuators": "numbers"},
+    ),
+    "compensate_program": (
+        pk.compensate_program,
+        {"controller": pk.load("hexapod"), "calibrated": pk.load("hexapod"), "path": "a.gcode"},
+        {"controller": "robot", "calibrated": "robot", "path": "path"},
     ),
     "read_measurements": (pk.read_measurements, {"path": "probe.csv"}, {"path": "path"}),
     "Tracker": (
@@ -486,7 +498,16 @@ def test_the_arguments_that_are_to_fit_do(name: str) -> None:
 def test_every_public_call_is_among_them() -> None:
     results = {  # made by calls, not by users
         *("Allocation", "ArmInverse", "Assemblies", "Bootstrap", "Certificate", "Compensation"),
-        *("CorrectionGrid", "Dexterity", "Event", "Feasibility", "Finding", "Forward"),
+        *(
+            "CorrectedProgram",
+            "LocatedAnchors",
+            "CorrectionGrid",
+            "Dexterity",
+            "Event",
+            "Feasibility",
+            "Finding",
+            "Forward",
+        ),
         *("Geometry", "GeometryCheck", "Identification", "Move", "MoveSample", "Plan"),
         *(
             "DHTable",
