@@ -147,7 +147,7 @@ $(BIN)/pip:
 
 $(PACKAGE): $(SOURCES) | $(BIN)/pip
 	$(PREREQUISITES)
-	@echo "installing pkmcal in $(VENV) and compiling its core: about half a minute"
+	@echo "installing pkmcal in $(VENV) and compiling its core: a minute or two"
 	$(PIP) install --editable .
 	@touch $@
 
