@@ -11,7 +11,7 @@ class SideBySide(build_ext):
     """Compile the files of an extension at the same time: setuptools takes one after the other."""
 
     def build_extension(self, ext):
-        print(f"compiling {len(ext.sources)} C files: one or two minutes of processor time", flush=True)
+        print(f"compiling {len(ext.sources)} C files: a minute or two", flush=True)
         compile_one, link = self.compiler._compile, self.compiler.link_shared_object
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             objects = []
