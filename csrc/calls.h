@@ -117,11 +117,11 @@ int CALL(arm_jacobian)(const pkm_arm *arm, const pkm_links *links, int frame, pt
 int CALL(arm_error_jacobian)(const pkm_arm *arm, const pkm_links *links, const double *error,
                              int frame, ptrdiff_t n, const double *theta, double *jacobian);
 
-/* Machines of chains. As forward, with the passive joints (n, passive) at the pose. */
+/* Machines of chains. As forward. */
 int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
                         ptrdiff_t geometry_stride, const double *q, const double *guess,
-                        ptrdiff_t guess_stride, double *pose, double *passive, int32_t *status,
-                        int32_t *iterations, double *residual);
+                        ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
+                        double *residual);
 
 /* pose (n, 6) as given -> q (n, actuators), each chain alone from its home; NaN where one of six free
  * joints or more does not reach. */

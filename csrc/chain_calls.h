@@ -103,8 +103,8 @@ SHARED void chain_solve(const pkm_chains *machine, const chain_numbers *numbers,
 
 int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
                         ptrdiff_t geometry_stride, const double *q, const double *guess,
-                        ptrdiff_t guess_stride, double *pose, double *passive, int32_t *status,
-                        int32_t *iterations, double *residual)
+                        ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
+                        double *residual)
 {
     if (!chains_fit(machine)) return PKM_BAD_MACHINE;
     const chain_geometry of = {machine, geometry, geometry_stride};
@@ -135,9 +135,7 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
         const mask good = how == fill_mask(PKM_OK), closest = good | (how == fill_mask(PKM_NOT_CLOSED));
         map_to_pose(machine->map, at.state, found);
         for (int k = 0; k < 6; k++) found[k] = select(good, found[k], fill(NAN));
-        for (int c = 0; c < machine->passive; c++) at.theta[c] = select(good, at.theta[c], fill(NAN));
         scatter_row(found, 6, pose, 6, row, count);
-        scatter_row(at.theta, machine->passive, passive, machine->passive, row, count);
         scatter(select(closest, worst, fill(NAN)), residual, 1, row, count);
         for (int l = 0; l < count; l++) {
             status[row[l]] = (int32_t)how[l];

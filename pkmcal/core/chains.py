@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -10,7 +9,8 @@ import numpy as np
 from pkmcal._core import ffi, lib
 from pkmcal.arrays import FloatArray, Int32Array
 from pkmcal.core.chain_rates import actuator_rates, platform_motion
-from pkmcal.core.library import ISA, MAPS, call, in_threads, part, pointer
+from pkmcal.core.core_machine import CoreMachine
+from pkmcal.core.library import ISA, MAPS, call, pointer
 from pkmcal.core.machine import CLOSURE_TOLERANCE, Closure, Machine
 
 MAX_CHAIN: int = lib.PKM_MAX_CHAIN
@@ -107,7 +107,7 @@ class ChainLayout:
         return int(most.sum() - own.sum())
 
 
-class ChainMachine:
+class ChainMachine(CoreMachine):
     """A machine of chains in the core, with the calls of `pkmcal.core.machine.Machine`.
 
     Parameters
@@ -119,6 +119,8 @@ class ChainMachine:
     isa : int
         Index into `ISAS`.
     """
+
+    _FORWARD, _ERRORS = "chain_forward", "chain_response"
 
     def __init__(
         self, layout: ChainLayout, closure_tolerance: float | None = None, isa: int = ISA
@@ -154,13 +156,6 @@ class ChainMachine:
         }
         self._angles = sorted(int(a) for a in turning if a >= 0)
 
-    def with_tolerance(self, closure_tolerance: float) -> ChainMachine:
-        """The same with another `closure_tolerance`, mm."""
-        other = copy(self)
-        other.struct = ffi.new("pkm_chains *", self.struct[0])
-        other.struct.closure_tolerance = closure_tolerance
-        return other
-
     def inverse(
         self, slots: FloatArray, pose: FloatArray, near: FloatArray | None = None
     ) -> FloatArray:
@@ -179,53 +174,9 @@ class ChainMachine:
         out[self._angles] = 2 * np.pi / np.abs(gain[self._angles])
         return out
 
-    def nearest_turns(
-        self, slots: FloatArray, q: FloatArray, near: FloatArray | None = None
-    ) -> FloatArray:
-        """Coordinates (N, n) with whole turns added, as `inverse` gives them."""
-        if not self._angles:
-            return q
-        out: FloatArray = q.copy()
-        turns = self.turns(slots)
-        about = np.broadcast_to(self.layout.near if near is None else near, q.shape)
-        for a in self._angles:
-            out[:, a] -= turns[a] * np.rint((q[:, a] - about[:, a]) / turns[a])
-        return out
-
-    def forward(
-        self,
-        slots: FloatArray,
-        q: FloatArray,
-        guess: FloatArray,
-        threads: int | None,
-        shape: tuple[int, ...] | None = None,
-    ) -> tuple[FloatArray, Int32Array, Int32Array, FloatArray]:
-        """Actuator coordinates (N, n) to pose, status, iterations and residual.
-
-        As `pkmcal.core.machine.Machine.forward`.
-        """
-        n, shape = len(q), (len(q),) if shape is None else shape
-        pose, residual = np.empty((n, 6)), np.empty(n)
-        passive = np.empty((n, self.struct.passive))
-        status, iterations = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
-        stride = slots[0].size if slots.ndim == 3 else 0
-        guess_stride = 6 if guess.ndim == 2 else 0
-
-        def run(start: int, stop: int) -> None:
-            geometry = part(slots, start, stop) if stride else slots
-            begin = part(guess, start, stop) if guess_stride else guess
-            whole = (pose, passive, status, iterations, residual)
-            found = [part(each, start, stop) for each in whole]
-            given = (geometry, stride, part(q, start, stop), begin, guess_stride)
-            call("chain_forward", self.struct, stop - start, *given, *found, isa=self.isa)
-
-        in_threads(run, n, threads)
-        return (
-            pose.reshape(*shape, 6),
-            status.reshape(shape),
-            iterations.reshape(shape),
-            residual.reshape(shape),
-        )
+    def reference(self, slots: FloatArray) -> FloatArray:
+        """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
+        return self.layout.near
 
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m); the least squares of the closures."""
@@ -241,23 +192,6 @@ class ChainMachine:
         """∂pose/∂q at poses (N, 6): (N, 6, n), or of the twist (ω, v) of the platform by them."""
         out = np.empty((len(pose), 6, self.actuators))
         given = (len(pose), slots, 0, pose, q, None, self.actuators, twists)
-        call("chain_response", self.struct, *given, out, isa=self.isa)
-        return out
-
-    def error_jacobian(
-        self,
-        slots: FloatArray,
-        pose: FloatArray,
-        q: FloatArray,
-        columns: Int32Array,
-        twists: bool = False,
-    ) -> FloatArray:
-        """∂pose/∂(numbers at `columns` of the geometry): (N, 6, columns).
-
-        Or of the twist (ω, v) of the platform by them.
-        """
-        out = np.empty((len(pose), 6, len(columns)))
-        given = (len(pose), slots, 0, pose, q, columns, len(columns), twists)
         call("chain_response", self.struct, *given, out, isa=self.isa)
         return out
 

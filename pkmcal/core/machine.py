@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from copy import copy
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from pkmcal._core import ffi, lib
 from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.core.core_machine import CoreMachine
 from pkmcal.core.library import (
     AXES,
     DRIVERS,
@@ -18,8 +18,6 @@ from pkmcal.core.library import (
     SLOTS,
     call,
     ensure,
-    in_threads,
-    part,
     pointer,
 )
 
@@ -57,8 +55,8 @@ class Closure(NamedTuple):
     pose_by_free: FloatArray
 
 
-class Machine:
-    """A machine in the core: what of a robot does not change with its geometry.
+class Machine(CoreMachine):
+    """A machine of limbs in the core: what of a robot does not change with its geometry.
 
     Parameters
     ----------
@@ -78,6 +76,8 @@ class Machine:
     isa : int
         Index into `ISAS`.
     """
+
+    _FORWARD, _ERRORS = "forward", "error_jacobian"
 
     def __init__(
         self,
@@ -125,13 +125,6 @@ class Machine:
             driven.setdefault(limb["actuator"], []).append(i)
         self._angles = {a: each for a, each in driven.items() if limbs[each[0]]["angle"]}
 
-    def with_tolerance(self, closure_tolerance: float) -> Machine:
-        """The same with another `closure_tolerance`, mm."""
-        other = copy(self)
-        other.struct = ffi.new("pkm_machine *", self.struct[0])
-        other.struct.closure_tolerance = closure_tolerance
-        return other
-
     def inverse(
         self, slots: FloatArray, pose: FloatArray, near: FloatArray | None = None
     ) -> FloatArray:
@@ -159,59 +152,12 @@ class Machine:
                 out[a] = (1 + int(np.argmax(whole))) * 2 * np.pi / abs(slots[limbs[0], _GAIN])
         return out
 
-    def nearest_turns(
-        self, slots: FloatArray, q: FloatArray, near: FloatArray | None = None
-    ) -> FloatArray:
-        """Coordinates (N, n) with whole turns added, as `inverse` gives them."""
-        if not self._angles:
-            return q
-        out: FloatArray = q.copy()
-        turns = self.turns(slots)
-        for a in np.flatnonzero(np.isfinite(turns)).tolist():
-            i = self._angles[a][0]
-            own = (self.struct.near[i] - slots[i, _OFFSET]) / slots[i, _GAIN]
-            about = own if near is None else near[..., a]
-            out[:, a] -= turns[a] * np.rint((q[:, a] - about) / turns[a])
+    def reference(self, slots: FloatArray) -> FloatArray:
+        """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
+        out = np.zeros(self.actuators)
+        for a, (i, *_) in self._angles.items():
+            out[a] = (self.struct.near[i] - slots[i, _OFFSET]) / slots[i, _GAIN]
         return out
-
-    def forward(
-        self,
-        slots: FloatArray,
-        q: FloatArray,
-        guess: FloatArray,
-        threads: int | None,
-        shape: tuple[int, ...] | None = None,
-    ) -> tuple[FloatArray, Int32Array, Int32Array, FloatArray]:
-        """Actuator coordinates (N, n) to pose, status, iterations and residual.
-
-        `slots` is one geometry (limbs, SLOTS), or one per row (N, limbs, SLOTS); `guess` (6,) or
-        (N, 6). What is found has the leading `shape` of N rows, by default (N,).
-        """
-        n, shape = len(q), (len(q),) if shape is None else shape
-        pose, residual = np.empty((n, 6)), np.empty(n)
-        status, iterations = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
-        stride = slots[0].size if slots.ndim == 3 else 0
-        guess_stride = 6 if guess.ndim == 2 else 0
-
-        def run(start: int, stop: int) -> None:
-            if stop - start == n:  # one row as often as not: no slices
-                whole = (n, slots, stride, q, guess, guess_stride, pose, status, iterations)
-                return call("forward", self.struct, *whole, residual, isa=self.isa)
-            geometry = part(slots, start, stop) if stride else slots
-            begin = part(guess, start, stop) if guess_stride else guess
-            found = [part(each, start, stop) for each in (pose, status, iterations, residual)]
-            given = (geometry, stride, part(q, start, stop), begin, guess_stride)
-            call("forward", self.struct, stop - start, *given, *found, isa=self.isa)
-
-        in_threads(run, n, threads)
-        if len(shape) == 1:
-            return pose, status, iterations, residual
-        return (
-            pose.reshape(*shape, 6),
-            status.reshape(shape),
-            iterations.reshape(shape),
-            residual.reshape(shape),
-        )
 
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m)."""
@@ -226,23 +172,6 @@ class Machine:
         out = np.empty((len(pose), 6, self.actuators))
         given = (len(pose), slots, 0, pose, q, twists, out)
         call("forward_jacobian", self.struct, *given, isa=self.isa)
-        return out
-
-    def error_jacobian(
-        self,
-        slots: FloatArray,
-        pose: FloatArray,
-        q: FloatArray,
-        columns: Int32Array,
-        twists: bool = False,
-    ) -> FloatArray:
-        """∂pose/∂(numbers at `columns` of the flattened slots): (N, 6, columns).
-
-        Or of the twist (ω, v) of the platform by them.
-        """
-        out = np.empty((len(pose), 6, len(columns)))
-        given = (len(pose), slots, 0, pose, q, columns, len(columns), twists)
-        call("error_jacobian", self.struct, *given, out, isa=self.isa)
         return out
 
     def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:

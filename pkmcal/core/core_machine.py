@@ -1,0 +1,120 @@
+"""What machines of limbs and of chains have in common in the core: rows, angles, threads."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from copy import copy
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from pkmcal._core import ffi
+from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.core.library import call, in_threads, part
+
+M = TypeVar("M", bound="CoreMachine")
+
+
+class CoreMachine(ABC):
+    """A machine in the core: its struct, and calls that differ in the name of the C call alone.
+
+    Attributes
+    ----------
+    struct : cdata
+        Of C.
+    isa : int
+        Index into `ISAS`.
+    actuators : int
+        Number of actuator coordinates, n.
+    """
+
+    _FORWARD: ClassVar[str]
+    _ERRORS: ClassVar[str]
+    struct: Any
+    isa: int
+    actuators: int
+
+    def with_tolerance(self: M, closure_tolerance: float) -> M:
+        """The same with another `closure_tolerance`, mm."""
+        other = copy(self)
+        other.struct = ffi.new(ffi.typeof(self.struct), self.struct[0])
+        other.struct.closure_tolerance = closure_tolerance
+        return other
+
+    @abstractmethod
+    def turns(self, slots: FloatArray) -> FloatArray:
+        """How far each actuator goes in a whole turn, (n,); infinite where it is no angle."""
+
+    @abstractmethod
+    def reference(self, slots: FloatArray) -> FloatArray:
+        """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
+
+    def nearest_turns(
+        self, slots: FloatArray, q: FloatArray, near: FloatArray | None = None
+    ) -> FloatArray:
+        """Coordinates (N, n) with whole turns added, as `inverse` gives them."""
+        turns = self.turns(slots)
+        angles = np.isfinite(turns)
+        if not angles.any():
+            return q
+        about = self.reference(slots) if near is None else near
+        off, turn = q[:, angles] - about[..., angles], turns[angles]
+        out: FloatArray = q.copy()
+        out[:, angles] -= turn * np.rint(off / turn)
+        return out
+
+    def forward(
+        self,
+        slots: FloatArray,
+        q: FloatArray,
+        guess: FloatArray,
+        threads: int | None,
+        shape: tuple[int, ...] | None = None,
+    ) -> tuple[FloatArray, Int32Array, Int32Array, FloatArray]:
+        """Actuator coordinates (N, n) to pose, status, iterations and residual.
+
+        `slots` is one geometry, (limbs, SLOTS) or (1, numbers) of chains, or one per row (N, …);
+        `guess` (6,) or (N, 6). What is found has the leading `shape` of N rows, by default (N,).
+        """
+        n, shape = len(q), (len(q),) if shape is None else shape
+        pose, residual = np.empty((n, 6)), np.empty(n)
+        status, iterations = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
+        stride = slots[0].size if slots.ndim == 3 else 0
+        guess_stride = 6 if guess.ndim == 2 else 0
+
+        def run(start: int, stop: int) -> None:
+            if stop - start == n:  # one row as often as not: no slices
+                whole = (n, slots, stride, q, guess, guess_stride, pose, status, iterations)
+                return call(self._FORWARD, self.struct, *whole, residual, isa=self.isa)
+            geometry = part(slots, start, stop) if stride else slots
+            begin = part(guess, start, stop) if guess_stride else guess
+            found = [part(each, start, stop) for each in (pose, status, iterations, residual)]
+            given = (geometry, stride, part(q, start, stop), begin, guess_stride)
+            call(self._FORWARD, self.struct, stop - start, *given, *found, isa=self.isa)
+
+        in_threads(run, n, threads)
+        if len(shape) == 1:
+            return pose, status, iterations, residual
+        return (
+            pose.reshape(*shape, 6),
+            status.reshape(shape),
+            iterations.reshape(shape),
+            residual.reshape(shape),
+        )
+
+    def error_jacobian(
+        self,
+        slots: FloatArray,
+        pose: FloatArray,
+        q: FloatArray,
+        columns: Int32Array,
+        twists: bool = False,
+    ) -> FloatArray:
+        """∂pose/∂(numbers at `columns` of the flattened geometry): (N, 6, columns).
+
+        Or of the twist (ω, v) of the platform by them.
+        """
+        out = np.empty((len(pose), 6, len(columns)))
+        given = (len(pose), slots, 0, pose, q, columns, len(columns), twists)
+        call(self._ERRORS, self.struct, *given, out, isa=self.isa)
+        return out
