@@ -15,7 +15,7 @@ import numpy as np
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
-from pkmcal.controllers.loss import Loss, loss, nearest
+from pkmcal.controllers.loss import Loss, cylinder, loss, nearest
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
@@ -146,9 +146,5 @@ def _workspace(robot: Robot, anchors: FloatArray) -> tuple[FloatArray, str]:
     high = 0.5 * float(anchors[:, 2].max())
     if not (across > 0.0 and high > 0.0):
         raise ArgumentError(f"robot: {robot.name}: one anchor at least must be above the origin")
-    rng = np.random.default_rng(0)
-    r, angle = across * np.sqrt(rng.random(_POSES)), 2.0 * np.pi * rng.random(_POSES)
-    poses = np.zeros((_POSES, 6))
-    poses[:, 0], poses[:, 1] = r * np.cos(angle), r * np.sin(angle)
-    poses[:, 2] = high * rng.random(_POSES)
-    return poses, f"within {across:.0f} mm of the origin and {high:.0f} mm above it"
+    over = f"within {across:.0f} mm of the origin and {high:.0f} mm above it"
+    return cylinder(across, high, _POSES), over

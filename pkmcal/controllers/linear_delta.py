@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.controllers.loss import Loss, loss, nearest
+from pkmcal.controllers.loss import Loss, cylinder, loss, nearest
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_lines import Source
@@ -132,12 +132,8 @@ def _workspace(firmware: FirmwareDelta) -> tuple[FloatArray, str]:
     """Poses over the bed, and what to call them."""
     across = 0.8 * firmware.radius
     high = max(0.0, 0.5 * min(firmware.endstops))
-    rng = np.random.default_rng(0)
-    r, angle = across * np.sqrt(rng.random(_POSES)), 2.0 * np.pi * rng.random(_POSES)
-    poses = np.zeros((_POSES, 6))
-    poses[:, 0], poses[:, 1] = r * np.cos(angle), r * np.sin(angle)
-    poses[:, 2] = high * rng.random(_POSES)
-    return poses, f"within {across:.0f} mm of the middle and {high:.0f} mm of the bed"
+    over = f"within {across:.0f} mm of the middle and {high:.0f} mm of the bed"
+    return cylinder(across, high, _POSES), over
 
 
 def _projected(

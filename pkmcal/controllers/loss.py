@@ -39,6 +39,16 @@ class Loss:
         return f"off by {self.rms:.2g} mm rms, {self.worst:.2g} mm at most, {self.over}"
 
 
+def cylinder(across: float, high: float, count: int) -> FloatArray:
+    """Poses (count, 6) within a radius of the vertical through the origin and a height above it."""
+    rng = np.random.default_rng(0)
+    r, angle = across * np.sqrt(rng.random(count)), 2.0 * np.pi * rng.random(count)
+    poses = np.zeros((count, 6))
+    poses[:, 0], poses[:, 1] = r * np.cos(angle), r * np.sin(angle)
+    poses[:, 2] = high * rng.random(count)
+    return poses
+
+
 def off_by(model: Robot, q: FloatArray, poses: FloatArray) -> FloatArray:
     """How far (N, 3) a model of a machine that only translates is from poses (N, 6)."""
     found: FloatArray = model.forward(q, guess=poses).pose[:, :3] - poses[:, :3]
