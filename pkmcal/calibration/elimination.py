@@ -226,8 +226,8 @@ class Blocks:
             damping[:] = 1.0  # the gain is that of states before
         if damping.any():
             _, gain = _steps(*self._normal(residual, by_unknown), np.zeros(self.poses))
-        lost = ~(gain <= _CLOSE * cost + floor)
-        status = np.where(lost & (states.status == 0), 1, states.status).astype(np.int32)
+        unsolved = ~(gain <= _CLOSE * cost + floor)
+        status = np.where(unsolved & (states.status == 0), 1, states.status).astype(np.int32)
         return RowStates(states.pose, states.actuators, status)
 
     def _sums(self, squares: FloatArray) -> FloatArray:

@@ -194,8 +194,8 @@ class Estimator:
         None where too few equations are left to show it.
         """
         _, singular, rows = np.linalg.svd(triangle(jacobian), full_matrices=False)
-        told = singular > ROUNDING * singular[0]
-        basis = jacobian @ (rows[told].T / singular[told])
+        identifiable = singular > ROUNDING * singular[0]
+        basis = jacobian @ (rows[identifiable].T / singular[identifiable])
         left = residual - basis @ (basis.T @ residual)
         every = np.ones(len(self.equations.components))
         shares = self.equations.by_groups(evaluation, noise, every, left, basis)

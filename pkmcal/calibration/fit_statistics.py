@@ -140,18 +140,18 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
     """What the measurements alone determine."""
     equations, measured = estimator.equations, estimate.state.measured
     names = equations.parameters.names
-    told = Gauges((), measured.unidentifiable)
+    named_freedoms = Gauges((), measured.unidentifiable)
     if equations.closures.unknowns:
-        told = gauges(equations.parameters, measured.unidentifiable)
+        named_freedoms = gauges(equations.parameters, measured.unidentifiable)
     if mirror_fits(equations, estimate.evaluation, estimate.state.noise):
-        told = replace(told, texts=(*told.texts, MIRROR))
-    open_ones = sparse_basis(told.rest, names).T
+        named_freedoms = replace(named_freedoms, texts=(*named_freedoms.texts, MIRROR))
+    open_ones = sparse_basis(named_freedoms.rest, names).T
     jacobian = estimator.scaled_jacobian(estimate.evaluation)
     return Identifiability(
         rank=measured.rank,
         gap=measured.gap,
         unidentifiable=tuple(as_sum(combination, names) for combination in open_ones),
-        gauges=told.texts,
+        gauges=named_freedoms.texts,
         observability=observability(jacobian, len(equations.actuators), measured.rank),
     )
 

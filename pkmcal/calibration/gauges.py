@@ -1,7 +1,8 @@
 """Freedoms that no self-calibration can end: where the machine stands, how large it is.
 
 Closures do not change when all anchors move as one body, or when every length and every gain grows
-by the same factor. Such combinations of parameters are told by what they are, not by their numbers.
+by the same factor. Such combinations of parameters are named by what they are, not by their
+numbers.
 """
 
 from __future__ import annotations

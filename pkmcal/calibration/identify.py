@@ -136,7 +136,7 @@ def identify(
     0.3
     """
     machine = as_machine(robot)
-    datasets, unread = _telling(
+    datasets, unread = _informative(
         machine, _datasets(machine, measurements, frame, target, attachment)
     )
     held: list[tuple[FitData, int]] = []
@@ -266,7 +266,7 @@ def _datasets(
     return datasets
 
 
-def _telling(machine: Calibratable, datasets: list[FitData]) -> tuple[list[FitData], int]:
+def _informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[FitData], int]:
     """Leave rows out that say nothing: unread, where poses follow from the actuators exactly.
 
     And count them.

@@ -95,9 +95,9 @@ def _poses_of_units(equations: Equations) -> IntArray:
     from scipy.sparse.csgraph import connected_components
 
     unit, pose = equations.unit_of_row, poses_of_rows(equations)
-    told = unit >= 0
+    used = unit >= 0
     units = len(equations.components)
     shape = (units + int(pose.max()) + 1,) * 2
-    joined = coo_array((np.ones(int(told.sum())), (unit[told], units + pose[told])), shape)
+    joined = coo_array((np.ones(int(used.sum())), (unit[used], units + pose[used])), shape)
     _, group = connected_components(joined, directed=False)
     return numbered(group[:units])

@@ -114,8 +114,8 @@ def limits(
     yield from (filled("", text) for text in identifiability.gauges)
     if identifiability.rank < parameters:
         gap = f", gap {identifiability.gap:.0e}" if np.isfinite(identifiability.gap) else ""
-        told = "; unidentifiable combinations:" if identifiability.unidentifiable else ""
-        yield f"rank {identifiability.rank} of {parameters}{gap}{told}"
+        heading = "; unidentifiable combinations:" if identifiability.unidentifiable else ""
+        yield f"rank {identifiability.rank} of {parameters}{gap}{heading}"
         yield from (filled("  ", text) for text in identifiability.unidentifiable[:4])
         if len(identifiability.unidentifiable) > 4:
             yield f"  and {len(identifiability.unidentifiable) - 4} more"

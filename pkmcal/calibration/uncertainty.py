@@ -67,7 +67,7 @@ class Uncertainty:
 
     @property
     def known(self) -> bool:
-        """Whether there is noise to tell the uncertainty: stated, or shown by spare equations."""
+        """Whether there is noise to state the uncertainty: stated, or shown by spare equations."""
         return not self.unknown.any()
 
     @property

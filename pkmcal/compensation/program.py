@@ -243,9 +243,9 @@ def _corrected(program: Program, machine: _Machine, chord: float) -> CorrectedPr
 
 def _require(program: Program, which: IntArray, commands: FloatArray) -> None:
     """Refuse poses without a command."""
-    lost = which[~np.isfinite(commands).all(axis=1)]
-    if len(lost):
-        line = program.moves[int(lost[0])].line
+    unreached = which[~np.isfinite(commands).all(axis=1)]
+    if len(unreached):
+        line = program.moves[int(unreached[0])].line
         raise program.wrong(line, "the machine does not reach a pose of this move")
 
 

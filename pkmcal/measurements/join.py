@@ -58,12 +58,14 @@ def join(table: Table, log: Table, how: Join) -> None:
 
 def _put(table: Table, log: Table, actuators: Sequence[str], rows: Rows, said: str) -> None:
     kept = [i for i, row in enumerate(rows) if row is not None]
-    lost = [i for i, row in enumerate(rows) if row is None]
+    unmatched = [i for i, row in enumerate(rows) if row is None]
     unused = len(log) - len({row for row in rows if row is not None})
-    if lost:
-        lines = ", ".join(str(table.lines[i]) for i in lost[:_LISTED])
-        more = ", …" if len(lost) > _LISTED else ""
-        said += f"; {len(lost)} of {len(rows)} points without a row left out: lines {lines}{more}"
+    if unmatched:
+        lines = ", ".join(str(table.lines[i]) for i in unmatched[:_LISTED])
+        more = ", …" if len(unmatched) > _LISTED else ""
+        said += (
+            f"; {len(unmatched)} of {len(rows)} points without a row left out: lines {lines}{more}"
+        )
     if unused:
         said += f"; {unused} of its {len(log)} rows not used"
     table.take(kept)

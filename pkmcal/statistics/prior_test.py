@@ -98,12 +98,12 @@ def prior_test(
     own = with_prior - basis @ (basis.T @ with_prior)
     left = data - basis @ (basis.T @ data)
     turn, singular, rows = np.linalg.svd(own, full_matrices=False)
-    told = singular > _ROUNDING * float(np.linalg.norm(with_prior))
-    if not told.any():  # the other parameters take up all that the data say
+    shown = singular > _ROUNDING * float(np.linalg.norm(with_prior))
+    if not shown.any():  # the other parameters take up all that the data say
         nothing = np.full(with_prior.shape[1], np.nan)
         return PriorTest(float("nan"), 1.0, nothing, 1.0, float("nan"))
-    singular, rows = singular[told], rows[told]
-    along = turn[:, told].T @ left
+    singular, rows = singular[shown], rows[shown]
+    along = turn[:, shown].T @ left
     expected = singular**2 + variance
     share = variance / expected
     count = len(singular)
