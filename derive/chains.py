@@ -10,6 +10,7 @@ from __future__ import annotations
 import sympy as sp
 
 from .emit import Function
+from .rotation import axial
 
 
 def _closure() -> Function:
@@ -23,8 +24,7 @@ def _closure() -> Function:
     R, p = f.matrix("R", "platform to base, row by row"), f.vector("p", 3, "its origin [mm]")
     D = C * R.T
     half = f.let("half", f.scalar("length", "λ [mm]") / 2)
-    turn = sp.Matrix([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])
-    f.output("r", sp.Matrix([*(half * turn), *(c - p)]), "[mm]")
+    f.output("r", sp.Matrix([*(half * axial(D)), *(c - p)]), "[mm]")
     return f
 
 

@@ -45,6 +45,11 @@ def rpy_angles(f: Function, R: sp.Matrix) -> sp.Matrix:
     return sp.Matrix([alpha, beta, gamma])
 
 
+def axial(R: sp.Matrix) -> sp.Matrix:
+    """Twice the vector of the skew part of R; of a rotation 2 sin φ times its axis."""
+    return sp.Matrix([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+
+
 def skew(v: sp.Matrix) -> sp.Matrix:
     """[v], the matrix of v × (.)."""
     return sp.Matrix([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])

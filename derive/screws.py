@@ -15,7 +15,7 @@ import mpmath as mp
 import sympy as sp
 
 from .emit import Function
-from .rotation import rot_z, rpy, rpy_angles, skew
+from .rotation import axial, rot_z, rpy, rpy_angles, skew
 
 SERIES_END = 10.0  # x up to which c4 and c5 come from their series: a little over π²
 SERIES_COUNT = 14  # terms: the first left out is below 1e-17 of the sum
@@ -103,7 +103,7 @@ def _rotation_log() -> Function:
     )
     R = f.matrix("R", "rotation, row by row")
     trace = R.trace()
-    turn = sp.Matrix([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    turn = axial(R)
     K = sp.zeros(4, 4)
     K[0, 0] = 1 + trace
     for i in range(3):

@@ -1,5 +1,5 @@
 /* Generated from derive/chains.py by `python -m derive`; never edited by hand.
- * derivation 75227f8337adb372
+ * derivation ab4a00b608b30e11
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*

@@ -1,5 +1,5 @@
 /* Generated from derive/elementary.py by `python -m derive`; never edited by hand.
- * derivation ee1a05376e5a3059
+ * derivation b080d1f7a24f7a0e
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* (sin(x)/x - 1)/x²,  |x| <= π/4, as a polynomial in x² */

@@ -1,5 +1,5 @@
 /* Generated from derive/frames.py by `python -m derive`; never edited by hand.
- * derivation 064796f6c05fd882
+ * derivation d28ffed79d024c2d
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

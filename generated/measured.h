@@ -1,5 +1,5 @@
 /* Generated from derive/measured.py by `python -m derive`; never edited by hand.
- * derivation fafb62ad3ba56268
+ * derivation cca478c486a28e49
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

@@ -1,5 +1,5 @@
 /* Generated from derive/limbs.py by `python -m derive`; never edited by hand.
- * derivation 2b280541b1c38441
+ * derivation da07a7bf6fb6fcc8
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* the numbers of one limb, in the order of the core */

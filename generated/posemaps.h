@@ -1,5 +1,5 @@
 /* Generated from derive/posemaps.py by `python -m derive`; never edited by hand.
- * derivation c82604cd594b497c
+ * derivation d5ebca21a7c1e36a
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

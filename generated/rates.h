@@ -1,5 +1,5 @@
 /* Generated from derive/rates.py by `python -m derive`; never edited by hand.
- * derivation d08ef53fd1ac55ee
+ * derivation 6b12fcc55aa3478c
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /*

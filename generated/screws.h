@@ -1,5 +1,5 @@
 /* Generated from derive/screws.py by `python -m derive`; never edited by hand.
- * derivation 049ec697311cf9c9
+ * derivation 4ef477eb820a60ee
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #define SERIES_END 10.0

@@ -1,5 +1,5 @@
 /* Generated from derive/tpr2tps.py by `python -m derive`; never edited by hand.
- * derivation 01ceb63d5fa3e876
+ * derivation 4eb9f93e8b43916e
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
