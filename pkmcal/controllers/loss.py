@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, rms
 from pkmcal.kinematics.robot import Robot
 
 EXACT = 1e-6  # mm: firmware numbers have six decimals
@@ -58,7 +58,7 @@ def off_by(model: Robot, q: FloatArray, poses: FloatArray) -> FloatArray:
 def loss(model: Robot, q: FloatArray, poses: FloatArray, over: str) -> Loss:
     """How far a model is from poses; infinitely where it has none."""
     off = np.nan_to_num(np.linalg.norm(off_by(model, q, poses), axis=1), nan=np.inf)
-    return Loss(float(np.sqrt((off**2).mean())), float(off.max()), over)
+    return Loss(rms(off), float(off.max()), over)
 
 
 def nearest(

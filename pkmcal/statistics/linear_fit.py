@@ -7,7 +7,7 @@ spoil the others.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -69,10 +69,6 @@ class LinearFit:
     def key(self) -> IntArray:
         """Number of cluster and component of each equation, (M,)."""
         return numbered(self.cluster, self.component)
-
-    def with_residual(self, residual: FloatArray) -> LinearFit:
-        """The same with other residuals (M,)."""
-        return replace(self, residual=residual)
 
 
 def linear_fit(

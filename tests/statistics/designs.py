@@ -55,7 +55,7 @@ class Design:
     def fitted(self, errors: FloatArray) -> tuple[LinearFit, FloatArray]:
         """The fit to errors (M,), and the errors of the parameters that follow."""
         b = self.fit.design.T @ errors
-        return self.fit.with_residual(errors - self.fit.design @ b), self.contrasts @ b
+        return replace(self.fit, residual=errors - self.fit.design @ b), self.contrasts @ b
 
 
 def _design(found: pk.Identification) -> Design:

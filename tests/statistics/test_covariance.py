@@ -87,7 +87,7 @@ def test_degrees_of_freedom_are_satterthwaites() -> None:
     found = sandwich.freedom(contrast)[0]
     assert found == pytest.approx(values.sum() ** 2 / (values**2).sum(), rel=1e-9)
     y = free.residual
-    variance = (contrast @ Sandwich(free.with_residual(maker @ y)).data @ contrast.T)[0, 0]
+    variance = (contrast @ Sandwich(replace(free, residual=maker @ y)).data @ contrast.T)[0, 0]
     assert variance == pytest.approx(y @ form @ y, rel=1e-9)
 
 

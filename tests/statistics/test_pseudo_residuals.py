@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,7 +41,7 @@ def robust_fit(design: Design, y: FloatArray, name: LossName) -> tuple[LinearFit
     r = y - fit.design @ b
     if name != "linear":
         r = pseudo_residuals(r, components, loss.weights(r), loss.decline(r), p).residual
-    return fit.with_residual(r), design.contrasts @ b
+    return replace(fit, residual=r), design.contrasts @ b
 
 
 def with_gross(design: Design, shared: float, share: float, rng: np.random.Generator) -> FloatArray:
