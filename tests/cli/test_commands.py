@@ -33,7 +33,8 @@ from ..simulated import altered
 ROOT = Path(__file__).resolve().parents[2]
 DELTA = ROOT / "examples" / "linear-delta"
 ROBOT, PROBE = str(DELTA / "robot.toml"), str(DELTA / "probe.csv")
-VERBS = sorted(typer.main.get_group(verbs.app).commands)
+GROUP = typer.main.get_group(verbs.app)
+VERBS = GROUP.list_commands(typer.Context(GROUP))
 
 
 def files_below(folder: Path) -> set[str]:

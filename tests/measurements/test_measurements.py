@@ -115,7 +115,7 @@ BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"actuators": None}, TypeError, "actuators must be an array of numbers, found None"),
     ({"values": [[1, 2], [3, 4]]}, ValueError, r"values of kind 'position' .*\(2, 3\).*\(2, 2\)"),
     ({"values": [[1, 2, 3], [4, np.inf, 6]]}, ValueError, "values must be finite.* at index 1, 1"),
-    ({"values": None}, ValueError, "values of kind 'position' must be given; None goes with"),
+    ({"values": None}, ValueError, "'position' must be given, found None: that goes with"),
     ({"kind": "closure", "sigma": 0.1, "values": None}, ValueError, "sigma: nothing was read"),
     ({"kind": "closure", "target": [0, 0, 1], "values": None}, ValueError, "target: a closure"),
     (
