@@ -120,7 +120,7 @@ class Blocks:
             found.append((rest.transpose(0, 2, 1) @ mine).reshape(-1, *width))
         return np.concatenate(found)
 
-    def given_back(
+    def by_groups(
         self,
         by_unknown: FloatArray,
         group: IntArray,
@@ -128,7 +128,7 @@ class Blocks:
         residual: FloatArray,
         taken: FloatArray,
     ) -> Shares:
-        """What is left, said of groups of the equations again.
+        """Squared residuals and degrees of freedom of each group of the original equations.
 
         Parameters
         ----------

@@ -354,7 +354,7 @@ class Equations(Readings):
             return Shares(squares, freedom, np.diag(freedom))
         _, by_unknown = self._system(evaluation.robot, evaluation.states, evaluation.theta, noise)
         group = self._group_of_equation
-        return self._blocks.given_back(by_unknown, group, weights, residual, taken)
+        return self._blocks.by_groups(by_unknown, group, weights, residual, taken)
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""

@@ -11,7 +11,6 @@ from pkmcal.calibration.elimination import Shares
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identifiability import (
-    ROUNDING,
     Decomposed,
     Directions,
     decompose,
@@ -21,7 +20,7 @@ from pkmcal.calibration.least_squares import Search
 from pkmcal.calibration.loss import Loss, LossName
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics import prior_test
-from pkmcal.statistics.linear_fit import triangle
+from pkmcal.statistics.linear_fit import column_basis, triangle
 from pkmcal.statistics.robust_scale import median_ratio
 
 _ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
@@ -193,9 +192,7 @@ class Estimator:
 
         None where too few equations are left to show it.
         """
-        _, singular, rows = np.linalg.svd(triangle(jacobian), full_matrices=False)
-        identifiable = singular > ROUNDING * singular[0]
-        basis = jacobian @ (rows[identifiable].T / singular[identifiable])
+        basis = column_basis(jacobian)
         left = residual - basis @ (basis.T @ residual)
         every = np.ones(len(self.equations.components))
         shares = self.equations.by_groups(evaluation, noise, every, left, basis)

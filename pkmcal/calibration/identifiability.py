@@ -13,14 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, first_largest
-from pkmcal.statistics.linear_fit import triangle
+from pkmcal.statistics.linear_fit import ROUNDING, triangle
 
 _KINDS = 4  # kinds of parameters whose combinations are looked for
 _OUTSIDE = 1e-5  # share of a combination outside some parameters that does not count
 _ALIKE = 1e-3  # share by which entries of a combination differ that are not equal
 _SURE = 6  # decimals of a coefficient that are more than rounding
 _SPELLED = 6  # parameters whose coefficients are printed
-ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 CLEAR = 0.01  # share of the machine's size to which a combination must be determined to count
 
 

@@ -17,7 +17,8 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, first_largest
-from pkmcal.calibration.identifiability import ROUNDING, decompose
+from pkmcal.calibration.identifiability import decompose
+from pkmcal.statistics.linear_fit import ROUNDING
 
 Criterion = Literal["prediction", "D", "A"]
 

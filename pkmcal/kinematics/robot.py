@@ -118,12 +118,13 @@ class Robot(Kinematics, Result):
         rows, shape = self.own_rows(pose)
         q = self.machine.inverse(self.slots, rows)
         closure = self.machine.closure(self.slots, rows, q)
-        with np.errstate(invalid="ignore"):  # rows that are no poses
-            off = np.abs(rows - closure.pose)
-            off[:, 3:] = self.length * np.abs(wrapped(off[:, 3:]))
-        if self.model.map == "spatial":  # which has every pose, by whatever angles
-            off[:] = 0.0
-        return np.asarray(np.abs(np.hstack([closure.residual, off])).max(axis=1)).reshape(shape)
+        worst = np.abs(closure.residual).max(axis=1)
+        if self.model.map != "spatial":  # which has every pose, by whatever angles
+            with np.errstate(invalid="ignore"):  # rows that are no poses
+                off = np.abs(rows - closure.pose)
+                off[:, 3:] = self.length * np.abs(wrapped(off[:, 3:]))
+            worst = np.maximum(worst, off.max(axis=1))
+        return np.asarray(worst).reshape(shape)
 
     def feasible(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> Feasibility:
         """Which limits of which limbs a pose keeps.

@@ -14,6 +14,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 
+ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 _IN_ONE_THREAD = 8192  # numbers
 
 
@@ -135,6 +136,14 @@ def sums(rows: FloatArray, key: IntArray) -> FloatArray:
     first = np.flatnonzero(np.diff(key[order], prepend=-1))
     total: FloatArray = np.add.reduceat(rows[order], first, axis=0)
     return total
+
+
+def column_basis(matrix: FloatArray) -> FloatArray:
+    """Orthonormal basis (M, r) of the columns."""
+    _, singular, rows = np.linalg.svd(triangle(matrix), full_matrices=False)
+    keep = singular > ROUNDING * singular[0]
+    basis: FloatArray = matrix @ (rows[keep].T / singular[keep])
+    return basis
 
 
 def triangle(matrix: FloatArray) -> FloatArray:

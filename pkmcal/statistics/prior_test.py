@@ -14,11 +14,10 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.statistics.distributions import f_tail, t_tail
-from pkmcal.statistics.linear_fit import triangle
+from pkmcal.statistics.linear_fit import ROUNDING, triangle
 
 CONTRADICTED = 0.01  # chance below which the data contradict the prior
 LEAST_FREEDOM = 5.0  # of the data alone, from which they show the noise
-_ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 _INFORMED = 0.1  # share of its deviation by which the data must move a parameter to be judged
 _WIDEST = 1e6  # factor on the prior beyond which none is looked for
 
@@ -70,7 +69,7 @@ def data_alone(jacobian: FloatArray, data: FloatArray) -> tuple[float, float]:
     factor = triangle(np.column_stack([jacobian, data]))
     n = jacobian.shape[1]
     basis, singular, _ = np.linalg.svd(factor[:, :n], full_matrices=False)
-    basis = basis[:, singular > _ROUNDING * singular[0]]
+    basis = basis[:, singular > ROUNDING * singular[0]]
     rest = factor[:, n] - basis @ (basis.T @ factor[:, n])
     return float(rest @ rest), float(len(data) - basis.shape[1])
 
@@ -94,11 +93,11 @@ def prior_test(
     basis = np.zeros((len(data), 0))
     if without.shape[1]:
         basis, singular, _ = np.linalg.svd(without, full_matrices=False)
-        basis = basis[:, singular > _ROUNDING * singular[0]]
+        basis = basis[:, singular > ROUNDING * singular[0]]
     own = with_prior - basis @ (basis.T @ with_prior)
     left = data - basis @ (basis.T @ data)
     turn, singular, rows = np.linalg.svd(own, full_matrices=False)
-    shown = singular > _ROUNDING * float(np.linalg.norm(with_prior))
+    shown = singular > ROUNDING * float(np.linalg.norm(with_prior))
     if not shown.any():  # the other parameters take up all that the data say
         nothing = np.full(with_prior.shape[1], np.nan)
         return PriorTest(float("nan"), 1.0, nothing, 1.0, float("nan"))

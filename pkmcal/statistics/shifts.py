@@ -17,13 +17,13 @@ import numpy as np
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.statistics.clusters import Sandwich
 from pkmcal.statistics.distributions import f_tail
-from pkmcal.statistics.linear_fit import LinearFit, triangle
+from pkmcal.statistics.linear_fit import ROUNDING, LinearFit, column_basis, triangle
+from pkmcal.statistics.prior_test import data_alone
 
 _CHANCE = 0.01  # among all candidates, below which one has shifted …
 _SHARE, _FALL = 0.05, 0.03  # … if it is so much of the disagreement, and the rms falls so much
 _ALIKE = 6.63  # drop in units of the variance by which candidates differ that can be told apart
 _FEW = 30  # equations up to which clusters are too few for their own variances
-_ROUNDING = 1e-9
 _SAME = 1e-6  # share of a candidate that must be left beside what is there
 
 
@@ -85,8 +85,8 @@ def shifted(
     y = np.concatenate([r1, r2])
     late = np.arange(len(y)) >= len(r1)
     cluster = np.concatenate([c1, c2 + c1.max() + 1])
-    common = _orthonormal(np.vstack([x1, x2]) @ basis)
-    apart = _unexplained(x1 @ basis, r1) + _unexplained(x2 @ basis, r2)
+    common = column_basis(np.vstack([x1, x2]) @ basis)
+    apart = data_alone(x1 @ basis, r1)[0] + data_alone(x2 @ basis, r2)[0]
     raw = [np.vstack([np.zeros((len(r1), d.shape[1])), x2 @ d]) for d in candidates]
     few = len(y) <= _FEW
     taken: list[tuple[_Trial, tuple[int, ...], float]] = []
@@ -177,7 +177,7 @@ def _together(
     n = design.shape[1]
     whole = np.hstack([design, *columns])
     _, singular, rows = np.linalg.svd(triangle(whole), full_matrices=False)
-    keep = singular > _ROUNDING * singular[0]
+    keep = singular > ROUNDING * singular[0]
     half = rows[keep].T / singular[keep]
     basis = whole @ half
     solution = half @ (basis.T @ y)
@@ -201,17 +201,3 @@ def _together(
 def _fit(design: FloatArray, residual: FloatArray, cluster: IntArray) -> LinearFit:
     p = design.shape[1]
     return LinearFit(design, residual, np.zeros((0, p)), np.eye(p), cluster, np.zeros_like(cluster))
-
-
-def _orthonormal(matrix: FloatArray) -> FloatArray:
-    """Orthonormal basis (M, r) of the columns."""
-    _, singular, rows = np.linalg.svd(triangle(matrix), full_matrices=False)
-    keep = singular > _ROUNDING * singular[0]
-    basis: FloatArray = matrix @ (rows[keep].T / singular[keep])
-    return basis
-
-
-def _unexplained(design: FloatArray, y: FloatArray) -> float:
-    basis = _orthonormal(design)
-    left = y - basis @ (basis.T @ y)
-    return float(left @ left)
