@@ -226,6 +226,8 @@ def parameters(
             start += list(place)
     travel = max(_travel(robot, data.measured) for data in datasets)
     of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
+    of_unit |= {"1/mm": 1.0 / travel**2, "1/rad": robot.length / travel**2}
+    of_unit["1/mm2"] = of_unit["1/mm"] / robot.length
     scale = np.array([of_unit[unit] for unit in units])
     values = np.array(start, dtype=np.float64)
     lower, upper = _bounds(bounds, names, values)
