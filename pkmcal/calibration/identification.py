@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import arguments
+from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
+from pkmcal.calibration.law_tests import LawTest, law_tests
 from pkmcal.calibration.moved import Moved, moved
 from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import robust_check
@@ -55,6 +57,18 @@ class Identification(Parts, Result):
         if self.holdout.drawn or not self.holdout.data or not self.fit.uncertainty.known:
             return ()
         return moved(self.fit, self.holdout.data, self.holdout.like)
+
+    @cached_property
+    def law_tests(self) -> tuple[LawTest, ...]:
+        """Whether the free numbers of drive laws are needed: an F test of each kind against 0.
+
+        Nothing is said of kinds with a prior, or that the measurements do not determine.
+        """
+        if isinstance(self.robot, SerialArm):
+            return ()
+        prior = self.fit.parameters.prior
+        given = (self.robot.geometry, self.table, self.covariance, prior, self.covariance_rule)
+        return law_tests(*given)
 
     @property
     def loss(self) -> str:
@@ -205,6 +219,7 @@ class Identification(Parts, Result):
             row_names(datasets, self.outliers),
             self.outliers,
         )
+        yield from (summary.filled("", str(test)) for test in self.law_tests)
         if self.at_bounds:
             yield summary.bounds(self.at_bounds)
         yield ""

@@ -74,6 +74,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "evaluations",
     "history",
     "moved",
+    "law_tests",
     "warnings",
 )
 

@@ -63,6 +63,7 @@ def mjcf(robot: Robot, path: str | PathLike[str]) -> None:
 def text_of(robot: Robot) -> str:
     """The MJCF text."""
     _require(robot)
+    require_no_laws(robot, "this model")
     home = robot.own_home
     drives, directions, _ = robot.limb_machine.limbs(robot.slots, home[None])
     if not np.isfinite(drives).all():

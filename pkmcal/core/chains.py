@@ -188,6 +188,16 @@ class ChainMachine(CoreMachine):
         found: FloatArray = numbers[place + 1] * q + numbers[place]
         return found
 
+    def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """The gain of each actuator, (N, n)."""
+        return np.tile(slots.ravel()[self.layout.drive_place + 1], (len(q), 1))
+
+    def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
+        """What the actuators read (N, n) at q̃ (N, n)."""
+        place, numbers = self.layout.drive_place, slots.ravel()
+        q: FloatArray = (way - numbers[place]) / numbers[place + 1]
+        return q
+
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m); the least squares of the closures."""
         closure = self.closure(slots, pose, self.inverse(slots, pose))

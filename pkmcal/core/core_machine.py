@@ -67,6 +67,14 @@ class CoreMachine(ABC):
     def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """The ways q̃ of the drives at actuator coordinates (N, n), (N, drives)."""
 
+    @abstractmethod
+    def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """How far the drives go by their actuators at coordinates (N, n), (N, drives)."""
+
+    @abstractmethod
+    def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
+        """Actuator coordinates (N, n) where the drives are at their ways (N, drives)."""
+
     def nearest_turns(
         self, slots: FloatArray, q: FloatArray, near: FloatArray | None = None
     ) -> FloatArray:

@@ -86,6 +86,10 @@ class DrivenMachine(CoreMachine):
         """Ways (N, drives) at readings (N, n)."""
         return self.ways(slots, q).way
 
+    def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """How far the drives go by their actuators at readings (N, n), (N, drives)."""
+        return self.ways(slots, q).slope
+
     def bare(self, slots: FloatArray, q: FloatArray) -> tuple[AnyMachine, FloatArray, FloatArray]:
         """The machine within, its geometry, and its actuators where the readings are q."""
         return self.inner, self._bare(slots), self.drives(slots, q)
@@ -111,7 +115,7 @@ class DrivenMachine(CoreMachine):
         row, column = divmod(place, self._wide)
         return row * self._width + column
 
-    def _readings(self, slots: FloatArray, way: FloatArray) -> FloatArray:
+    def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
         """Readings (N, n) of drives; of those that share an actuator the mean."""
         approach = self._approach(len(way))
         q = self.laws.readings(slots, way, approach)
@@ -146,7 +150,7 @@ class DrivenMachine(CoreMachine):
     def reference(self, slots: FloatArray) -> FloatArray:
         """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
         near = self.inner.reference(self._bare(slots))
-        q: FloatArray = self._readings(slots, near[None])[0]
+        q: FloatArray = self.at_drives(slots, near[None])[0]
         angle = np.array([self.laws.drives[drives[0]].angle for drives in self._driven])
         return np.where(angle, q, 0.0)
 
@@ -165,7 +169,7 @@ class DrivenMachine(CoreMachine):
         way = self.drives(slots, q)  # a turn of the drive is one, whatever q makes of it
         turned = self.inner.nearest_turns(self._bare(slots), way, self._near(slots, near))
         moved = open_ended & (turned != way)[:, alone]
-        return np.where(moved, self._readings(slots, turned), q)
+        return np.where(moved, self.at_drives(slots, turned), q)
 
     def _near(self, slots: FloatArray, near: FloatArray | None) -> FloatArray | None:
         if near is None:
@@ -180,7 +184,7 @@ class DrivenMachine(CoreMachine):
     ) -> FloatArray:
         """Poses (N, 6) to readings (N, n)."""
         way = self.inner.inverse(self._bare(slots), pose, self._near(slots, near))
-        return self._readings(slots, way)
+        return self.at_drives(slots, way)
 
     def forward(
         self,

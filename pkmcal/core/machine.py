@@ -164,6 +164,17 @@ class Machine(CoreMachine):
         found: FloatArray = slots[:, _GAIN] * q[:, of_limbs] + slots[:, _OFFSET]
         return found
 
+    def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """The gain of each limb, (N, limbs)."""
+        return np.tile(slots[:, _GAIN], (len(q), 1))
+
+    def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
+        """Actuator coordinates (N, n) of q̃ (N, limbs); of limbs that share one the mean."""
+        q = (way - slots[:, _OFFSET]) / slots[:, _GAIN]
+        of_limbs = np.array(list(self.struct.actuator[0 : self.struct.limbs]))
+        each = [q[:, of_limbs == a].mean(axis=1) for a in range(self.actuators)]
+        return np.stack(each, axis=1)
+
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m)."""
         out = np.empty((len(pose), self.actuators, self.m))

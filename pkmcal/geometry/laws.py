@@ -13,7 +13,7 @@ from pkmcal.geometry.geometry import Geometry
 
 
 class LawNumber(NamedTuple):
-    """A number of a law: the key of a robot file, which entry there, its public name and its unit."""
+    """A number of a law: key and entry in a robot file, its public name and its unit."""
 
     key: str
     entry: int
