@@ -123,5 +123,3 @@ def _kind(slot: str) -> str:
         return ""
     wave = _WAVE.fullmatch(match[1])
     return f"harmonic {wave[1]}" if wave else match[1]
-
-

@@ -14,8 +14,8 @@ from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import c_source
 from pkmcal.controllers.c_source import Number
-from pkmcal.controllers.rendering import rendered
 from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.rendering import rendered
 from pkmcal.core.library import AXES, DRIVERS, MAPS, ROWS, SLOTS
 from pkmcal.core.poses import invert
 from pkmcal.exceptions import ArgumentError

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers.c_header import prepared
+from pkmcal.controllers.laws import require_no_laws
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole

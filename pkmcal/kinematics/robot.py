@@ -441,8 +441,12 @@ class Robot(Kinematics, Result):
         Raises
         ------
         ValueError
-            `like` describes another robot.
+            `like` describes another robot; a drive law has no inverse over its stroke, so that
+            the file could not be read.
         """
+        for d, why in self.model.doubts().items():
+            limb = self.model.limb_of_drive(d) + 1
+            raise ArgumentError(f"robot: limb {limb} of {self.name}: its drive law: {why}")
         if like is None or self.model.chains is not None:
             robot_file.write(self.model, path, comment)
             return
