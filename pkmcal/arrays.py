@@ -19,7 +19,7 @@ Int32Array = NDArray[np.int32]  # what the core writes
 Int64Array = NDArray[np.int64]
 TextArray = NDArray[np.str_]
 
-Unit = Literal["mm", "rad", "1"]
+Unit = Literal["mm", "rad", "1", "1/mm", "1/rad", "1/mm2"]
 
 
 def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.core.chains import ChainMachine
+from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.machine import Machine
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
@@ -20,7 +22,7 @@ def surplus(robot: Robot) -> int:
     None where limbs are chains: their joints give way, and the pose follows from that.
     """
     machine = robot.machine
-    return machine.rows - machine.m if isinstance(machine, Machine) else 0
+    return machine.rows - machine.m if robot.model.chains is None else 0
 
 
 def moved(robot: Robot, pose: FloatArray, step: FloatArray) -> FloatArray:
@@ -70,6 +72,6 @@ def sphere_actuators(robot: Robot) -> list[int]:
     return of_rows
 
 
-def _of_limbs(robot: Robot) -> Machine:
-    assert isinstance(robot.machine, Machine)  # `surplus` is 0 otherwise
+def _of_limbs(robot: Robot) -> Machine | DrivenMachine:
+    assert not isinstance(robot.machine, ChainMachine)  # `surplus` is 0 otherwise
     return robot.machine
