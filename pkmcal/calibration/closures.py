@@ -20,9 +20,10 @@ for noise would make small whatever geometry lets them agree.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -80,6 +81,9 @@ class Closures(Protocol):
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """The equations (K, equations), whitened, and their derivative by the unknowns."""
 
+    def shifted(self, by: FloatArray) -> Self:
+        """The same with whitened equations (K, equations) that are larger: of other readings."""
+
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Factors (equations,) to mm of the equations times their sigma."""
 
@@ -117,6 +121,10 @@ class Commanded:
         """No equations."""
         return np.empty((len(self.read), 0)), np.empty((len(self.read), 0, 0))
 
+    def shifted(self, by: FloatArray) -> Self:
+        """No equations."""
+        return self
+
     def lengths(self, robot: Calibratable) -> FloatArray:
         """No equations."""
         return np.empty(0)
@@ -152,6 +160,7 @@ class NoisyActuators:
         self._free = np.flatnonzero(sigma.any(axis=0))
         self.sigma: FloatArray | None = sigma[:, self._free]
         self._white = 1.0 / self.sigma
+        self._shift = np.zeros_like(self._white)
         self.unknowns = self.equations = len(self._free)
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
@@ -168,7 +177,13 @@ class NoisyActuators:
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """Where they are less what they read."""
         off = (states.actuators - self.read)[:, self._free]
-        return off * self._white, self._white[:, :, None] * np.eye(self.unknowns)
+        return off * self._white + self._shift, self._white[:, :, None] * np.eye(self.unknowns)
+
+    def shifted(self, by: FloatArray) -> Self:
+        """The same with larger equations."""
+        other = copy.copy(self)
+        other._shift = self._shift + by
+        return other
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units."""
@@ -219,6 +234,7 @@ class FreePoses:
             [sigma[:, a] if a >= 0 else common for a in self._roles.actuator], axis=1
         )
         self._white = 1.0 / self.sigma
+        self._shift = np.zeros_like(self._white)
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
         """Poses stay where they are, or where joints hold them, until they are fitted."""
@@ -238,8 +254,15 @@ class FreePoses:
         if self._held:
             by_step = by_step @ self._allowed(robot, states)[0]
         off *= self._white
+        off += self._shift
         by_step *= self._white[:, :, None]
         return off, by_step
+
+    def shifted(self, by: FloatArray) -> Self:
+        """The same with larger equations."""
+        other = copy.copy(self)
+        other._shift = self._shift + by
+        return other
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units; the other rows are in mm."""
