@@ -132,7 +132,7 @@ def robot_text(anchors: FloatArray, name: str, head: str) -> str:
 
 
 def _require(robot: Robot) -> None:
-    require_no_laws(robot, "this command")
+    require_no_laws(robot, "M669")
     limbs = [(limb.kind, limb.actuator) for limb in robot.model.limbs]
     lines_of_its_own = limbs == [("UPS", i) for i in range(len(_LETTERS))]
     if robot.model.map != "translation" or not lines_of_its_own or not robot.frames.trivial:

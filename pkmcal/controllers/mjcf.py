@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pkmcal.arguments import path as as_path
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, furthest_axis
 from pkmcal.controllers.c_header import prepared
 from pkmcal.controllers.laws import require_no_laws
 from pkmcal.core.library import POSE
@@ -162,7 +162,7 @@ def _swinging(
     parent: Xml.Element, name: str, at: FloatArray, along: FloatArray, normal: FloatArray
 ) -> Xml.Element:
     """A body whose z points along the leg: on two hinges, or on one about a normal."""
-    other = normal if normal.any() else np.eye(3)[np.argmin(abs(along))]
+    other = normal if normal.any() else np.eye(3)[furthest_axis(along)]
     x = np.cross(np.cross(along, other), along)
     x /= np.linalg.norm(x)
     body = _body(

@@ -61,7 +61,7 @@ class ChainLayout:
     zero : ndarray (actuators)
         What the actuators read at home.
     near : ndarray (actuators)
-        The coordinate that an angle is given nearest to.
+        What they read, gain and offset included, where an angle is given nearest to.
     """
 
     map: str
@@ -175,8 +175,10 @@ class ChainMachine(CoreMachine):
         return out
 
     def reference(self, slots: FloatArray) -> FloatArray:
-        """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
-        return self.layout.near
+        """The coordinate (n,) that an angle is given nearest to."""
+        drive, place = slots.ravel(), self.layout.drive_place
+        found: FloatArray = (self.layout.near - drive[place]) / drive[place + 1]
+        return found
 
     def bare(self, slots: FloatArray, q: FloatArray) -> tuple[ChainMachine, FloatArray, FloatArray]:
         """The machine without drive laws, its geometry, and its coordinates at q (N, n)."""

@@ -358,7 +358,7 @@ class Laws:
         if np.isfinite(span).all():  # beyond a turning point the proof ends
             low = np.where(np.isnan(low), span[0], np.maximum(low, span[0]))
             high = np.where(np.isnan(high), span[1], np.minimum(high, span[1]))
-        q = 0.5 * (low + high)
+        q: FloatArray = 0.5 * (low + high)
         offset, sign = numbers[0, drive.offset], 1.0 if rising else -1.0
         scale = np.abs(way) + most + abs(offset)
         done = np.zeros(len(q), dtype=bool)

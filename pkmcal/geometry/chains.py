@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Unit
+from pkmcal.arrays import FloatArray, Unit, furthest_axis
 from pkmcal.core.chains import ChainLayout
 from pkmcal.display import Table, fixed
 from pkmcal.geometry.laws import Law, LawNumber
@@ -382,8 +382,7 @@ def _same_end(a: tuple[Joint, ...], b: tuple[Joint, ...]) -> bool:
 
 def across(direction: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Two unit vectors at right angles to a unit vector, and to each other."""
-    least = np.eye(3)[int(np.argmin(np.abs(direction)))]
-    one = np.cross(direction, least)
+    one = np.cross(direction, np.eye(3)[furthest_axis(direction)])
     one /= np.linalg.norm(one)
     return one, np.cross(direction, one)
 

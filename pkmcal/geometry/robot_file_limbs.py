@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pkmcal.arguments import did_you_mean
-from pkmcal.arrays import FloatArray, Unit
+from pkmcal.arrays import FloatArray, Unit, furthest_axis
 from pkmcal.core.library import AXES, SLOTS
 from pkmcal.files.toml_table import Table, shown, unit_vector
 from pkmcal.geometry.limb_kinds import ALIASES, KINDS, LimbKind
@@ -247,7 +247,8 @@ def _frame(table: Table, key: str, zero: str | None = None) -> FloatArray:
     """Right-handed orthonormal axes (columns) whose third is the direction under `key`.
 
     The first is the direction under `zero`; without one it is the coordinate axis that is
-    furthest from the third, made orthogonal to it. Axes that are orthonormal keep their bits.
+    furthest from the third (`furthest_axis`), made orthogonal to it. Axes that are orthonormal
+    keep their bits.
     """
     e3 = table.vector(key)
     if zero is not None:
@@ -256,7 +257,7 @@ def _frame(table: Table, key: str, zero: str | None = None) -> FloatArray:
             angle = math.degrees(math.acos(max(-1.0, min(1.0, _dot(given, e3)))))
             table.fail(zero, f"must be at a right angle to {key}, found {angle:.4g} degrees")
     else:
-        k = min(range(3), key=lambda axis: abs(e3[axis]))
+        k = furthest_axis(np.array(e3))
         given = (float(k == 0), float(k == 1), float(k == 2))
     along = _dot(given, e3)
     if abs(along) > 1e-15:
