@@ -169,8 +169,7 @@ def misfit(
     start, end = commanded
     equations, state = estimator.equations, estimate.state
     chosen, fitted = equations.parameters, state.fitted.identifiable
-    moved = (estimate.evaluation.theta - chosen.start) / chosen.scale
-    prior = estimator.prior @ moved
+    prior = chosen.prior_left(estimate.evaluation.theta)
     dof = float(estimate.weights @ equations.components) + len(prior) - state.fitted.rank
     squares = np.repeat(estimate.weights, equations.components) @ estimate.residual**2
     stated = equations.sigma_stated and dof > 0
