@@ -13,7 +13,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.labels import Labels, labels
 from pkmcal.calibration.later import Later, OwnNumbers, compared, later
@@ -59,6 +59,8 @@ class HeldOut:
         They at the estimate, their own parameters found.
     own : mapping of str to (float, float)
         These parameters, of sessions that were not fitted: value and standard deviation.
+    spare : float
+        Lengths that are left to compare when these parameters have taken theirs.
     drawn : bool
         Whether they are of the same measurements as the fitted points, drawn at random.
     """
@@ -77,6 +79,7 @@ class HeldOut:
     later: Later | None = None
     end: Evaluation | None = None
     own: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    spare: float = float("nan")
     drawn: bool = False
 
     @property
@@ -142,7 +145,8 @@ def evaluate(
         chi2_tail(k * d**2 / e, k) < _ODD / count if np.isfinite(d) and e > 0 else False
         for d, e, k in zip(off, expected, np.bincount(row, minlength=count), strict=True)
     ])  # fmt: skip
-    usable = uncertainty.known and bool(good.any())
+    spare = float((1.0 - points.taken[good[row]]).sum())
+    usable = uncertainty.known and bool(good.any()) and spare >= LEAST_FREEDOM
     return HeldOut(
         rms_before=equations.rms(before),
         rms=equations.rms(after),
@@ -158,6 +162,7 @@ def evaluate(
         later=rows,
         end=after,
         own=_own_numbers(rows, equations, after, own, uncertainty),
+        spare=spare,
     )
 
 
