@@ -394,6 +394,121 @@ def test_they_are_off_by_what_is_expected_beside_their_own_zeros(
     assert np.mean(alarms) <= 0.04
 
 
+# machines whose rows have poses of their own, and arms --------------------------------------------
+
+
+def a_hexapod_with_noisy_legs(seed: int) -> tuple[Robot, list[Measurements], list[str]]:
+    robot, rng = pk.load("hexapod"), np.random.default_rng(seed)
+    sets = []
+    for day in DAYS[:2]:
+        true = moved(robot, 1.0, rng)
+        q = robot.inverse(hexapod_poses(robot, 20, rng))
+        seen = pk.VirtualMachine(true, NOISE, int(rng.integers(2**31))).measure(q, "pose")
+        read = q + rng.normal(0.0, 0.01, q.shape)
+        sets.append(dataclasses.replace(seen, actuators=read, actuator_sigma=0.01, session=day))
+    return robot, sets, ["offset*", "platform*"]
+
+
+def an_arm(seed: int) -> tuple[pk.SerialArm, list[Measurements], list[str]]:
+    arm, rng = pk.load("3r"), np.random.default_rng(seed)
+    assert isinstance(arm, pk.SerialArm)
+    sets = []
+    for day in DAYS[:2]:
+        errors = np.zeros((arm.n_joints, 6))
+        errors[[0, 2], 5] = rng.normal(0.0, 1e-3, 2)  # axes 1 and 2 turn alike
+        q = rng.uniform(-1.5, 1.5, (15, arm.n_joints))
+        machine = pk.VirtualMachine(arm.replace(errors), NOISE, int(rng.integers(2**31)))
+        sets.append(dataclasses.replace(machine.measure(q), session=day))
+    return arm, sets, ["joint[13].dpsi", "joint2.dx"]
+
+
+CABLES = np.array([[0, -1597, -120.0], [1550, 900, -120], [-1370, 790, -120], [0, 0, 2355.0]])
+
+
+@pytest.fixture(scope="module")
+def cables(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    """A point hung on four cables: one closure more than it has coordinates."""
+    path = tmp_path_factory.mktemp("cables") / "cables.toml"
+    limbs = "".join(
+        f'[[limb]]\nkind = "cable"\nbase = {anchor}\nplatform = [0.0, 0.0, 0.0]\n'
+        for anchor in CABLES.tolist()
+    )
+    path.write_text(
+        'name = "cables"\nunits = { length = "mm", angle = "deg" }\n[pose]\n'
+        'map = "translation"\nhome = { z = 600.0 }\n' + limbs
+    )
+    return pk.load(path)
+
+
+def on_cables(
+    robot: Robot, seed: int, rows: tuple[int, ...], unread: int = 0
+) -> list[Measurements]:
+    """Sessions of a machine whose anchors are its own and whose zeros change; some rows unread."""
+    rng = np.random.default_rng(seed)
+    anchors, sets = CABLES + rng.normal(0.0, 5.0, (4, 3)), []
+    for day, count in zip(DAYS, rows, strict=False):
+        zeros = rng.normal(0.0, 5.0, 4)
+        at = np.c_[rng.uniform(-500, 500, (count, 2)), rng.uniform(0, 1200, count)]
+        lengths = np.linalg.norm(at[:, None] - anchors, axis=2) - zeros
+        seen = at + rng.normal(0.0, 0.2, at.shape)
+        seen[:unread] = np.nan
+        sets.append(Measurements(lengths + rng.normal(0.0, 0.2, lengths.shape), seen, sigma=0.2,
+                                 actuator_sigma=0.2, session=day))  # fmt: skip
+    return sets
+
+
+@pytest.mark.parametrize("name", ["noisy legs", "arm", "cables"])
+def test_on_every_sort_of_machine_everything_anew_is_two_calibrations(
+    name: str, cables: Robot
+) -> None:
+    robot: Robot | pk.SerialArm
+    if name == "cables":
+        robot, sets, free = cables, on_cables(cables, 1, (25, 20), unread=5), ["base*", "offset*"]
+    else:
+        robot, sets, free = (an_arm if name == "arm" else a_hexapod_with_noisy_legs)(1)
+    both = pk.identify(robot, sets, free, per_session="*")
+    for day, measured in zip(DAYS, sets, strict=False):
+        alone = pk.identify(robot, measured, free)
+        mine = [both.free.index(f"{n}@{day}") for n in alone.free]
+        np.testing.assert_allclose(both.values[mine], alone.values, atol=2e-5 * alone.stderr.max())
+        np.testing.assert_allclose(both.stderr[mine], alone.stderr, rtol=0.05)
+
+
+@pytest.mark.parametrize("name", ["noisy legs", "arm", "cables"])
+def test_common_numbers_are_known_better_by_all_sessions(name: str, cables: Robot) -> None:
+    """And what is of a session is that of the whole: each is in its interval."""
+    robot: Robot | pk.SerialArm
+    if name == "cables":
+        robot, sets, free = cables, on_cables(cables, 2, (25, 20), unread=5), ["base*", "offset*"]
+        own, common = "offset*", "base2.x"
+    else:
+        robot, sets, free = (an_arm if name == "arm" else a_hexapod_with_noisy_legs)(2)
+        own, common = (
+            ("joint[13].dpsi", "joint2.dx") if name == "arm" else ("offset*", "platform2.x")
+        )
+    found = pk.identify(robot, sets, free, per_session=own)
+    alone = [pk.identify(robot, measured, free) for measured in sets]
+    known = found.parameters[common]["stderr"]
+    assert all(known < each.parameters[common]["stderr"] for each in alone)
+    assert 0.7 < found.chi2_per_dof < 1.3
+    shared = pk.identify(robot, sets[0], free, holdout=sets[1], per_session=own)
+    assert not shared.holdout_contradicts and shared.holdout_parameters
+    for number, value in shared.holdout_parameters.items():
+        together = found.parameters[number]
+        assert abs(value["value"] - together["value"]) < 4.0 * value["stderr"]
+
+
+def test_closures_alone_tell_a_session_its_zeros(cables: Robot) -> None:
+    """Nothing was read of the second session but the actuators; its zeros follow, in part."""
+    first, second = on_cables(cables, 3, (40, 30))
+    blind = dataclasses.replace(second, values=np.full_like(second.values, np.nan))
+    found = pk.identify(cables, first, ["base*", "offset*"], holdout=blind, per_session="offset*")
+    seen = pk.identify(cables, [first, second], ["base*", "offset*"], per_session="offset*")
+    assert np.isnan(found.holdout_rms) and len(found.holdout_parameters) == 4
+    for name, own in found.holdout_parameters.items():
+        assert abs(own["value"] - seen.parameters[name]["value"]) < 4.0 * own["stderr"] < 20.0
+
+
 # as good as the Cramér-Rao bound -----------------------------------------------------------------
 
 SIGMA = 0.5  # mm: errors of the numbers, and the prior
