@@ -83,6 +83,14 @@ class HeldOut:
     drawn: bool = False
 
     @property
+    def units(self) -> dict[str, str]:
+        """Unit of each parameter of the rows: "mm", "rad" or "1"."""
+        if self.later is None:
+            return {}
+        chosen = self.later.parameters
+        return dict(zip(chosen.names, chosen.units, strict=True))
+
+    @property
     def data(self) -> tuple[FitData, ...]:
         """The sets of measurements."""
         return () if self.later is None else self.later.data
