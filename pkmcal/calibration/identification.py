@@ -242,6 +242,8 @@ class Identification(Parts, Result):
             f"{self.robot.name}: {len(self.free)} parameters from {count} {what}"
             f"{'s' if count > 1 else ''}"
         )
+        if self.sessions:
+            yield summary.sessions(self.sessions)
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)
         datasets = self.fit.equations.datasets
@@ -257,6 +259,9 @@ class Identification(Parts, Result):
             yield summary.bounds(self.at_bounds)
         yield ""
         yield from summary.parameter_rows(self.table)
+        if self.holdout.own:
+            yield ""
+            yield summary.own_numbers(self.holdout)
 
     def __repr__(self) -> str:
         return (

@@ -233,6 +233,15 @@ class Readings:
                 parts.append(part / white)
         return parts
 
+    def variances(self, noise: FloatArray) -> FloatArray:
+        """Variances (M,) of the readings as they are weighted, mm² and rad²."""
+        parts = []
+        for white, factor in zip(self._whiten, noise, strict=False):
+            each = np.linalg.inv(white) ** 2 if white.ndim == 3 else white**-2.0
+            parts.append(factor**2 * (each.sum(axis=2) if each.ndim == 3 else each).ravel())
+        variances: FloatArray = np.concatenate(parts)[self.present]
+        return variances
+
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""
         parts = [_rounded(m, self.parameters.robot.length) for m in self.sets]
