@@ -231,9 +231,11 @@ class Measurements(Result):
     @property
     def pose_index(self) -> Int64Array:
         """Which pose each row belongs to, (N,), counted from 0: by `group`, else by actuators."""
-        rows = self.actuators if self.group is None else self.group[:, None]
-        if self.group is None and self.approach is not None:  # backlash is between them
-            rows = np.hstack([rows, self.approach])
+        rows: FloatArray | Int64Array = self.actuators
+        if self.group is not None:
+            rows = self.group[:, None]
+        elif self.approach is not None:  # backlash is between them
+            rows = np.hstack([self.actuators, self.approach])
         return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
 
     @property
