@@ -165,8 +165,9 @@ class Equations(Readings):
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
         off, by_unknown = self.closures.residual(robot, states)
-        u = self.closures.unknowns
-        equation, by_unknown = off.reshape(-1) / noise[-1], by_unknown.reshape(-1, u) / noise[-1]
+        off /= noise[-1]
+        by_unknown /= noise[-1]
+        equation, by_unknown = off.reshape(-1), by_unknown.reshape(-1, self.closures.unknowns)
         if not self.count.any():
             return equation, by_unknown
         twists = self.closures.twists(robot, states)
@@ -203,10 +204,12 @@ class Equations(Readings):
             return readings
         p, robot, states = self.parameters, evaluation.robot, evaluation.states
         _, by_unknown = self._system(robot, states, evaluation.theta, noise)
-        by_all, own = np.zeros((len(by_unknown), len(p))), len(by_unknown) - len(readings)
         of_closures = self.closures.by_numbers(robot, states, p.places)
-        np.divide(of_closures.reshape(own, -1), noise[-1], out=by_all[:own, : len(p.places)])
-        by_all[own:] = readings
+        of_closures /= noise[-1]
+        by_all = of_closures.reshape(-1, len(p.places))
+        if by_all.shape != (len(by_unknown), len(p)):  # readings, too, or what they alone depend on
+            by_all = np.pad(by_all, ((0, len(readings)), (0, len(p) - len(p.places))))
+            by_all[len(by_all) - len(readings) :] = readings
         return self._blocks.left(by_unknown, by_all)
 
     def start_from(self, rows: IntArray, poses: FloatArray) -> None:
