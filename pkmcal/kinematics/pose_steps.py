@@ -11,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
+from pkmcal.core.chains import ChainMachine
+from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.machine import Machine
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
@@ -49,7 +51,7 @@ def surplus(robot: Robot) -> int:
     of an over-constrained machine they are those of passive joints, which give way, and the pose
     follows from that. None where limbs are chains.
     """
-    return row_roles(robot).surplus if isinstance(robot.machine, Machine) else 0
+    return row_roles(robot).surplus if robot.model.chains is None else 0
 
 
 def row_roles(robot: Robot) -> RowRoles:
@@ -136,6 +138,6 @@ def sphere_actuators(robot: Robot) -> list[int]:
     return of_rows
 
 
-def _of_limbs(robot: Robot) -> Machine:
-    assert isinstance(robot.machine, Machine)  # `surplus` is 0 otherwise
+def _of_limbs(robot: Robot) -> Machine | DrivenMachine:
+    assert not isinstance(robot.machine, ChainMachine)  # `surplus` is 0 otherwise
     return robot.machine
