@@ -289,8 +289,7 @@ class Equations(Readings):
 
     def _points(self, evaluation: Evaluation, i: int) -> tuple[FloatArray, FloatArray]:
         """Where the targets of set `i` are in the base frame (N, 3), and how they are turned."""
-        sought = self._columns[i].get("target")
-        target = self._known[i]["target"] if sought is None else evaluation.theta[sought]
+        target = self.point(i, "target", evaluation.theta)
         places, _, turn = instruments.points(evaluation.pose[self.pose_of[i]], target)
         return places, turn
 
@@ -308,7 +307,7 @@ class Equations(Readings):
         parts = []
         for i, seen in enumerate(evaluation.predicted):
             rows, k = seen.values.shape
-            part = np.zeros((rows, k, len(p)))
+            part = np.zeros((rows, k, len(p) + 1))  # the last takes what is by points that are held
             if by_geometry is not None:
                 part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
             if seen.by_frame is not None and p.frame is not None:
@@ -317,7 +316,8 @@ class Equations(Readings):
                 by_point = seen.by_target if name == "target" else seen.by_anchor
                 assert by_point is not None
                 np.put_along_axis(part, np.repeat(columns[:, None, :], k, axis=1), by_point, axis=2)
-            parts.append(by_difference(self.sets[i].kind, part, evaluation.residuals[i]))
+            by_all = part[:, :, : len(p)]
+            parts.append(by_difference(self.sets[i].kind, by_all, evaluation.residuals[i]))
         return parts
 
     def by_groups(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import arguments
+from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
 from pkmcal.calibration.moved import Moved, moved
@@ -197,13 +198,17 @@ class Identification(Parts, Result):
         )
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)
-        datasets = self.fit.equations.datasets
+        datasets, chosen = self.fit.equations.datasets, self.fit.parameters
+        framed = len(self.free) > len(chosen.places) or isinstance(self.robot, SerialArm)
+        if self.datum.names:
+            yield summary.filled("", str(self.datum))
         yield from summary.limits(
             self.identifiability,
             len(self.free),
             self.correlations,
             row_names(datasets, self.outliers),
             self.outliers,
+            frames=framed and not self.datum.names and not np.isfinite(self.stderr).all(),
         )
         if self.at_bounds:
             yield summary.bounds(self.at_bounds)

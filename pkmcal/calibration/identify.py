@@ -10,7 +10,10 @@ import numpy as np
 
 from pkmcal.arguments import instance, word
 from pkmcal.arms.arm import SerialArm
+from pkmcal.calibration.begin import begun, estimator_at
 from pkmcal.calibration.closures import has_equations
+from pkmcal.calibration.datum import DATUMS, NO_DATUM, Datum, DatumRule
+from pkmcal.calibration.datum import datum as choose_datum
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
@@ -26,8 +29,15 @@ from pkmcal.calibration.fit_statistics import (
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.loss import LIMITS, LossName
-from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
-from pkmcal.calibration.parameters import KNOWN, Bounds, FitData, Known, Prior, parameters
+from pkmcal.calibration.mode_slips import in_other_modes
+from pkmcal.calibration.parameters import (
+    KNOWN,
+    Bounds,
+    FitData,
+    Known,
+    Prior,
+    parameters,
+)
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
     contradicted_prior,
@@ -61,6 +71,8 @@ def identify(
     bounds: Bounds = None,
     attachment: Known | Sequence[Known] = "known",
     covariance: CovarianceRule = "auto",
+    fix: str | Sequence[str] | None = None,
+    datum: DatumRule = "none",
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -104,6 +116,15 @@ def identify(
         several targets and repeats do. "classical": all errors are independent. "auto": cluster
         where the residuals show a shared error or the loss is robust, else classical. The values
         are the same.
+    fix : str or sequence of str, optional
+        Numbers of the geometry, by name or wildcard, that keep their present values though `free`
+        or the robot's default set has them.
+    datum : {"none", "auto"}
+        "auto": also hold as many numbers as the measurements leave open of where the base frame and
+        the platform frame lie, and of how the frames between an arm's joints are drawn: about
+        3-2-1 of the joints of each. What is predicted of a measurement stays the same, and the
+        other numbers have finite deviations, in the frames that the held ones define. They are
+        `Identification.datum`. "none": such combinations move as little as possible.
 
     Returns
     -------
@@ -145,22 +166,20 @@ def identify(
     elif holdout is not None:
         pairs = [draw(data, holdout) for data in datasets]
         datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
-    chosen = parameters(machine, datasets, free, prior, bounds)
+    chosen = parameters(machine, datasets, free, prior, bounds, fix)
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
-    equations = Equations(datasets, chosen, unread)
-    commanded = equations.commanded()
-    start = commanded.start()
-    if in_their_modes(commanded, start) is not start:
-        start = commanded.start()  # an unknown frame was laid with rows of other modes
+    word("datum", datum, DATUMS)
+    equations, commanded, start = begun(datasets, chosen, unread)
     try:
-        if not start.ok and commanded is equations:
-            raise ArgumentError(commanded.failures(start))
-        own = equations.begin(commanded, start)
-        if not own.ok:
-            raise ArgumentError(equations.failures(own))
-        estimator = Estimator(equations, own, loss)
+        estimator = estimator_at(equations, commanded, start, loss)
         estimate = estimator.solve()
+        held_numbers = choose_datum(estimator, estimate) if datum == "auto" else NO_DATUM
+        if held_numbers.names:
+            chosen = chosen.without(held_numbers.names)
+            equations, commanded, start = begun(datasets, chosen, unread)
+            estimator = estimator_at(equations, commanded, start, loss)
+            estimate = estimator.solve()
     except ValueError as error:
         hint = likely_unit_errors(datasets, chosen, start) or likely_row_errors(datasets, chosen)
         if not hint and not start.ok:
@@ -169,13 +188,13 @@ def identify(
     unlike = unlike_components(estimator, estimate)
     if unlike is not None:
         commanded = equations.reweighted(unlike[1])
-        estimator = Estimator(commanded, own, loss)
+        estimator = Estimator(commanded, estimator.start, loss)
         estimate = estimator.solve(estimate.evaluation)
     sure = uncertainty(estimator, estimate, covariance, None if unlike is None else unlike[0])
     outside = replace(
         evaluate(held, estimator, estimate, sure), drawn=not isinstance(holdout, Measurements)
     )
-    result = _result(estimator, estimate, commanded, start, outside, sure)
+    result = _result(estimator, estimate, commanded, start, outside, sure, held_numbers)
     notes = _warnings(result, estimator, estimate, datasets)
     for text in notes:
         warnings.warn(text, CalibrationWarning, stacklevel=2)
@@ -336,6 +355,7 @@ def _result(
     start: Evaluation,
     held: HeldOut,
     sure: Uncertainty,
+    datum: Datum,
 ) -> Identification:
     chosen, search = estimator.equations.parameters, estimator.search
     robot = as_given(chosen.robot.replace(chosen.values_at(estimate.evaluation.theta)))
@@ -355,4 +375,5 @@ def _result(
         repeats=repeats(sure),
         search=SearchRecord(search.converged, search.evaluations, tuple(search.history)),
         fit=Fit(commanded, start, end, estimate, sure),
+        datum=datum,
     )

@@ -98,6 +98,8 @@ class Parameters:
         Column of the x of each unknown point, by "target", "attachment" or "anchor" and its name.
     robot : Calibratable
         The machine they belong to.
+    held_points : tuple
+        Unknown points that are held where the user puts them.
     """
 
     names: tuple[str, ...]
@@ -112,6 +114,7 @@ class Parameters:
     origin: FloatArray
     points: Mapping[tuple[str, str], int]
     robot: Calibratable
+    held_points: tuple[tuple[str, str], ...] = ()
 
     def __len__(self) -> int:
         return len(self.names)
@@ -128,6 +131,25 @@ class Parameters:
         stated = np.flatnonzero(np.isfinite(sigma))
         rows: FloatArray = np.eye(len(sigma))[stated] / sigma[stated, None]
         return rows
+
+    def without(self, names: Sequence[str]) -> Parameters:
+        """The same with numbers of the geometry, or whole points, held at their present values."""
+        kept = np.array([name not in names for name in self.names])
+        before = np.cumsum(kept) - kept
+        return replace(
+            self,
+            names=tuple(name for name, keep in zip(self.names, kept, strict=True) if keep),
+            units=tuple(unit for unit, keep in zip(self.units, kept, strict=True) if keep),
+            start=self.start[kept],
+            scale=self.scale[kept],
+            prior=self.prior[kept],
+            lower=self.lower[kept],
+            upper=self.upper[kept],
+            places=self.places[kept[: len(self.places)]],
+            frame=None if self.frame is None else int(before[self.frame]),
+            points={point: int(before[x]) for point, x in self.points.items() if kept[x]},
+            held_points=tuple(point for point, x in self.points.items() if not kept[x]),
+        )
 
     def values_at(self, theta: FloatArray) -> FloatArray:
         """The geometry's values (p,) for `theta` (n,)."""
@@ -167,14 +189,14 @@ class Parameters:
         return rates
 
     def columns_of(self, role: str, measured: Measurements) -> IntArray:
-        """Columns of the unknown point of each row, (N, 3)."""
+        """Columns of the unknown point of each row, (N, 3); -1 where it is held."""
         places, index = _points_of(role, measured)
         for name in places:
-            if (role, name) not in self.points:
+            if (role, name) not in {*self.points, *self.held_points}:
                 known = did_you_mean(name, (other for _, other in self.points))
                 raise ArgumentError(f"holdout: its {role} {name!r} was not fitted{known}")
-        first = np.array([self.points[role, name] for name in places])
-        columns: IntArray = first[index][:, None] + np.arange(3)
+        first = np.array([self.points.get((role, name), -1) for name in places])[index]
+        columns: IntArray = np.where(first < 0, -1, first + np.arange(3)[:, None]).T
         return columns
 
 
@@ -184,6 +206,7 @@ def parameters(
     free: str | Sequence[str] | None,
     prior: Prior,
     bounds: Bounds,
+    fix: str | Sequence[str] | None = None,
 ) -> Parameters:
     """The parameters of a calibration; the arguments are those of `identify`.
 
@@ -200,6 +223,11 @@ def parameters(
     chosen = geometry.match(free, "free")
     if not chosen:
         raise ArgumentError("free: name at least one parameter")
+    if fix is not None:
+        held = geometry.match(fix, "fix")
+        chosen = [name for name in chosen if name not in held]
+        if not chosen:
+            raise ArgumentError("fix: no parameter is left free")
     places = np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)
     names, units = list(chosen), [str(geometry.units[i]) for i in places]
     start = list(geometry.values[places])
@@ -266,6 +294,13 @@ def _points_of(role: str, measured: Measurements) -> tuple[dict[str, FloatArray]
         )
     places = np.zeros((len(names), 3)) if given is None else given
     return dict(zip(names, places, strict=True)), index
+
+
+def places_of(role: str, measured: Measurements) -> FloatArray:
+    """Where the user puts the unknown point of each row, (N, 3)."""
+    places, index = _points_of(role, measured)
+    of_rows: FloatArray = np.array(list(places.values()))[index]
+    return of_rows
 
 
 def _matching(argument: str, pattern: object, names: Sequence[str]) -> list[int]:

@@ -7,6 +7,7 @@ from typing import Any
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
+from pkmcal.calibration.datum import NO_DATUM, Datum
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_statistics import (
     Identifiability,
@@ -34,6 +35,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "covariance_rule",
     "rank",
     "gap",
+    "datum",
     "unidentifiable",
     "gauges",
     "rms",
@@ -104,6 +106,8 @@ class Parts(MisfitNames):
         What looks wrong with measurements or result.
     prior_test : PriorTest or None
         Whether the measurements contradict the prior, where there is one.
+    datum : Datum
+        Numbers that are held because they only say where frames lie.
     """
 
     robot: Robot | SerialArm
@@ -116,6 +120,7 @@ class Parts(MisfitNames):
     fit: Fit
     warnings: tuple[str, ...] = ()
     prior_test: PriorTest | None = None
+    datum: Datum = NO_DATUM
 
     @property
     def free(self) -> tuple[str, ...]:

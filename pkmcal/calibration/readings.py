@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
-from pkmcal.calibration.parameters import POINTS, FitData, Parameters
+from pkmcal.calibration.parameters import POINTS, FitData, Parameters, places_of
 from pkmcal.measurements import orientation
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import Predicted, difference, predict
@@ -63,9 +63,10 @@ class Readings:
         ]
         self._known = [
             {
-                name: m.attachments if role == "attachment" else m.targets
+                name: places_of(role, m)
+                if name in columns
+                else (m.attachments if role == "attachment" else m.targets)
                 for name, role in POINTS[m.kind].items()
-                if name not in columns
             }
             for m, columns in zip(self.sets, self._columns, strict=True)
         ]
@@ -91,6 +92,11 @@ class Readings:
             np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in self.sets
         ])  # fmt: skip
 
+    def point(self, i: int, name: str, theta: FloatArray) -> FloatArray:
+        """Where the target or anchor of each row of set `i` is, (N, 3)."""
+        known, columns = self._known[i][name], self._columns[i].get(name)
+        return known if columns is None else np.where(columns < 0, known, theta[columns])
+
     def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Readings of each set at poses (K, 6)."""
         frame = self.parameters.frame_at(theta)
@@ -100,8 +106,7 @@ class Readings:
                 pose[self.pose_of[i]],
                 frame=frame if self._framed[i] else None,
                 origin=self.parameters.origin,
-                **self._known[i],
-                **{name: theta[columns] for name, columns in self._columns[i].items()},
+                **{name: self.point(i, name, theta) for name in self._known[i]},
             )
             for i, measured in enumerate(self.sets)
         )

@@ -13,9 +13,10 @@ import typer
 
 import pkmcal as pk
 from pkmcal.arguments import word
+from pkmcal.calibration.datum import DATUMS
 from pkmcal.calibration.loss import LIMITS
 from pkmcal.calibration.parameters import KNOWN, Known
-from pkmcal.cli.geometry_options import free_names, read_deviations
+from pkmcal.cli.geometry_options import free_names, matching, read_deviations
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.measured import (
     Columns,
@@ -85,6 +86,23 @@ def calibrate(
             " classical, where none do; auto: as the residuals show.",
         ),
     ] = "auto",
+    fix: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Hold this number as it is. Repeat it, separate names with commas, or use"
+            " wildcards.",
+        ),
+    ] = None,
+    datum: Annotated[
+        str,
+        typer.Option(
+            metavar="WORD",
+            help="auto: hold as many numbers as only say where the frames of base and platform"
+            " lie, if they are not known, and those between an arm's joints; the others then have"
+            " finite ±. none: hold none.",
+        ),
+    ] = "none",
     controller: Controller = None,
     join: JoinBy = "auto",
     ignore: Ignore = None,
@@ -141,7 +159,10 @@ def calibrate(
     if tracker is not None:
         seen = read_tracker(tracker)
         measured = [_seen_by(seen, each) for each in measured]
-    chosen = free_names(machine, free)
+    fixed = matching("--fix", machine, fix or [])
+    chosen = [name for name in free_names(machine, free) if name not in fixed]
+    if fixed and not chosen:
+        raise ArgumentError(f"--fix {','.join(fix or [])}: no parameter is left free")
     with progress("identifying"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
         found = pk.identify(
@@ -155,6 +176,8 @@ def calibrate(
             attachment=_known("--attachment", attachment, measured),
             holdout=held,
             covariance=word("--covariance", covariance, RULES),
+            fix=fixed or None,
+            datum=word("--datum", datum, DATUMS),
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:
