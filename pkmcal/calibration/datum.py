@@ -11,7 +11,7 @@ criterion matrices, 1973); what is left has finite deviations, in frames that th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -20,7 +20,7 @@ from pkmcal.arrays import BoolArray, FloatArray, first_largest
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identifiability import decompose, listed
-from pkmcal.calibration.parameters import Parameters
+from pkmcal.calibration.parameters import Asked, Parameters
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.screw import from_pose
@@ -45,6 +45,8 @@ class Datum:
     names : tuple of str
         The numbers; they keep their present values and are no parameters. Of a platform that does
         not turn they may be coordinates of a target.
+    points : tuple of (str, str)
+        Role and name of points whose coordinates are among them.
     base, platform, between : int
         How many say where the base frame lies, where the platform frame lies, and how frames
         between joints are drawn; the rest says where both frames lie at once.
@@ -59,6 +61,13 @@ class Datum:
     base: int = 0
     platform: int = 0
     between: int = 0
+    points: tuple[tuple[str, str], ...] = ()
+
+    def asked(self, asked: Asked) -> Asked:
+        """The same calibration with these numbers held."""
+        of_points = tuple(f"{role}{name}." for role, name in self.points)
+        fix = tuple(name for name in self.names if not name.startswith(of_points))
+        return replace(asked, fix=(*asked.fix, *fix), held_points=frozenset(self.points))
 
     def __str__(self) -> str:
         parts = [
@@ -83,40 +92,46 @@ def datum(estimator: Estimator, estimate: Estimate) -> Datum:
     A number with a prior or bounds is not held.
     """
     chosen = estimator.equations.parameters
-    count = len(chosen.places)
-    open_ones = _basis(estimate.state.determined.unidentifiable[:count])
+    open_ones = estimate.state.determined.unidentifiable
+    of_geometry = _basis(open_ones[chosen.geometry])
     # they are those of the nominal machine or of the identified one
-    at_either = [
-        _Frames(chosen, evaluation) for evaluation in (estimator.start, estimate.evaluation)
-    ]
-    frames = max(at_either, key=lambda each: _inside(open_ones, each.all).shape[1])
-    free = _inside(open_ones, frames.all)
+    at_either = [_Frames(chosen, found) for found in (estimator.start, estimate.evaluation)]
+    frames = max(at_either, key=lambda each: _inside(of_geometry, each.all).shape[1])
+    free = _inside(of_geometry, frames.all)
     stated = np.isfinite(chosen.prior) | np.isfinite(chosen.lower) | np.isfinite(chosen.upper)
-    held = _held(free, chosen.names[:count], ~stated[:count])
+    stated |= np.array(["@" in name for name in chosen.names])  # of one session alone
+    names = chosen.names[chosen.geometry]
+    held = _held(free, names, ~stated[chosen.geometry])
     between = _inside(free, frames.between).shape[1]
     base, platform = _inside(free, frames.base), _inside(free, frames.platform)
     either = _basis(np.hstack([base, platform])).shape[1]
-    points = _held_points(chosen, estimate.state.determined.unidentifiable, stated)
+    points = _held_points(chosen, open_ones, stated)
+    axes = [f"{role}{name}.{axis}" for role, name in points for axis in "xyz"]
     return Datum(
-        (*(chosen.names[i] for i in sorted(held)), *(chosen.names[i] for i in points)),
+        (*(names[i] for i in sorted(held)), *axes),
         base.shape[1] - between,
-        either - base.shape[1] + len(points),
+        either - base.shape[1] + len(axes),
         between,
+        tuple(points),
     )
 
 
-def _held_points(chosen: Parameters, open_ones: FloatArray, stated: BoolArray) -> list[int]:
-    """Coordinates of points on a platform that does not turn, which shift with the frame alone."""
-    count, held = len(chosen.places), list[int]()
-    _, singular, rows = np.linalg.svd(open_ones[:count])
+def _held_points(
+    chosen: Parameters, open_ones: FloatArray, stated: BoolArray
+) -> list[tuple[str, str]]:
+    """Points on a platform that does not turn, which shift with the frame alone."""
+    _, singular, rows = np.linalg.svd(open_ones[chosen.geometry])
     rank = int(np.count_nonzero(singular > _OUTSIDE))
     rest: FloatArray = open_ones @ rows[rank:].T  # without any number of the geometry
-    for first in chosen.points.values():
-        mine = [first, first + 1, first + 2]
+    held = []
+    for point, first in chosen.points.items():
+        mine = np.flatnonzero(np.isin(chosen.number_of, np.arange(first, first + 3)))
+        if len(mine) != 3 or stated[mine].any():  # or there is one in each session
+            continue
         _, singular, rows = np.linalg.svd(rest[mine])
-        if np.count_nonzero(singular > _OUTSIDE) == len(mine) and not stated[mine].any():
-            held += mine
-            rest = rest @ rows[len(mine) :].T
+        if np.count_nonzero(singular > _OUTSIDE) == 3:
+            held.append(point)
+            rest = rest @ rows[3:].T
     return held
 
 
@@ -127,17 +142,21 @@ class _Frames:
         robot = evaluation.robot
         poses, actuators = _over_the_workspace(evaluation)
         twists = robot.error_twists(poses, actuators)[:, :, chosen.places]
-        twists = twists * chosen.scale[: len(chosen.places)]
+        # a number that is found in each session changes in all of them alike
+        number = chosen.number_of[chosen.geometry]
+        of_number = np.zeros(len(chosen.places))
+        of_number[number] = chosen.scale[chosen.geometry]
+        twists = twists * of_number
         motions = from_pose(poses)
         by_base, by_platform = np.zeros((2, len(poses), 6, 6))
         turns = np.tile(np.eye(3), (len(poses), 1, 1))
         by_base[:, :3, :3], by_base[:, 3:, 3:] = turns, turns
         by_base[:, 3:, :3] = np.cross(turns, motions[:, None, :3, 3]).transpose(0, 2, 1)
         by_platform[:, :3, :3] = by_platform[:, 3:, 3:] = motions[:, :3, :3]
-        self.between = _still(twists, robot.length)
-        self.base = _still(twists, robot.length, by_base)
-        self.platform = _still(twists, robot.length, by_platform)
-        self.all = _still(twists, robot.length, by_base, by_platform)
+        self.between = _basis(_still(twists, robot.length)[number])
+        self.base = _basis(_still(twists, robot.length, by_base)[number])
+        self.platform = _basis(_still(twists, robot.length, by_platform)[number])
+        self.all = _basis(_still(twists, robot.length, by_base, by_platform)[number])
 
 
 def _over_the_workspace(evaluation: Evaluation) -> tuple[FloatArray, FloatArray]:
@@ -165,7 +184,8 @@ def _still(twists: FloatArray, length: float, *frames: FloatArray) -> FloatArray
     rows[:, :3] *= length
     rows[:, :, p:] /= np.tile([length] * 3 + [1.0] * 3, len(frames))
     singular, directions = decompose(rows.reshape(-1, rows.shape[2]))
-    return _basis(directions[:p, singular <= ROUNDING * singular[0]])
+    still: FloatArray = directions[:p, singular <= ROUNDING * singular[0]]
+    return still
 
 
 def _basis(columns: FloatArray) -> FloatArray:

@@ -62,8 +62,9 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
     chain = robot.geometry.chain[:, parameters.places]
     change = np.linalg.pinv(chain) @ numbers  # of the free numbers, as far as they can follow
     left = numbers - chain @ change
+    own = parameters.geometry
     scaled = np.zeros((len(parameters), change.shape[1]))
-    scaled[: len(change)] = change / parameters.scale[: len(change), None]
+    scaled[own] = change[parameters.number_of[own]] / parameters.scale[own, None]
     size = np.linalg.norm(scaled, axis=0)
     there = size > 0  # the machine has what would move, and some of it is free
     scaled, left = scaled[:, there] / size[there], left[:, there] / size[there]
@@ -133,6 +134,8 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
     joints = robot.slots[:, 3:6]
     if robot.model.map not in ("translation", "xy") or np.ptp(joints, axis=0).any():
         return False
+    if any(name.startswith("base") and "@" in name for name in parameters.names):
+        return False  # anchors of each session: not looked at
     cost = float((equations.residual(evaluation, noise) ** 2).sum())
     for k, axis in enumerate(robot.coordinates):
         names = [f"base{i + 1}.{axis}" for i in range(len(robot.slots))]

@@ -176,7 +176,7 @@ def calibrate(
             attachment=_known("--attachment", attachment, measured),
             holdout=held,
             covariance=word("--covariance", covariance, RULES),
-            fix=fixed or None,
+            fix=fixed,
             datum=word("--datum", datum, DATUMS),
         )
     if output is not None:
