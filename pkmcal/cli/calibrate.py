@@ -28,6 +28,7 @@ from pkmcal.cli.measured import (
     Rename,
     Rotation,
     Units,
+    rows_to_drop,
 )
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm
 from pkmcal.cli.output import Output, say
@@ -103,6 +104,18 @@ def calibrate(
             " finite ±. none: hold none.",
         ),
     ] = "none",
+    drop: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ROW|FILE:LINE",
+            help="Leave this row out: its number, as outliers are named, or a line of a file."
+            " Repeat it, or separate rows with commas.",
+        ),
+    ] = None,
+    drop_outliers: Annotated[
+        bool,
+        typer.Option("--drop-outliers", help="Leave out the rows that the others contradict."),
+    ] = False,
     controller: Controller = None,
     join: JoinBy = "auto",
     ignore: Ignore = None,
@@ -159,6 +172,9 @@ def calibrate(
     if tracker is not None:
         seen = read_tracker(tracker)
         measured = [_seen_by(seen, each) for each in measured]
+    dropped = rows_to_drop(drop or [], measured)
+    if dropped and drop_outliers:
+        raise ArgumentError("--drop names rows, --drop-outliers finds them: one of the two")
     fixed = matching("--fix", machine, fix or [])
     chosen = [name for name in free_names(machine, free) if name not in fixed]
     if fixed and not chosen:
@@ -178,6 +194,7 @@ def calibrate(
             covariance=word("--covariance", covariance, RULES),
             fix=fixed,
             datum=word("--datum", datum, DATUMS),
+            drop="outliers" if drop_outliers else dropped,
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:
