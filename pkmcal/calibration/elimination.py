@@ -120,6 +120,16 @@ class Blocks:
             found.append((rest.transpose(0, 2, 1) @ mine).reshape(-1, *width))
         return np.concatenate(found)
 
+    def spread(self, by_unknown: FloatArray, left: FloatArray) -> FloatArray:
+        """Equations (E,) of which so much is left (M,), and nothing for the poses to take."""
+        spread, first = np.zeros(len(self.pose_of)), 0
+        for equations, rest in self.rotations(by_unknown):
+            count, _, most = rest.shape
+            mine = left[first : first + count * most].reshape(count, most, 1)
+            spread[equations] = (rest @ mine)[:, :, 0]
+            first += count * most
+        return spread
+
     def by_groups(
         self,
         by_unknown: FloatArray,

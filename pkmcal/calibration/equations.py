@@ -29,7 +29,7 @@ from pkmcal.calibration.session_machines import (
 )
 from pkmcal.core.library import STATUS
 from pkmcal.measurements import orientation
-from pkmcal.measurements.observation import by_difference, distance_per_point
+from pkmcal.measurements.observation import by_difference, corrected, distance_per_point
 from pkmcal.result import failed_rows
 
 
@@ -233,15 +233,40 @@ class Equations(Readings):
         guess[rows] = poses
         self._states = replace(self._states, pose=guess)
 
-    def with_readings(self, values: Sequence[FloatArray], prior_centre: FloatArray) -> Equations:
-        """The same with other measured values (N, k) of each set, and another centre (n,)."""
-        other = copy.copy(self)
+    def redrawn(
+        self, at: Evaluation, noise: FloatArray, left: FloatArray, prior_centre: FloatArray
+    ) -> tuple[Equations, Evaluation]:
+        """The same with other readings, and evaluated where these have been drawn.
+
+        Parameters
+        ----------
+        at : Evaluation
+            Where the machine is taken to be.
+        noise : ndarray (G,)
+            See `whitened`.
+        left : ndarray (M,)
+            What its readings leave there, as `residual`.
+        prior_centre : ndarray (n,)
+            Another centre of the prior.
+        """
+        other, errors, unknowns = copy.copy(self), left, self.closures.unknowns
+        if unknowns:
+            off, by_unknown = self._system(at.machines, at.states, at.theta, noise)
+            errors = self._blocks.spread(by_unknown, left)
+            own = len(self.actuators) * self.closures.equations
+            change = -noise[-1] * (errors + off)[:own]
+            other.closures = self.closures.shifted(change.reshape(len(self.actuators), -1))
+            errors = errors[own:]
+        residuals = tuple(self.unwhiten(errors, noise[: len(self.sets)]))
         other.sets = tuple(
-            replace(measured, values=given.reshape(measured.values.shape))
-            for measured, given in zip(self.sets, values, strict=True)
+            replace(m, values=corrected(m.kind, seen.values, residual).reshape(m.values.shape))
+            for m, seen, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
         other.parameters = replace(self.parameters, start=prior_centre)
-        return other
+        other.warm_start(at)
+        if unknowns:
+            return other, other.at(at.theta, noise)
+        return other, replace(at, residuals=residuals)
 
     def reweighted(self, deviations: Sequence[FloatArray]) -> Equations:
         """The same where the components (k,) of each set have other relative deviations."""

@@ -83,7 +83,7 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
 
 
 def _motions(robot: Robot) -> FloatArray:
-    """Changes (limbs, SLOTS, 7) of all numbers: shifts and turns of the base, and the scale."""
+    """Changes of all numbers (*slots, 7): shifts and turns of the base, and the scale."""
     slots = robot.slots
     change = np.zeros((*slots.shape, 7))
     change[:, 0:3, 0:3] = np.eye(3)
@@ -93,6 +93,13 @@ def _motions(robot: Robot) -> FloatArray:
         change[:, 0:3, 3:6] = turned.transpose(0, 2, 1)
     if all(KINDS[limb.kind].actuator_unit == "mm" for limb in robot.model.limbs):
         change[:, _SCALED, _SCALE] = slots[:, _SCALED]
+        for number, place in zip(robot.geometry.numbers, robot.geometry.slot_index, strict=True):
+            spool = robot.model.limbs[number.limb].law
+            turns = spool is not None and spool.spool  # gain and quadratic number turn a spool
+            key = number.slot.removeprefix("drive.")
+            if key != number.slot or key == "gain":
+                grows = not (turns and key in ("gain", "quadratic"))
+                change.reshape(-1, 7)[place, _SCALE] = slots.flat[place] * grows
     return change
 
 

@@ -15,6 +15,7 @@ from pkmcal import arguments
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
+from pkmcal.calibration.law_tests import LawTest, law_tests
 from pkmcal.calibration.moved import Moved, moved
 from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import robust_check
@@ -58,6 +59,18 @@ class Identification(Parts, Result):
         if self.holdout.drawn or later is None or end is None or not self.fit.uncertainty.known:
             return ()
         return moved(self.fit, later, end)
+
+    @cached_property
+    def law_tests(self) -> tuple[LawTest, ...]:
+        """Whether the free numbers of drive laws are needed: an F test of each kind against 0.
+
+        Nothing is said of kinds with a prior, or that the measurements do not determine.
+        """
+        if isinstance(self.robot, SerialArm):
+            return ()
+        prior = self.fit.parameters.prior
+        given = (self.robot.geometry, self.table, self.covariance, prior, self.covariance_rule)
+        return law_tests(*given)
 
     @property
     def loss(self) -> str:
@@ -243,6 +256,7 @@ class Identification(Parts, Result):
             self.outliers,
             frames=framed and not self.datum.names and not np.isfinite(self.stderr).all(),
         )
+        yield from (summary.filled("", str(test)) for test in self.law_tests)
         if self.at_bounds:
             yield summary.bounds(self.at_bounds)
         yield ""

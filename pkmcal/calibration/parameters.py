@@ -303,6 +303,8 @@ def parameters(
     units = tuple(row.units[j] for j in number_of)
     travel = max(_travel(robot, data.measured) for data in datasets)
     of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
+    of_unit |= {"1/mm": 1.0 / travel**2, "1/rad": robot.length / travel**2}
+    of_unit["1/mm2"] = of_unit["1/mm"] / robot.length
     scale = np.array([of_unit[unit] for unit in units])
     if like is not None:
         known = dict(zip(like.names, like.scale.tolist(), strict=True))

@@ -81,6 +81,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "sessions",
     "robots",
     "holdout_parameters",
+    "law_tests",
     "warnings",
 )
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.arguments import instance
-from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit, rms
+from pkmcal.arrays import BoolArray, FloatArray, largest_first, mm_per_unit, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identifiability import listed
@@ -26,7 +26,7 @@ _LEAST_FREEDOM = 0.5  # degrees of freedom from which residuals show how good a 
 MISFIT_RATIO = 0.2  # of the misfit that another reading may leave to be named as what was meant
 _REMOTE = 3.0  # times a machine's reach within which a point of its platform is
 _PULLED = 2.0  # times what is expected, from which a pull on a prior is worth a word
-_ALIKE = 1e-6  # share by which misfits differ that are not equal
+_ALIKE = 1e-6  # share by which misfits, or pulls, differ that are not equal
 _FACTORS = {
     "mm": (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)),
     "rad": (
@@ -216,7 +216,7 @@ def contradicted_prior(
         return []
     pulls = np.nan_to_num(test.pulls)
     stated = [i for i, sigma in enumerate(parameters.prior) if np.isfinite(sigma)]
-    worst = [k for k in np.argsort(-np.abs(pulls), kind="stable")[:3] if abs(pulls[k]) > _PULLED]
+    worst = [k for k in largest_first(np.abs(pulls), _ALIKE)[:3] if abs(pulls[k]) > _PULLED]
     shown = ", ".join(f"{parameters.names[stated[k]]} {abs(pulls[k]):.1f}" for k in worst)
     pulled = f" and pull {shown} times as far as prior and noise let expect" if worst else ""
     return [

@@ -99,6 +99,11 @@ class SessionClosures:
         off, by_unknown = zip(*found, strict=True)
         return _joined(off, self._rows), _joined(by_unknown, self._rows)
 
+    def shifted(self, by: FloatArray) -> SessionClosures:
+        """The same with whitened equations (K, equations) that are larger: of other readings."""
+        parts = [part.shifted(by[own]) for part, own in zip(self._parts, self._rows, strict=True)]
+        return SessionClosures(parts, self._rows)
+
     def lengths(self, machines: Machines) -> FloatArray:
         """Factors (equations,) to mm of the equations times their sigma."""
         return self._parts[0].lengths(machines.robots[0])
