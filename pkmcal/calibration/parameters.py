@@ -195,7 +195,7 @@ class Parameters:
         part_of = []
         for data in datasets:
             session = data.measured.session if "session" in self.scope else None
-            names = [""] * len(data.rows) if session is None else session.tolist()
+            names = [""] * len(data.measured) if session is None else session.tolist()
             one = data.set_name if "set" in self.scope else ""
             part_of.append(
                 np.array(

@@ -63,8 +63,9 @@ def test_outliers_among_held_out_rows_are_left_out_too() -> None:
     assert found.dropped == GROSS and found.holdout_outliers == ()
     kept = {*found.holdout.rows.tolist(), *found.rows.tolist()}
     assert kept == set(range(60)) - set(GROSS)
-    held = pk.identify(robot, measured, drop=GROSS[:1], holdout=0.4).holdout_outliers
-    assert held == GROSS[1:], "one of them was drawn to be held out"
+    with pytest.warns(pk.CalibrationWarning):
+        plain = pk.identify(robot, measured, holdout=0.4)
+    assert set(plain.holdout_outliers) & set(GROSS), "one of them was drawn to be held out"
     assert found.holdout_rms < 1.5 * found.holdout_expected
 
 
