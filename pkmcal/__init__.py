@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.calibration.anchors import locate_anchors as locate_anchors
     from pkmcal.calibration.bootstrap import Bootstrap as Bootstrap
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
+    from pkmcal.calibration.datum import Datum as Datum
     from pkmcal.calibration.distances import Distances as Distances
     from pkmcal.calibration.identification import Identification as Identification
     from pkmcal.calibration.identify import identify as identify
@@ -83,6 +84,7 @@ _HOMES = {
     "arms.inverse": ("ArmInverse",),
     "calibration.anchors": ("LocatedAnchors", "locate_anchors"),
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
+    "calibration.datum": ("Datum",),
     "calibration.distances": ("Distances",),
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),
