@@ -249,6 +249,18 @@ def _reached(robot: Robot, ends: FloatArray) -> float:
     return 1.0
 
 
+def turning(robot: Robot) -> Iterator[Finding]:
+    """Drive laws without an inverse."""
+    for d, why in robot.model.doubts().items():
+        limb = robot.model.limb_of_drive(d) + 1
+        yield Finding(
+            "drive",
+            (limb,),
+            f"the drive law of limb {limb} has no inverse: {why}",
+            "such numbers fit noise: free fewer, or hold them by a prior or a smoothness",
+        )
+
+
 def singular(robot: Robot) -> Iterator[Finding]:
     """Machines that are singular in every pose, or at home."""
     random = np.random.default_rng(0)

@@ -15,7 +15,7 @@ from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
 from pkmcal.core.chains import ChainMachine
-from pkmcal.core.driven import CompiledMachine
+from pkmcal.core.driven import CompiledMachine, DrivenMachine
 from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
@@ -388,6 +388,37 @@ class Robot(Kinematics, Result):
         changed.slots = np.ascontiguousarray(changed.model.geometry.slots)
         return changed
 
+    def approaching(self, approach: ArrayLike) -> Robot:
+        """The robot with actuators that come from a known direction, for laws with backlash.
+
+        Parameters
+        ----------
+        approach : array_like (n,) or (..., n)
+            Of each actuator +1 where its reading grew before it stopped, -1 where it fell, 0 where
+            that is not known, which is half way between. A batch goes with calls of as many rows.
+
+        Returns
+        -------
+        Robot
+            What `replace` and `load` make of it knows no directions.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")  # without backlash
+        >>> bool(robot.approaching([1] * 6).forward(robot.inverse(robot.home)).ok)
+        True
+        """
+        rows, shape = as_rows("approach", approach, self.n_actuators)
+        if not np.isin(rows, (-1.0, 0.0, 1.0)).all():
+            raise ArgumentError("approach must be 1, -1 or 0 for each actuator")
+        if not isinstance(self.machine, DrivenMachine):
+            return self
+        other = copy(self)
+        other.__dict__.pop("_of_any_misfit", None)  # of the same directions
+        other.machine = self.machine.approaching(rows[0] if shape == () else rows)
+        return other
+
     @cached_property
     def _of_any_misfit(self) -> CompiledMachine:
         return self.machine.with_tolerance(np.inf)
@@ -441,8 +472,12 @@ class Robot(Kinematics, Result):
         Raises
         ------
         ValueError
-            `like` describes another robot.
+            `like` describes another robot; a drive law has no inverse over its stroke, so that
+            the file could not be read.
         """
+        for d, why in self.model.doubts().items():
+            limb = self.model.limb_of_drive(d) + 1
+            raise ArgumentError(f"robot: limb {limb} of {self.name}: its drive law: {why}")
         if like is None or self.model.chains is not None:
             robot_file.write(self.model, path, comment)
             return

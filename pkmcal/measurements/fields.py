@@ -195,6 +195,28 @@ def names_of_targets(
     return names
 
 
+def approach_array(given: ArrayLike | None, actuators: FloatArray) -> FloatArray | None:
+    """From where each actuator came (N, n): 1, -1 or 0; "order": by the order of the rows."""
+    if given is None:
+        return None
+    if isinstance(given, str):
+        if given != "order":
+            raise ArgumentError(f"approach must be 'order' or numbers; found {given!r}")
+        moved = np.sign(np.diff(actuators, axis=0, prepend=actuators[:1]))
+        for row, before in zip(moved[1:], moved[:-1], strict=True):
+            row[row == 0.0] = before[row == 0.0]  # it stood still since
+        return np.asarray(moved)
+    found = numbers("approach", given)
+    if found.shape not in ((), actuators.shape[1:], actuators.shape):
+        raise ArgumentError(
+            f"approach must be one number or have shape {actuators.shape[1:]} or"
+            f" {actuators.shape}; found {found.shape}"
+        )
+    if not np.isin(found, (-1.0, 0.0, 1.0)).all():
+        raise ArgumentError("approach must be 1, -1 or 0 for each actuator")
+    return np.array(np.broadcast_to(found, actuators.shape))
+
+
 def sessions_array(given: str | Sequence[str] | TextArray | None, rows: int) -> TextArray | None:
     """One name per row; None where none is given."""
     if given is None:

@@ -19,6 +19,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.components import COMPONENTS, Kind
 from pkmcal.measurements.fields import (
     actuator_sigma_array,
+    approach_array,
     attachment_array,
     integers,
     names_of_targets,
@@ -37,6 +38,7 @@ _LISTED_ROWS = 12  # a longer list of measurements is printed with its middle le
 
 _PER_ROW = (
     "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines", "session",
+    "approach",
 )  # fmt: skip
 
 
@@ -88,6 +90,10 @@ class Measurements(Result):
     session : str or (N,) sequence of str, optional
         When the rows were measured, one word for all or one a row: `identify` may find some
         numbers anew in each session. None: not stated. Kept as (N,).
+    approach : scalar, (n,) or (N, n) array, or "order", optional
+        From where each actuator came, for drives with backlash: 1 where its reading had grown, -1
+        where it had fallen, 0 where that is not known. "order": the machine was driven from row to
+        row as they stand. Kept as (N, n).
     lines : (N,) array of int, optional
         The line of each row in the file it was read from, to name it by.
     file : str
@@ -121,6 +127,7 @@ class Measurements(Result):
     attachment: FloatArray | None = None
     actuator_sigma: FloatArray | None = None
     session: TextArray | None = None
+    approach: FloatArray | None = None
     lines: Int64Array | None = None
     file: str = ""
     notes: tuple[str, ...] = ()
@@ -141,6 +148,7 @@ class Measurements(Result):
         attachment: ArrayLike | None = None,
         actuator_sigma: ArrayLike | None = None,
         session: str | Sequence[str] | TextArray | None = None,
+        approach: ArrayLike | None = None,
         lines: ArrayLike | None = None,
         file: str = "",
         notes: Sequence[str] = (),
@@ -167,6 +175,7 @@ class Measurements(Result):
             "attachment": attachment_array(attachment, kind, targets, len(q)),
             "actuator_sigma": actuator_sigma_array(actuator_sigma, q.shape),
             "session": sessions_array(session, len(q)),
+            "approach": approach_array(approach, q),
             "lines": None if lines is None else integers("lines", lines, len(q)),
             "file": file,
             "notes": words("notes", notes),
@@ -222,7 +231,11 @@ class Measurements(Result):
     @property
     def pose_index(self) -> Int64Array:
         """Which pose each row belongs to, (N,), counted from 0: by `group`, else by actuators."""
-        rows = self.actuators if self.group is None else self.group[:, None]
+        rows: FloatArray | Int64Array = self.actuators
+        if self.group is not None:
+            rows = self.group[:, None]
+        elif self.approach is not None:  # backlash is between them
+            rows = np.hstack([self.actuators, self.approach])
         return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
 
     @property
@@ -324,6 +337,8 @@ class Measurements(Result):
             columns["group"] = self.group
         if self.session is not None:
             columns["session"] = self.session
+        if self.approach is not None:
+            columns |= {f"approach.q{i + 1}": each for i, each in enumerate(self.approach.T)}
         return columns
 
     def _parts(self) -> Iterator[str | Table]:
@@ -375,6 +390,8 @@ class Measurements(Result):
             parts.append("sigma " + self._sigma_text())
         if self.actuator_sigma is not None:
             parts.append("actuator_sigma stated")
+        if self.approach is not None:
+            parts.append("approach stated")
         if self.sessions:
             many = "s" if len(self.sessions) > 1 else ""
             parts.append(f"session{many} {', '.join(map(display.printable, self.sessions))}")
