@@ -101,7 +101,7 @@ def dexterity(robot: Robot, poses: ArrayLike) -> Dexterity:
 
 def _measures(robot: Robot, poses: FloatArray) -> FloatArray:
     """The five measures, one per row (5, N)."""
-    own, _ = robot.own_rows(poses)
+    own = robot.on_map(robot.own_rows(poses)[0])
     slots = robot.slots
     closure = robot.machine.closure(slots, own, robot.machine.inverse(slots, own))
     out = np.full((5, len(own)), np.nan)

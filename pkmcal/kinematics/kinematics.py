@@ -403,11 +403,17 @@ class Kinematics:
         By default q is the inverse of the poses as the pose map has them.
         """
         if q is None:
-            on_map = own.copy()
-            if self.model.map in ("translation", "planar", "xy"):  # what these do not move is 0
-                on_map[:, [i for i, name in enumerate(POSE) if name not in self.coordinates]] = 0.0
-            q = self.machine.inverse(self.slots, on_map)
+            q = self.machine.inverse(self.slots, self.on_map(own))
         return self.machine.closure(self.slots, own, q).by_step
+
+    def on_map(self, own: FloatArray) -> FloatArray:
+        """Own poses (N, 6) as the pose map has them: what it does not move is not looked at."""
+        if self.model.map == "2tpr2tps":  # has x follow z and β
+            q = np.zeros((len(own), self.n_actuators))
+            return self.machine.closure(self.slots, own, q).pose
+        found = own.copy()
+        found[:, [i for i, name in enumerate(POSE) if name not in self.coordinates]] = 0.0
+        return found
 
     def drives(self, q: FloatArray) -> FloatArray:
         """q̃ of each limb (N, limbs) at actuator coordinates (N, n).
