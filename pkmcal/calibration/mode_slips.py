@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, largest_first
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
@@ -49,9 +50,9 @@ def in_other_modes(equations: Equations, evaluation: Evaluation) -> list[str]:
 
 def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, FloatArray]:
     """Distinct rows of actuators (s,) that another mode fits better, and their poses there."""
-    robot, pose = evaluation.robot, evaluation.pose
+    machines, pose = evaluation.machines, evaluation.pose
     none = np.empty(0, dtype=np.intp), np.empty((0, 6))
-    if not isinstance(robot, Robot):
+    if not isinstance(evaluation.robot, Robot):
         return none  # an arm has one pose
     misfit = equations.misfit(pose, evaluation.theta)
     solved, read = np.isfinite(misfit), ~np.isnan(misfit)
@@ -62,7 +63,12 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
     if not 0 < len(gross) <= _MOST * np.count_nonzero(read):
         return none
     least, best = np.where(solved, misfit, np.inf), pose.copy()
-    modes = [_modes(robot, equations.actuators, pose, int(k), misfit <= limit) for k in gross]
+    modes = [
+        _modes(
+            instance("robot", machines.at(k), Robot), equations.actuators, pose, k, misfit <= limit
+        )
+        for k in gross.tolist()
+    ]
     for j in range(max(map(len, modes))):
         trial = pose.copy()
         for k, of_row in zip(gross, modes, strict=True):

@@ -180,6 +180,26 @@ class ChainMachine(CoreMachine):
         found: FloatArray = (self.layout.near - drive[place]) / drive[place + 1]
         return found
 
+    def bare(self, slots: FloatArray, q: FloatArray) -> tuple[ChainMachine, FloatArray, FloatArray]:
+        """The machine without drive laws, its geometry, and its coordinates at q (N, n)."""
+        return self, slots, q
+
+    def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """What the actuators read with gain and offset, (N, n)."""
+        place, numbers = self.layout.drive_place, slots.ravel()
+        found: FloatArray = numbers[place + 1] * q + numbers[place]
+        return found
+
+    def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """The gain of each actuator, (N, n)."""
+        return np.tile(slots.ravel()[self.layout.drive_place + 1], (len(q), 1))
+
+    def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
+        """What the actuators read (N, n) at q̃ (N, n)."""
+        place, numbers = self.layout.drive_place, slots.ravel()
+        q: FloatArray = (way - numbers[place]) / numbers[place + 1]
+        return q
+
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m); the least squares of the closures."""
         closure = self.closure(slots, pose, self.inverse(slots, pose))

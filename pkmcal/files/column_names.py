@@ -37,6 +37,7 @@ _SYNONYMS: dict[str, str] = {
     "distance": "dist|length measured|measured length|measured distance|ball bar length",
     "sigma": "std|stdev|stddev|std dev|standard deviation|sigma xyz",
     "group": "pose|pose id|pose no|pose nr|pose number|pose name|configuration|config",
+    "session": "session id|session name|session no|session number|sitting",
     "target": "reflector|smr|target name|reflector name|marker|prism",
     "name": "point id|point|point name|pointname|point no|pt|pt id|pt name|id|label|object name"
     "|measurement|measurement name|feature|feature name|element|step|step no|punkt|messpunkt"

@@ -11,15 +11,16 @@ INDEPENDENT = 1e-7  # least part of a number's effect that the others cannot hav
 _ALIKE = 1e-6  # share by which effects differ that are not equal
 POSES = 40  # at least
 _HALVINGS = 8
+_KNOWN = ("gain", "drive")  # better than what an arm of a machine is
 SHARE = 0.2  # of the characteristic length, and rad: how far from home the actuators go
-ERRORS = {"mm": 0.1, "rad": 1e-3, "1": 1e-4}  # sizes at which effects are compared
+ERRORS = {"mm": 0.1, "rad": 1e-3}  # sizes at which effects are compared
 
 
 def independent_numbers(robot: Robot) -> tuple[str, ...]:
     """Names of numbers that poses of the workspace tell apart, as many as there are.
 
-    The gains are not among them: they are known better than what an arm of a machine is. Of the
-    effects that are left, the largest is taken next, of those alike the first.
+    Gains and drive laws are not among them: they are known better than what an arm of a machine
+    is. Of the effects that are left, the largest is taken next, of those alike the first.
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def independent_numbers(robot: Robot) -> tuple[str, ...]:
         [
             i
             for i, (name, tied) in enumerate(zip(geometry.names, geometry.tied, strict=True))
-            if not tied and not name.startswith("gain")
+            if not tied and not name.startswith(_KNOWN)
         ]
     )
     effects = near_home(robot)[:, :, places]

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal import display
 from pkmcal.arguments import checked_seed, shown, word, words
-from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.components import COMPONENTS, Kind
@@ -23,6 +23,7 @@ from pkmcal.measurements.fields import (
     integers,
     names_of_targets,
     numbers,
+    sessions_array,
     sigma_array,
     target_array,
     units_of_actuators,
@@ -35,7 +36,7 @@ from pkmcal.result import Result
 _LISTED_ROWS = 12  # a longer list of measurements is printed with its middle left out
 
 _PER_ROW = (
-    "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines",
+    "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines", "session",
 )  # fmt: skip
 
 
@@ -84,6 +85,9 @@ class Measurements(Result):
         Standard deviation of what the actuators read, mm or rad. None: they are where they read on
         a machine with as many closures as free coordinates; on one with more, and with rows that
         contradict each other, it is estimated from them. Kept as (N, n).
+    session : str or (N,) sequence of str, optional
+        When the rows were measured, one word for all or one a row: `identify` may find some
+        numbers anew in each session. None: not stated. Kept as (N,).
     lines : (N,) array of int, optional
         The line of each row in the file it was read from, to name it by.
     file : str
@@ -116,6 +120,7 @@ class Measurements(Result):
     actuator_units: tuple[str, ...] | None = None
     attachment: FloatArray | None = None
     actuator_sigma: FloatArray | None = None
+    session: TextArray | None = None
     lines: Int64Array | None = None
     file: str = ""
     notes: tuple[str, ...] = ()
@@ -135,6 +140,7 @@ class Measurements(Result):
         actuator_units: str | Sequence[str] | None = None,
         attachment: ArrayLike | None = None,
         actuator_sigma: ArrayLike | None = None,
+        session: str | Sequence[str] | TextArray | None = None,
         lines: ArrayLike | None = None,
         file: str = "",
         notes: Sequence[str] = (),
@@ -160,6 +166,7 @@ class Measurements(Result):
             "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
             "attachment": attachment_array(attachment, kind, targets, len(q)),
             "actuator_sigma": actuator_sigma_array(actuator_sigma, q.shape),
+            "session": sessions_array(session, len(q)),
             "lines": None if lines is None else integers("lines", lines, len(q)),
             "file": file,
             "notes": words("notes", notes),
@@ -217,6 +224,11 @@ class Measurements(Result):
         """Which pose each row belongs to, (N,), counted from 0: by `group`, else by actuators."""
         rows = self.actuators if self.group is None else self.group[:, None]
         return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+
+    @property
+    def sessions(self) -> tuple[str, ...]:
+        """The different sessions, in the order of their first rows; empty where none is stated."""
+        return () if self.session is None else tuple(dict.fromkeys(self.session.tolist()))
 
     def select(self, rows: ArrayLike | slice) -> Measurements:
         """Some of the rows, as measurements: a slice, row numbers or a mask of N booleans.
@@ -310,6 +322,8 @@ class Measurements(Result):
             columns["target"] = [self.target_names[i] for i in self.target_index]
         if self.group is not None:
             columns["group"] = self.group
+        if self.session is not None:
+            columns["session"] = self.session
         return columns
 
     def _parts(self) -> Iterator[str | Table]:
@@ -333,6 +347,9 @@ class Measurements(Result):
         if self.group is not None:
             heads.append("group")
             columns.append([str(number) for number in self.group])
+        if self.session is not None and len(self.sessions) > 1:
+            heads.append("session")
+            columns.append([display.printable(name) for name in self.session])
         rows = list(zip(*columns, strict=True))
         if len(rows) > _LISTED_ROWS:
             rows[_LISTED_ROWS - 4 : -3] = [("⋮",) * len(heads)]
@@ -358,6 +375,9 @@ class Measurements(Result):
             parts.append("sigma " + self._sigma_text())
         if self.actuator_sigma is not None:
             parts.append("actuator_sigma stated")
+        if self.sessions:
+            many = "s" if len(self.sessions) > 1 else ""
+            parts.append(f"session{many} {', '.join(map(display.printable, self.sessions))}")
         if self.target_names is not None:
             known = "" if self.target is not None else " (places not known)"
             parts.append(f"targets {' '.join(self.target_names)}{known}")

@@ -74,7 +74,7 @@ def verdict(found: Identification) -> tuple[str, str]:
 
 def instrument_identified(found: Identification) -> bool:
     """Say whether a frame or points of the instrument are among the parameters."""
-    return len(found.free) > len(found.fit.parameters.places)
+    return len(found.free) > int(found.fit.parameters.geometry.stop)
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:
