@@ -12,6 +12,7 @@ from pkmcal.checks.joint_layout import ALIKE, joints, size
 from pkmcal.core.library import POSE, SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.dexterity import dexterity
+from pkmcal.kinematics.limits import kept, margin_of
 from pkmcal.kinematics.perturbed import completed
 from pkmcal.kinematics.robot import Robot
 
@@ -169,7 +170,9 @@ def _in_strokes(robot: Robot, drive: FloatArray, factor: float) -> bool:
     for value, limb in zip(drive, robot.model.limbs, strict=True):
         if limb.stroke is not None:
             stated = True
-            if not factor * limb.stroke[0] <= value <= factor * limb.stroke[1]:
+            low, high = limb.stroke
+            margin = margin_of((factor * low, factor * high), value)
+            if not kept(margin, KINDS[limb.kind].actuator_unit, robot.machine.struct.size):
                 return False
     return bool(np.isfinite(drive).all()) and (stated or factor == 1.0)
 

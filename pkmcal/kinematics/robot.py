@@ -141,7 +141,8 @@ class Robot(Kinematics, Result):
         Returns
         -------
         Feasibility
-            ``.ok`` for each pose; reach, stroke and joint cones for each limb.
+            ``.ok`` for each pose; reach, stroke and joint cones for each limb. What exceeds a
+            limit by rounding, 1e-10 of the machine's size or rad, keeps it.
         """
         rows, shape = self.own_rows(pose)
         chains = self.model.chains
@@ -160,7 +161,8 @@ class Robot(Kinematics, Result):
             there = self.drives(self._batch(actuators, shape))
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
             drive = np.where(angle, there + wrapped(drive - there), drive)
-        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform), shape)
+        size = self.machine.struct.size
+        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform, size), shape)
 
     def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
         """Every assembly mode at given actuator coordinates, with proof.
@@ -223,7 +225,7 @@ class Robot(Kinematics, Result):
             order,
             poses=poses,
             distance=lambda pose: pose_distance(own, self.frames.inward(pose), self.length),
-            feasible=lambda: self.feasible(poses).ok,
+            feasible=lambda: self.feasible(poses, np.tile(rows, (len(poses), 1))).ok,
             continued=continued,
         )
 
