@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import partial
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -219,6 +220,19 @@ class SerialArm(SerialChain, Result):
         """
         real = self.corrected()
         return table_of(real.axes, real.points, real.home, convention)
+
+    def show(self, path: str | PathLike[str] | None = None) -> Path:
+        """Write the arm as a page that moves it, as `pkmcal.show` does.
+
+        Parameters
+        ----------
+        path : str or path, optional
+            Where to write; an existing file is replaced. By default a temporary file, which is
+            opened in the browser.
+        """
+        from pkmcal.view.show import show
+
+        return show(self, path)
 
     # files --------------------------------------------------------------------------------------
 

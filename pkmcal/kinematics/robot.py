@@ -7,6 +7,7 @@ from copy import copy
 from dataclasses import fields, replace
 from functools import cached_property
 from os import PathLike
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -342,6 +343,19 @@ class Robot(Kinematics, Result):
             return errors
         named = errors @ self.geometry.chain[:, -count:]
         return np.concatenate([errors, named], axis=-1)
+
+    def show(self, path: str | PathLike[str] | None = None) -> Path:
+        """Write the machine as a page that moves it, as `pkmcal.show` does.
+
+        Parameters
+        ----------
+        path : str or path, optional
+            Where to write; an existing file is replaced. By default a temporary file, which is
+            opened in the browser.
+        """
+        from pkmcal.view.show import show
+
+        return show(self, path)
 
     # changing and saving --------------------------------------------------------------------------
 
