@@ -9,8 +9,9 @@ import typer
 
 import pkmcal as pk
 from pkmcal.cli.inputs import Inputs
-from pkmcal.cli.options import Force, RobotOrArm
+from pkmcal.cli.options import Force, Json, RobotOrArm
 from pkmcal.cli.output import Output, say
+from pkmcal.report.as_json import as_json
 
 
 def show(
@@ -22,6 +23,7 @@ def show(
         ),
     ] = None,
     force: Force = False,
+    json: Json = False,
 ) -> int:
     """Write a page that shows a machine and moves it, for any browser and without a network.
 
@@ -35,5 +37,8 @@ def show(
     place = Path(f"{Path(robot).name.partition('.')[0]}.html") if out is None else out
     with Output(place.parent, [place.name], read, force).draft() as draft:
         pk.show(machine, draft / place.name)
-    say(f"{place}: {machine.name}; open it in a browser")
+    if json:
+        say(as_json({"robot": machine.name, "file": str(place)}, schema="show"))
+    else:
+        say(f"{place}: {machine.name}; open it in a browser")
     return 0

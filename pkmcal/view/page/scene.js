@@ -50,7 +50,7 @@ class Scene {
     if (canvas.height !== Math.round(high * ratio)) canvas.height = Math.round(high * ratio)
     context.setTransform(ratio, 0, 0, ratio, 0, 0)
     const [ct, st, ce, se] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)]
-    const away = (FOCAL * 1.18 * this.radius) / this.zoom * Math.max(1, high / wide)
+    const away = (FOCAL * 1.08 * this.radius) / this.zoom * Math.max(1, high / wide)
     return {
       wide, high, away, scale: (FOCAL * high) / 2 * Math.min(1, (wide / high)) * Math.max(1, high / wide),
       right: [-st, ct, 0], up: [-ct * se, -st * se, ce], back: [ct * ce, st * ce, se],
