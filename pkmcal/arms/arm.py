@@ -221,7 +221,9 @@ class SerialArm(SerialChain, Result):
         real = self.corrected()
         return table_of(real.axes, real.points, real.home, convention)
 
-    def show(self, path: str | PathLike[str] | None = None) -> Path:
+    def show(
+        self, path: str | PathLike[str] | None = None, *, poses: ArrayLike | None = None
+    ) -> Path:
         """Write the arm as a page that moves it, as `pkmcal.show` does.
 
         Parameters
@@ -229,10 +231,12 @@ class SerialArm(SerialChain, Result):
         path : str or path, optional
             Where to write; an existing file is replaced. By default a temporary file, which is
             opened in the browser.
+        poses : array_like (N, n), optional
+            Joint coordinates to be shown and gone to one by one, mm and rad.
         """
         from pkmcal.view.show import show
 
-        return show(self, path)
+        return show(self, path, poses=poses)
 
     # files --------------------------------------------------------------------------------------
 

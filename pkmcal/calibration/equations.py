@@ -263,7 +263,7 @@ class Equations(Readings):
             if kind == "pose":
                 poses = np.concatenate([evaluation.pose[self.pose_of[i]] for i in framed[kind]])
                 return of_poses(values, poses), theta
-            points = np.concatenate([self._points(evaluation, i)[0] for i in framed[kind]])
+            points = np.concatenate([self.targets_at(evaluation, i)[0] for i in framed[kind]])
             return of_heights(values, points), theta
         columns = np.concatenate([
             self._columns[i]["target"][:, 0]
@@ -273,7 +273,7 @@ class Equations(Readings):
         ])  # fmt: skip
         sought, target = np.unique(columns, return_inverse=True)
         target = target.reshape(-1) - int(sought[0] < 0)
-        parts = [self._points(evaluation, i) for i in framed["position"]]
+        parts = [self.targets_at(evaluation, i) for i in framed["position"]]
         seen = PointPairs(
             values=np.concatenate([self.sets[i].values for i in framed["position"]]),
             point=np.concatenate([places for places, _ in parts]),
@@ -287,7 +287,7 @@ class Equations(Readings):
             theta[mine] = np.clip(moved, self.parameters.lower[mine], self.parameters.upper[mine])
         return frame, theta
 
-    def _points(self, evaluation: Evaluation, i: int) -> tuple[FloatArray, FloatArray]:
+    def targets_at(self, evaluation: Evaluation, i: int) -> tuple[FloatArray, FloatArray]:
         """Where the targets of set `i` are in the base frame (N, 3), and how they are turned."""
         sought = self._columns[i].get("target")
         target = self._known[i]["target"] if sought is None else evaluation.theta[sought]

@@ -344,7 +344,9 @@ class Robot(Kinematics, Result):
         named = errors @ self.geometry.chain[:, -count:]
         return np.concatenate([errors, named], axis=-1)
 
-    def show(self, path: str | PathLike[str] | None = None) -> Path:
+    def show(
+        self, path: str | PathLike[str] | None = None, *, poses: ArrayLike | None = None
+    ) -> Path:
         """Write the machine as a page that moves it, as `pkmcal.show` does.
 
         Parameters
@@ -352,10 +354,12 @@ class Robot(Kinematics, Result):
         path : str or path, optional
             Where to write; an existing file is replaced. By default a temporary file, which is
             opened in the browser.
+        poses : array_like (N, 6), optional
+            To be shown and gone to one by one, mm and rad.
         """
         from pkmcal.view.show import show
 
-        return show(self, path)
+        return show(self, path, poses=poses)
 
     # changing and saving --------------------------------------------------------------------------
 

@@ -17,6 +17,7 @@ from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 
 MOST_JOINTS = 32  # of a serial arm in csrc/view/arms.c
+ARM_ERRORS = 8 * (1 + MOST_JOINTS * (1 + 9 + 3) + 16)  # where an arm's joint errors are, bytes
 _ROOM = 32768  # bytes in csrc/view/view.h
 _ARRAYS = (  # of pkm_chains, in its order
     "first", "member", "ball", "end_place", "ball_place", "end", "prismatic", "actuator",

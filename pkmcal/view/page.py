@@ -10,6 +10,7 @@ import json
 import zlib
 from base64 import b64encode
 from functools import cache
+from hashlib import sha256
 from importlib.resources import files
 from typing import Any
 
@@ -19,23 +20,27 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.display import printable
 from pkmcal.kinematics.robot import Robot
+from pkmcal.screw import to_pose
 from pkmcal.view import parallel, serial
 
-SCRIPTS = ("algebra", "core", "mover", "arm", "limits", "bodies", "scene", "panel", "start")
+_SCRIPTS = ("algebra", "core", "mover", "arm", "limits", "bodies", "scene", "panel")
 _MODULES = {"limbs": "limbs", "chains": "chains", "arm": "arms"}
 _DIGITS = 3  # of the ends of the cloud, mm
 
 
-def html(robot: Robot | SerialArm) -> str:
-    """The page of a robot or an arm."""
+def html(robot: Robot | SerialArm, poses: FloatArray | None = None) -> str:
+    """The page of a robot, with poses (N, 6) to visit, or of an arm, with coordinates (N, n)."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
     environment = Environment(
         loader=PackageLoader("pkmcal.view", "page"), autoescape=True, undefined=StrictUndefined
     )
+    data = machine(robot)
+    if poses is not None:
+        data["places"] = places("poses", robot, poses)
     return environment.get_template("view.html.jinja").render(
-        title=printable(robot.name), style=Markup(style()), view=Markup(element(machine(robot)))
+        title=printable(robot.name), style=Markup(style()), view=Markup(element(data))
     )
 
 
@@ -49,6 +54,10 @@ def machine(robot: Robot | SerialArm) -> dict[str, Any]:
     return found
 
 
+_ELEMENT = (
+    '<div class="pkmcal-view"><p class="without">The machine moves in browsers of 2023 and later,'
+    " with JavaScript.</p></div>\n"
+)
 # Unpacks the scripts and runs them with the element before it and the data.
 _LOADER = """<script>
 (async root => {
@@ -61,14 +70,36 @@ await new Function("root", "data", text)(root, %s)
 """
 
 
+def places(
+    name: str, robot: Robot | SerialArm, poses: FloatArray, q: FloatArray | None = None
+) -> dict[str, Any]:
+    """Poses (N, 6) that the page goes to one by one; of an arm joint coordinates (N, n)."""
+    if isinstance(robot, SerialArm):
+        q = poses
+        poses = to_pose(robot.forward(poses))
+    found: dict[str, Any] = {"name": name, "poses": poses.tolist()}
+    return found if q is None else found | {"q": q.tolist()}
+
+
 def element(data: dict[str, Any]) -> str:
     """The element of a page that shows the machine, with all that it needs but its style."""
+    return _ELEMENT + _LOADER % (packed(scripts().encode()), _given(data))
+
+
+def plain_element(data: dict[str, Any]) -> tuple[str, str]:
+    """The same for a page that runs no other script, and the hash by which its policy names it.
+
+    The scripts are as they are, for unpacking them would take the right to run any text.
+    """
+    run = f"\n(async (root, data) => {{\n{scripts('calibration' in data)}\n}})"
+    run += f"(document.currentScript.previousElementSibling, {_given(data)})\n"
+    digest = b64encode(sha256(run.encode()).digest()).decode()
+    return f"{_ELEMENT}<script>{run}</script>\n", f"sha256-{digest}"
+
+
+def _given(data: dict[str, Any]) -> str:
     module = _resource(f"wasm/{_MODULES[data['kind']]}.wasm")
-    given = as_script({**data, "wasm": packed(module)})
-    return (
-        '<div class="pkmcal-view"><p class="without">The machine moves in browsers of 2023 and'
-        f" later, with JavaScript.</p></div>\n{_LOADER % (packed(scripts().encode()), given)}"
-    )
+    return as_script({**data, "wasm": packed(module)})
 
 
 def as_script(data: object) -> str:
@@ -89,9 +120,10 @@ def style() -> str:
 
 
 @cache
-def scripts() -> str:
+def scripts(calibration: bool = False) -> str:
     """All scripts of the element, one after the other: the body of a function of root and data."""
-    body = "\n".join(_squeezed(_text(f"page/{name}.js")) for name in SCRIPTS)
+    names = [*_SCRIPTS, *(["calibration"] if calibration else []), "start"]
+    body = "\n".join(_squeezed(_text(f"page/{name}.js")) for name in names)
     return f"'use strict'\n{body}\nreturn start(root, data)"
 
 

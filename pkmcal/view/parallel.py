@@ -40,6 +40,7 @@ def data(robot: Robot) -> dict[str, Any]:
         "name": robot.name,
         "what": words.of_robot(robot),
         "numbers": numbers,
+        "geometry": numbers or len(blob) - robot.slots.nbytes,
         "map": model.map,
         "free": [POSE.index(name) for name in MAPS[model.map]],
         "moved": [POSE.index(name) for name in spans],

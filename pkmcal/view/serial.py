@@ -43,5 +43,6 @@ def data(arm: SerialArm) -> dict[str, Any]:
             {"kind": "P" if kind == "prismatic" else "R", "name": name}
             for kind, name in zip(arm.kinds, arm.joint_names or [None] * arm.n_joints, strict=True)
         ],
+        "geometry": memory.ARM_ERRORS,
         "machine": memory.arm(arm),
     }

@@ -7,16 +7,24 @@ import webbrowser
 from os import PathLike
 from pathlib import Path
 
+from numpy.typing import ArrayLike
+
 from pkmcal import arguments
 from pkmcal.arguments import instance
 from pkmcal.arms.arm import SerialArm
+from pkmcal.arrays import as_rows
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.seal import sealed
 from pkmcal.kinematics.robot import Robot
 from pkmcal.view.page import html
 
 
-def show(robot: Robot | SerialArm, path: str | PathLike[str] | None = None) -> Path:
+def show(
+    robot: Robot | SerialArm,
+    path: str | PathLike[str] | None = None,
+    *,
+    poses: ArrayLike | None = None,
+) -> Path:
     """Write a machine as one HTML file, to move it and look at it from all sides.
 
     Sliders move the platform, or the actuators one by one; the kinematics in the file are those of
@@ -31,6 +39,9 @@ def show(robot: Robot | SerialArm, path: str | PathLike[str] | None = None) -> P
     path : str or path, optional
         Where to write; an existing file is replaced, whole or not at all. By default a temporary
         file, which is opened in the browser.
+    poses : array_like (N, 6), of an arm (N, n), optional
+        To be shown and gone to one by one, mm and rad; of an arm joint coordinates. Those of
+        `plan_poses`, for example.
 
     Returns
     -------
@@ -39,6 +50,8 @@ def show(robot: Robot | SerialArm, path: str | PathLike[str] | None = None) -> P
 
     Raises
     ------
+    ValueError, TypeError
+        Poses of a wrong shape, or no machine.
     OSError
         The file cannot be written.
 
@@ -53,7 +66,10 @@ def show(robot: Robot | SerialArm, path: str | PathLike[str] | None = None) -> P
     """
     if not isinstance(robot, SerialArm):
         instance("robot", robot, Robot, " or a SerialArm")
-    content = sealed(html(robot).encode(), ".html")
+    rows = None
+    if poses is not None:
+        rows = as_rows("poses", poses, robot.n_joints if isinstance(robot, SerialArm) else 6)[0]
+    content = sealed(html(robot, rows).encode(), ".html")
     if path is not None:
         place = Path(arguments.path("path", path))
         write_whole(place, content)

@@ -75,6 +75,8 @@ class Arm {
     return [...scaled(turn, (sine > 1e-12 ? angle / sine : 1) * this.data.length), ...p]
   }
 
+  visit(pose, q) { this.arrived(q) }
+
   moveActuator(a, value) {
     const q = [...this.q]
     q[a] = value

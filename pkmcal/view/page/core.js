@@ -26,6 +26,8 @@ async function loadedCore(data) {
   if (!(wasm.begin(machine.byteLength, data.numbers) > 0)) throw Error('the core does not take this machine')
   const core = {
     wasm,
+    bytes: machine.byteLength,
+    numbers: new Float64Array(wasm.memory.buffer, wasm.machine_room() + data.geometry),
     // six numbers of A followed by B
     compose(a, b) {
       core.a.set(a), core.b.set(b)

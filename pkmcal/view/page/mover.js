@@ -204,6 +204,12 @@ class Mover {
     this.arrived(own, q)
   }
 
+  // a pose, with coordinates that lead to it where they are known
+  visit(pose, q) {
+    if (q) this.arrived(this.inward(pose), q)
+    else this.moveTo(pose)
+  }
+
   // the k-th pose with the actuators as at home
   takeMode(k) {
     const pose = this.data.modes.poses[k]

@@ -52,6 +52,7 @@ class Panel {
     this.actuators(side, data)
     const buttons = made('div', side, { className: 'buttons' })
     made('button', buttons, { type: 'button', text: 'Home', onclick: () => { mover.home(); changed() } })
+    if (data.places) this.places(side, data.places)
     if (data.modes?.poses.length > 1) this.modes(side, data)
     this.toggles(side, show)
     made('p', side, { className: 'hint', text: 'Drag the picture to turn it; the wheel or two fingers zoom.' })
@@ -90,6 +91,22 @@ class Panel {
     made('button', buttons, { type: 'button', text: '‹', title: 'previous assembly mode', onclick: step(-1) })
     this.mode = made('span', buttons)
     made('button', buttons, { type: 'button', text: '›', title: 'next assembly mode', onclick: step(1) })
+  }
+
+  // poses to visit one by one: measured ones, or planned ones
+  places(side, { name, poses, q }) {
+    made('h3', side, { text: name[0].toUpperCase() + name.slice(1) })
+    const buttons = made('div', side, { className: 'buttons' })
+    let now = -1
+    const step = by => () => {
+      now = now < 0 ? (by > 0 ? 0 : poses.length - 1) : (now + by + poses.length) % poses.length
+      this.mover.visit(poses[now], q?.[now])
+      shown.textContent = `${now + 1} of ${poses.length}`
+      this.changed()
+    }
+    made('button', buttons, { type: 'button', text: '‹', title: 'go to the pose before', onclick: step(-1) })
+    const shown = made('span', buttons, { text: `${poses.length}` })
+    made('button', buttons, { type: 'button', text: '›', title: 'go to the next pose', onclick: step(1) })
   }
 
   toggles(side, show) {

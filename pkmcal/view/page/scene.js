@@ -50,7 +50,7 @@ class Scene {
     if (canvas.height !== Math.round(high * ratio)) canvas.height = Math.round(high * ratio)
     context.setTransform(ratio, 0, 0, ratio, 0, 0)
     const [ct, st, ce, se] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)]
-    const away = (FOCAL * 1.08 * this.radius) / this.zoom * Math.max(1, high / wide)
+    const away = (FOCAL * 1.14 * this.radius) / this.zoom * Math.max(1, high / wide)
     return {
       wide, high, away, scale: (FOCAL * high) / 2 * Math.min(1, (wide / high)) * Math.max(1, high / wide),
       right: [-st, ct, 0], up: [-ct * se, -st * se, ce], back: [ct * ce, st * ce, se],
@@ -74,6 +74,7 @@ class Scene {
     for (const body of bodies.list) this.plan(eye, body, colours, tasks)
     tasks.sort((a, b) => b.far - a.far)
     for (const task of tasks) task.draw()
+    if (extra.key) this.scaleOf(eye, colours, extra.key)
     this.texts(eye, bodies.list.filter(body => body.text), colours)
   }
 
@@ -90,8 +91,11 @@ class Scene {
       tasks.push({ far: at[2] - body.r, draw: () => this.sphere(at, body.r, colour) })
     } else if (body.face || body.line) {
       const points = (body.face ?? body.line).map(p => this.seen(eye, p))
-      const far = points.reduce((sum, p) => sum + p[2], 0) / points.length
+      const far = body.over ? -1 : points.reduce((sum, p) => sum + p[2], 0) / points.length
       tasks.push({ far, draw: () => this.path(points, colour, body) })
+    } else if (body.arrow) {
+      const [a, b] = body.arrow.map(p => this.seen(eye, p))
+      tasks.push({ far: (a[2] + b[2]) / 2, draw: () => this.arrow(a, b, colour) })
     } else if (body.dots) {
       for (const p of body.dots) {
         const at = this.seen(eye, p)
@@ -141,6 +145,25 @@ class Scene {
     context.lineWidth = wide
     context.stroke()
     context.setLineDash([])
+  }
+
+  arrow(a, b, colour) {
+    const v = [b[0] - a[0], b[1] - a[1]], long = Math.hypot(...v), head = Math.min(7, long)
+    this.dot(a, colour, 5)
+    if (long < 1) return
+    const [x, y] = [v[0] / long * head, v[1] / long * head]
+    this.path([a, b], colour, { wide: 1.8 })
+    this.path([[b[0] - x - y * 0.5, b[1] - y + x * 0.5], b, [b[0] - x + y * 0.5, b[1] - y - x * 0.5]], colour, { wide: 1.8 })
+  }
+
+  // how long a residual is in the middle of the picture
+  scaleOf(eye, colours, { long, text }) {
+    const wide = (long * eye.scale) / eye.away, x = 16, y = eye.high - 18
+    this.path([[x, y - 4], [x, y + 4], [x, y], [x + wide, y], [x + wide, y - 4], [x + wide, y + 4]], colours.ink, { wide: 1.6 })
+    this.context.font = '12px system-ui, sans-serif'
+    this.context.textAlign = 'left'
+    this.context.fillStyle = colours.ink
+    this.context.fillText(`residual of ${text}`, x, y - 12)
   }
 
   dot([x, y], colour, wide) {
@@ -198,13 +221,14 @@ class Scene {
     }
     const apart = () => { const [a, b] = [...held.values()]; return Math.hypot(a[0] - b[0], a[1] - b[1]) }
     canvas.addEventListener('pointerdown', e => {
+      this.pointed?.(e.offsetX, e.offsetY)
       held.set(e.pointerId, [e.clientX, e.clientY])
       canvas.setPointerCapture(e.pointerId)
     })
     for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, e => held.delete(e.pointerId))
     canvas.addEventListener('pointermove', e => {
       const from = held.get(e.pointerId)
-      if (!from) return
+      if (!from) return this.pointed?.(e.offsetX, e.offsetY)
       const before = held.size === 2 ? apart() : 0
       held.set(e.pointerId, [e.clientX, e.clientY])
       if (before) moved(0, 0, apart() / before)
