@@ -77,6 +77,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.moves.events import Event as Event
     from pkmcal.moves.move import Move as Move
     from pkmcal.moves.move import MoveSample as MoveSample
+    from pkmcal.view.show import show as show
 
 _HOMES = {
     "arms.arm": ("SerialArm",),
@@ -126,6 +127,7 @@ _HOMES = {
     "modes.certificate": ("Certificate",),
     "moves.events": ("Event",),
     "moves.move": ("Move", "MoveSample"),
+    "view.show": ("show",),
 }
 _HOME_OF = {name: f"pkmcal.{home}" for home, names in _HOMES.items() for name in names}
 _MODULES = ("export", "screw", "trajectory")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import partial
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -219,6 +220,23 @@ class SerialArm(SerialChain, Result):
         """
         real = self.corrected()
         return table_of(real.axes, real.points, real.home, convention)
+
+    def show(
+        self, path: str | PathLike[str] | None = None, *, poses: ArrayLike | None = None
+    ) -> Path:
+        """Write the arm as a page that moves it, as `pkmcal.show` does.
+
+        Parameters
+        ----------
+        path : str or path, optional
+            Where to write; an existing file is replaced. By default a temporary file, which is
+            opened in the browser.
+        poses : array_like (N, n), optional
+            Joint coordinates to be shown and gone to one by one, mm and rad.
+        """
+        from pkmcal.view.show import show
+
+        return show(self, path, poses=poses)
 
     # files --------------------------------------------------------------------------------------
 

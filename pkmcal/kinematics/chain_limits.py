@@ -69,20 +69,29 @@ def _value(
     joint = chains.limbs[i][k]
     if joint.actuator is not None:
         return drive[:, joint.actuator]
-    name = joint.share or f"limb{i + 1}.joint{k + 1}"
-    index = list(chains.parts).index(name + PARTS[0])
-    return passive[:, machine.layout.coordinate[index]]
+    return passive[:, passive_coordinate(chains, i, k)]
+
+
+def passive_coordinate(chains: Chains, i: int, k: int) -> int:
+    """Which of the passive coordinates joint k of limb i has, its first part's."""
+    name = chains.limbs[i][k].share or f"limb{i + 1}.joint{k + 1}"
+    return int(chains.layout.coordinate[list(chains.parts).index(name + PARTS[0])])
+
+
+def home_axes(machine: ChainMachine) -> FloatArray:
+    """Axes at home of each frame that `ChainMachine.frames` gives, (frames, 3, 3)."""
+    layout = machine.layout
+    home = np.empty((len(layout.member) + len(layout.ball), 3, 3))
+    for i, (first, end) in enumerate(zip(layout.first[:-1], layout.first[1:], strict=True)):
+        home[first + i : end + i] = layout.axes[layout.member[first:end]]
+        home[end + i] = np.eye(3) if layout.ball[i] else layout.home[:3, :3]
+    return home
 
 
 def _turned(machine: ChainMachine, frames: FloatArray) -> FloatArray:
     """What the bodies have turned by since home: before each joint, and of each end."""
-    layout = machine.layout
-    home = np.empty((frames.shape[1], 3, 3))
-    for i, (first, end) in enumerate(zip(layout.first[:-1], layout.first[1:], strict=True)):
-        home[first + i : end + i] = layout.axes[layout.member[first:end]]
-        home[end + i] = np.eye(3) if layout.ball[i] else layout.home[:3, :3]
     R = frames[..., :9].reshape(*frames.shape[:2], 3, 3)
-    found: FloatArray = R @ home.swapaxes(1, 2)
+    found: FloatArray = R @ home_axes(machine).swapaxes(1, 2)
     return found
 
 
@@ -92,14 +101,19 @@ def _platform(machine: ChainMachine, own: FloatArray) -> FloatArray:
     return found
 
 
-def _bend(limb: tuple[Joint, ...], k: int, before: FloatArray, after: FloatArray) -> FloatArray:
-    """How far a joint bends from home, rad: a U its normal, an S the limb."""
+def bend_direction(limb: tuple[Joint, ...], k: int) -> FloatArray:
+    """What a cone of joint k limits, at home: of a U its normal, of an S the limb."""
     joint = limb[k]
     if joint.kind == "U":
         direction = np.cross(joint.axes[0], joint.axes[1])
-        direction /= np.linalg.norm(direction)
-    else:
-        way = towards(limb, k)
-        direction = np.array([0.0, 0.0, 1.0]) if way is None else way
+        normal: FloatArray = direction / np.linalg.norm(direction)
+        return normal
+    way = towards(limb, k)
+    return np.array([0.0, 0.0, 1.0]) if way is None else way
+
+
+def _bend(limb: tuple[Joint, ...], k: int, before: FloatArray, after: FloatArray) -> FloatArray:
+    """How far a joint bends from home, rad."""
+    direction = bend_direction(limb, k)
     a, b = before @ direction, after @ direction
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))

@@ -7,6 +7,7 @@ from copy import copy
 from dataclasses import fields, replace
 from functools import cached_property
 from os import PathLike
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -348,6 +349,23 @@ class Robot(Kinematics, Result):
             return errors
         named = errors @ self.geometry.chain[:, -count:]
         return np.concatenate([errors, named], axis=-1)
+
+    def show(
+        self, path: str | PathLike[str] | None = None, *, poses: ArrayLike | None = None
+    ) -> Path:
+        """Write the machine as a page that moves it, as `pkmcal.show` does.
+
+        Parameters
+        ----------
+        path : str or path, optional
+            Where to write; an existing file is replaced. By default a temporary file, which is
+            opened in the browser.
+        poses : array_like (N, 6), optional
+            To be shown and gone to one by one, mm and rad.
+        """
+        from pkmcal.view.show import show
+
+        return show(self, path, poses=poses)
 
     # changing and saving --------------------------------------------------------------------------
 
