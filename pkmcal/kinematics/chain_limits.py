@@ -49,12 +49,12 @@ def feasibility(
                 where = last if joint is limb[-1] else before
                 where[:, i] = np.fmin(where[:, i], joint.cone - bend)
             at += count
-    cones = (kept(margin, "rad", chains.size) for margin in (before, last))
     reach = np.asarray(np.isfinite(q).all(axis=1) & np.isfinite(frames).all(axis=(1, 2)))
     first = np.array([_first_actuator(limb) for limb in chains.limbs])
     shown = np.where(first >= 0, drive[:, np.maximum(first, 0)], 0.0)
     return Feasibility(
-        np.broadcast_to(reach[:, None], shape).copy(), in_stroke, *cones,
+        np.broadcast_to(reach[:, None], shape).copy(), in_stroke,
+        kept(before, "rad", chains.size), kept(last, "rad", chains.size),
         np.where(reach[:, None], shown, np.nan), stroke, before, last,
     )  # fmt: skip
 

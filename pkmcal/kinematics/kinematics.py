@@ -412,8 +412,8 @@ class Kinematics:
         """Own poses (N, 6) as the pose map has them: what it does not move is not looked at."""
         if self.model.map == "2tpr2tps":  # has x follow z and β
             q = np.zeros((len(own), self.n_actuators))
-            return self.machine.closure(self.slots, own, q).pose
-        found = own.copy()
+            return np.asarray(self.machine.closure(self.slots, own, q).pose)
+        found: FloatArray = own.copy()
         found[:, [i for i, name in enumerate(POSE) if name not in self.coordinates]] = 0.0
         return found
 

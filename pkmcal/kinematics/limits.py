@@ -102,9 +102,15 @@ def feasibility(
         ):
             if cone is not None:
                 margin[:, i] = _inside(cone, direction[:, i])
-    cones = (kept(margin, "rad", size) for margin in (base_cone, platform_cone))
     return Feasibility(
-        np.isfinite(drive), in_stroke, *cones, drive, stroke, base_cone, platform_cone
+        np.isfinite(drive),
+        in_stroke,
+        kept(base_cone, "rad", size),
+        kept(platform_cone, "rad", size),
+        drive,
+        stroke,
+        base_cone,
+        platform_cone,
     )
 
 

@@ -27,8 +27,13 @@ _POSES = 200  # measured poses that can be visited
 
 
 def element(found: Identification) -> tuple[str, str]:
-    """The element of the report, and the hash by which its policy names the script."""
+    """The element of the report, and the hash by which its policy names the script.
+
+    Nothing, and "none", of a machine that the page cannot hold: the still pictures stay.
+    """
     robot = found.robot
+    if isinstance(robot, Robot) and any(law is not None for law in robot.model.laws):
+        return "", "none"
     data = page.machine(robot)
     data.pop("cloud", None)  # the report has its own pictures of the workspace
     data["places"] = _measured(found)
