@@ -20,7 +20,7 @@ from pkmcal.report.drawing import (
     in_context,
     sample,
 )
-from pkmcal.report.skeleton import Skeleton, exaggerated
+from pkmcal.report.skeleton import Skeleton, middle_exaggerated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,11 +65,7 @@ def machine(found: Identification) -> Figure | None:
 
     Both at the same commands; None where one has no pose.
     """
-    equations = found.fit.equations
-    middle = len(equations.actuators) // 2
-    q, pose = equations.actuators[middle], found.fit.end.pose[middle]
-    before, after = found.fit.start.theta, found.fit.end.theta
-    drawn = exaggerated(equations.parameters, before, after, q, pose)
+    drawn = middle_exaggerated(found)
     if drawn is None:
         return None
     figure = empty_figure(_WIDTH, 4.8)

@@ -9,6 +9,7 @@ import numpy as np
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.parameters import Parameters
 from pkmcal.core.instruments import seen_points
 from pkmcal.geometry.limb_kinds import KINDS
@@ -94,6 +95,15 @@ def _placed(
         _in_frame(outward, base[_around(base)]),
         _in_frame(outward, ends[_around(ends) if order is None else order]),
     )
+
+
+def middle_exaggerated(found: Identification) -> tuple[Skeleton, Skeleton, int] | None:
+    """`exaggerated` of a calibration, at the commands of the row in the middle."""
+    equations = found.fit.equations
+    middle = len(equations.actuators) // 2
+    q, pose = equations.actuators[middle], found.fit.end.pose[middle]
+    before, after = found.fit.start.theta, found.fit.end.theta
+    return exaggerated(equations.parameters, before, after, q, pose)
 
 
 def exaggerated(
