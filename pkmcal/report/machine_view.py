@@ -17,7 +17,7 @@ from pkmcal.calibration.row_names import row_names
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_given
 from pkmcal.report.drawing import sample
-from pkmcal.report.skeleton import middle_exaggerated
+from pkmcal.report.exaggerated import middle_exaggerated
 from pkmcal.view import page
 
 _NAMED = 100  # outliers, which have the names of their lines; others have numbers
