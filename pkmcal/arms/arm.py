@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +23,10 @@ from pkmcal.files.reading import Input
 from pkmcal.result import Result
 
 _SAME = 1e-9  # mm, and mm per rad: by so much the arm of a source may differ
+
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class SerialArm(SerialChain, Result):
@@ -237,6 +241,33 @@ class SerialArm(SerialChain, Result):
         from pkmcal.view.show import show
 
         return show(self, path, poses=poses)
+
+    def plot(
+        self,
+        axes: Axes | None = None,
+        theta: ArrayLike | None = None,
+        *,
+        color: str | None = None,
+    ) -> Axes:
+        """Draw the arm as lines with matplotlib, for papers.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Of three dimensions, or of two: then it is seen from above. By default new ones.
+        theta : array_like (n,), optional
+            Its joint coordinates, rad and mm; zero by default.
+        color : str, optional
+            Of all lines; by default the next of the axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes, in mm, with equal scales.
+        """
+        from pkmcal.view.plot import of_arm
+
+        return of_arm(self, axes, theta, color)
 
     # files --------------------------------------------------------------------------------------
 

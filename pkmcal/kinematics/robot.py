@@ -8,6 +8,7 @@ from dataclasses import fields, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +33,9 @@ from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
 from pkmcal.modes.find import assemblies, continue_path, find_modes, nearest_first, pose_distance
 from pkmcal.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class Robot(Kinematics, Result):
@@ -366,6 +370,49 @@ class Robot(Kinematics, Result):
         from pkmcal.view.show import show
 
         return show(self, path, poses=poses)
+
+    def plot(
+        self,
+        axes: Axes | None = None,
+        pose: ArrayLike | None = None,
+        *,
+        numbers: bool = True,
+        color: str | None = None,
+    ) -> Axes:
+        """Draw the machine as lines with matplotlib, for papers.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Of three dimensions, or of two: then it is seen from above. By default new ones.
+        pose : array_like (6,), optional
+            Where it is drawn, mm and rad; home by default.
+        numbers : bool
+            Whether limbs have their numbers.
+        color : str, optional
+            Of all lines; by default the next of the axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes, in mm, with equal scales.
+
+        Raises
+        ------
+        ValueError
+            The machine does not get to the pose.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> from matplotlib.figure import Figure
+        >>> axes = Figure().add_subplot(projection="3d")
+        >>> pk.load("hexapod").plot(axes).get_xlabel()
+        'x [mm]'
+        """
+        from pkmcal.view.plot import of_robot
+
+        return of_robot(self, axes, pose, numbers, color)
 
     # changing and saving --------------------------------------------------------------------------
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import FloatArray, rms
+from pkmcal.arrays import FloatArray
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.row_names import row_names
@@ -18,11 +18,11 @@ from pkmcal.core import instruments
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_given
 from pkmcal.report.drawing import sample
+from pkmcal.report.exaggerated import middle_exaggerated
 from pkmcal.view import page
 
 _NAMED = 100  # outliers, which have the names of their lines; others have numbers
-_MOST_TIMES = 1000.0  # by which a change is multiplied
-_SEEN = 0.03  # of the machine's size: how far a change is to be seen at first
+_MORE = 10  # times the exaggeration that is drawn at first
 _POSES = 200  # measured poses that can be visited
 
 
@@ -37,7 +37,7 @@ def element(found: Identification) -> tuple[str, str]:
     data = page.machine(robot)
     data.pop("cloud", None)  # the report has its own pictures of the workspace
     data["places"] = _measured(found)
-    data["calibration"] = {"points": _points(found), "change": _change(found, data["size"])}
+    data["calibration"] = {"points": _points(found), "change": _change(found)}
     return page.plain_element(data)
 
 
@@ -105,22 +105,20 @@ def _measured(found: Identification) -> dict[str, Any]:
     return page.places(name, found.robot, end.pose[chosen], q)
 
 
-def _change(found: Identification, size: float) -> dict[str, Any]:
+def _change(found: Identification) -> dict[str, Any]:
     """Numbers of the machine that changed, as the core has them, before and after."""
     parameters = found.fit.equations.parameters
     assumed = as_given(parameters.robot.replace(parameters.values_at(found.fit.start.theta)))
     before, after = _numbers(assumed), _numbers(found.robot)
     places = np.flatnonzero(before != after)
-    moved = rms((before - after)[places]) if len(places) else 0.0
-    times = _SEEN * size / moved if moved > 0 else 1.0
-    power = 10.0 ** np.floor(np.log10(max(times, 1.0)))
-    steps = [step for step in (1.0, 2.0, 5.0) if step * power <= max(times, 1.0)]
+    drawn = middle_exaggerated(found)
+    times = 1 if drawn is None else drawn[2]
     return {
         "places": places.tolist(),
         "before": before[places].tolist(),
         "after": after[places].tolist(),
-        "times": min(steps[-1] * power, _MOST_TIMES),
-        "most": _MOST_TIMES,
+        "times": times,
+        "most": _MORE * times,
     }
 
 

@@ -3,7 +3,7 @@ async function start(root, data) {
   const core = await loadedCore(data)
   const mover = data.kind === 'arm' ? new Arm(core, data) : new Mover(core, data)
   const cloud = data.cloud ? await cloudOf(data.cloud) : null
-  const show = { numbers: true, frames: true, limits: true, cloud: false, places: true, names: { numbers: 'numbers', frames: 'frames' } }
+  const show = { numbers: !data.calibration, frames: true, limits: true, cloud: false, places: true, names: { numbers: 'numbers', frames: 'frames' } }
   if (data.kind !== 'arm') show.names.limits = 'joint cones'
   if (cloud) show.names.cloud = 'where it gets to'
   if (data.places) show.names.places = data.places.name
