@@ -117,7 +117,7 @@ def _sizes(robot: Robot) -> dict[str, float]:
     sizes = {
         "base joints": float(np.linalg.norm(base.points, axis=1).max()),
         "platform joints": float(np.linalg.norm(platform.points, axis=1).max()),
-        "home": float(np.linalg.norm(robot.model.home[:3])),
+        "home": float(np.linalg.norm(robot.own_home[:3])),
         "rods": float(slots[:, SLOTS.index("rod")].max()),
         "cranks": float(slots[:, SLOTS.index("crank")].max()),
         "strokes": max(ends, default=0.0),
@@ -144,7 +144,7 @@ def _mended(robot: Robot) -> Iterator[Finding]:
     mended = []
     for name in _sizes(robot):
         for factor, unit in _FACTORS:
-            slots, home, stroke = robot.slots.copy(), robot.model.home[None].copy(), 1.0
+            slots, home, stroke = robot.slots.copy(), robot.own_home[None].copy(), 1.0
             if name in _LENGTHS:
                 columns = [SLOTS.index(slot) for slot in _LENGTHS[name]]
                 slots[:, columns] *= factor

@@ -55,8 +55,8 @@ class Kinematics:
         self.model = instance("model", model, Model, " (see pkmcal.load)")
         self.slots = np.ascontiguousarray(model.geometry.slots)
         self.frames = Frames(model.base_frame, model.tool_frame)
-        self.own_home = np.ascontiguousarray(model.home, dtype=np.float64)
         self.machine = machine_of(model, self.slots, self.length)
+        self.own_home = self.on_map(np.array(model.home, dtype=np.float64)[None])[0].copy()
 
     @property
     def limb_machine(self) -> Machine | DrivenMachine:
