@@ -234,11 +234,12 @@ class FreePoses:
         self._arcs = 1.0 / mm_per_unit(pose_steps.step_units(robot), robot.length)
         self.unknowns = robot.machine.m - self._held
         self.equations = len(self._roles.read)
-        # passive rows that give way are as sure as the file weighs them against the actuators
-        common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
-        self.sigma: FloatArray | None = np.stack(
-            [sigma[:, a] if a >= 0 else common for a in self._roles.actuator], axis=1
-        )
+        self.sigma: FloatArray | None = sigma
+        if self._roles.actuator != tuple(range(sigma.shape[1])):
+            # passive rows that give way are as sure as the file weighs them against the actuators
+            common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
+            each = [sigma[:, a] if a >= 0 else common for a in self._roles.actuator]
+            self.sigma = np.stack(each, axis=1)
         self._white = 1.0 / self.sigma
         self._shift: FloatArray | float = 0.0
 
