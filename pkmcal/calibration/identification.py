@@ -246,13 +246,17 @@ class Identification(Parts, Result):
             yield summary.sessions(self.sessions)
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)
-        datasets = self.fit.equations.datasets
+        datasets, chosen = self.fit.equations.datasets, self.fit.parameters
+        framed = len(self.free) > len(chosen.places) or isinstance(self.robot, SerialArm)
+        if self.datum.names:
+            yield summary.filled("", str(self.datum))
         yield from summary.limits(
             self.identifiability,
             len(self.free),
             self.correlations,
             row_names(datasets, self.outliers),
             self.outliers,
+            frames=framed and not self.datum.names and not np.isfinite(self.stderr).all(),
         )
         yield from (summary.filled("", str(test)) for test in self.law_tests)
         if self.at_bounds:

@@ -92,6 +92,10 @@ class Asked:
         Names or wildcards.
     by_set : frozenset of str
         Of "frame", "target", "attachment" and "anchor", what each set has for itself.
+    fix : tuple of str
+        Names or wildcards of numbers of the geometry that are held.
+    held_points : frozenset of (str, str)
+        Unknown points that are held where the user puts them, by role and name.
     """
 
     free: str | Sequence[str] | None = None
@@ -99,6 +103,8 @@ class Asked:
     bounds: Bounds = None
     per_session: tuple[str, ...] = ()
     by_set: frozenset[str] = frozenset()
+    fix: tuple[str, ...] = ()
+    held_points: frozenset[tuple[str, str]] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,7 +319,7 @@ def parameters(
     blocks = [("frame", slice(row.frame, row.frame + 6))] if row.frame is not None else []
     blocks += [(role, slice(first, first + 3)) for (role, _), first in row.points.items()]
     scope = scopes(row.names, blocks, asked.per_session, asked.by_set)
-    entries = _entries(row, scope, blocks, datasets)
+    entries = _entries(row, scope, blocks, datasets, asked.held_points)
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
     names = tuple(row.names[j] + (f"@{behind}" if behind else "") for j, behind in entries)
     units = tuple(row.units[j] for j in number_of)
@@ -371,6 +377,11 @@ def _numbers_of_a_row(robot: Calibratable, datasets: Sequence[FitData], asked: A
     chosen = geometry.match(free, "free")
     if not chosen:
         raise ArgumentError("free: name at least one parameter")
+    if asked.fix:
+        held = geometry.match(asked.fix, "fix")
+        chosen = [name for name in chosen if name not in held]
+        if not chosen:
+            raise ArgumentError("fix: no parameter is left free")
     places = np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)
     names, units = list(chosen), [str(geometry.units[i]) for i in places]
     start = list(geometry.values[places])
@@ -407,10 +418,11 @@ def _entries(
     scope: Sequence[Scope],
     blocks: Sequence[tuple[str, slice]],
     datasets: Sequence[FitData],
+    held: frozenset[tuple[str, str]],
 ) -> list[tuple[int, str]]:
     """The parameters: the number of a row that each is, and what stands behind the @ of its name.
 
-    Those of the geometry session by session, behind what is common.
+    Those of the geometry session by session, behind what is common. Points that are held are none.
     """
     own = range(len(row.places))
     found = [(j, "") for j in own if scope[j] == "common"]
@@ -418,6 +430,8 @@ def _entries(
     of_point = {first: (role, name) for (role, name), first in row.points.items()}
     for _, block in blocks:
         kind, point = scope[block.start], of_point.get(block.start)
+        if point in held:
+            continue
         behind = dict.fromkeys(
             label(kind, session, data.set_name)
             for data in datasets
@@ -465,6 +479,13 @@ def _points_of(role: str, measured: Measurements) -> tuple[dict[str, FloatArray]
         )
     places = np.zeros((len(names), 3)) if given is None else given
     return dict(zip(names, places, strict=True)), index
+
+
+def places_of(role: str, measured: Measurements) -> FloatArray:
+    """Where the user puts the unknown point of each row, (N, 3)."""
+    places, index = _points_of(role, measured)
+    of_rows: FloatArray = np.array(list(places.values()))[index]
+    return of_rows
 
 
 def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool) -> list[int]:

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
-from pkmcal.calibration.parameters import POINTS, FitData, Parameters
+from pkmcal.calibration.parameters import POINTS, FitData, Parameters, places_of
+from pkmcal.calibration.sessions import NONE
 from pkmcal.measurements import orientation
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import Predicted, difference, joined, predict
@@ -80,9 +81,10 @@ class Readings:
         ]
         self._known = [
             {
-                name: m.attachments if role == "attachment" else m.targets
+                name: places_of(role, m)  # of points that are held
+                if name in columns
+                else (m.attachments if role == "attachment" else m.targets)
                 for name, role in POINTS[m.kind].items()
-                if name not in columns
             }
             for m, columns in zip(self.sets, self._columns, strict=True)
         ]
@@ -144,23 +146,24 @@ class Readings:
         return found
 
     def columns_of(self, i: int, name: str) -> IntArray | None:
-        """Parameters (N, 3) of a point of each row of set `i`; None where it is known.
+        """Parameters (N, 3) of a point of each row of set `i`; `NONE` where it is held.
 
+        None where it is known.
         `name` is what `predict` calls it.
         """
         return self._columns[i].get(name)
 
     def points_of(self, i: int, name: str, theta: FloatArray) -> FloatArray:
         """Where that point is (N, 3), mm."""
-        columns = self._columns[i].get(name)
-        return self._known[i][name] if columns is None else theta[columns]
+        known, columns = self._known[i][name], self._columns[i].get(name)
+        return known if columns is None else np.where(columns == NONE, known, theta[columns])
 
     def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Readings of each set at poses (K, 6)."""
         return tuple(self._predicted_of(i, pose, theta) for i in range(len(self.sets)))
 
     def _predicted_of(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
-        places = self._known[i] | {name: theta[own] for name, own in self._columns[i].items()}
+        places = {name: self.points_of(i, name, theta) for name in self._known[i]}
         kind, mine = self.sets[i].kind, pose[self.pose_of[i]]
         if not self._frames[i]:
             return predict(kind, mine, **places)

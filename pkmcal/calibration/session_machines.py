@@ -184,16 +184,21 @@ def _approaching(
 
 def commanded_closures(rows: Sequence[IntArray], read: FloatArray) -> SessionClosures:
     """Poses that follow from what the actuators read."""
-    return SessionClosures([Commanded(read[own]) for own in rows], rows)
+    return SessionClosures([Commanded(each) for each in _apart(read, rows)], rows)
 
 
 def closures_of_sessions(
     robot: Calibratable, rows: Sequence[IntArray], read: FloatArray, sigma: FloatArray | None
 ) -> SessionClosures:
     """What the closures say of poses at what the actuators read (K, n); see `closures_of`."""
-    return SessionClosures(
-        [closures_of(robot, read[own], None if sigma is None else sigma[own]) for own in rows], rows
-    )
+    sigmas = [None] * len(rows) if sigma is None else _apart(sigma, rows)
+    pairs = zip(_apart(read, rows), sigmas, strict=True)
+    return SessionClosures([closures_of(robot, *pair) for pair in pairs], rows)
+
+
+def _apart(whole: FloatArray, rows: Sequence[IntArray]) -> list[FloatArray]:
+    """The rows of each machine; a single one has them all."""
+    return [whole] if len(rows) == 1 else [whole[own] for own in rows]
 
 
 def _some(states: RowStates, rows: IntArray) -> RowStates:

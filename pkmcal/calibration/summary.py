@@ -109,8 +109,12 @@ def limits(
     correlations: Sequence[tuple[str, str, float]],
     odd: str,
     outliers: Sequence[int],
+    frames: bool,
 ) -> Iterator[str]:
-    """Where the result has limits: rank, correlations, outliers; `odd` names the last."""
+    """Where the result has limits: rank, correlations, outliers; `odd` names the last.
+
+    `frames`: whether a datum may be what is missing.
+    """
     yield from (filled("", text) for text in identifiability.gauges)
     if identifiability.rank < parameters:
         gap = f", gap {identifiability.gap:.0e}" if np.isfinite(identifiability.gap) else ""
@@ -119,6 +123,12 @@ def limits(
         yield from (filled("  ", text) for text in identifiability.unidentifiable[:4])
         if len(identifiability.unidentifiable) > 4:
             yield f"  and {len(identifiability.unidentifiable) - 4} more"
+        if frames and identifiability.unidentifiable:
+            yield filled(
+                "  ",
+                "--datum auto (datum='auto') holds as many numbers as only say where frames lie;"
+                " the others then have finite ±",
+            )
     if correlations:
         shown = ", ".join(f"{a} / {b} {value:+.3f}" for a, b, value in correlations[:3])
         more = f" and {len(correlations) - 3} more" if len(correlations) > 3 else ""

@@ -13,9 +13,10 @@ import typer
 
 import pkmcal as pk
 from pkmcal.arguments import word
+from pkmcal.calibration.datum import DATUMS
 from pkmcal.calibration.loss import LIMITS
 from pkmcal.calibration.parameters import KNOWN, Known
-from pkmcal.cli.geometry_options import free_names, read_deviations
+from pkmcal.cli.geometry_options import free_names, matching, read_deviations
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.measured import (
     Columns,
@@ -27,6 +28,7 @@ from pkmcal.cli.measured import (
     Rename,
     Rotation,
     Units,
+    rows_to_drop,
 )
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm
 from pkmcal.cli.output import Output, say
@@ -103,6 +105,35 @@ def calibrate(
             " classical, where none do; auto: as the residuals show.",
         ),
     ] = "auto",
+    fix: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Hold this number as it is. Repeat it, separate names with commas, or use"
+            " wildcards.",
+        ),
+    ] = None,
+    datum: Annotated[
+        str,
+        typer.Option(
+            metavar="WORD",
+            help="auto: hold as many numbers as only say where the frames of base and platform"
+            " lie, if they are not known, and those between an arm's joints; the others then have"
+            " finite ±. none: hold none.",
+        ),
+    ] = "none",
+    drop: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ROW|FILE:LINE",
+            help="Leave this row out: its number, as outliers are named, or a line of a file."
+            " Repeat it, or separate rows with commas.",
+        ),
+    ] = None,
+    drop_outliers: Annotated[
+        bool,
+        typer.Option("--drop-outliers", help="Leave out the rows that the others contradict."),
+    ] = False,
     controller: Controller = None,
     join: JoinBy = "auto",
     ignore: Ignore = None,
@@ -162,7 +193,13 @@ def calibrate(
     if tracker is not None:
         seen = read_tracker(tracker)
         measured = [_seen_by(seen, each) for each in measured]
-    chosen = free_names(machine, free)
+    dropped = rows_to_drop(drop or [], measured)
+    if dropped and drop_outliers:
+        raise ArgumentError("--drop names rows, --drop-outliers finds them: one of the two")
+    fixed = matching("--fix", machine, fix or [])
+    chosen = [name for name in free_names(machine, free) if name not in fixed]
+    if fixed and not chosen:
+        raise ArgumentError(f"--fix {','.join(fix or [])}: no parameter is left free")
     with progress("identifying"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
         found = pk.identify(
@@ -177,6 +214,9 @@ def calibrate(
             holdout=held,
             covariance=word("--covariance", covariance, RULES),
             per_session=anew,
+            fix=fixed,
+            datum=word("--datum", datum, DATUMS),
+            drop="outliers" if drop_outliers else dropped,
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:

@@ -7,6 +7,8 @@ from copy import copy
 from dataclasses import fields, replace
 from functools import cached_property
 from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,6 +33,9 @@ from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
 from pkmcal.modes.find import assemblies, continue_path, find_modes, nearest_first, pose_distance
 from pkmcal.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class Robot(Kinematics, Result):
@@ -141,7 +146,8 @@ class Robot(Kinematics, Result):
         Returns
         -------
         Feasibility
-            ``.ok`` for each pose; reach, stroke and joint cones for each limb.
+            ``.ok`` for each pose; reach, stroke and joint cones for each limb. What exceeds a
+            limit by rounding, 1e-10 of the machine's size or rad, keeps it.
         """
         rows, shape = self.own_rows(pose)
         chains = self.model.chains
@@ -160,7 +166,8 @@ class Robot(Kinematics, Result):
             there = self.drives(self._batch(actuators, shape))
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
             drive = np.where(angle, there + wrapped(drive - there), drive)
-        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform), shape)
+        size = self.machine.struct.size
+        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform, size), shape)
 
     def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
         """Every assembly mode at given actuator coordinates, with proof.
@@ -223,7 +230,7 @@ class Robot(Kinematics, Result):
             order,
             poses=poses,
             distance=lambda pose: pose_distance(own, self.frames.inward(pose), self.length),
-            feasible=lambda: self.feasible(poses).ok,
+            feasible=lambda: self.feasible(poses, np.tile(rows, (len(poses), 1))).ok,
             continued=continued,
         )
 
@@ -346,6 +353,66 @@ class Robot(Kinematics, Result):
             return errors
         named = errors @ self.geometry.chain[:, -count:]
         return np.concatenate([errors, named], axis=-1)
+
+    def show(
+        self, path: str | PathLike[str] | None = None, *, poses: ArrayLike | None = None
+    ) -> Path:
+        """Write the machine as a page that moves it, as `pkmcal.show` does.
+
+        Parameters
+        ----------
+        path : str or path, optional
+            Where to write; an existing file is replaced. By default a temporary file, which is
+            opened in the browser.
+        poses : array_like (N, 6), optional
+            To be shown and gone to one by one, mm and rad.
+        """
+        from pkmcal.view.show import show
+
+        return show(self, path, poses=poses)
+
+    def plot(
+        self,
+        axes: Axes | None = None,
+        pose: ArrayLike | None = None,
+        *,
+        numbers: bool = True,
+        color: str | None = None,
+    ) -> Axes:
+        """Draw the machine as lines with matplotlib, for papers.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Of three dimensions, or of two: then it is seen from above. By default new ones.
+        pose : array_like (6,), optional
+            Where it is drawn, mm and rad; home by default.
+        numbers : bool
+            Whether limbs have their numbers.
+        color : str, optional
+            Of all lines; by default the next of the axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes, in mm, with equal scales.
+
+        Raises
+        ------
+        ValueError
+            The machine does not get to the pose.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> from matplotlib.figure import Figure
+        >>> axes = Figure().add_subplot(projection="3d")
+        >>> pk.load("hexapod").plot(axes).get_xlabel()
+        'x [mm]'
+        """
+        from pkmcal.view.plot import of_robot
+
+        return of_robot(self, axes, pose, numbers, color)
 
     # changing and saving --------------------------------------------------------------------------
 

@@ -11,6 +11,7 @@ from pkmcal.arguments import shown, words
 from pkmcal.arrays import FloatArray, Int64Array, TextArray, as_numbers
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import LONGEST_NAME
+from pkmcal.measurements.components import COMPONENTS, Kind
 from pkmcal.measurements.tracker import Tracker
 
 _ROUNDED = 1e-9  # share by which a covariance may miss symmetry, as what was computed or typed does
@@ -71,6 +72,26 @@ def sigma_array(
     if not (sigma > 0).all():
         raise ArgumentError(f"sigma must be positive; found {sigma.min()} (None means not known)")
     return np.array(np.broadcast_to(sigma, shape))
+
+
+def value_of_row(given: ArrayLike | None, kind: Kind, q: tuple[int, ...]) -> FloatArray | None:
+    """What was read in one row, (k,) or a number, as that of (1,) rows."""
+    if given is None:
+        return None
+    value = numbers("values", given, blank=True)
+    k = len(COMPONENTS[kind])
+    if value.shape != ((k,) if k != 1 else ()):
+        what = f"have shape ({k},)" if k != 1 else "be a number"
+        raise ArgumentError(
+            f"values of kind {kind!r} must {what} for one row of actuators {q}, or actuators have"
+            f" shape (N, n); found {value.shape}"
+        )
+    return value[None]
+
+
+def number_of_row(given: ArrayLike | None) -> ArrayLike | None:
+    """What has one entry a row, of one row."""
+    return None if given is None else np.atleast_1d(np.asarray(given))
 
 
 def values_array(given: ArrayLike | None, kind: str, shape: tuple[int, int]) -> FloatArray:

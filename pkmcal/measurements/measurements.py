@@ -23,11 +23,13 @@ from pkmcal.measurements.fields import (
     attachment_array,
     integers,
     names_of_targets,
+    number_of_row,
     numbers,
     sessions_array,
     sigma_array,
     target_array,
     units_of_actuators,
+    value_of_row,
     values_array,
 )
 from pkmcal.measurements.measurement_writer import write_measurements
@@ -53,6 +55,8 @@ class Measurements(Result):
     values : (N, 6), (N, 3) or (N,) array
         What was measured, in mm and rad, in the base frame (or the instrument's, where
         `identify` is given ``frame="unknown"``); see `kind`. NaN: not read there.
+        One row is taken as it is: actuators (n,) with values (6,), (3,) or a number, and what else
+        has one entry a row likewise.
     kind : {"position", "pose", "height", "distance", "closure"}
         "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the target,
         (N, 3). "height": z of the target, (N,). "distance": from the target, which here is a
@@ -155,9 +159,17 @@ class Measurements(Result):
     ) -> None:
         word("kind", kind, COMPONENTS)
         q = numbers("actuators", actuators)
-        if q.ndim != 2 or 0 in q.shape:
-            raise ArgumentError(f"actuators must have shape (N, n), not empty; found {q.shape}")
-        shape = (len(q), len(COMPONENTS[kind]))
+        if q.ndim not in (1, 2) or 0 in q.shape:
+            raise ArgumentError(
+                f"actuators must have shape (N, n), or (n,) for one row, not empty; found {q.shape}"
+            )
+        k = len(COMPONENTS[kind])
+        if q.ndim == 1:
+            q, values = q[None], value_of_row(values, kind, q.shape)
+            group, target_index, lines = map(number_of_row, (group, target_index, lines))
+            if k > 1 and np.shape(sigma) == (k, k):
+                sigma = np.asarray(sigma)[None]
+        shape = (len(q), k)
         v = values_array(values, kind, shape)
         index = None if target_index is None else integers("target_index", target_index, len(q))
         place = target_array(target, kind, index, len(q))

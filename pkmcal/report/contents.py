@@ -180,13 +180,19 @@ def correlation(found: Identification) -> FloatArray:
 
 
 def iso9283(found: Identification) -> list[dict[str, Any]]:
-    """Compute AP, RP and AD of every set of positions or poses, before and after."""
+    """Compute AP, RP and AD of every set of positions or poses, before and after.
+
+    Without outliers, which are errors of the measurement.
+    """
     equations = found.fit.equations
     scores = []
     for i, measured in enumerate(equations.sets):
         if measured.kind not in ("position", "pose"):
             continue
         read = np.isfinite(measured.values).all(axis=1)
+        odd = np.isin(equations.rows[equations.set_of == i], found.outliers)
+        left_out = int((read & odd).sum())
+        read &= ~odd
         if not read.any():
             continue
         group = np.unique(groups(measured)[read], return_inverse=True)[1]
@@ -195,6 +201,7 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
         last = performance(values, values - found.residuals[i][read, :3], group)
         scores.append({
             "set": i + 1,
+            "outliers": left_out,
             "poses": len(first.repeats),
             "repeats": [int(first.repeats.min()), int(first.repeats.max())],
             "accuracy_before": first.accuracy.tolist(),

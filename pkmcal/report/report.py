@@ -15,8 +15,9 @@ from pkmcal.calibration.row_names import row_names
 from pkmcal.display import printable
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import checksums, comment, version
-from pkmcal.report import contents
+from pkmcal.report import contents, machine_view
 from pkmcal.report.as_json import as_json
+from pkmcal.view import page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -104,7 +105,10 @@ def html(facts: Mapping[str, Any]) -> str:
         name: Markup(svg)  # matplotlib escapes the texts in it
         for name, svg in _figures(facts).items()
     }
-    return environment.get_template(_TEMPLATE).render(**facts, figures=figures)
+    view, digest = machine_view.element(facts["found"])
+    parts = {"figures": figures, "view": Markup(view), "view_digest": digest}
+    style = Markup(page.style())
+    return environment.get_template(_TEMPLATE).render(**facts, **parts, view_style=style)
 
 
 def _as_data(facts: Mapping[str, Any]) -> dict[str, Any]:
