@@ -17,6 +17,7 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 Int32Array = NDArray[np.int32]  # what the core writes
 Int64Array = NDArray[np.int64]
+TextArray = NDArray[np.str_]
 
 Unit = Literal["mm", "rad", "1"]
 

@@ -19,7 +19,8 @@ from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_p
 from pkmcal.calibration.closures import Closures, Commanded, RowStates, closures_of
 from pkmcal.calibration.elimination import Blocks, Shares
 from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.parameters import FitData, Parameters
+from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.parameters import Parameters
 from pkmcal.calibration.readings import ROUNDING, Readings, of_read
 from pkmcal.core import instruments
 from pkmcal.core.library import STATUS
@@ -255,14 +256,18 @@ class Equations(Readings):
         theta = evaluation.theta.copy()
         framed = {
             kind: [i for i, m in enumerate(self.sets) if self._framed[i] and m.kind == kind]
-            for kind in ("position", "pose", "height")
+            for kind in ("position", "pose", "height", "orientation", "tilt")
         }
         if not framed["position"]:
-            kind = "pose" if framed["pose"] else "height"
+            kind = next(kind for kind in ("pose", "height", "orientation", "tilt") if framed[kind])
             values = np.concatenate([self.sets[i].values for i in framed[kind]])
-            if kind == "pose":
-                poses = np.concatenate([evaluation.pose[self.pose_of[i]] for i in framed[kind]])
-                return of_poses(values, poses), theta
+            seen = np.concatenate([evaluation.predicted[i].values for i in framed[kind]])
+            if kind == "tilt":  # as level as the robot file says
+                return np.zeros(6), theta
+            if kind != "height":
+                whole = np.zeros((2, len(values), 6))
+                whole[:, :, -values.shape[1] :] = values, seen
+                return of_poses(*whole[:, np.isfinite(values).all(axis=1)]), theta
             points = np.concatenate([self._points(evaluation, i)[0] for i in framed[kind]])
             return of_heights(values, points), theta
         columns = np.concatenate([
@@ -289,8 +294,7 @@ class Equations(Readings):
 
     def _points(self, evaluation: Evaluation, i: int) -> tuple[FloatArray, FloatArray]:
         """Where the targets of set `i` are in the base frame (N, 3), and how they are turned."""
-        sought = self._columns[i].get("target")
-        target = self._known[i]["target"] if sought is None else evaluation.theta[sought]
+        target = self._arguments(i, evaluation.theta)["target"]
         places, _, turn = instruments.points(evaluation.pose[self.pose_of[i]], target)
         return places, turn
 
@@ -311,12 +315,14 @@ class Equations(Readings):
             part = np.zeros((rows, k, len(p)))
             if by_geometry is not None:
                 part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
+                if seen.by_other is not None:
+                    there = by_geometry[self.other_of[i]]
+                    part[:, :, : len(p.places)] += seen.by_other @ there
             if seen.by_frame is not None and p.frame is not None:
                 part[:, :, p.frame : p.frame + 6] = seen.by_frame
             for name, columns in self._columns[i].items():
-                by_point = seen.by_target if name == "target" else seen.by_anchor
-                assert by_point is not None
-                np.put_along_axis(part, np.repeat(columns[:, None, :], k, axis=1), by_point, axis=2)
+                row, slot = np.nonzero(columns >= 0)
+                part[row, :, columns[row, slot]] += seen.by[name][row, :, slot]
             parts.append(by_difference(self.sets[i].kind, part, evaluation.residuals[i]))
         return parts
 

@@ -27,7 +27,8 @@ from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
-from pkmcal.calibration.parameters import KNOWN, Bounds, FitData, Known, Prior, parameters
+from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.parameters import KNOWN, Bounds, Known, Prior, parameters
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
     contradicted_prior,
@@ -37,10 +38,12 @@ from pkmcal.calibration.plausibility import (
     likely_unit_errors,
 )
 from pkmcal.calibration.row_errors import likely_row_errors
+from pkmcal.calibration.starts import known_distances, with_starts
 from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable, as_given, as_machine
+from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import RULES, CovarianceRule
 
@@ -90,7 +93,7 @@ def identify(
     target : {"known", "unknown"} or a sequence of them
         Whether the measured points of the platform are known or to be found, from where
         `Measurements.target` puts them: ``target1.x`` …; for distances the fixed point,
-        ``anchor1.x`` ….
+        ``anchor1.x`` …; for orientations how the sensor is mounted, ``mounting.alpha`` ….
     holdout : float or Measurements, optional
         A fraction of the poses of each set, drawn at random with repeats kept together, or other
         measurements: they are not fitted, only compared.
@@ -145,6 +148,7 @@ def identify(
     elif holdout is not None:
         pairs = [draw(data, holdout) for data in datasets]
         datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
+    datasets += known_distances(datasets)
     chosen = parameters(machine, datasets, free, prior, bounds)
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
@@ -255,12 +259,13 @@ def _datasets(
     for measured, unknowns in zip(sets, unknown, strict=True):
         datasets.append(FitData(measured, np.arange(first, first + len(measured)), *unknowns))
         first += len(measured)
+    datasets = with_starts(robot, datasets)
     known = [data.measured.actuator_sigma is not None for data in datasets]
     if any(known) and not all(known):
         raise ArgumentError("measurements: state actuator_sigma of all sets, or of none")
     if any(data.unknown_frame for data in datasets) and not any(data.framed for data in datasets):
         raise ArgumentError("frame: distances do not depend on it, it cannot be unknown")
-    distances = any(data.measured.kind == "distance" for data in datasets)
+    distances = any(KINDS[data.measured.kind].point == "base" for data in datasets)
     if any(data.unknown_attachment for data in datasets) and not distances:
         raise ArgumentError("attachment: distances alone have one, it cannot be unknown")
     return datasets

@@ -15,7 +15,7 @@ from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.labels import labels
 from pkmcal.calibration.mode_slips import in_their_modes
-from pkmcal.calibration.parameters import FitData
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.statistics.shifts import shifted
 
 _MAY_MOVE = re.compile(

@@ -11,10 +11,10 @@ import numpy as np
 
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
+from pkmcal.calibration.fit_data import Dependence, FitData, Numbers
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import Calibratable
-from pkmcal.measurements.components import Kind
 from pkmcal.measurements.measurements import Measurements
 
 Prior = float | Mapping[str, float] | None
@@ -22,58 +22,13 @@ Known = Literal["known", "unknown"]
 KNOWN: tuple[Known, ...] = ("known", "unknown")
 Bounds = Mapping[str, tuple[float, float]] | None
 
-_POINT = (("x", "mm"), ("y", "mm"), ("z", "mm"))
-_FRAME = (*_POINT, ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
-
-# The points that measurements of a kind depend on: what `predict` calls them, and users.
-POINTS: dict[Kind, dict[str, str]] = {
-    "pose": {},
-    "position": {"target": "target"},
-    "height": {"target": "target"},
-    "distance": {"target": "attachment", "anchor": "anchor"},
-    "closure": {},
-}
-
-
-@dataclass(frozen=True, eq=False)
-class FitData:
-    """Rows of one set of measurements, to be fitted or held out.
-
-    Attributes
-    ----------
-    measured : Measurements
-        These rows alone.
-    rows : ndarray of int (N,)
-        Their numbers in what the user gave, counted through all sets.
-    unknown_frame, unknown_target, unknown_attachment : bool
-        Which of them `identify` was asked to find along.
-    """
-
-    measured: Measurements
-    rows: IntArray
-    unknown_frame: bool
-    unknown_target: bool
-    unknown_attachment: bool = False
-
-    @property
-    def framed(self) -> bool:
-        """Whether these readings depend on the unknown frame."""
-        return self.unknown_frame and self.measured.kind != "distance"
-
-    @property
-    def sought(self) -> tuple[str, ...]:
-        """Which of its points are estimated: "target", or "attachment" and "anchor"."""
-        unknown = {
-            "target": self.unknown_target,
-            "anchor": self.unknown_target,
-            "attachment": self.unknown_attachment,
-        }
-        return tuple(role for role in POINTS[self.measured.kind].values() if unknown[role])
-
+_FRAME = (
+    ("x", "mm"), ("y", "mm"), ("z", "mm"), ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"),
+)  # fmt: skip
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """The parameter vector: numbers of the geometry first, then frame and points.
+    """The parameter vector: numbers of the geometry first, then frame and what readings depend on.
 
     Attributes
     ----------
@@ -94,8 +49,9 @@ class Parameters:
     origin : ndarray (6,)
         Where the frame's six numbers count from: the base in the instrument's frame is at `origin`
         followed by them. Near it they are small, and their angles regular.
-    points : mapping
-        Column of the x of each unknown point, by "target", "attachment" or "anchor" and its name.
+    found_along : mapping
+        First column of the numbers of each point, zero or artefact that is found along, by role
+        (`Dependence.role`) and name.
     robot : Calibratable
         The machine they belong to.
     """
@@ -110,7 +66,7 @@ class Parameters:
     places: IntArray
     frame: int | None
     origin: FloatArray
-    points: Mapping[tuple[str, str], int]
+    found_along: Mapping[tuple[str, str], int]
     robot: Calibratable
 
     def __len__(self) -> int:
@@ -166,15 +122,17 @@ class Parameters:
             rates[mine, mine] = compose_rates(self.origin, at, nowhere, whole)[0]
         return rates
 
-    def columns_of(self, role: str, measured: Measurements) -> IntArray:
-        """Columns of the unknown point of each row, (N, 3)."""
-        places, index = _points_of(role, measured)
-        for name in places:
-            if (role, name) not in self.points:
-                known = did_you_mean(name, (other for _, other in self.points))
-                raise ArgumentError(f"holdout: its {role} {name!r} was not fitted{known}")
-        first = np.array([self.points[role, name] for name in places])
-        columns: IntArray = first[index][:, None] + np.arange(3)
+    def columns_of(self, dependence: Dependence) -> IntArray:
+        """Columns of the argument of each row, (N, w); -1 where a number of it is given."""
+        columns = np.full(dependence.given.shape, -1, dtype=np.intp)
+        for i, (name, numbers) in enumerate(dependence.sought.items()):
+            first = self.found_along.get((dependence.role, name))
+            if first is None:
+                known = did_you_mean(name, (other for _, other in self.found_along))
+                role = dependence.role.partition(" ")[0]
+                raise ArgumentError(f"holdout: {role} {name!r} was not fitted{known}")
+            rows = np.flatnonzero(dependence.index == i)
+            columns[rows[:, None], numbers.slots] = first + np.arange(len(numbers.slots))
         return columns
 
 
@@ -209,21 +167,22 @@ def parameters(
         names += [f"frame.{axis}" for axis, _ in _FRAME]
         units += [unit for _, unit in _FRAME]
         start += [0.0] * 6
-    points: dict[tuple[str, str], int] = {}
-    known: dict[tuple[str, str], FloatArray] = {}
-    for role, measured in ((role, data.measured) for data in datasets for role in data.sought):
-        for name, place in _points_of(role, measured)[0].items():
-            if (role, name) in points:
-                if (known[role, name] != place).any():
+    found_along: dict[tuple[str, str], int] = {}
+    known: dict[tuple[str, str], Numbers] = {}
+    for dependence in (each for data in datasets for each in data.dependences()):
+        role = dependence.role
+        for name, numbers in dependence.sought.items():
+            if (role, name) in found_along:
+                if (known[role, name].start != numbers.start).any():
                     raise ArgumentError(
                         f"{role}: {role} {name} starts at different places in different"
                         " measurements; give different targets different target_names"
                     )
                 continue
-            points[role, name], known[role, name] = len(names), place
-            names += [f"{role}{name}.{axis}" for axis, _ in _POINT]
-            units += [unit for _, unit in _POINT]
-            start += list(place)
+            found_along[role, name], known[role, name] = len(names), numbers
+            names += numbers.names
+            units += numbers.units
+            start += list(numbers.start)
     travel = max(_travel(robot, data.measured) for data in datasets)
     of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
     scale = np.array([of_unit[unit] for unit in units])
@@ -240,7 +199,7 @@ def parameters(
         places=places,
         frame=frame,
         origin=np.zeros(6),
-        points=points,
+        found_along=found_along,
         robot=robot,
     )
 
@@ -249,23 +208,6 @@ def _travel(robot: Calibratable, measured: Measurements) -> float:
     """Largest actuator coordinate, mm; an angle counts as its arc."""
     arcs = measured.actuators * mm_per_unit(robot.actuator_units, robot.length)
     return max(1.0, float(np.abs(arcs).max()))
-
-
-def _points_of(role: str, measured: Measurements) -> tuple[dict[str, FloatArray], IntArray]:
-    """The points of one role by name, where the user puts them, and which one each row has."""
-    given = measured.attachment if role == "attachment" else measured.target
-    names, index = measured.target_names, measured.target_index
-    one = given is None if role == "attachment" else names is None and given is None
-    if one or (given is not None and given.ndim == 1):
-        place = np.zeros(3) if given is None else given
-        return {"1": place}, np.zeros(len(measured), dtype=np.intp)
-    if names is None or index is None:
-        raise ArgumentError(
-            f"{role}: one place per row cannot be estimated; say with target_index which of a few"
-            " each row measured"
-        )
-    places = np.zeros((len(names), 3)) if given is None else given
-    return dict(zip(names, places, strict=True)), index
 
 
 def _matching(argument: str, pattern: object, names: Sequence[str]) -> list[int]:

@@ -12,7 +12,8 @@ from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identifiability import listed
-from pkmcal.calibration.parameters import FitData, Parameters
+from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.parameters import Parameters
 from pkmcal.display import chance_text, first_rows
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -184,11 +185,13 @@ def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
     lengths = np.abs(geometry.values[np.array(geometry.units) == "mm"]).max(initial=0.0)
     size = _REMOTE * max(reach, parameters.robot.length, float(lengths))
     found = []
-    for (role, name), first in parameters.points.items():
+    for (role, name), first in parameters.found_along.items():
+        if role not in ("target", "attachment"):
+            continue
         place = end.theta[first : first + 3]
         moved = float(np.linalg.norm(place - parameters.start[first : first + 3]))
         far = float(np.linalg.norm(place))
-        if role != "anchor" and min(moved, far) > size:
+        if min(moved, far) > size:
             found.append(
                 f"{role} {name} was found {far:.3g} mm from the platform's origin, beyond the"
                 f" machine's size ({size:.0f} mm): measure poses that turn more, or state where it"
@@ -242,6 +245,7 @@ def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: b
         )
         table = np.column_stack([
             measured.actuators,
+            np.empty((len(measured), 0)) if measured.other is None else measured.other,
             measured.values.reshape(len(measured), -1),
             targets,
         ])  # fmt: skip

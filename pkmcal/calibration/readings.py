@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
-from pkmcal.calibration.parameters import POINTS, FitData, Parameters
+from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.parameters import Parameters
 from pkmcal.measurements import orientation
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import Predicted, difference, predict
@@ -38,6 +39,8 @@ class Readings:
         Its stated deviations.
     pose_of : list of ndarray of int
         Which pose each row of each set is at.
+    other_of : list of ndarray of int or None
+        At which other pose it ends, of distances between two.
     set_of : ndarray of int (N,)
         Which set each row is of.
     count : ndarray of int (N,)
@@ -53,40 +56,37 @@ class Readings:
         self.rows = np.concatenate([data.rows for data in datasets])
         self.parameters = parameters
         self._framed = [data.framed for data in datasets]
-        self._columns = [  # of the points that are sought, by what `predict` calls them
-            {
-                name: parameters.columns_of(role, data.measured)
-                for name, role in POINTS[data.measured.kind].items()
-                if role in data.sought
-            }
-            for data in datasets
+        depend = [list(data.dependences()) for data in datasets]
+        self._given = [{each.argument: each.given for each in mine} for mine in depend]
+        self._columns = [  # of the numbers that are found along
+            {each.argument: parameters.columns_of(each) for each in mine if each.sought}
+            for mine in depend
         ]
-        self._known = [
-            {
-                name: m.attachments if role == "attachment" else m.targets
-                for name, role in POINTS[m.kind].items()
-                if name not in columns
-            }
-            for m, columns in zip(self.sets, self._columns, strict=True)
-        ]
+        self._along = [data.along for data in datasets]
         # several targets or repeats at the same actuators are one pose
-        actuators = np.concatenate([m.actuators for m in self.sets])
-        noises = [m.actuator_sigma for m in self.sets]
+        seconds = [m for m in self.sets if m.other is not None]
+        actuators = np.concatenate([
+            *(m.actuators for m in self.sets),
+            *(m.other for m in seconds if m.other is not None),
+        ])  # fmt: skip
+        noises = [m.actuator_sigma for m in (*self.sets, *seconds)]
         stated = [sigma for sigma in noises if sigma is not None]
         key = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
         distinct, inverse = np.unique(key, axis=0, return_inverse=True)
         n = actuators.shape[1]
         self.actuators = np.ascontiguousarray(distinct[:, :n])
         self.actuator_sigma = np.ascontiguousarray(distinct[:, n:]) if stated else None
-        edges = np.cumsum([0, *map(len, self.sets)])
-        self.pose_of = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
+        edges = np.cumsum([0, *map(len, self.sets), *map(len, seconds)])
+        place = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
+        self.pose_of, there = place[: len(self.sets)], iter(place[len(self.sets) :])
+        self.other_of = [None if m.other is None else next(there) for m in self.sets]
         self.deviations = tuple(np.ones(len(m.components)) for m in self.sets)
         self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
         self.present: BoolArray = np.concatenate([
             np.isfinite(m.values).reshape(-1) for m in self.sets
         ])  # fmt: skip
         self._whole = bool(self.present.all())
-        self.set_of = np.repeat(np.arange(len(self.sets)), np.diff(edges))
+        self.set_of = np.repeat(np.arange(len(self.sets)), [len(m) for m in self.sets])
         self.count = np.concatenate([
             np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in self.sets
         ])  # fmt: skip
@@ -100,11 +100,20 @@ class Readings:
                 pose[self.pose_of[i]],
                 frame=frame if self._framed[i] else None,
                 origin=self.parameters.origin,
-                **self._known[i],
-                **{name: theta[columns] for name, columns in self._columns[i].items()},
+                artefact=measured.artefact,
+                along=self._along[i],
+                other=None if (other := self.other_of[i]) is None else pose[other],
+                **self._arguments(i, theta),
             )
             for i, measured in enumerate(self.sets)
         )
+
+    def _arguments(self, i: int, theta: FloatArray) -> dict[str, FloatArray]:
+        """What the readings of set `i` depend on beside the pose, (N, w) each."""
+        found = dict(self._given[i])
+        for name, columns in self._columns[i].items():
+            found[name] = np.where(columns < 0, found[name], theta[columns])
+        return found
 
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
         """Measured less predicted of each set."""

@@ -52,7 +52,7 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements import orientation_columns
 from pkmcal.measurements.actuator_columns import ACTUATOR, Actuated, compare, read_actuators
 from pkmcal.measurements.calibratable import as_machine
-from pkmcal.measurements.components import COMPONENTS, Kind
+from pkmcal.measurements.components import KINDS, Kind, components
 from pkmcal.measurements.join import JOINS, Join
 from pkmcal.measurements.join import join as joined
 from pkmcal.measurements.measurements import Measurements
@@ -316,7 +316,7 @@ def _read_values(
         places = [_read(table, axis, "mm")[0] for axis in _AXES]
         nominal = _nominal(robot, actuators)
         return np.column_stack([*places, orientation_columns.read(table, rotation, nominal)])
-    columns = [_read(table, *component, blank=True)[0] for component in COMPONENTS[kind]]
+    columns = [_read(table, *component, blank=True)[0] for component in KINDS[kind].components]
     if not columns:
         return None
     return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
@@ -340,7 +340,7 @@ def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
     given = [name for name in table.columns if name.partition(".")[0] in ("sigma", "cov")]
     if not given:
         return None
-    names, units = zip(*COMPONENTS[kind], strict=True)
+    names, units = zip(*KINDS[kind].components, strict=True)
     pairs = list(itertools.combinations_with_replacement(range(len(names)), 2))
     forms = {
         "one": ["sigma"],

@@ -10,7 +10,7 @@ from typing import Protocol
 
 from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.files.csv_writer import write_csv
-from pkmcal.measurements.components import COMPONENTS, Kind
+from pkmcal.measurements.components import KINDS, Kind, components
 
 
 class Writable(Protocol):
@@ -30,7 +30,7 @@ class Writable(Protocol):
 
     @property
     def kind(self) -> Kind:
-        """Which key of `COMPONENTS` they are."""
+        """Which key of `KINDS` they are."""
 
     @property
     def sigma(self) -> FloatArray | None:
@@ -99,7 +99,7 @@ def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
     """Headings and cells, in the order in which they are written."""
     for i, unit in enumerate(m.actuator_units or ("mm",) * m.actuators.shape[1]):
         yield f"q{i + 1} [{unit}]", _exact(m.actuators[:, i])
-    components = COMPONENTS[m.kind]
+    components = components(m.kind, m.artefact)
     for i, (name, unit) in enumerate(components):
         yield f"{name} [{unit}]", _exact(m.values.reshape(len(m.values), -1)[:, i])
     yield from _actuator_sigma(m)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 
 from pkmcal import display
 from pkmcal.arguments import checked_seed, shown, word, words
-from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.components import COMPONENTS, Kind
+from pkmcal.measurements.components import KINDS, Artefact, Kind, components
 from pkmcal.measurements.fields import (
     actuator_sigma_array,
     attachment_array,
@@ -28,6 +28,7 @@ from pkmcal.measurements.fields import (
     units_of_actuators,
     values_array,
 )
+from pkmcal.measurements.kind_fields import KindFields, TouchDistances, kind_fields
 from pkmcal.measurements.measurement_writer import write_measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.result import Result
@@ -36,6 +37,7 @@ _LISTED_ROWS = 12  # a longer list of measurements is printed with its middle le
 
 _PER_ROW = (
     "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines",
+    "other", "run", "touched",
 )  # fmt: skip
 
 
@@ -47,7 +49,7 @@ class Measurements(Result):
     ----------
     actuators : (N, n) array
         Actuator coordinates as commanded or read, mm or rad as the limbs say.
-    values : (N, 6), (N, 3) or (N,) array
+    values : (N, 6), (N, 3), (N, 2) or (N,) array
         What was measured, in mm and rad, in the base frame (or the instrument's, where
         `identify` is given ``frame="unknown"``); see `kind`. NaN: not read there.
     kind : {"position", "pose", "height", "distance", "closure"}
@@ -55,6 +57,11 @@ class Measurements(Result):
         (N, 3). "height": z of the target, (N,). "distance": from the target, which here is a
         fixed point of the base frame, to the attachment, a point of the platform, (N,).
         "closure": nothing, `values` is None; what the actuators read is all that is known.
+        "between": from where the target is in one row to where it is at `other`, (N,).
+        "relative-distance": a distance less the zero of its `run`, (N,). "orientation": alpha beta
+        gamma of the platform, (N, 3). "tilt": how far the x and y axes of a sensor on the platform,
+        whose mounting is not known, point up, (N, 2). "touch": names of what the target touches,
+        (N,), the same where it touches the same; kept as how far off it is, which is 0.
     sigma : scalar, (k,), (N, 1), (N, k) or (N, k, k) array, or Tracker, optional
         Standard deviation of the values in their own units; k is the number of components of the
         kind. (N, k, k) are covariance matrices. One number for poses counts as mm and as rad.
@@ -84,6 +91,17 @@ class Measurements(Result):
         Standard deviation of what the actuators read, mm or rad. None: they are where they read on
         a machine with as many closures as free coordinates; on one with more, and with rows that
         contradict each other, it is estimated from them. Kept as (N, n).
+    other : (N, n) array, optional
+        Of kind "between": the actuators at the second place.
+    run : (N,) sequence of str, optional
+        Of kind "relative-distance": in which run each was read, by a name. A run has one zero.
+    artefact : {"point", "line", "plane", "sphere"}, optional
+        Of kind "touch": what is touched; "point" by default: a socket, a cone, a hole.
+    touch_distances : mapping of (str, str) to float or (float, float), optional
+        Known distances between touched points, or centres of spheres, mm, or each with its
+        standard deviation, which is 1 µm by default: ``{("A", "B"): 50.0}``.
+    joint : str, optional
+        Of kind "angle": the passive joint that is read.
     lines : (N,) array of int, optional
         The line of each row in the file it was read from, to name it by.
     file : str
@@ -116,6 +134,12 @@ class Measurements(Result):
     actuator_units: tuple[str, ...] | None = None
     attachment: FloatArray | None = None
     actuator_sigma: FloatArray | None = None
+    other: FloatArray | None = None
+    run: TextArray | None = None
+    touched: TextArray | None = None
+    artefact: Artefact | None = None
+    touch_distances: TouchDistances = ()
+    joint: str | None = None
     lines: Int64Array | None = None
     file: str = ""
     notes: tuple[str, ...] = ()
@@ -135,15 +159,24 @@ class Measurements(Result):
         actuator_units: str | Sequence[str] | None = None,
         attachment: ArrayLike | None = None,
         actuator_sigma: ArrayLike | None = None,
+        other: ArrayLike | None = None,
+        run: Sequence[str] | TextArray | None = None,
+        touched: Sequence[str] | TextArray | None = None,
+        artefact: Artefact | None = None,
+        touch_distances: Mapping[tuple[str, str], Any] | TouchDistances = (),
+        joint: str | None = None,
         lines: ArrayLike | None = None,
         file: str = "",
         notes: Sequence[str] = (),
     ) -> None:
-        word("kind", kind, COMPONENTS)
+        word("kind", kind, KINDS)
         q = numbers("actuators", actuators)
         if q.ndim != 2 or 0 in q.shape:
             raise ArgumentError(f"actuators must have shape (N, n), not empty; found {q.shape}")
-        shape = (len(q), len(COMPONENTS[kind]))
+        own, values = kind_fields(
+            kind, q.shape, values, KindFields(other, run, touched, artefact, touch_distances, joint)
+        )
+        shape = (len(q), len(components(kind, own["artefact"])))
         v = values_array(values, kind, shape)
         index = None if target_index is None else integers("target_index", target_index, len(q))
         place = target_array(target, kind, index, len(q))
@@ -160,6 +193,7 @@ class Measurements(Result):
             "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
             "attachment": attachment_array(attachment, kind, targets, len(q)),
             "actuator_sigma": actuator_sigma_array(actuator_sigma, q.shape),
+            **own,
             "lines": None if lines is None else integers("lines", lines, len(q)),
             "file": file,
             "notes": words("notes", notes),
@@ -178,12 +212,12 @@ class Measurements(Result):
     @property
     def components(self) -> tuple[str, ...]:
         """Names of the components of one value: ("x", "y", "z") for a position."""
-        return tuple(name for name, _ in COMPONENTS[self.kind])
+        return tuple(name for name, _ in components(self.kind, self.artefact))
 
     @property
     def units(self) -> tuple[str, ...]:
         """Units of the components, "mm" or "rad"."""
-        return tuple(unit for _, unit in COMPONENTS[self.kind])
+        return tuple(unit for _, unit in components(self.kind, self.artefact))
 
     @property
     def targets(self) -> FloatArray:
@@ -323,7 +357,7 @@ class Measurements(Result):
             heads.append(_heading(f"q{i + 1}", unit))
             columns.append(_column(self.actuators[:, i], unit, None))
         deviations = self._deviations()
-        for i, (name, unit) in enumerate(COMPONENTS[self.kind]):
+        for i, (name, unit) in enumerate(zip(self.components, self.units, strict=True)):
             heads.append(_heading(name, unit))
             sigma = None if deviations is None else deviations[:, i]
             columns.append(_column(self.values.reshape(len(self), -1)[:, i], unit, sigma))
