@@ -170,8 +170,8 @@ def calls() -> list[Call]:
                 " derivatives by the artefact and by the point", measured.touched,
                 "artefact point inside by_artefact by_point", ((3,), (3, 6), (3, 3)),
                 {"artefact": "either"}),
-        formula("tilts", "how far the axes of sensors point up, with the derivatives by the turning,"
-                " the mounting and the vertical", measured.tilt,
+        formula("tilts", "how far the axes of sensors point up, with the derivatives by the"
+                " turning, the mounting and the vertical", measured.tilt,
                 "pose mounting up tilt by_turn by_mounting by_up",
                 ((2,), (2, 3), (2, 3), (2, 3)), {"mounting": "either", "up": "either"}),
         formula("tpr2tps_lengths", "2TPR&2TPS: eq. 8", tpr2tps.lengths, "size free lengths",

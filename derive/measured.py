@@ -53,7 +53,9 @@ def distance() -> Function:
     _, R, p = posed(f, "pose", "of the platform")
     target = f.vector("target", 3, "t, in platform axes [mm]")
     anchor = f.vector("anchor", 3, "a, in base axes [mm]")
-    (zero,) = f.vector("zero", 1, "z, the zero of a relative reading or the radius of a sphere [mm]")
+    (zero,) = f.vector(
+        "zero", 1, "z, the zero of a relative reading or the radius of a sphere [mm]"
+    )
     lever = f.let("lever", R * target, "R t")
     d = f.let("d", p + lever - anchor, "d = p + R t - a")
     distance = f.let("rho", sp.sqrt(d.dot(d)), "ρ = ‖d‖")

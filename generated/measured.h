@@ -1,5 +1,5 @@
 /* Generated from derive/measured.py by `python -m derive`; never edited by hand.
- * derivation 46f1840f75f8d09e
+ * derivation 3e3a185506b42a8a
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation fbfdd9ae03a3881a
+ * derivation c0aeb76a329e588d
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* a (n, 6) or (6), b (n, 6) or (6) -> out (n, 6): A followed by B. */

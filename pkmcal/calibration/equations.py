@@ -279,13 +279,13 @@ class Equations(Readings):
         sought, target = np.unique(columns, return_inverse=True)
         target = target.reshape(-1) - int(sought[0] < 0)
         parts = [self._points(evaluation, i) for i in framed["position"]]
-        seen = PointPairs(
+        pairs = PointPairs(
             values=np.concatenate([self.sets[i].values for i in framed["position"]]),
             point=np.concatenate([places for places, _ in parts]),
             turn=np.concatenate([turn for _, turn in parts]),
             target=target,
         )
-        frame, shifts = of_points(seen)
+        frame, shifts = of_points(pairs)
         for first, shift in zip(sought[sought >= 0], shifts, strict=True):
             mine = slice(first, first + 3)
             moved = theta[mine] + shift
@@ -374,7 +374,7 @@ class Equations(Readings):
     def distances(self, evaluation: Evaluation) -> FloatArray:
         """How far off each measured point is, mm, in the order of the sets."""
         return np.concatenate([
-            distance_per_point(of_read(m, r))
+            distance_per_point(of_read(m, r), m.units, self.parameters.robot.length)
             for m, r in zip(self.sets, evaluation.residuals, strict=True)
         ])  # fmt: skip
 

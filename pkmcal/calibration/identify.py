@@ -15,6 +15,7 @@ from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit import Fit
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.fit_statistics import (
     SearchRecord,
     identifiability,
@@ -27,7 +28,6 @@ from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
-from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.parameters import KNOWN, Bounds, Known, Prior, parameters
 from pkmcal.calibration.plausibility import (
     beyond_strokes,

@@ -12,10 +12,10 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit import Fit
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.labels import labels
 from pkmcal.calibration.mode_slips import in_their_modes
-from pkmcal.calibration.fit_data import FitData
 from pkmcal.statistics.shifts import shifted
 
 _MAY_MOVE = re.compile(

@@ -26,6 +26,7 @@ _FRAME = (
     ("x", "mm"), ("y", "mm"), ("z", "mm"), ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"),
 )  # fmt: skip
 
+
 @dataclass(frozen=True, eq=False)
 class Parameters:
     """The parameter vector: numbers of the geometry first, then frame and what readings depend on.

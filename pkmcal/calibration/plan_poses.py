@@ -13,9 +13,9 @@ from pkmcal.arguments import number, whole, word, words
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows
 from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identifiability import as_sum, sparse_basis
 from pkmcal.calibration.optimal_design import CRITERIA, Criterion, Design
-from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.parameters import Parameters, Prior, parameters
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed

@@ -11,8 +11,8 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.parameters import Parameters
 from pkmcal.display import chance_text, first_rows
 from pkmcal.kinematics.robot import Robot

@@ -58,10 +58,10 @@ KINDS: dict[Kind, KindOfReading] = {
 
 # How far a touching point is off the artefact, in its axes.
 TOUCHES: dict[Artefact, Components] = {
-    "point": (("off.x", "mm"), ("off.y", "mm"), ("off.z", "mm")),
+    "point": (("off1", "mm"), ("off2", "mm"), ("off3", "mm")),
     "line": (("off1", "mm"), ("off2", "mm")),
-    "plane": (("off", "mm"),),
-    "sphere": (("off", "mm"),),
+    "plane": (("off1", "mm"),),
+    "sphere": (("off1", "mm"),),
 }
 
 

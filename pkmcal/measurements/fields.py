@@ -124,7 +124,7 @@ def target_array(
 ) -> FloatArray | None:
     """One target, one per row, or several that an index chooses from; None where none is given."""
     if not KINDS[kind].point and (given is not None or index is not None):
-        own = "a pose is the platform's own" if kind == "pose" else f"kind {kind!r} reads no point"
+        own = "a pose is the platform's own" if kind == "pose" else f"a {kind} reads no point"
         raise ArgumentError(f"target: {own} and takes no target")
     if index is not None and index.min() < 0:
         raise ArgumentError(f"target_index counts from 0; found {index.min()}")

@@ -8,6 +8,9 @@ columns                               meaning
 ``z [mm]`` alone                      a height
 ``x [mm], y [mm], probe [mm]``        where a printer's probe triggered; or ``q1`` … and ``probe``
 ``distance [mm]``                     from the fixed point ``target`` to the ``attachment``
+``alpha``, ``beta``, ``gamma [deg]``  an orientation, where there is no position
+``to.q1``, ``run``, ``tilt1``,        distances between two places and relative ones, tilts, angles
+``angle:…``, ``touch`` …              of joints, touches: `pkmcal.measurements.kind_columns`
 ``A.x [mm], A.y [mm], A.z [mm]`` …    positions of several targets A, B, … in one row
 ``sigma [mm]``                        standard deviation of the row, of every component
 ``sigma.x [mm]``, ``sigma.alpha``…    … or of each component
@@ -52,9 +55,17 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements import orientation_columns
 from pkmcal.measurements.actuator_columns import ACTUATOR, Actuated, compare, read_actuators
 from pkmcal.measurements.calibratable import as_machine
-from pkmcal.measurements.components import KINDS, Kind, components
+from pkmcal.measurements.components import KINDS, Kind
 from pkmcal.measurements.join import JOINS, Join
 from pkmcal.measurements.join import join as joined
+from pkmcal.measurements.kind_columns import (
+    component_names,
+    components_in,
+    kinds_in,
+    names_of_kinds,
+    read_kind_fields,
+    value_columns,
+)
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.orientation_columns import checked, names_in
 from pkmcal.measurements.probe import (
@@ -167,6 +178,7 @@ def read_measurements(
     kind = _kind(table, several)
     fields: dict[str, Any] = {"sigma": _read_sigma(table, kind), "lines": np.array(table.lines)}
     fields["actuator_sigma"] = _read_actuator_sigma(table, actuator_units)
+    fields |= read_kind_fields(table, kind, actuator_units)
     if "group" in table.columns:
         fields["group"] = table.integers("group")
     values: FloatArray | None
@@ -276,8 +288,8 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     names |= {f"actuator_sigma.{name}" for name in names if ACTUATOR.fullmatch(name)}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
-    names |= {f"sigma.{name}" for name in components}
-    pairs = itertools.combinations_with_replacement(components, 2)
+    names |= {f"sigma.{name}" for name in component_names()} | names_of_kinds(table)
+    pairs = itertools.product(component_names(), repeat=2)
     return names | {f"cov.{a}.{b}" for a, b in pairs} | set(names_in(table))
 
 
@@ -285,8 +297,9 @@ def _kind(table: Table, several: tuple[str, ...]) -> Kind:
     """What was measured, by the columns that are there."""
     names = table.columns.keys()
     turned = set(names_in(table)) | (set(_ANGLES) & names)
+    own = kinds_in(table)
     groups = {
-        "distance": {"distance"} & names,
+        **{title: {title} for title in own},
         "x, y, z": ({*_AXES} & names) | turned,
         f"several targets ({', '.join(several)})": set(several),
     }
@@ -295,10 +308,12 @@ def _kind(table: Table, several: tuple[str, ...]) -> Kind:
         raise table.header_error(f"more than one thing measured: {' and '.join(there)}")
     if not there:
         return "closure"
-    if "distance" in names:
-        return "distance"
+    if own:
+        return next(iter(own.values()))
     if several:
         return "position"
+    if turned and names.isdisjoint(_AXES):
+        return "orientation"
     if names.isdisjoint(("x", "y", *turned)):
         return "height"
     return "pose" if turned else "position"
@@ -312,11 +327,11 @@ def _read_values(
     robot: Actuated | None,
 ) -> FloatArray | None:
     """What was measured, (N, k) or (N,); None without columns of it."""
-    if kind == "pose" and names_in(table) not in ((), _ANGLES):
-        places = [_read(table, axis, "mm")[0] for axis in _AXES]
+    if KINDS[kind].turning is not None and names_in(table) not in ((), _ANGLES):
+        places = [_read(table, axis, "mm")[0] for axis in _AXES] if kind == "pose" else []
         nominal = _nominal(robot, actuators)
         return np.column_stack([*places, orientation_columns.read(table, rotation, nominal)])
-    columns = [_read(table, *component, blank=True)[0] for component in KINDS[kind].components]
+    columns = [_read(table, *component, blank=True)[0] for component in value_columns(table, kind)]
     if not columns:
         return None
     return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
@@ -340,7 +355,9 @@ def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
     given = [name for name in table.columns if name.partition(".")[0] in ("sigma", "cov")]
     if not given:
         return None
-    names, units = zip(*KINDS[kind].components, strict=True)
+    if kind == "closure":
+        raise table.header_error(f"column {given[0]!r}: nothing was read that it could be of")
+    names, units = zip(*components_in(table, kind), strict=True)
     pairs = list(itertools.combinations_with_replacement(range(len(names)), 2))
     forms = {
         "one": ["sigma"],
@@ -361,9 +378,9 @@ def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
         for name, (i, j) in zip(forms[form], pairs, strict=True):
             sigma[:, i, j] = sigma[:, j, i] = table.numbers(name, f"{units[i]}*{units[j]}")[0]
         return sigma
-    of = units if form == "each" else units[:1]
+    of, read = units if form == "each" else units[:1], [n for n, _ in value_columns(table, kind)]
     columns = [
-        table.numbers(sigma, unit, like=names[0] if form == "one" else name)[0]
+        table.numbers(sigma, unit, like=read[0] if read and form == "one" else name)[0]
         for sigma, unit, name in zip(forms[form], of, names, strict=False)
     ]
     for name, column in zip(forms[form], columns, strict=True):

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, wrapped
+from pkmcal.arrays import FloatArray, IntArray, mm_per_unit, wrapped
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose
 from pkmcal.measurements import orientation
@@ -91,7 +91,7 @@ def predict(
         Poses at the second place.
     """
     match kind, artefact:
-        case ("distance" | "relative-distance"), _:
+        case (("distance" | "relative-distance"), _):
             return _distances(pose, target, anchor, zero)
         case "touch", "sphere":
             return _distances(pose, target, anchor, zero)
@@ -280,7 +280,14 @@ def by_difference(kind: Kind, derivative: FloatArray, residual: FloatArray) -> F
     return np.concatenate([derivative[:, :first], turning], axis=1)
 
 
-def distance_per_point(residual: FloatArray) -> FloatArray:
-    """How far off each measured point is, mm (N,); of poses their position."""
-    off: FloatArray = np.linalg.norm(residual[:, :3], axis=1)
+def distance_per_point(residual: FloatArray, units: Sequence[str], length: float) -> FloatArray:
+    """How far off each measured point is, mm (N,); of poses their position.
+
+    Where angles alone were read, their arc at a characteristic length, mm.
+    """
+    if "mm" in units:
+        residual = residual[:, np.array(units) == "mm"]
+    elif units:
+        residual = residual * mm_per_unit(units, length)
+    off: FloatArray = np.linalg.norm(residual, axis=1)
     return off
