@@ -21,8 +21,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.calibration.closures import Closures, RowStates
-from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.calibration.closures import RowStates
+from pkmcal.calibration.session_machines import Machines, SessionClosures
 
 _STEPS = 50  # of finding the best poses
 _SETTLED = 1e-12  # share of a pose's cost that a further step would gain
@@ -120,6 +120,16 @@ class Blocks:
             found.append((rest.transpose(0, 2, 1) @ mine).reshape(-1, *width))
         return np.concatenate(found)
 
+    def spread(self, by_unknown: FloatArray, left: FloatArray) -> FloatArray:
+        """Equations (E,) of which so much is left (M,), and nothing for the poses to take."""
+        spread, first = np.zeros(len(self.pose_of)), 0
+        for equations, rest in self.rotations(by_unknown):
+            count, _, most = rest.shape
+            mine = left[first : first + count * most].reshape(count, most, 1)
+            spread[equations] = (rest @ mine)[:, :, 0]
+            first += count * most
+        return spread
+
     def by_groups(
         self,
         by_unknown: FloatArray,
@@ -175,7 +185,7 @@ class Blocks:
         return Shares(squares, freedom, information)
 
     def best(
-        self, closures: Closures, robot: Calibratable, states: RowStates, system: System
+        self, closures: SessionClosures, machines: Machines, states: RowStates, system: System
     ) -> RowStates:
         """The states of least squares, each pose by itself.
 
@@ -183,9 +193,9 @@ class Blocks:
 
         Parameters
         ----------
-        closures : Closures
+        closures : SessionClosures
             What the unknowns are.
-        robot : Calibratable
+        machines : Machines
             With the present numbers.
         states : RowStates
             Where to start.
@@ -209,7 +219,7 @@ class Blocks:
             if settled.all():
                 break
             step[settled] = 0.0
-            trial = closures.moved(robot, states, step)
+            trial = closures.moved(machines, states, step)
             residual_there, by_unknown_there = system(trial)
             cost_there = self._sums(residual_there**2)
             better = ~settled & (cost_there < cost)

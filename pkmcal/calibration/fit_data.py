@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, IntArray, Unit
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.components import KINDS
@@ -51,7 +50,7 @@ class Dependence:
     argument : str
         Its name there.
     role : str
-        What it is to users: "target", "anchor", "attachment", "run", "touch", "mounting".
+        What it is to users: "target", "anchor", "attachment", "run", "angle", "touch", "mounting".
     given : ndarray (N, w)
         Its numbers, as far as they are known.
     sought : mapping of str to Numbers
@@ -98,6 +97,8 @@ class FitData:
         Their numbers in what the user gave, counted through all sets.
     unknown_frame, unknown_target, unknown_attachment : bool
         Which of them `identify` was asked to find along.
+    set_name : str
+        Of the set, where it has a frame or points of its own.
     starts : mapping of (str, str) to Start
         Of all that is always found along, by role and name.
     """
@@ -107,6 +108,7 @@ class FitData:
     unknown_frame: bool
     unknown_target: bool
     unknown_attachment: bool = False
+    set_name: str = ""
     starts: Mapping[tuple[str, str], Start] = field(default_factory=dict)
 
     @property
@@ -120,20 +122,7 @@ class FitData:
         touched = self.measured.touched
         if touched is None:
             return None
-        return np.array([self.start("touch", name).along for name in touched.tolist()])
-
-    def start(self, role: str, name: str) -> Start:
-        """Where the numbers of a role and name start.
-
-        Raises
-        ------
-        ValueError
-            Held-out rows of what no fitted row is of.
-        """
-        if (role, name) not in self.starts:
-            known = did_you_mean(name, (other for _, other in self.starts))
-            raise ArgumentError(f"holdout: {role.partition(' ')[0]} {name!r} was not fitted{known}")
-        return self.starts[role, name]
+        return np.array([self.starts["touch", name].along for name in touched.tolist()])
 
     def dependences(self) -> Iterator[Dependence]:
         """What the readings depend on beside the pose and the frame."""
@@ -145,6 +134,8 @@ class FitData:
             yield self._point("anchor", "anchor", self.unknown_target)
         if m.run is not None:
             yield self._always("zero", "run", (("zero", "mm"),), m.run.tolist())
+        if m.joint is not None:
+            yield self._always("zero", "angle", (("zero", "rad"),), [m.joint] * len(m))
         if m.kind == "tilt" or (m.kind == "orientation" and self.unknown_target):
             yield self._always("mounting", "mounting", _ANGLES, [""] * len(m))
         if m.touched is not None:
@@ -188,7 +179,7 @@ class FitData:
         """What is never known before: `numbers` are the argument's, `names` (N,) whose they are."""
         sought = {}
         for name in dict.fromkeys(names):
-            start = self.start(role, name)
+            start = self.starts[role, name]
             chosen = [numbers[slot] for slot in start.slots]
             whose = ".".join(filter(None, (role.partition(" ")[0], name)))
             sought[name] = Numbers(

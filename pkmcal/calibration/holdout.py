@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.labels import Labels, labels
-from pkmcal.calibration.mode_slips import in_their_modes
+from pkmcal.calibration.later import Later, OwnNumbers, compared, later
 from pkmcal.calibration.uncertainty import Uncertainty, stated_variances
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
@@ -26,6 +26,8 @@ from pkmcal.statistics.holdout_test import HoldoutTest, Lengths, holdout_test
 from pkmcal.statistics.linear_fit import numbered
 from pkmcal.statistics.noise import Noise, noise
 
+_LOOSE = 1e-6  # share of a number in combinations that its session's rows do not show
+_NOTHING = 1e-6  # share of a variance below which nothing is left of a reading
 _ODD = 0.01  # chance of naming any held-out row that is as far off as expected
 
 
@@ -51,10 +53,12 @@ class HeldOut:
         The distances in short.
     test : HoldoutTest or None
         Whether they contradict the fit; None where that cannot be said.
-    data : tuple of FitData
-        The sets of measurements.
-    like : tuple of int
-        The fitted set of each.
+    later : Later or None
+        The rows.
+    end : Evaluation or None
+        They at the estimate, their own parameters found.
+    own : mapping of str to (float, float)
+        These parameters, of sessions that were not fitted: value and standard deviation.
     drawn : bool
         Whether they are of the same measurements as the fitted points, drawn at random.
     """
@@ -70,9 +74,15 @@ class HeldOut:
     before: Distances = field(default_factory=Distances)
     after: Distances = field(default_factory=Distances)
     test: HoldoutTest | None = None
-    data: tuple[FitData, ...] = ()
-    like: tuple[int, ...] = ()
+    later: Later | None = None
+    end: Evaluation | None = None
+    own: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     drawn: bool = False
+
+    @property
+    def data(self) -> tuple[FitData, ...]:
+        """The sets of measurements."""
+        return () if self.later is None else self.later.data
 
     @property
     def contradicts(self) -> bool:
@@ -116,12 +126,13 @@ def evaluate(
     """
     if not held:
         return HeldOut()
-    parameters = estimator.equations.parameters
-    equations = Equations([data for data, _ in held], parameters).commanded()
-    after = in_their_modes(equations, equations.at(estimate.evaluation.theta))
-    before = equations.at(estimator.start.theta)
+    rows = later(estimator.equations.parameters, held)
+    equations = rows.equations(estimator.equations).commanded()
+    before = equations.start(rows.at(estimator.start.theta), rows.own)
+    after, own = compared(rows, equations, estimate, uncertainty)
+    rows = replace(rows, parameters=equations.parameters)  # their own frames have been laid
     named = labels(equations)
-    points = _points(equations, after, named, [like for _, like in held], uncertainty)
+    points = _points(rows, equations, after, named, own, uncertainty)
     row = named.row[named.length]
     count = len(equations.rows)
     off_before, off = equations.distances(before), equations.distances(after)
@@ -144,8 +155,9 @@ def evaluate(
         before=distances(off_before, odd),
         after=distances(off, odd),
         test=_test(points, named, good[row], uncertainty) if usable else None,
-        data=tuple(data for data, _ in held),
-        like=tuple(like for _, like in held),
+        later=rows,
+        end=after,
+        own=_own_numbers(rows, equations, after, own, uncertainty),
     )
 
 
@@ -154,19 +166,20 @@ class _Points:
     """Lengths (M,) of the points held out; of a pose its position.
 
     Residuals and design in mm, the variance of a reading and of what actuators add to it in mm²,
-    and the fitted set that each is like.
+    the share of each that numbers of its own session took, and the fitted set that each is like.
     """
 
     residual: FloatArray
     design: FloatArray
     reading: FloatArray
     by_actuators: FloatArray
+    taken: FloatArray
     like: IntArray
 
     @property
     def own(self) -> FloatArray:
-        """Variance of a length whatever the parameters are."""
-        return self.reading + self.by_actuators
+        """Variance of a residual whatever the parameters of the fit are."""
+        return (self.reading + self.by_actuators) * (1.0 - self.taken)
 
     def by_fit(self, uncertainty: Uncertainty) -> FloatArray:
         """Variance that the parameters' errors add."""
@@ -177,35 +190,91 @@ class _Points:
 
 
 def _points(
+    rows: Later,
     equations: Equations,
     after: Evaluation,
     named: Labels,
-    like: Sequence[int],
+    own: OwnNumbers | None,
     uncertainty: Uncertainty,
 ) -> _Points:
     """The lengths at the solution."""
-    scale = equations.parameters.scale
-    by_actuators = after.robot.actuator_twists(after.pose, after.actuators)
+    like = rows.like
+    by_actuators = after.machines.actuator_twists(after.states)
     variances, added = [], []
     for i, measured in enumerate(equations.sets):
-        rows, k = after.residuals[i].shape
+        count, k = after.residuals[i].shape
         variances.append(np.repeat(_variances(measured, uncertainty, like[i]), k))
         sigma = _of_actuators(measured, after.robot, uncertainty)
         moved = after.predicted[i].by_twist @ by_actuators[equations.pose_of[i]]
-        part = np.zeros((rows, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
+        part = (
+            np.zeros((count, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
+        )
         added.append(part.ravel())
-    jacobian = [part.reshape(-1, part.shape[2]) for part in equations.jacobian(after)]
+    jacobian = np.concatenate([
+        part.reshape(-1, part.shape[2]) for part in equations.jacobian(after)
+    ])[equations.present]  # fmt: skip
+    back = uncertainty.fit.back
+    design = rows.by_fitted(jacobian * equations.parameters.scale, len(back)) @ back
+    taken = np.zeros(len(design))
+    if own is not None:
+        design -= _followed(equations, after, own, rows, back)
+        taken = own.leverage
 
     def lengths(parts: Sequence[FloatArray]) -> FloatArray:
         return np.concatenate(parts)[equations.present][named.length]
 
     return _Points(
         residual=lengths([part.ravel() for part in after.residuals]),
-        design=(lengths(jacobian) * scale) @ uncertainty.fit.back,
+        design=design[named.length],
         reading=lengths(variances),
         by_actuators=lengths(added),
+        taken=taken[named.length],
         like=np.array(like)[named.set_of[named.length]],
     )
+
+
+def _followed(
+    equations: Equations,
+    after: Evaluation,
+    own: OwnNumbers,
+    rows: Later,
+    back: FloatArray,
+) -> FloatArray:
+    """What their own numbers take of errors of the fitted ones: (M, p), mm and rad."""
+    whitened = equations.by_parameters(after, own.noise) * equations.parameters.scale
+    design = rows.by_fitted(whitened, len(back)) @ back
+    columns = [
+        np.concatenate([part.ravel() for part in equations.unwhiten(column, own.noise)])
+        for column in (design - own.left(design)).T
+    ]
+    followed: FloatArray = np.array(columns).reshape(len(columns), -1).T
+    return followed[equations.present]
+
+
+def _own_numbers(
+    rows: Later,
+    equations: Equations,
+    after: Evaluation,
+    own: OwnNumbers | None,
+    uncertainty: Uncertainty,
+) -> dict[str, tuple[float, float]]:
+    """Values and deviations of parameters that the fit has not; inf where nothing shows them."""
+    if own is None:
+        return {}
+    chosen, mine = equations.parameters, np.flatnonzero(rows.own)
+    whitened = equations.by_parameters(after, own.noise) * chosen.scale
+    design = rows.by_fitted(whitened, len(uncertainty.fit.back)) @ uncertainty.fit.back
+    pulled = own.half @ (own.taken.T @ design)
+    spare = len(whitened) - own.half.shape[1]
+    matrix = own.half @ own.half.T + pulled @ uncertainty.by_cluster @ pulled.T
+    rates = (chosen.reported_rates(after.theta) * chosen.scale)[np.ix_(mine, mine)]
+    deviation = np.sqrt(np.maximum(np.diagonal(rates @ matrix @ rates.T), 0.0))
+    projector = own.half @ np.linalg.pinv(own.half)
+    loose = np.diagonal(projector) < 1.0 - _LOOSE
+    deviation[loose | (not uncertainty.known) | (spare < 0)] = np.inf
+    values = chosen.reported(after.theta)[mine].tolist()
+    names = [chosen.names[c] for c in mine]
+    return dict(zip(names, zip(values, deviation.tolist(), strict=True), strict=True))
 
 
 def _variances(measured: Measurements, uncertainty: Uncertainty, like: int) -> FloatArray:
@@ -235,7 +304,7 @@ def _test(
 ) -> HoldoutTest | None:
     """Test lengths of the rows that were reached; None where their noise is not known."""
     own = points.own[good]
-    if not (own > 0).all():
+    if not (own > _NOTHING * np.median(own)).all():
         return None
     fitted, split = _fitted_lengths(uncertainty, np.unique(points.like))
     unit = np.sqrt(own)
@@ -249,7 +318,8 @@ def _test(
     # rows at the same actuators have their errors in common
     common = split.shared + float(np.mean(points.by_actuators[good] / own)) * split.total
     of_held = Noise(split.total, min(common, split.total))
-    return holdout_test(fitted, held, split, uncertainty.by_cluster, of_held)
+    taken = float(points.taken[good].mean())
+    return holdout_test(fitted, held, split, uncertainty.by_cluster, of_held, taken)
 
 
 def _fitted_lengths(uncertainty: Uncertainty, sets: IntArray) -> tuple[Lengths, Noise]:

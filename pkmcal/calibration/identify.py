@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.arguments import instance, word
+from pkmcal.arguments import word, words
 from pkmcal.arms.arm import SerialArm
-from pkmcal.calibration.closures import has_equations
+from pkmcal.calibration.datasets import as_fit_data, as_fitted, by_set, informative
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
@@ -28,7 +28,7 @@ from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
-from pkmcal.calibration.parameters import KNOWN, Bounds, Known, Prior, parameters
+from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior, parameters
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
     contradicted_prior,
@@ -36,14 +36,14 @@ from pkmcal.calibration.plausibility import (
     implausible_changes,
     insufficient_data,
     likely_unit_errors,
+    shrunk,
 )
 from pkmcal.calibration.row_errors import likely_row_errors
-from pkmcal.calibration.starts import known_distances, with_starts
+from pkmcal.calibration.starts import known_distances
 from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import Calibratable, as_given, as_machine
-from pkmcal.measurements.components import KINDS
+from pkmcal.measurements.calibratable import as_given, as_machine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import RULES, CovarianceRule
 
@@ -64,6 +64,7 @@ def identify(
     bounds: Bounds = None,
     attachment: Known | Sequence[Known] = "known",
     covariance: CovarianceRule = "auto",
+    per_session: str | Sequence[str] = (),
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -88,12 +89,14 @@ def identify(
         Weight of rows with large residuals, by the length of the whole measured vector.
     frame : {"known", "unknown"} or a sequence of them
         Whether the instrument's frame is the robot's base frame or is to be found: six parameters
-        ``frame.x`` … ``frame.gamma``, the pose of the base in the instrument's frame. With
-        several sets one word each, if not the same for all. No start near it is needed.
+        ``frame.x`` … ``frame.gamma``, the pose of the base in the instrument's frame. Of several
+        sets one word says that all have the same frame; one word each, that each unknown one is
+        another, ``frame.x@2``. No start near it is needed.
     target : {"known", "unknown"} or a sequence of them
         Whether the measured points of the platform are known or to be found, from where
         `Measurements.target` puts them: ``target1.x`` …; for distances the fixed point,
-        ``anchor1.x`` …; for orientations how the sensor is mounted, ``mounting.alpha`` ….
+        ``anchor1.x`` …; for orientations how the sensor is mounted, ``mounting.alpha`` …. One
+        word, or one each, as for frames.
     holdout : float or Measurements, optional
         A fraction of the poses of each set, drawn at random with repeats kept together, or other
         measurements: they are not fitted, only compared.
@@ -107,6 +110,12 @@ def identify(
         several targets and repeats do. "classical": all errors are independent. "auto": cluster
         where the residuals show a shared error or the loss is robust, else classical. The values
         are the same.
+    per_session : str or sequence of str
+        Names or wildcards, ``"offset*"``, ``"frame*"``, of what is found anew in each
+        `Measurements.session`: ``offset5@thursday``. A set without sessions is one, named after its
+        file or counted from 1. All else is common. Priors and bounds hold for each session's
+        number; of a session that is held out such numbers are found from its rows, before these
+        are compared with the fit.
 
     Returns
     -------
@@ -139,17 +148,20 @@ def identify(
     0.3
     """
     machine = as_machine(robot)
-    datasets, unread = _informative(
-        machine, _datasets(machine, measurements, frame, target, attachment)
+    unknown = {"frame": frame, "target": target, "attachment": attachment}
+    anew = words("per_session", per_session)
+    asked = Asked(free, prior, bounds, anew, by_set(unknown))
+    datasets, unread = informative(
+        machine, as_fit_data(machine, measurements, unknown, sessions=bool(anew))
     )
     held: list[tuple[FitData, int]] = []
     if isinstance(holdout, Measurements):
-        held = [_as_fitted(machine, holdout, datasets)]
+        held = [as_fitted(machine, holdout, datasets, sessions=bool(anew))]
     elif holdout is not None:
         pairs = [draw(data, holdout) for data in datasets]
         datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
     datasets += known_distances(datasets)
-    chosen = parameters(machine, datasets, free, prior, bounds)
+    chosen = parameters(machine, datasets, asked)
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
     equations = Equations(datasets, chosen, unread)
@@ -206,6 +218,7 @@ def _warnings(
     notes += in_other_modes(equations, fit.end)
     notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
+    notes += shrunk(equations, fit.start, fit.end)
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():
@@ -241,99 +254,6 @@ def _remedy(result: Identification) -> str:
     return cure
 
 
-def _datasets(
-    robot: Calibratable,
-    measurements: Measurements | Sequence[Measurements],
-    frame: Known | Sequence[Known],
-    target: Known | Sequence[Known],
-    attachment: Known | Sequence[Known],
-) -> list[FitData]:
-    sets = list(measurements) if isinstance(measurements, Iterable) else [measurements]
-    for measured in sets:
-        _check(robot, measured, "measurements")
-    if not sets:
-        raise ArgumentError("measurements: none given")
-    datasets, first = [], 0
-    said = {"frame": frame, "target": target, "attachment": attachment}
-    unknown = zip(*(_unknown(name, given, len(sets)) for name, given in said.items()), strict=True)
-    for measured, unknowns in zip(sets, unknown, strict=True):
-        datasets.append(FitData(measured, np.arange(first, first + len(measured)), *unknowns))
-        first += len(measured)
-    datasets = with_starts(robot, datasets)
-    known = [data.measured.actuator_sigma is not None for data in datasets]
-    if any(known) and not all(known):
-        raise ArgumentError("measurements: state actuator_sigma of all sets, or of none")
-    if any(data.unknown_frame for data in datasets) and not any(data.framed for data in datasets):
-        raise ArgumentError("frame: distances do not depend on it, it cannot be unknown")
-    distances = any(KINDS[data.measured.kind].point == "base" for data in datasets)
-    if any(data.unknown_attachment for data in datasets) and not distances:
-        raise ArgumentError("attachment: distances alone have one, it cannot be unknown")
-    return datasets
-
-
-def _informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[FitData], int]:
-    """Leave rows out that say nothing: unread, where poses follow from the actuators exactly.
-
-    And count them.
-    """
-    if has_equations(machine, [data.measured.actuator_sigma for data in datasets]):
-        return datasets, 0
-    kept, unread = [], 0
-    for data in datasets:
-        values = data.measured.values.reshape(len(data.measured), -1)
-        read = np.isfinite(values).any(axis=1)
-        unread += int((~read).sum())
-        if read.all():
-            kept.append(data)
-        elif read.any():
-            measured = data.measured.select(read)
-            kept.append(replace(data, measured=measured, rows=data.rows[read]))
-    if not kept:
-        raise ArgumentError(
-            f"measurements: nothing was read but the actuators; poses of {machine.name} follow from"
-            " these, which then say nothing of its geometry: measure poses, points, heights or"
-            " distances"
-        )
-    return kept, unread
-
-
-def _as_fitted(
-    robot: Calibratable, holdout: Measurements, datasets: Sequence[FitData]
-) -> tuple[FitData, int]:
-    """Hold other measurements out, with what is unknown of the fitted set of their kind.
-
-    And with the noise of its actuators, where their own is not stated.
-    """
-    _check(robot, holdout, "holdout")
-    alike = [i for i, data in enumerate(datasets) if data.measured.kind == holdout.kind]
-    i = alike[0] if alike else 0
-    of_actuators = datasets[i].measured.actuator_sigma
-    if holdout.actuator_sigma is None and of_actuators is not None:
-        holdout = replace(holdout, actuator_sigma=np.sqrt(np.mean(of_actuators**2, axis=0)))
-    return replace(datasets[i], measured=holdout, rows=np.arange(len(holdout))), i
-
-
-def _check(robot: Calibratable, measured: Measurements, argument: str) -> None:
-    n = instance(argument, measured, Measurements).actuators.shape[1]
-    if n != robot.n_actuators:
-        raise ArgumentError(
-            f"{argument}: {robot.name} has {robot.n_actuators} actuators, found {n} per row"
-        )
-    if measured.actuator_units not in (None, robot.actuator_units):
-        raise ArgumentError(
-            f"{argument}: the actuators of {robot.name} are in {', '.join(robot.actuator_units)},"
-            f" found {', '.join(measured.actuator_units or ())}"
-        )
-
-
-def _unknown(argument: str, given: str | Sequence[str], count: int) -> list[bool]:
-    alone = isinstance(given, str) or not isinstance(given, Iterable)
-    said = [given] * count if alone else list(given)
-    if len(said) != count:
-        raise ArgumentError(f"{argument}: one word for each of {count} sets, found {len(said)}")
-    return [word(argument, each, KNOWN) == "unknown" for each in said]
-
-
 def _result(
     estimator: Estimator,
     estimate: Estimate,
@@ -343,15 +263,14 @@ def _result(
     sure: Uncertainty,
 ) -> Identification:
     chosen, search = estimator.equations.parameters, estimator.search
-    robot = as_given(chosen.robot.replace(chosen.values_at(estimate.evaluation.theta)))
-    if isinstance(robot, Robot):
-        robot = robot.closing(commanded.actuators, estimate.evaluation.pose)
     end = estimate.evaluation
+    robots = _robots(commanded, end)
     if commanded is not estimator.equations:
         commanded.warm_start(end)
         end = commanded.at(end.theta)
     return Identification(
-        robot=robot,
+        robot=robots[chosen.sessions[-1] if chosen.sessions else ""],
+        robots=_of_sessions(robots, held),
         prior_test=tested_prior(estimator, estimate),
         table=parameter_table(estimator, estimate, sure),
         identifiability=identifiability(estimator, estimate),
@@ -361,3 +280,30 @@ def _result(
         search=SearchRecord(search.converged, search.evaluations, tuple(search.history)),
         fit=Fit(commanded, start, end, estimate, sure),
     )
+
+
+def _of_sessions(
+    robots: Mapping[str, Robot | SerialArm], held: HeldOut
+) -> dict[str, Robot | SerialArm]:
+    """The machines of all sessions by name, those that were held out with them."""
+    found = {name: robot for name, robot in robots.items() if name}
+    if found and held.later is not None and held.end is not None:
+        chosen = held.later.parameters
+        for name in chosen.sessions:
+            if name not in found:
+                values = chosen.values_at(held.end.theta, chosen.geometry_of(name))
+                found[name] = as_given(chosen.robot.replace(values))
+    return found
+
+
+def _robots(commanded: Equations, end: Evaluation) -> dict[str, Robot | SerialArm]:
+    """The machine of each session, "" where there are none, at the parameters of an evaluation."""
+    chosen, found = commanded.parameters, {}
+    for session in chosen.sessions or ("",):
+        columns = chosen.geometry_of(session)
+        robot = as_given(chosen.robot.replace(chosen.values_at(end.theta, columns)))
+        own = (commanded.machine_columns == columns).all(axis=1)[commanded.machine_of_pose]
+        if isinstance(robot, Robot):
+            robot = robot.closing(commanded.actuators[own], end.pose[own])
+        found[session] = robot
+    return found

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.loss import Loss
@@ -24,9 +24,13 @@ class Search:
         What is fitted.
     start : Evaluation
         θ0, where all rows are reached.
+    columns : ndarray of int, optional
+        The parameters that are found, n of them; all by default. The others stay at θ0.
 
     Attributes
     ----------
+    scale : ndarray (n,)
+        That of `Parameters`.
     prior : ndarray (p, n)
         A row for each parameter with a prior, in units of its deviation.
     evaluations : int
@@ -38,12 +42,18 @@ class Search:
         the closures where nothing else was read.
     """
 
-    def __init__(self, equations: Equations, start: Evaluation) -> None:
+    def __init__(
+        self, equations: Equations, start: Evaluation, columns: IntArray | None = None
+    ) -> None:
         parameters = equations.parameters
-        self.equations, self.start, self.scale = equations, start, parameters.scale
-        self.prior = parameters.prior_rows
-        self._centre = self.prior @ ((parameters.start - start.theta) / self.scale)
-        lower, upper = ((end - start.theta) / self.scale for end in parameters.bounds)
+        self._found: IntArray | slice = slice(None) if columns is None else columns
+        self.equations, self.start = equations, start
+        self.scale = parameters.scale[self._found]
+        rows = parameters.prior_rows[:, self._found]
+        self.prior = rows[rows.any(axis=1)]
+        away = (parameters.start - start.theta)[self._found] / self.scale
+        self._centre = self.prior @ away
+        lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
         self._method: Literal["trf", "lm"] = "trf" if bounded else "lm"
@@ -59,7 +69,9 @@ class Search:
         """The equations at scaled parameters (n,), poses found with this noise (G,)."""
         same = not self.equations.closures.unknowns or np.array_equal(noise, self._last[1])
         if not (same and np.array_equal(u, self._last[0])):
-            there = self.equations.at(self.start.theta + self.scale * u, noise)
+            theta = self.start.theta.copy()
+            theta[self._found] += self.scale * u
+            there = self.equations.at(theta, noise)
             self._last = (u.copy(), noise, there)
             self.evaluations += 1
         return self._last[2]
@@ -75,7 +87,7 @@ class Search:
             It does not exist, at a singularity of the machine.
         """
         equations = self.equations
-        jacobian = equations.by_parameters(evaluation, noise) * self.scale
+        jacobian = equations.by_parameters(evaluation, noise)[:, self._found] * self.scale
         if aside is not None:
             jacobian[np.repeat(aside, equations.components)] = 0.0
         if not np.isfinite(jacobian).all():

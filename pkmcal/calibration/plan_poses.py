@@ -16,7 +16,7 @@ from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identifiability import as_sum, sparse_basis
 from pkmcal.calibration.optimal_design import CRITERIA, Criterion, Design
-from pkmcal.calibration.parameters import Parameters, Prior, parameters
+from pkmcal.calibration.parameters import Asked, Parameters, Prior, parameters
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError
@@ -298,7 +298,7 @@ def _equations(
         index = np.tile(np.arange(count), len(q))
         measured = replace(measured, target=several, target_index=index)
     data = FitData(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
-    return Equations([data], parameters(robot, [data], free, prior, None)).commanded()
+    return Equations([data], parameters(robot, [data], Asked(free, prior))).commanded()
 
 
 def _design(

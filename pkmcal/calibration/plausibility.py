@@ -8,13 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit, rms
+from pkmcal.arguments import instance
+from pkmcal.arrays import BoolArray, FloatArray, largest_first, mm_per_unit, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.parameters import Parameters
-from pkmcal.display import chance_text, first_rows
+from pkmcal.display import chance_text, first_rows, printable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.prior_test import PriorTest
@@ -24,9 +25,10 @@ FAR = 0.25  # share of the machine's size by which errors of manufacture do not 
 _BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
 _LEAST_FREEDOM = 0.5  # degrees of freedom from which residuals show how good a fit is
 MISFIT_RATIO = 0.2  # of the misfit that another reading may leave to be named as what was meant
+_SHRUNK = 0.02  # share of its size by which errors of manufacture do not shrink a machine
 _REMOTE = 3.0  # times a machine's reach within which a point of its platform is
 _PULLED = 2.0  # times what is expected, from which a pull on a prior is worth a word
-_ALIKE = 1e-6  # share by which misfits differ that are not equal
+_ALIKE = 1e-6  # share by which misfits, or pulls, differ that are not equal
 _FACTORS = {
     "mm": (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)),
     "rad": (
@@ -123,13 +125,13 @@ def beyond_strokes(equations: Equations, start: Evaluation, end: Evaluation) -> 
     Both with the nominal machine, whose offsets may be unknown, and with the identified one,
     which may have been misled.
     """
-    robot, calibrated = start.robot, end.robot
-    if not isinstance(robot, Robot) or not isinstance(calibrated, Robot):
+    robot = start.robot
+    if not isinstance(robot, Robot):
         return []  # the file of an arm states no strokes
-    out = _out_of_stroke(calibrated, calibrated.feasible(end.pose).drive)
+    out = _out_of_stroke(robot, _drives(end))
     if not out.any():
         return []
-    drive = robot.feasible(start.pose).drive
+    drive = _drives(start)
     out &= _out_of_stroke(robot, drive)
     if not out.any():
         return []
@@ -152,6 +154,13 @@ def beyond_strokes(equations: Equations, start: Evaluation, end: Evaluation) -> 
     ]
 
 
+def _drives(evaluation: Evaluation) -> FloatArray:
+    """Drive coordinates (K, limbs) at the poses, each of its session's machine."""
+    return evaluation.machines.joined(
+        lambda robot, own: instance("robot", robot, Robot).feasible(evaluation.pose[own]).drive
+    )
+
+
 def _out_of_stroke(robot: Robot, drive: FloatArray) -> BoolArray:
     """Which drives (K, limbs) are beyond their strokes by more than errors explain."""
     strokes = [limb.stroke or (-np.inf, np.inf) for limb in robot.model.limbs]
@@ -163,8 +172,7 @@ def _out_of_stroke(robot: Robot, drive: FloatArray) -> BoolArray:
 
 def implausible_changes(start: Evaluation, end: Evaluation, parameters: Parameters) -> list[str]:
     """Find numbers of the geometry that moved further than errors of manufacture explain."""
-    k = len(parameters.places)
-    moved = np.abs((end.theta - start.theta) / parameters.scale)[:k]
+    moved = np.abs((end.theta - start.theta) / parameters.scale)[parameters.geometry]
     far = np.flatnonzero(moved > FAR * parameters.robot.length)
     if not len(far):
         return []
@@ -185,19 +193,49 @@ def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
     lengths = np.abs(geometry.values[np.array(geometry.units) == "mm"]).max(initial=0.0)
     size = _REMOTE * max(reach, parameters.robot.length, float(lengths))
     found = []
-    for (role, name), first in parameters.found_along.items():
+    for (role, point), number in parameters.found_along.items():
         if role not in ("target", "attachment"):
             continue
-        place = end.theta[first : first + 3]
-        moved = float(np.linalg.norm(place - parameters.start[first : first + 3]))
-        far = float(np.linalg.norm(place))
-        if min(moved, far) > size:
+        for first in np.flatnonzero(parameters.number_of == number).tolist():
+            place = end.theta[first : first + 3]
+            moved = float(np.linalg.norm(place - parameters.start[first : first + 3]))
+            far = float(np.linalg.norm(place))
+            if min(moved, far) <= size:
+                continue
+            behind = parameters.names[first].partition("@")[2]
+            name = f"{point} of {printable(behind)}" if behind else point
             found.append(
                 f"{role} {name} was found {far:.3g} mm from the platform's origin, beyond the"
                 f" machine's size ({size:.0f} mm): measure poses that turn more, or state where it"
                 " is"
             )
     return found
+
+
+def shrunk(equations: Equations, start: Evaluation, end: Evaluation) -> list[str]:
+    """Say where a machine that touches has become smaller, which makes all of its misfits smaller.
+
+    That a point, a line or a plane was touched again says nothing of how large the machine is.
+    """
+    kinds = {measured.kind for measured in equations.sets}
+    if not kinds <= {"touch", "orientation", "tilt", "angle", "closure"}:
+        return []  # some length was read
+    rows = np.concatenate([
+        place for m, place in zip(equations.sets, equations.pose_of, strict=True) if m.kind == "touch"
+    ] or [np.empty(0, dtype=np.intp)])  # fmt: skip
+    if not len(rows):
+        return []
+    spans = []
+    for evaluation in (start, end):
+        places = evaluation.pose[rows, :3]
+        spans.append(rms(np.linalg.norm(places - places.mean(axis=0), axis=1)))
+    share = 1.0 - spans[1] / spans[0]
+    if share < _SHRUNK:
+        return []
+    return [
+        f"the poses lie {100 * share:.2g} % closer together than before: touches alone do not say"
+        " how large a machine is, state touch_distances or measure a length as well"
+    ]
 
 
 def contradicted_prior(
@@ -208,7 +246,7 @@ def contradicted_prior(
         return []
     pulls = np.nan_to_num(test.pulls)
     stated = [i for i, sigma in enumerate(parameters.prior) if np.isfinite(sigma)]
-    worst = [k for k in np.argsort(-np.abs(pulls), kind="stable")[:3] if abs(pulls[k]) > _PULLED]
+    worst = [k for k in largest_first(np.abs(pulls), _ALIKE)[:3] if abs(pulls[k]) > _PULLED]
     shown = ", ".join(f"{parameters.names[stated[k]]} {abs(pulls[k]):.1f}" for k in worst)
     pulled = f" and pull {shown} times as far as prior and noise let expect" if worst else ""
     return [

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
+from pkmcal.calibration import joint_angles
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.parameters import Parameters
+from pkmcal.calibration.sessions import NONE
 from pkmcal.measurements import orientation
+from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import Predicted, difference, predict
+from pkmcal.measurements.observation import Predicted, difference, joined, predict, read_angles
 
 ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
 
@@ -41,6 +45,12 @@ class Readings:
         Which pose each row of each set is at.
     other_of : list of ndarray of int or None
         At which other pose it ends, of distances between two.
+    spread : Spread
+        Which parameters hold in each row.
+    machine_columns : ndarray of int (S, g)
+        The parameters of the geometry of each machine: one, or one a session.
+    machine_of_pose, command_of_pose : ndarray of int (K,)
+        Which of them each pose is of, and which poses are at the same actuators.
     set_of : ndarray of int (N,)
         Which set each row is of.
     count : ndarray of int (N,)
@@ -55,30 +65,55 @@ class Readings:
         self.sets = tuple(data.measured for data in datasets)
         self.rows = np.concatenate([data.rows for data in datasets])
         self.parameters = parameters
+        self.spread = parameters.spread(datasets)
         self._framed = [data.framed for data in datasets]
+        self._frames = [self._frames_of(i) for i in range(len(datasets))]
         depend = [list(data.dependences()) for data in datasets]
         self._given = [{each.argument: each.given for each in mine} for mine in depend]
-        self._columns = [  # of the numbers that are found along
-            {each.argument: parameters.columns_of(each) for each in mine if each.sought}
+        self._numbers = [  # that are found along, by what `predict` calls them
+            {each.argument: parameters.numbers_of(each) for each in mine if each.sought}
             for mine in depend
+        ]
+        self._columns = [  # the parameters that these are
+            {
+                name: np.where(
+                    numbers == NONE,
+                    NONE,
+                    np.take_along_axis(self.spread.columns[part], numbers, axis=1),
+                )
+                for name, numbers in of_set.items()
+            }
+            for of_set, part in zip(self._numbers, self.spread.part_of, strict=True)
         ]
         self._along = [data.along for data in datasets]
         # several targets or repeats at the same actuators are one pose
-        seconds = [m for m in self.sets if m.other is not None]
+        double = [i for i, m in enumerate(self.sets) if m.other is not None]
         actuators = np.concatenate([
             *(m.actuators for m in self.sets),
-            *(m.other for m in seconds if m.other is not None),
+            *(m.other for m in self.sets if m.other is not None),
         ])  # fmt: skip
-        noises = [m.actuator_sigma for m in (*self.sets, *seconds)]
+        noises = [m.actuator_sigma for m in (*self.sets, *(self.sets[i] for i in double))]
         stated = [sigma for sigma in noises if sigma is not None]
-        key = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
-        distinct, inverse = np.unique(key, axis=0, return_inverse=True)
-        n = actuators.shape[1]
+        commands = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
+        self.machine_columns, machine_of = self.spread.machines(len(parameters.places))
+        machine = np.concatenate([*machine_of, *(machine_of[i] for i in double)])
+        # machines of different sessions are not at the same pose at the same actuators
+        several = len(self.machine_columns) > 1
+        key = np.column_stack([commands, machine]) if several else commands
+        distinct, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        n, width = actuators.shape[1], commands.shape[1]
         self.actuators = np.ascontiguousarray(distinct[:, :n])
-        self.actuator_sigma = np.ascontiguousarray(distinct[:, n:]) if stated else None
-        edges = np.cumsum([0, *map(len, self.sets), *map(len, seconds)])
+        self.actuator_sigma = np.ascontiguousarray(distinct[:, n:width]) if stated else None
+        self.machine_of_pose: IntArray = machine[first]
+        self.command_of_pose: IntArray = (
+            np.unique(distinct[:, :width], axis=0, return_inverse=True)[1].reshape(-1)
+            if several
+            else np.arange(len(distinct))
+        )
+        count = [len(m) for m in self.sets]
+        edges = np.cumsum([0, *count, *(count[i] for i in double)])
         place = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
-        self.pose_of, there = place[: len(self.sets)], iter(place[len(self.sets) :])
+        self.pose_of, there = place[: len(count)], iter(place[len(count) :])
         self.other_of = [None if m.other is None else next(there) for m in self.sets]
         self.deviations = tuple(np.ones(len(m.components)) for m in self.sets)
         self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
@@ -86,34 +121,100 @@ class Readings:
             np.isfinite(m.values).reshape(-1) for m in self.sets
         ])  # fmt: skip
         self._whole = bool(self.present.all())
-        self.set_of = np.repeat(np.arange(len(self.sets)), [len(m) for m in self.sets])
+        self.set_of = np.repeat(np.arange(len(self.sets)), count)
         self.count = np.concatenate([
             np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in self.sets
         ])  # fmt: skip
 
-    def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
-        """Readings of each set at poses (K, 6)."""
-        frame = self.parameters.frame_at(theta)
-        return tuple(
-            predict(
-                measured.kind,
-                pose[self.pose_of[i]],
-                frame=frame if self._framed[i] else None,
-                origin=self.parameters.origin,
-                artefact=measured.artefact,
-                along=self._along[i],
-                other=None if (other := self.other_of[i]) is None else pose[other],
-                **self._arguments(i, theta),
-            )
-            for i, measured in enumerate(self.sets)
-        )
+    def _frames_of(self, i: int) -> list[tuple[int, IntArray]]:
+        """The first parameter of each frame of a set, and the rows that have it."""
+        number = self.parameters.frame
+        if number is None or not self._framed[i]:
+            return []
+        first = self.spread.columns[self.spread.part_of[i], number]
+        return [(int(each), np.flatnonzero(first == each)) for each in np.unique(first)]
 
-    def _arguments(self, i: int, theta: FloatArray) -> dict[str, FloatArray]:
-        """What the readings of set `i` depend on beside the pose, (N, w) each."""
+    @property
+    def frames(self) -> dict[int, dict[int, IntArray]]:
+        """Rows of each set that have each frame, by its first parameter."""
+        found: dict[int, dict[int, IntArray]] = {}
+        for i, frames in enumerate(self._frames):
+            for first, rows in frames:
+                found.setdefault(first, {})[i] = rows
+        return found
+
+    def columns_of(self, i: int, name: str) -> IntArray | None:
+        """Parameters (N, w) of what rows of set `i` depend on; None where all of it is given.
+
+        `name` is what `predict` calls it.
+        """
+        return self._columns[i].get(name)
+
+    def arguments_of(self, i: int, theta: FloatArray) -> dict[str, FloatArray]:
+        """What readings of set `i` depend on beside the pose, (N, w) each, for `predict`."""
         found = dict(self._given[i])
         for name, columns in self._columns[i].items():
-            found[name] = np.where(columns < 0, found[name], theta[columns])
+            found[name] = np.where(columns == NONE, found[name], theta[columns])
         return found
+
+    def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
+        """Readings of each set at poses (K, 6)."""
+        return tuple(self._predicted_of(i, pose, theta) for i in range(len(self.sets)))
+
+    def _predicted_of(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
+        places, measured = self.arguments_of(i, theta), self.sets[i]
+        kind, mine, there = measured.kind, pose[self.pose_of[i]], self.other_of[i]
+        touching = (measured.artefact, self._along[i])
+        if measured.joint is not None:
+            return read_angles(self._angles(i, pose, theta), **places)
+        if not self._frames[i]:
+            return predict(
+                kind,
+                mine,
+                touching=touching,
+                other=None if there is None else pose[there],
+                **places,
+            )
+        parts = [
+            predict(
+                kind,
+                mine[rows],
+                frame=theta[first : first + 6],
+                origin=self.parameters.origin[first],
+                touching=touching,
+                **{name: place[rows] for name, place in places.items()},
+            )
+            for first, rows in self._frames[i]
+        ]
+        return joined(parts, [rows for _, rows in self._frames[i]])
+
+    def _angles(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray:
+        """Angles (N,) of the passive joint that set `i` reads."""
+        measured, joint = self.sets[i], str(self.sets[i].joint)
+        found = np.empty(len(measured))
+        for machine, rows in self._machines(i, theta):
+            at = pose[self.pose_of[i][rows]]
+            found[rows] = joint_angles.angles(machine, measured.actuators[rows], at, joint)
+        return found
+
+    def by_numbers(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray | None:
+        """How readings of set `i` follow the geometry not by the pose alone, (N, k, g)."""
+        measured, places = self.sets[i], self.parameters.places
+        if measured.joint is None:
+            return None
+        found = np.empty((len(measured), 1, len(places)))
+        for machine, rows in self._machines(i, theta):
+            q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
+            found[rows, 0] = joint_angles.rates(machine, q, at, measured.joint, places)
+        return found
+
+    def _machines(self, i: int, theta: FloatArray) -> Iterator[tuple[Calibratable, IntArray]]:
+        """The machines of set `i`, one or one a session, and the rows of each."""
+        machine_of_row = self.machine_of_pose[self.pose_of[i]]
+        for machine in np.unique(machine_of_row):
+            values = self.parameters.values_at(theta, self.machine_columns[machine])
+            rows = np.flatnonzero(machine_of_row == machine)
+            yield self.parameters.robot.with_values(values), rows
 
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
         """Measured less predicted of each set."""
@@ -203,8 +304,9 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     sigma = measured.sigma
     if sigma is None:
         return np.tile(mm_per_unit(measured.units, length), (len(measured), 1))
-    if measured.kind == "pose" and not _same_turnings(sigma):
-        sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, 3:]))
+    first = KINDS[measured.kind].turning
+    if first is not None and not _same_turnings(sigma, first):
+        sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, first:]))
     if sigma.ndim == 2:
         return 1.0 / sigma
     missing = np.isnan(measured.values)
@@ -214,6 +316,6 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     return np.linalg.inv(np.linalg.cholesky(sigma))
 
 
-def _same_turnings(sigma: FloatArray) -> bool:
-    """Whether standard deviations (N, 6) are the same about every axis."""
-    return sigma.ndim == 2 and bool((sigma[:, 4:] == sigma[:, 3:4]).all())
+def _same_turnings(sigma: FloatArray, first: int) -> bool:
+    """Whether standard deviations (N, k) are the same about every axis."""
+    return sigma.ndim == 2 and bool((sigma[:, first + 1 :] == sigma[:, first : first + 1]).all())

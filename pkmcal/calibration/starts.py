@@ -15,6 +15,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.alignment import angles_of, nearest_rotations, of_directions
 from pkmcal.calibration.fit_data import FitData, Start
+from pkmcal.calibration.joint_angles import angles
 from pkmcal.core import instruments
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements import orientation
@@ -36,6 +37,9 @@ def with_starts(machine: Calibratable, datasets: Sequence[FitData]) -> list[FitD
     pairs = [(d, pose) for d, pose in zip(datasets, poses, strict=True) if pose is not None]
     _zeros([(d.measured, pose) for d, pose in pairs if d.measured.run is not None], found)
     _touches([(d.measured, pose) for d, pose in pairs if d.measured.touched is not None], found)
+    _joints(
+        machine, [(d.measured, pose) for d, pose in pairs if d.measured.joint is not None], found
+    )
     _mountings([pair for pair in pairs if pair[0].measured.kind in ("tilt", "orientation")], found)
     return [replace(data, starts=found) for data in datasets]
 
@@ -76,7 +80,7 @@ def known_distances(datasets: Sequence[FitData]) -> list[FitData]:
 
 def _has_own(data: FitData) -> bool:
     m = data.measured
-    return m.run is not None or m.touched is not None or m.kind in ("tilt", "orientation")
+    return m.kind in ("relative-distance", "touch", "angle", "tilt", "orientation")
 
 
 def _zeros(sets: Sequence[tuple[Measurements, FloatArray]], found: Found) -> None:
@@ -88,6 +92,18 @@ def _zeros(sets: Sequence[tuple[Measurements, FloatArray]], found: Found) -> Non
             off.setdefault(name, []).append(here[m.run == name])
     for name, parts in off.items():
         found["run", name] = Start((0,), np.nan_to_num([_mean(np.concatenate(parts))]))
+
+
+def _joints(
+    machine: Calibratable, sets: Sequence[tuple[Measurements, FloatArray]], found: Found
+) -> None:
+    off: dict[str, list[FloatArray]] = {}
+    for m, pose in sets:
+        joint = str(m.joint)
+        off.setdefault(joint, []).append(angles(machine, m.actuators, pose, joint) - m.values)
+    for joint, parts in off.items():
+        turns = np.exp(1j * np.concatenate(parts))
+        found["angle", joint] = Start((0,), np.array([np.angle(np.nansum(turns))]))
 
 
 def _touches(sets: Sequence[tuple[Measurements, FloatArray]], found: Found) -> None:
@@ -177,27 +193,27 @@ def _mountings(pairs: Sequence[tuple[FitData, FloatArray]], found: Found) -> Non
             values = np.concatenate([data.measured.values for data, _ in mine])
             pose = np.concatenate([pose for _, pose in mine])
             known = np.isfinite(values).all(axis=1) & np.isfinite(pose).all(axis=1)
-            angles = np.zeros(3)
+            mounting = np.zeros(3)
             if known.any():
-                angles = of(values[known], pose[known, 3:], mine[0][0].unknown_frame)
-            found["mounting", ""] = Start(_EVERY, angles)
+                mounting = of(values[known], pose[known, 3:], mine[0][0].unknown_frame)
+            found["mounting", ""] = Start(_EVERY, mounting)
 
 
-def _of_orientations(values: FloatArray, angles: FloatArray, framed: bool) -> FloatArray:
+def _of_orientations(values: FloatArray, turned: FloatArray, framed: bool) -> FloatArray:
     """Mounting (3,) with which a sensor reads these orientations."""
-    platform, sensor = orientation.rotations(angles), orientation.rotations(values)
+    platform, sensor = orientation.rotations(turned), orientation.rotations(values)
     frame = np.eye(3)
     if framed:  # turnings from the first reading on do not depend on the mounting
-        first = np.zeros(len(angles), dtype=np.intp)
-        turnings = [orientation.between(each, each[first]) for each in (values, angles)]
+        first = np.zeros(len(turned), dtype=np.intp)
+        turnings = [orientation.between(each, each[first]) for each in (values, turned)]
         frame = of_directions(*turnings)
     mountings = platform.transpose(0, 2, 1) @ frame.T @ sensor
     return angles_of(nearest_rotations(mountings.sum(axis=0)))
 
 
-def _of_tilts(values: FloatArray, angles: FloatArray, framed: bool) -> FloatArray:
+def _of_tilts(values: FloatArray, turned: FloatArray, framed: bool) -> FloatArray:
     """Mounting (3,) with which a sensor reads these tilts, whichever side up."""
-    up = orientation.rotations(angles)[:, 2, :]  # the vertical in platform axes
+    up = orientation.rotations(turned)[:, 2, :]  # the vertical in platform axes
     level = np.sin(values)
     rest = np.sqrt(np.maximum(0.0, 1.0 - (level**2).sum(axis=1)))
     trials = []

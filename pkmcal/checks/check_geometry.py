@@ -110,6 +110,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
         home      a home that the constraints of limbs do not allow
         stroke    home, or a stroke's ends, that the inverse kinematics cannot use
         singular  home, or every pose, is singular; affinely similar base and platform
+        drive     drive laws that may turn back within their stroke: they have no inverse
         stated    numbers that contradict what the robot file states
         ========  ==========================================================================
 

@@ -238,14 +238,8 @@ def _shown(robot: Robot, limb: int) -> tuple[float, str]:
 
 def _reached(robot: Robot, ends: FloatArray) -> float:
     """How much of the way from home to the drives `ends` the forward kinematics follows."""
-    drive = robot.feasible(robot.home).drive
     start = robot.inverse(robot.home)
-    limbs = robot.model.limbs
-    goal = start.copy()
-    for i, limb in enumerate(limbs):
-        goal[limb.actuator] += (ends[i] - drive[i]) / robot.geometry[f"gain{i + 1}"]
-    shares = np.bincount([limb.actuator for limb in limbs])
-    goal = start + (goal - start) / shares
+    goal = robot.machine.at_drives(robot.slots, ends[None])[0]
     pose = robot.home
     for k in range(1, _STEPS + 1):
         found = robot.forward(start + (goal - start) * k / _STEPS, guess=pose)

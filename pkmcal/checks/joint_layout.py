@@ -217,7 +217,7 @@ def traits(robot: Robot) -> list[Trait]:
     ]  # fmt: skip
     drive = robot.feasible(robot.home).drive
     ends = np.array([limb.stroke or (np.nan, np.nan) for limb in limbs])
-    slot = dict(zip(SLOTS, robot.geometry.slots.T, strict=True))
+    slot = dict(zip(SLOTS, robot.geometry.slots.T[: len(SLOTS)], strict=True))
     for driver in DRIVERS:
         mine = [KINDS[limb.kind].driver == driver for limb in limbs]
         if not any(mine):

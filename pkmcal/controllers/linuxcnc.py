@@ -13,6 +13,7 @@ from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import linuxcnc_modules
 from pkmcal.controllers.c_header import text_of as header_of
+from pkmcal.controllers.laws import require_no_laws
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.rendering import rendered
 from pkmcal.core.library import POSE, SLOTS
@@ -80,6 +81,7 @@ def contents(robot: Robot, folder: str) -> tuple[dict[str, str], Loss | None]:
             f"folder must have a name of 1 to {_LONGEST} letters, for LinuxCNC's own are short,"
             f" found {folder!r}"
         )
+    require_no_laws(robot, "a kinematics module")
     module = linuxcnc_modules.of_robot(robot)
     says = _contents(robot, name)
     files = {

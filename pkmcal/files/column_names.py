@@ -41,6 +41,7 @@ _SYNONYMS: dict[str, str] = {
     "tilt1": "tilt 1|inclination 1|inclinometer 1",
     "tilt2": "tilt 2|inclination 2|inclinometer 2",
     "touch": "touched|socket",
+    "session": "session id|session name|session no|session number|sitting",
     "target": "reflector|smr|target name|reflector name|marker|prism",
     "name": "point id|point|point name|pointname|point no|pt|pt id|pt name|id|label|object name"
     "|measurement|measurement name|feature|feature name|element|step|step no|punkt|messpunkt"

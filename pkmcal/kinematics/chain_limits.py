@@ -28,7 +28,7 @@ def feasibility(
         Poses and coordinates; NaN out of reach.
     """
     passive, frames = machine.frames(slots, own, q)
-    drive = drives(machine, slots, q)
+    drive = machine.drives(slots, q)
     shape = (len(own), len(chains.limbs))
     stroke, before, last = (np.full(shape, np.inf) for _ in range(3))
     room = np.zeros((3, shape[1]))
@@ -63,20 +63,10 @@ def feasibility(
     )  # fmt: skip
 
 
-def drives(machine: ChainMachine, slots: FloatArray, q: FloatArray) -> FloatArray:
-    """What the actuators read with gain and offset, (N, n)."""
-    place, numbers = machine.layout.drive_place, slots.ravel()
-    found: FloatArray = numbers[place + 1] * q + numbers[place]
-    return found
-
-
-def in_strokes(
-    chains: Chains, machine: ChainMachine, slots: FloatArray, q: FloatArray
-) -> BoolArray:
-    """Which actuators (n,) keep the strokes of their joints at coordinates (n,)."""
+def in_strokes(chains: Chains, drive: FloatArray) -> BoolArray:
+    """Which actuators (n,) keep the strokes of their joints with drives at q̃ (n,)."""
     limits = [joint.stroke or (-np.inf, np.inf) for _, joint in chains.actuated]
     low, high = np.array(limits).T
-    drive = drives(machine, slots, q[None])[0]
     return np.asarray((low <= drive) & (drive <= high))
 
 

@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, first_largest
 from pkmcal.kinematics.robot import Robot
 
 INDEPENDENT = 1e-7  # least part of a number's effect that the others cannot have
+_ALIKE = 1e-6  # share by which effects differ that are not equal
 POSES = 40
+_KNOWN = ("gain", "drive")  # better than what an arm of a machine is
 SHARE = 0.2  # of the characteristic length, and rad: how far from home the actuators go
-ERRORS = {"mm": 0.1, "rad": 1e-3, "1": 1e-4}  # sizes at which effects are compared
+ERRORS = {"mm": 0.1, "rad": 1e-3}  # sizes at which effects are compared
 
 
 def independent_numbers(robot: Robot) -> tuple[str, ...]:
     """Names of numbers that poses of the workspace tell apart, as many as there are.
 
-    The gains are not among them: they are known better than what an arm of a machine is. Chosen by
-    QR with exchanges of columns, in which the largest effect that is left comes next.
+    Gains and drive laws are not among them: they are known better than what an arm of a machine
+    is. Of the effects that are left, the largest is taken next, of those alike the first.
 
     Parameters
     ----------
@@ -35,24 +37,35 @@ def independent_numbers(robot: Robot) -> tuple[str, ...]:
     >>> len(independent_numbers(pk.load("five-bar")))
     13
     """
-    from scipy.linalg import qr
-
     geometry = robot.geometry
     places = np.array(
         [
             i
             for i, (name, tied) in enumerate(zip(geometry.names, geometry.tied, strict=True))
-            if not tied and not name.startswith("gain")
+            if not tied and not name.startswith(_KNOWN)
         ]
     )
     effects = near_home(robot)[:, :, places]
     effects[:, 3:] *= robot.length
     scale = np.array([ERRORS[geometry.units[i]] for i in places])
     columns = effects.reshape(-1, len(places)) * scale
-    R, order = qr(columns, mode="r", pivoting=True)
-    diagonal = np.abs(np.diag(R))
-    rank = int((diagonal > INDEPENDENT * diagonal[0]).sum())
-    return tuple(geometry.names[places[i]] for i in sorted(order[:rank]))
+    return tuple(geometry.names[places[i]] for i in sorted(_independent(columns)))
+
+
+def _independent(columns: FloatArray) -> list[int]:
+    """Which columns are taken. LAPACK's exchanges decide between equal ones by rounding."""
+    left = np.asarray(np.linalg.qr(columns, mode="r"))
+    found: list[int] = []
+    least = INDEPENDENT * float(np.linalg.norm(left, axis=0).max(initial=0.0))
+    while len(found) < min(left.shape):
+        size = np.linalg.norm(left, axis=0)
+        size[found] = 0.0
+        if not size.max() > least:
+            break
+        found.append(first_largest(size, _ALIKE * float(size.max())))
+        along = left[:, found[-1]] / size[found[-1]]
+        left -= np.outer(along, along @ left)
+    return found
 
 
 def near_home(robot: Robot) -> FloatArray:

@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows
 from pkmcal.core.chains import ChainMachine
-from pkmcal.core.library import MAPS, POSE, SLOTS
+from pkmcal.core.driven import DrivenMachine
+from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import CHAIN, Model
-from pkmcal.kinematics.chain_limits import drives as chain_drives
 from pkmcal.kinematics.chain_limits import in_strokes
 from pkmcal.kinematics.complete import Completed, complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
@@ -60,7 +60,7 @@ class Kinematics:
         self.machine = machine_of(model, self.slots, self.length)
 
     @property
-    def limb_machine(self) -> Machine:
+    def limb_machine(self) -> Machine | DrivenMachine:
         """The compiled machine of limbs in closed form.
 
         Raises
@@ -68,7 +68,7 @@ class Kinematics:
         ValueError
             The limbs are chains of joints.
         """
-        if isinstance(self.machine, ChainMachine):
+        if self.model.chains is not None or isinstance(self.machine, ChainMachine):
             raise ArgumentError(f"robot: {self.model.name} has limbs that are chains of joints")
         return self.machine
 
@@ -354,8 +354,9 @@ class Kinematics:
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (n,) or (N, n), for certificates and searches for modes."""
         limbs = self.model.limbs
+        machine, slots, at = self.machine.bare(self.slots, np.atleast_2d(q))
         return AssemblyProblem(
-            self.machine,
+            machine,
             self.model.map,
             [
                 () if limb.kind == CHAIN else KINDS[limb.kind].all_rows(limb.couple > 0)
@@ -363,8 +364,8 @@ class Kinematics:
             ],
             [limb.couple for limb in limbs],
             self.length,
-            self.slots,
-            q,
+            slots,
+            at if q.ndim == 2 else at[0],
         )
 
     @property
@@ -382,14 +383,16 @@ class Kinematics:
 
         Each chain closed for itself, in the posture that is reached from home.
         """
-        if not isinstance(self.machine, ChainMachine):
+        machine, slots, at = self.machine.bare(self.slots, q)
+        if not isinstance(machine, ChainMachine):
             raise ArgumentError(f"{self.model.name}: its limbs are no chains of joints")
-        return self.machine.frames(self.slots, np.ascontiguousarray(own), q)[0]
+        return machine.frames(slots, np.ascontiguousarray(own), at)[0]
 
     def chain_points(self, own: FloatArray, q: FloatArray) -> list[FloatArray]:
         """Where the joints of each chain are at own poses (N, 6), in own axes: (N, joints, 3)."""
-        assert isinstance(self.machine, ChainMachine) and self.model.chains is not None
-        frames = self.machine.frames(self.slots, np.ascontiguousarray(own), q)[1]
+        machine, slots, at = self.machine.bare(self.slots, q)
+        assert isinstance(machine, ChainMachine) and self.model.chains is not None
+        frames = machine.frames(slots, np.ascontiguousarray(own), at)[1]
         found, start = [], 0
         for limb, parts in zip(self.model.chains.limbs, self.model.chains.members, strict=True):
             first = np.cumsum([0, *(joint.parts for joint in limb[:-1])])
@@ -414,13 +417,11 @@ class Kinematics:
 
         Of a chain that of its first actuator, 0 where it has none.
         """
-        actuators = [limb.actuator for limb in self.model.limbs]
-        if isinstance(self.machine, ChainMachine):
-            each = np.hstack([chain_drives(self.machine, self.slots, q), np.zeros((len(q), 1))])
-            return np.asarray(each[:, actuators])
-        offset, gain = self.slots[:, SLOTS.index("offset")], self.slots[:, SLOTS.index("gain")]
-        found: FloatArray = gain * q[:, actuators] + offset
-        return found
+        found = self.machine.drives(self.slots, q)
+        if self.model.chains is None:
+            return found
+        each = np.hstack([found, np.zeros((len(q), 1))])
+        return np.asarray(each[:, [limb.actuator for limb in self.model.limbs]])
 
     def short_way(self, start: FloatArray, end: FloatArray) -> FloatArray:
         """Coordinates (n,) of `end` at the turn nearest to `start`, unless a stroke forbids it."""
@@ -430,9 +431,8 @@ class Kinematics:
 
     def _in_strokes(self, q: FloatArray) -> BoolArray:
         """Which actuators (n,) keep the strokes of all their limbs at coordinates (n,)."""
-        if isinstance(self.machine, ChainMachine):
-            assert self.model.chains is not None
-            return in_strokes(self.model.chains, self.machine, self.slots, q)
+        if self.model.chains is not None:
+            return in_strokes(self.model.chains, self.machine.drives(self.slots, q[None])[0])
         kept = np.ones(self.n_actuators, dtype=bool)
         for limb, drive in zip(self.model.limbs, self.drives(q[None])[0], strict=True):
             kept[limb.actuator] &= bool(stroke_margin(limb, drive) >= 0.0)

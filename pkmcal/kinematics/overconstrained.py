@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.core.chains import AnyMachine
+from pkmcal.core.driven import CompiledMachine
 from pkmcal.screw import from_pose, log
 
 # Of the size, to each side. The step's square is what differences of third order leave out, the
@@ -21,7 +21,7 @@ _STEP = 5e-6
 
 
 def error_jacobian(
-    machine: AnyMachine,
+    machine: CompiledMachine,
     slots: FloatArray,
     pose: FloatArray,
     q: FloatArray,
@@ -42,12 +42,13 @@ def error_jacobian(
     columns : ndarray of int (k,)
         Which numbers.
     units : sequence of str, k
-        Theirs, "mm", "rad" or "1".
+        Theirs.
     twists : bool
         Of the twist (ω, v) of the platform in place of the pose.
     """
     size = machine.struct.size
-    steps = {"mm": _STEP * size, "rad": _STEP, "1": _STEP}
+    steps = {"mm": _STEP * size, "rad": _STEP, "1": _STEP, "1/rad": _STEP}
+    steps |= {"1/mm": _STEP / size, "1/mm2": _STEP / size**2}
     out = np.empty((len(pose), 6, len(columns)))
     for k, (column, unit) in enumerate(zip(columns.tolist(), units, strict=True)):
         start, end = (

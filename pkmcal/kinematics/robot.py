@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
-from pkmcal.core.chains import AnyMachine, ChainMachine
+from pkmcal.core.chains import ChainMachine
+from pkmcal.core.driven import CompiledMachine
 from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
@@ -150,8 +151,9 @@ class Robot(Kinematics, Result):
                 if actuators is None
                 else (self._batch(actuators, shape))
             )
-            assert isinstance(self.machine, ChainMachine)
-            found = chain_limits.feasibility(chains, self.machine, self.slots, rows, q)
+            machine, slots, at = self.machine.bare(self.slots, q)
+            assert isinstance(machine, ChainMachine)
+            found = chain_limits.feasibility(chains, machine, slots, rows, at)
             return _shaped(found, shape)
         drive, on_base, on_platform = self.limb_machine.limbs(self.slots, rows)
         if actuators is not None:
@@ -209,7 +211,9 @@ class Robot(Kinematics, Result):
                 begin = self.short_way(rows[0], self.machine.inverse(self.slots, own)[0])[None]
             else:
                 begin = as_rows("actuators", actuators, self.n_actuators)[0]
-            end = continue_path(problem, own, begin, steps)
+            part = np.arange(steps + 1)[:, None] / steps
+            way = self.machine.bare(self.slots, begin + (rows - begin) * part)[2]
+            end = continue_path(problem, own, way)
             outward: FloatArray = self.frames.outward(end)[0]
             return outward
 
@@ -385,7 +389,7 @@ class Robot(Kinematics, Result):
         return changed
 
     @cached_property
-    def _of_any_misfit(self) -> AnyMachine:
+    def _of_any_misfit(self) -> CompiledMachine:
         return self.machine.with_tolerance(np.inf)
 
     @property

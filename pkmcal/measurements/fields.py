@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import words
-from pkmcal.arrays import FloatArray, Int64Array, as_numbers
+from pkmcal.arguments import shown, words
+from pkmcal.arrays import FloatArray, Int64Array, TextArray, as_numbers
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.reading import LONGEST_NAME
 from pkmcal.measurements.components import KINDS, Kind
 from pkmcal.measurements.tracker import Tracker
 
@@ -194,6 +195,27 @@ def names_of_targets(
         wanted = int(index.max()) + 1 if target is None else len(target)
         raise ArgumentError(f"target_names must name {wanted} targets; found {len(names)}")
     return names
+
+
+def sessions_array(given: str | Sequence[str] | TextArray | None, rows: int) -> TextArray | None:
+    """One name per row; None where none is given."""
+    if given is None:
+        return None
+    named = given.tolist() if isinstance(given, np.ndarray) else given
+    names = words("session", named)
+    if isinstance(named, str):
+        names = names * rows
+    if len(names) != rows:
+        raise ArgumentError(
+            f"session must be one name, or one for each of {rows} rows; found {len(names)}"
+        )
+    for name in dict.fromkeys(names):
+        if not name or name != " ".join(name.split()) or "@" in name or len(name) > LONGEST_NAME:
+            raise ArgumentError(
+                "session must be a name on one line, of at most"
+                f" {LONGEST_NAME} characters and without '@'; found {shown(name)}"
+            )
+    return np.array(names)
 
 
 def units_of_actuators(given: str | Sequence[str] | None, count: int) -> tuple[str, ...] | None:

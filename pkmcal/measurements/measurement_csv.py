@@ -18,6 +18,7 @@ columns                               meaning
 ``actuator_sigma [mm]``               standard deviation of what every actuator read
 ``actuator_sigma.q1 [mm]`` …          … or of each of them
 ``group``                             a whole number, the same for repeats of one pose
+``session``                           when the row was measured, by a name
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
@@ -47,7 +48,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal import arguments
 from pkmcal.arguments import word
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, TextArray
 from pkmcal.exceptions import ArgumentTypeError, FileError
 from pkmcal.files.column_names import SYNONYMS
 from pkmcal.files.csv_table import Table
@@ -60,7 +61,6 @@ from pkmcal.measurements.join import JOINS, Join
 from pkmcal.measurements.join import join as joined
 from pkmcal.measurements.kind_columns import (
     component_names,
-    components_in,
     kinds_in,
     names_of_kinds,
     read_kind_fields,
@@ -75,6 +75,7 @@ from pkmcal.measurements.probe import (
     is_of_trigger,
     probed,
 )
+from pkmcal.measurements.sigma_columns import read_actuator_sigma, read_sigma
 from pkmcal.measurements.table_layout import (
     Layout,
     layout,
@@ -176,11 +177,12 @@ def read_measurements(
     actuators, actuator_units = read_actuators(table, robot)
     compare(table, actuator_units, robot)
     kind = _kind(table, several)
-    fields: dict[str, Any] = {"sigma": _read_sigma(table, kind), "lines": np.array(table.lines)}
-    fields["actuator_sigma"] = _read_actuator_sigma(table, actuator_units)
+    fields: dict[str, Any] = {"sigma": read_sigma(table, kind), "lines": np.array(table.lines)}
+    fields["actuator_sigma"] = read_actuator_sigma(table, actuator_units)
     fields |= read_kind_fields(table, kind, actuator_units)
     if "group" in table.columns:
         fields["group"] = table.integers("group")
+    fields["session"] = _read_session(table)
     values: FloatArray | None
     if several:
         actuators, values, fields = read_several(table, several, actuators, fields)
@@ -223,7 +225,7 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
             " it probed"
         )
     z = _read(table, "probe", "mm")[0]
-    sigma = _read_sigma(table, "height")
+    sigma = read_sigma(table, "height")
     if any(ACTUATOR.fullmatch(name) for name in table.columns):
         actuators, units = read_actuators(table, robot)
         compare(table, units, robot)
@@ -247,8 +249,13 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
         f"{table.columns['probe'].name!r} taken as the firmware's z when the probe triggered: the"
         " actuators are those that the robot file has there, and the probe's tip is at 0"
     )
-    lines = np.array(table.lines)
-    return replace(measured, notes=_notes(table), lines=lines, file=table.path.name)
+    return replace(
+        measured,
+        notes=_notes(table),
+        lines=np.array(table.lines),
+        file=table.path.name,
+        session=_read_session(table),
+    )
 
 
 def _table(
@@ -284,7 +291,8 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     components = _AXES + _ANGLES
     names = {f"q{i + 1}" for i in range(len(table.columns))}
     names |= {name for name in table.columns if ACTUATOR.fullmatch(name)}
-    names |= {*components, "distance", "sigma", "group", "target", "probe", "actuator_sigma"}
+    names |= {*components, "distance", "sigma", "group", "session", "target", "probe"}
+    names |= {"actuator_sigma"}
     names |= {f"actuator_sigma.{name}" for name in names if ACTUATOR.fullmatch(name)}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
@@ -350,65 +358,8 @@ def _nominal(robot: Actuated | None, actuators: FloatArray) -> FloatArray | None
     return angles
 
 
-def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
-    """Deviations (rows, 1) or (rows, k), or covariances (rows, k, k)."""
-    given = [name for name in table.columns if name.partition(".")[0] in ("sigma", "cov")]
-    if not given:
-        return None
-    if kind == "closure":
-        raise table.header_error(f"column {given[0]!r}: nothing was read that it could be of")
-    names, units = zip(*components_in(table, kind), strict=True)
-    pairs = list(itertools.combinations_with_replacement(range(len(names)), 2))
-    forms = {
-        "one": ["sigma"],
-        "each": [f"sigma.{name}" for name in names],
-        "covariance": [f"cov.{names[i]}.{names[j]}" for i, j in pairs],
-    }
-    form = "covariance" if given[0].startswith("cov") else "each" if "." in given[0] else "one"
-    if form == "one" and kind == "pose":
-        raise table.header_error(
-            f"column 'sigma' for poses: expected {forms['each'][0]!r} to {forms['each'][-1]!r}"
-        )
-    table.require(forms[form])
-    for name in given:
-        if name not in forms[form]:
-            raise table.header_error(f"column {name!r} does not go with {given[0]!r} and {kind}s")
-    if form == "covariance":
-        sigma = np.empty((len(table), len(names), len(names)))
-        for name, (i, j) in zip(forms[form], pairs, strict=True):
-            sigma[:, i, j] = sigma[:, j, i] = table.numbers(name, f"{units[i]}*{units[j]}")[0]
-        return sigma
-    of, read = units if form == "each" else units[:1], [n for n, _ in value_columns(table, kind)]
-    columns = [
-        table.numbers(sigma, unit, like=read[0] if read and form == "one" else name)[0]
-        for sigma, unit, name in zip(forms[form], of, names, strict=False)
-    ]
-    for name, column in zip(forms[form], columns, strict=True):
-        if not (column > 0).all():
-            row = int(np.argmin(column > 0))
-            raise table.cell_error(name, row, f"must be positive, found {column[row]:g}")
-    return np.stack(columns, axis=1)
-
-
-def _read_actuator_sigma(table: Table, units: tuple[str, ...]) -> FloatArray | None:
-    """Deviations (rows, n) of what the actuators read."""
-    each = [f"actuator_sigma.q{i + 1}" for i in range(len(units))]
-    given = [name for name in table.columns if name.startswith("actuator_sigma")]
-    if not given:
-        return None
-    if given == ["actuator_sigma"]:
-        if len(set(units)) > 1:
-            raise table.header_error(
-                "column 'actuator_sigma' for lengths and angles: expected"
-                f" {each[0]!r} to {each[-1]!r}"
-            )
-        columns = [table.numbers("actuator_sigma", units[0])[0]] * len(units)
-    else:
-        table.require(each)
-        if len(given) > len(each):
-            raise table.header_error("column 'actuator_sigma' does not go with those of actuators")
-        columns = [table.numbers(name, unit)[0] for name, unit in zip(each, units, strict=True)]
-    return np.stack(columns, axis=1)
+def _read_session(table: Table) -> TextArray | None:
+    return np.array(table.texts("session")) if "session" in table.columns else None
 
 
 def _read(table: Table, name: str, *quantities: str, blank: bool = False) -> tuple[Any, str]:

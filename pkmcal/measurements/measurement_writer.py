@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.files.csv_writer import write_csv
 from pkmcal.measurements.components import Kind, components
 from pkmcal.measurements.kind_columns import OfAKind, kind_cells
@@ -75,6 +75,10 @@ class Writable(OfAKind, Protocol):
     def group(self) -> Int64Array | None:
         """Which rows repeat one pose."""
 
+    @property
+    def session(self) -> TextArray | None:
+        """When each row was measured."""
+
 
 def write_measurements(
     measurements: Writable, path: str | PathLike[str], comment: str = ""
@@ -134,6 +138,8 @@ def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
             yield f"{point}.{name} [mm]", _exact(rows[:, axis])
     if m.group is not None:
         yield "group", [str(number) for number in m.group]
+    if m.session is not None:
+        yield "session", m.session.tolist()
 
 
 def _actuator_sigma(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import display
 from pkmcal.arguments import checked_seed, shown, word, words
 from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.display import Table
@@ -23,20 +22,20 @@ from pkmcal.measurements.fields import (
     integers,
     names_of_targets,
     numbers,
+    sessions_array,
     sigma_array,
     target_array,
     units_of_actuators,
     values_array,
 )
 from pkmcal.measurements.kind_fields import KindFields, TouchDistances, kind_fields
+from pkmcal.measurements.listing import deviations, table, title
 from pkmcal.measurements.measurement_writer import write_measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.result import Result
 
-_LISTED_ROWS = 12  # a longer list of measurements is printed with its middle left out
-
 _PER_ROW = (
-    "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines",
+    "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines", "session",
     "other", "run", "touched",
 )  # fmt: skip
 
@@ -102,6 +101,9 @@ class Measurements(Result):
         standard deviation, which is 1 µm by default: ``{("A", "B"): 50.0}``.
     joint : str, optional
         Of kind "angle": the passive joint that is read.
+    session : str or (N,) sequence of str, optional
+        When the rows were measured, one word for all or one a row: `identify` may find some
+        numbers anew in each session. None: not stated. Kept as (N,).
     lines : (N,) array of int, optional
         The line of each row in the file it was read from, to name it by.
     file : str
@@ -140,6 +142,7 @@ class Measurements(Result):
     artefact: Artefact | None = None
     touch_distances: TouchDistances = ()
     joint: str | None = None
+    session: TextArray | None = None
     lines: Int64Array | None = None
     file: str = ""
     notes: tuple[str, ...] = ()
@@ -165,6 +168,7 @@ class Measurements(Result):
         artefact: Artefact | None = None,
         touch_distances: Mapping[tuple[str, str], Any] | TouchDistances = (),
         joint: str | None = None,
+        session: str | Sequence[str] | TextArray | None = None,
         lines: ArrayLike | None = None,
         file: str = "",
         notes: Sequence[str] = (),
@@ -194,6 +198,7 @@ class Measurements(Result):
             "attachment": attachment_array(attachment, kind, targets, len(q)),
             "actuator_sigma": actuator_sigma_array(actuator_sigma, q.shape),
             **own,
+            "session": sessions_array(session, len(q)),
             "lines": None if lines is None else integers("lines", lines, len(q)),
             "file": file,
             "notes": words("notes", notes),
@@ -251,6 +256,11 @@ class Measurements(Result):
         """Which pose each row belongs to, (N,), counted from 0: by `group`, else by actuators."""
         rows = self.actuators if self.group is None else self.group[:, None]
         return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+
+    @property
+    def sessions(self) -> tuple[str, ...]:
+        """The different sessions, in the order of their first rows; empty where none is stated."""
+        return () if self.session is None else tuple(dict.fromkeys(self.session.tolist()))
 
     def select(self, rows: ArrayLike | slice) -> Measurements:
         """Some of the rows, as measurements: a slice, row numbers or a mask of N booleans.
@@ -336,97 +346,22 @@ class Measurements(Result):
         columns: dict[str, Any] = {f"q{i + 1}": q for i, q in enumerate(self.actuators.T)}
         values = self.values.reshape(len(self), -1)
         columns |= dict(zip(self.components, values.T, strict=True))
-        deviations = self._deviations()
-        if deviations is not None:
+        sigma = deviations(self)
+        if sigma is not None:
             names = (f"sigma.{name}" for name in self.components)
-            columns |= dict(zip(names, deviations.T, strict=True))
+            columns |= dict(zip(names, sigma.T, strict=True))
+        if self.other is not None:
+            columns |= {f"to.q{i + 1}": q for i, q in enumerate(self.other.T)}
+        columns |= {} if self.run is None else {"run": self.run}
+        columns |= {} if self.touched is None else {"touch": self.touched}
         if self.target_index is not None and self.target_names is not None:
             columns["target"] = [self.target_names[i] for i in self.target_index]
         if self.group is not None:
             columns["group"] = self.group
+        if self.session is not None:
+            columns["session"] = self.session
         return columns
 
     def _parts(self) -> Iterator[str | Table]:
-        yield self._title()
-        yield self._table()
-
-    def _table(self) -> Table:
-        units = self.actuator_units or ("",) * self.actuators.shape[1]
-        heads, columns = ["row"], [[str(row) for row in range(len(self))]]
-        for i, unit in enumerate(units):
-            heads.append(_heading(f"q{i + 1}", unit))
-            columns.append(_column(self.actuators[:, i], unit, None))
-        deviations = self._deviations()
-        for i, (name, unit) in enumerate(zip(self.components, self.units, strict=True)):
-            heads.append(_heading(name, unit))
-            sigma = None if deviations is None else deviations[:, i]
-            columns.append(_column(self.values.reshape(len(self), -1)[:, i], unit, sigma))
-        if self.target_index is not None and self.target_names is not None:
-            heads.append("target")
-            columns.append([self.target_names[i] for i in self.target_index])
-        if self.group is not None:
-            heads.append("group")
-            columns.append([str(number) for number in self.group])
-        rows = list(zip(*columns, strict=True))
-        if len(rows) > _LISTED_ROWS:
-            rows[_LISTED_ROWS - 4 : -3] = [("⋮",) * len(heads)]
-        return Table(heads, rows)
-
-    def _deviations(self) -> FloatArray | None:
-        """Standard deviations (N, k), also where covariance matrices were given."""
-        if self.sigma is None or self.sigma.ndim == 2:
-            return self.sigma
-        variances: FloatArray = np.diagonal(self.sigma, axis1=1, axis2=2)
-        return np.sqrt(variances)
-
-    def _title(self) -> str:
-        many = "" if len(self) == 1 else "s"
-        n = self.actuators.shape[1]
-        what = f"{len(self)} measured {self.kind}{many}"
-        if self.kind == "closure":
-            what = f"{len(self)} row{many} of actuators alone"
-        elif missing := int(np.isnan(self.values.reshape(len(self), -1)).all(axis=1).sum()):
-            what += f" ({missing} not read)"
-        parts = [what, f"{n} actuator{'' if n == 1 else 's'}"]
-        if self.kind != "closure":
-            parts.append("sigma " + self._sigma_text())
-        if self.actuator_sigma is not None:
-            parts.append("actuator_sigma stated")
-        if self.target_names is not None:
-            known = "" if self.target is not None else " (places not known)"
-            parts.append(f"targets {' '.join(self.target_names)}{known}")
-        elif self.target is not None and self.target.ndim == 1:
-            parts.append("target ({:g}, {:g}, {:g}) mm".format(*self.target))
-        return ", ".join(parts)
-
-    def _sigma_text(self) -> str:
-        deviations = self._deviations()
-        if deviations is None:
-            return "not known"
-        texts = []
-        for unit in dict.fromkeys(self.units):
-            of_unit = deviations[:, [u == unit for u in self.units]]
-            ends = dict.fromkeys(_sigma_number(s, unit) for s in (of_unit.min(), of_unit.max()))
-            texts.append(" to ".join(ends) + " " + display.displayed(0.0, unit)[1])
-        return " and ".join(texts)
-
-
-def _sigma_number(sigma: float, unit: str) -> str:
-    shown, _ = display.displayed(float(sigma), unit)
-    return display.fixed(shown, display.decimals(shown))
-
-
-def _heading(name: str, unit: str) -> str:
-    shown = display.displayed(0.0, unit)[1]
-    return f"{name} [{shown}]" if shown else name
-
-
-def _column(values: FloatArray, unit: str, sigma: FloatArray | None) -> list[str]:
-    """Numbers to the digits their sigma supports, else to 0.1 µm and 0.0001 degrees."""
-    places = 4
-    if sigma is not None:
-        places = display.decimals(display.displayed(float(sigma.min()), unit)[0])
-    return [
-        "" if np.isnan(value) else display.fixed(display.displayed(float(value), unit)[0], places)
-        for value in values
-    ]
+        yield title(self)
+        yield table(self)

@@ -56,8 +56,7 @@ def predict(
     zero: FloatArray = _ZERO,
     mounting: FloatArray = _ORIGIN,
     place: FloatArray = _NOWHERE,
-    artefact: Artefact | None = None,
-    along: IntArray | None = None,
+    touching: tuple[Artefact | None, IntArray | None] = (None, None),
     other: FloatArray | None = None,
 ) -> Predicted:
     """Readings at poses.
@@ -65,7 +64,7 @@ def predict(
     Parameters
     ----------
     kind : str
-        What is read, a key of `KINDS`; of a closure nothing.
+        What is read, a key of `KINDS` but "angle" (see `read_angles`); of a closure nothing.
     pose : ndarray (N, 6)
         Of the platform in the base frame, mm and rad.
     target : ndarray (3,) or (N, 3)
@@ -83,13 +82,12 @@ def predict(
         α β γ of a sensor on the platform.
     place : ndarray (6,) or (N, 6)
         Pose of the touched point, line or plane in the base frame.
-    artefact : str, optional
-        What is touched.
-    along : ndarray of int (N,), optional
-        Which of its axes a line has, or is normal to a plane.
+    touching : (str, ndarray of int (N,)), optional
+        What is touched, and which of its axes a line has, or is normal to a plane.
     other : ndarray (N, 6), optional
         Poses at the second place.
     """
+    artefact, along = touching
     match kind, artefact:
         case (("distance" | "relative-distance"), _):
             return _distances(pose, target, anchor, zero)
@@ -112,6 +110,17 @@ def predict(
             return Predicted(np.empty((len(pose), 0)), np.empty((len(pose), 0, 6)))
     seen = _points(pose, target, frame, origin)
     return _rows(seen, np.array([[2]])) if kind == "height" else seen
+
+
+def read_angles(angles: FloatArray, zero: FloatArray = _ZERO) -> Predicted:
+    """Readings of a passive joint that is turned by angles (N,): these less a zero, rad.
+
+    A passive joint is where its chain closes, for which the pose alone does not say enough; how it
+    follows the machine's numbers is not among these derivatives.
+    """
+    rows = len(angles)
+    values = angles[:, None] - np.broadcast_to(zero, (rows, 1))
+    return Predicted(values, np.zeros((rows, 1, 6)), {"zero": np.full((rows, 1, 1), -1.0)})
 
 
 def _points(
@@ -251,6 +260,27 @@ def _frame_turning(frame: FloatArray | None, origin: FloatArray) -> tuple[FloatA
     inner = orientation.rotations(frame[None, 3:])[0]
     by_angles: FloatArray = outer @ orientation.axes_of_angles(frame[None, 3:])[0]
     return outer @ inner, by_angles
+
+
+def joined(parts: Sequence[Predicted], rows: Sequence[IntArray]) -> Predicted:
+    """Readings of one kind whose rows stand in several parts: in which rows each part's are."""
+    if len(parts) == 1:
+        return parts[0]
+    count = sum(map(len, rows))
+
+    def whole(of_parts: Sequence[FloatArray]) -> FloatArray:
+        found = np.empty((count, *of_parts[0].shape[1:]))
+        for values, mine in zip(of_parts, rows, strict=True):
+            found[mine] = values
+        return found
+
+    numbers = {
+        name: whole([vars(part)[name] for part in parts])
+        for name, values in vars(parts[0]).items()
+        if isinstance(values, np.ndarray)
+    }
+    by = {name: whole([part.by[name] for part in parts]) for name in parts[0].by}
+    return Predicted(**numbers, by=by)
 
 
 def difference(kind: Kind, values: FloatArray, predicted: FloatArray) -> FloatArray:

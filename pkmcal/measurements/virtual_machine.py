@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import checked_seed, number, shown, word
+from pkmcal.arguments import checked_seed, did_you_mean, number, shown, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.display import first_rows
@@ -88,6 +88,7 @@ class VirtualMachine:
         touched: Mapping[str, ArrayLike] | None = None,
         artefact: Artefact = "point",
         touches: Sequence[str] | None = None,
+        joint: str | None = None,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.
 
@@ -116,6 +117,8 @@ class VirtualMachine:
             line or plane a pose (6,), whose z it is along or normal to.
         artefact : {"point", "line", "plane", "sphere"}
             What it is.
+        joint : str, optional
+            Of kind "angle": the passive joint, a name of ``robot.passive_names``.
 
         Returns
         -------
@@ -145,23 +148,35 @@ class VirtualMachine:
             run=run,
             touched=touches,
             artefact=artefact if touching else None,
+            joint=joint,
         )
-        pose = self._poses(actuators, "q")
-        there = None if blank.other is None else self._poses(blank.other, "other")
-        exact = predict(
-            kind,
-            pose,
-            other=there,
-            artefact=blank.artefact,
-            along=np.full(len(blank), 2),
-            **self._arguments(blank, mounting, touched),
-        ).values
+        exact = self._exact(blank, mounting, touched)
         if blank.run is not None:
             first = np.unique(blank.run, return_index=True, return_inverse=True)[1:]
             exact -= exact[first[0]][first[1].reshape(-1)]
         noise, sigma = self._drawn(blank, exact)
         values = corrected(kind, exact, noise).reshape(blank.values.shape)
         return dataclasses.replace(blank, values=values, sigma=sigma)
+
+    def _exact(
+        self, blank: Measurements, mounting: ArrayLike, touched: Mapping[str, ArrayLike] | None
+    ) -> FloatArray:
+        """What would be read without noise, (N, k)."""
+        pose = self._poses(blank.actuators, "q")
+        if blank.joint is not None:
+            names = getattr(self._machine, "passive_names", ())
+            if blank.joint not in names:
+                known = did_you_mean(blank.joint, names)
+                raise ArgumentError(f"joint: no passive joint is called {blank.joint!r}{known}")
+            solved: Any = self._machine.forward(blank.actuators)
+            return np.array(solved.passive[:, [names.index(blank.joint)]])
+        return predict(
+            blank.kind,
+            pose,
+            other=None if blank.other is None else self._poses(blank.other, "other"),
+            touching=(blank.artefact, np.full(len(blank), 2)),
+            **self._arguments(blank, mounting, touched),
+        ).values
 
     def _poses(self, actuators: FloatArray, argument: str) -> FloatArray:
         solved = self._machine.forward(actuators)

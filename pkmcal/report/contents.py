@@ -9,7 +9,7 @@ import numpy as np
 
 from pkmcal import display
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import FloatArray, propagate, rms
+from pkmcal.arrays import FloatArray, largest_first, propagate, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
@@ -20,6 +20,7 @@ from pkmcal.measurements.iso9283 import performance
 from pkmcal.measurements.repeats import groups
 
 _WORST = 10  # rows that are listed
+_ALIKE = 1e-6  # mm by which distances differ that are not equal
 _CELLS, _DRAWN = 30, 500  # of the map of the workspace along an axis; of poses for its quantiles
 _SHARE = 0.9  # of the way from home to the ends of the workspace
 _MOSTLY, _ONLY = 0.5, 0.99  # of the prior's deviation, above which the prior dominates
@@ -73,7 +74,7 @@ def verdict(found: Identification) -> tuple[str, str]:
 
 def instrument_identified(found: Identification) -> bool:
     """Say whether a frame or points of the instrument are among the parameters."""
-    return len(found.free) > len(found.fit.parameters.places)
+    return len(found.free) > int(found.fit.parameters.geometry.stop)
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:
@@ -119,7 +120,8 @@ def points(found: Identification) -> list[dict[str, Any]]:
 
 def worst(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Select the rows with the largest distances after the calibration."""
-    return sorted(rows, key=lambda row: -row["after"])[:_WORST]
+    off = np.array([row["after"] for row in rows])
+    return [rows[i] for i in largest_first(off, _ALIKE)[:_WORST]]
 
 
 def moved(rows: list[dict[str, Any]]) -> list[tuple[int, str, str, int]]:
