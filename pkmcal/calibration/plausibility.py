@@ -220,11 +220,11 @@ def shrunk(equations: Equations, start: Evaluation, end: Evaluation) -> list[str
     kinds = {measured.kind for measured in equations.sets}
     if not kinds <= {"touch", "orientation", "tilt", "angle", "closure"}:
         return []  # some length was read
-    rows = np.concatenate([
-        place for m, place in zip(equations.sets, equations.pose_of, strict=True) if m.kind == "touch"
-    ] or [np.empty(0, dtype=np.intp)])  # fmt: skip
-    if not len(rows):
+    pairs = zip(equations.sets, equations.pose_of, strict=True)
+    touching = [place for measured, place in pairs if measured.kind == "touch"]
+    if not touching:
         return []
+    rows = np.concatenate(touching)
     spans = []
     for evaluation in (start, end):
         places = evaluation.pose[rows, :3]

@@ -105,6 +105,18 @@ def tilt(true: Robot, rng: np.random.Generator, machine: pk.VirtualMachine) -> C
     return Case(machine.measure(q, "tilt", mounting=list(MOUNTING.values())), read, MOUNTING)
 
 
+def angle(true: Robot, rng: np.random.Generator, machine: pk.VirtualMachine) -> Case:
+    q = true.inverse(pk.sample_poses(true, 40, seed=int(rng.integers(2**32))))
+    place = true.passive_names.index("limb1.joint2")
+
+    def read(robot: Robot, at: Numbers) -> FloatArray:
+        angles = robot.forward(q).passive[:, place] - at["angle.limb1.joint2.zero"]
+        return angles * ARM / NOISE
+
+    measured = machine.measure(q, "angle", joint="limb1.joint2")
+    return Case(measured, read, {"angle.limb1.joint2.zero": 0.0})
+
+
 # What is touched, around where the tip is at home (0, 0, 920).
 HIGH = 920.0
 TOUCHED: dict[str, dict[str, Numbers]] = {
@@ -203,6 +215,7 @@ CASES: dict[str, Callable[[Robot, np.random.Generator, pk.VirtualMachine], Case]
     "relative-distance": relative,
     "orientation": orientation,
     "tilt": tilt,
+    "angle": angle,
     "touch a point": lambda true, rng, _: touches("point", true, rng),
     "touch a line": lambda true, rng, _: touches("line", true, rng),
     "touch a plane": lambda true, rng, _: touches("plane", true, rng),
@@ -239,7 +252,7 @@ def test_each_kind_reaches_the_cramer_rao_bound_and_is_honest(
     kind: str, runs: int, within: float, covered: tuple[float, float]
 ) -> None:
     """Errors in units of the bound, over all parameters: 1 where all of it is attained."""
-    robot = pk.load("hexapod")
+    robot = pk.load("agile-eye" if kind == "angle" else "hexapod")
     squares, inside = [], []
     for seed in range(runs):
         rng = np.random.default_rng(seed)
