@@ -13,9 +13,10 @@ from pkmcal.arguments import number, whole, word, words
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows
 from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identifiability import as_sum, sparse_basis
 from pkmcal.calibration.optimal_design import CRITERIA, Criterion, Design
-from pkmcal.calibration.parameters import Asked, FitData, Parameters, Prior, parameters
+from pkmcal.calibration.parameters import Asked, Parameters, Prior, parameters
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError
@@ -28,6 +29,7 @@ from pkmcal.measurements.virtual_machine import VirtualMachine
 from pkmcal.result import Result
 
 Unknown = Literal["frame", "target"]
+PLANNED: tuple[Kind, ...] = ("position", "pose", "height", "distance", "orientation")
 UNKNOWN: tuple[Unknown, ...] = ("frame", "target")
 
 _DRAWS = 25  # of poses at random, to compare a plan with
@@ -145,7 +147,7 @@ def plan_poses(
         What is made least: the predicted error at the targets, the volume of the parameters'
         confidence region (largest det of the information), or the sum of their variances, scaled
         to mm at the machine.
-    kind : {"position", "pose", "height", "distance"}
+    kind : {"position", "pose", "height", "distance", "orientation"}
         What will be measured; see `Measurements`.
     target : array_like (3,) or (k, 3), optional
         The measured point of the platform, mm, or several that are measured at every pose. For
@@ -182,6 +184,7 @@ def plan_poses(
     (20, True)
     """
     word("criterion", criterion, CRITERIA)
+    word("kind", kind, PLANNED)
     if (count is None) == (accuracy is None):
         raise ArgumentError(
             "give either count, how many poses, or accuracy, the error wanted in mm"

@@ -13,7 +13,7 @@ from pkmcal.arguments import word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.optimal_design import CRITERIA
-from pkmcal.calibration.plan_poses import UNKNOWN, Plan, plan_poses
+from pkmcal.calibration.plan_poses import PLANNED, UNKNOWN, Plan, plan_poses
 from pkmcal.cli.geometry_options import free_names, read_deviations
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
@@ -25,7 +25,6 @@ from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.command_csv import read_commands, write_commands
-from pkmcal.measurements.components import COMPONENTS
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
 
@@ -99,7 +98,7 @@ def plan(
             accuracy=accuracy,
             targets=used,
             criterion=word("--criterion", criterion, CRITERIA),
-            kind=word("--kind", kind, COMPONENTS),
+            kind=word("--kind", kind, PLANNED),
             noise=noise,
             free=chosen or None,
             prior=read_deviations("--prior", prior or [], seen, chosen),

@@ -12,23 +12,26 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pkmcal.measurements.components import COMPONENTS
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
-KINDS = tuple(COMPONENTS)
-SHAPES = {"pose": (5, 6), "position": (5, 3), "height": (5,), "distance": (5,), "closure": (5, 0)}
+from .kinds import PUBLIC, needed, width
+
+SHAPES = {
+    "pose": (5, 6), "position": (5, 3), "height": (5,), "distance": (5,), "closure": (5, 0),
+    "between": (5,), "relative-distance": (5,), "orientation": (5, 3), "tilt": (5, 2),
+    "angle": (5,), "touch": (5, 3),
+}  # fmt: skip
 
 
 def make(kind: str = "position", **fields: Any) -> Measurements:
     random = np.random.default_rng(0)
-    if kind == "distance":
-        fields = {"target": [0, 0, 100]} | fields
+    fields = needed(kind, 5, 4) | fields
     q = random.uniform(300, 500, (5, 4))
     return Measurements(q, random.normal(size=SHAPES[kind]), kind, **fields)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", PUBLIC)
 def test_every_kind_has_its_shape_components_and_units(kind: str) -> None:
     m = make(kind)
     assert len(m) == 5
@@ -54,9 +57,9 @@ def test_sigma_of_any_stated_shape_is_one_per_component_and_row(shape: tuple[int
     np.testing.assert_array_equal(sigma, np.broadcast_to(given_sigma, (5, 3)))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", PUBLIC)
 def test_measurements_pickle_and_stay_read_only(kind: str) -> None:
-    m = make(kind, sigma=0.1 if COMPONENTS[kind] else None, group=[1, 1, 2, 3, 4])
+    m = make(kind, sigma=0.1 if width(kind) else None, group=[1, 1, 2, 3, 4])
     again = pickle.loads(pickle.dumps(m))
     assert str(again) == str(m)
     assert (again.actuators == m.actuators).all() and (again.group == m.group).all()
