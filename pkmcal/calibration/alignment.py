@@ -68,7 +68,7 @@ def of_points(seen: PointPairs) -> tuple[FloatArray, FloatArray]:
         shifts = turns.reshape(-1, 9) @ gain.T - still
         common = straight + np.einsum("ijk,sk->sij", by_shift, shifts)
         # a turning that points in a plane or a line do not determine stays as it is
-        turns = _nearest(common + _ALIKE * np.linalg.norm(straight) * turns)
+        turns = nearest_rotations(common + _ALIKE * np.linalg.norm(straight) * turns)
     off = (turns.reshape(-1, 9) @ seen_by.T) - point.reshape(-1)
     misfit = ((off - off @ inverse.T @ lever.T) ** 2).sum(axis=1)
     best = first_largest(-misfit, _ALIKE * float((point**2).sum()))
@@ -109,6 +109,20 @@ def of_heights(values: FloatArray, point: FloatArray) -> FloatArray:
     return frame
 
 
+def of_directions(values: FloatArray, directions: FloatArray) -> FloatArray:
+    """The turning (3, 3) that takes directions (N, 3) nearest to those that were measured (N, 3).
+
+    About directions that they have in common it turns as little as may be.
+    """
+    common = values.T @ directions
+    return nearest_rotations(common + _ALIKE * (np.linalg.norm(common) + 1.0) * np.eye(3))
+
+
+def angles_of(turn: FloatArray) -> FloatArray:
+    """α β γ (3,) of a turning (3, 3)."""
+    return _frame(turn, np.zeros(3))[3:]
+
+
 def _inverse(lever: FloatArray, floor: float) -> FloatArray:
     """Pseudo-inverse of mm per mm; what poses determine less than `floor` stays where it is stated.
 
@@ -134,9 +148,9 @@ def _frame(turn: FloatArray, place: FloatArray) -> FloatArray:
     return frame
 
 
-def _nearest(matrices: FloatArray) -> FloatArray:
-    """The rotations (s, 3, 3) that have most in common with matrices (s, 3, 3)."""
+def nearest_rotations(matrices: FloatArray) -> FloatArray:
+    """The rotations (..., 3, 3) that have most in common with matrices (..., 3, 3)."""
     left, _, right = np.linalg.svd(matrices)
-    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+    left[..., 2] *= np.linalg.det(left @ right)[..., None]
     rotations: FloatArray = left @ right
     return rotations

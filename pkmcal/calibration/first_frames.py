@@ -49,27 +49,34 @@ def _aligned(
 ) -> FloatArray:
     """The frame (6,) nearest to the readings; targets that are free are moved and then not free."""
     kinds = {
-        kind: [i for i in rows if readings.sets[i].kind == kind] for kind in ("pose", "height")
+        kind: sets
+        for kind in ("position", "pose", "height", "orientation", "tilt")
+        if (sets := [i for i in rows if readings.sets[i].kind == kind])
     }
-    of_points_in = [i for i in rows if readings.sets[i].kind == "position"]
+    of_points_in = kinds.get("position", [])
     if not of_points_in:
-        kind = "pose" if kinds["pose"] else "height"
+        kind = next(iter(kinds))
         values = np.concatenate([readings.sets[i].values[rows[i]] for i in kinds[kind]])
-        if kind == "pose":
-            poses = [evaluation.pose[readings.pose_of[i][rows[i]]] for i in kinds[kind]]
-            return of_poses(values, np.concatenate(poses))
+        if kind == "tilt":  # as level as the robot file says
+            return np.zeros(6)
+        if kind != "height":
+            seen = [evaluation.predicted[i].values[rows[i]] for i in kinds[kind]]
+            whole = np.zeros((2, len(values), 6))
+            whole[:, :, 6 - values.shape[1] :] = values, np.concatenate(seen)
+            read, predicted = whole[:, np.isfinite(values).all(axis=1)]
+            return of_poses(read, predicted)
         parts = [_points(readings, evaluation, i, rows[i], theta) for i in kinds[kind]]
         return of_heights(values, np.concatenate([places for places, _ in parts]))
     columns = np.concatenate([_sought(readings, i, rows[i], free) for i in of_points_in])
     sought, target = np.unique(columns[:, 0], return_inverse=True)
     parts = [_points(readings, evaluation, i, rows[i], theta) for i in of_points_in]
-    seen = PointPairs(
+    pairs = PointPairs(
         values=np.concatenate([readings.sets[i].values[rows[i]] for i in of_points_in]),
         point=np.concatenate([places for places, _ in parts]),
         turn=np.concatenate([turn for _, turn in parts]),
         target=target.reshape(-1) - int(sought[0] < 0),
     )
-    frame, shifts = of_points(seen)
+    frame, shifts = of_points(pairs)
     lower, upper = readings.parameters.bounds
     for first, shift in zip(sought[sought >= 0], shifts, strict=True):
         mine = slice(first, first + 3)
@@ -91,7 +98,7 @@ def _points(
     readings: Readings, evaluation: Evaluation, i: int, rows: IntArray, theta: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Where targets of rows of set `i` are in the base frame (N, 3), and how they are turned."""
-    target = readings.points_of(i, "target", theta)
+    target = readings.arguments_of(i, theta)["target"]
     pose = evaluation.pose[readings.pose_of[i][rows]]
     places, _, turn = instruments.points(pose, np.ascontiguousarray(target[rows]))
     return places, turn
