@@ -161,9 +161,7 @@ def _box(machine: Robot | SerialArm, given: list[str]) -> Box:
     return box
 
 
-def _drawn(
-    machine: Robot | SerialArm, box: dict[str, tuple[float, float]], seed: int
-) -> FloatArray:
+def _drawn(machine: Robot | SerialArm, box: Box, seed: int) -> FloatArray:
     if not isinstance(machine, SerialArm):
         return sample_poses(machine, _DRAWN, seed, share=_SHARE)
     ends = machine.limits()
