@@ -168,9 +168,7 @@ def misfit(
     """
     start, end = commanded
     equations, state = estimator.equations, estimate.state
-    chosen = equations.parameters
-    moved = (estimate.evaluation.theta - chosen.start) / chosen.scale
-    prior = estimator.prior @ moved
+    prior = equations.parameters.prior_left(estimate.evaluation.theta)
     dof = float(estimate.weights @ equations.components) + len(prior) - state.fitted.rank
     squares = np.repeat(estimate.weights, equations.components) @ estimate.residual**2
     stated = equations.sigma_stated and dof > 0

@@ -68,7 +68,7 @@ class Identification(Parts, Result):
         """
         if isinstance(self.robot, SerialArm):
             return ()
-        prior = self.fit.parameters.prior
+        prior = np.asarray(self.fit.parameters.prior_rows.any(axis=0))
         given = (self.robot.geometry, self.table, self.covariance, prior, self.covariance_rule)
         return law_tests(*given)
 
@@ -252,6 +252,8 @@ class Identification(Parts, Result):
             f"{self.robot.name}: {len(self.free)} parameters from {count} {what}"
             f"{'s' if count > 1 else ''}"
         )
+        if self.sessions:
+            yield summary.sessions(self.sessions)
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)
         datasets, chosen = self.fit.equations.datasets, self.fit.parameters
@@ -271,6 +273,9 @@ class Identification(Parts, Result):
             yield summary.bounds(self.at_bounds)
         yield ""
         yield from summary.parameter_rows(self.table)
+        if self.holdout.own:
+            yield ""
+            yield summary.own_numbers(self.holdout)
 
     def __repr__(self) -> str:
         return (

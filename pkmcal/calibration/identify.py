@@ -23,7 +23,7 @@ from pkmcal.calibration.dropped import (
     without,
 )
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_statistics import (
@@ -274,6 +274,11 @@ def _warnings(
         notes.append("the least squares did not converge: the result is not to be trusted")
     if result.holdout_unreached:
         notes.append(f"holdout: {result.holdout_unreached}; left out")
+    if result.holdout.spare < LEAST_FREEDOM:
+        notes.append(
+            f"holdout: {len(result.holdout.own)} numbers of its own session take all of its"
+            " readings, nothing is left to compare; hold out more rows of it"
+        )
     return notes
 
 

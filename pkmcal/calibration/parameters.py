@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.sessions import NONE, Scope, Spread, label, matches, scopes
+from pkmcal.calibration.smoothness import smoothness_rows
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import Calibratable
@@ -143,6 +145,8 @@ class Parameters:
         The machine they belong to.
     asked : Asked
         What they were made of.
+    bent : ndarray (s,) or None
+        By how much tables of drive laws bend, in standard deviations, where that is not 0.
     """
 
     names: tuple[str, ...]
@@ -162,6 +166,7 @@ class Parameters:
     origin: Mapping[int, FloatArray]
     robot: Calibratable
     asked: Asked
+    bent: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.names)
@@ -177,7 +182,24 @@ class Parameters:
         sigma = self.prior / self.scale
         stated = np.flatnonzero(np.isfinite(sigma))
         rows: FloatArray = np.eye(len(sigma))[stated] / sigma[stated, None]
-        return rows
+        return np.vstack([rows, self._smooth[0] * self.scale])
+
+    def prior_left(self, theta: FloatArray) -> FloatArray:
+        """What the prior misses (p,) at `theta`, in standard deviations."""
+        own = len(self.prior_rows) - len(self._smooth[1])
+        left: FloatArray = self.prior_rows[:own] @ ((self.start - theta) / self.scale)
+        return np.concatenate([left, (0.0 if self.bent is None else self.bent) - self.bends(theta)])
+
+    def bends(self, theta: FloatArray) -> FloatArray:
+        """How far tables of drive laws bend (s,), in standard deviations."""
+        rows, constant = self._smooth
+        found: FloatArray = rows @ theta + constant
+        return found
+
+    @cached_property
+    def _smooth(self) -> tuple[FloatArray, FloatArray]:
+        columns = [self.geometry_of(name) for name in self.sessions or (None,)]
+        return smoothness_rows(self.robot, self.places, columns, len(self))
 
     @property
     def geometry(self) -> slice:

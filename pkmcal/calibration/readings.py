@@ -37,6 +37,8 @@ class Readings:
         Distinct rows of what the actuators read.
     actuator_sigma : ndarray (K, n) or None
         Its stated deviations.
+    approach : ndarray (K, n) or None
+        From where the actuators came.
     pose_of : list of ndarray of int
         Which pose each row of each set is at.
     spread : Spread
@@ -91,6 +93,11 @@ class Readings:
         noises = [m.actuator_sigma for m in self.sets]
         stated = [sigma for sigma in noises if sigma is not None]
         commands = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
+        directions = [m.approach for m in self.sets]
+        if any(each is not None for each in directions):  # backlash is between their poses
+            known = [np.zeros(m.actuators.shape) if m.approach is None else m.approach
+                     for m in self.sets]  # fmt: skip
+            commands = np.hstack([commands, np.concatenate(known)])
         self.machine_columns, machine_of = self.spread.machines(len(parameters.places))
         machine = np.concatenate(machine_of)
         # machines of different sessions are not at the same pose at the same actuators
@@ -99,7 +106,9 @@ class Readings:
         distinct, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
         n, width = actuators.shape[1], commands.shape[1]
         self.actuators = np.ascontiguousarray(distinct[:, :n])
-        self.actuator_sigma = np.ascontiguousarray(distinct[:, n:width]) if stated else None
+        self.actuator_sigma = np.ascontiguousarray(distinct[:, n : 2 * n]) if stated else None
+        own = n * (1 + bool(stated))
+        self.approach = np.ascontiguousarray(distinct[:, own:width]) if width > own else None
         self.machine_of_pose: IntArray = machine[first]
         self.command_of_pose: IntArray = (
             np.unique(distinct[:, :width], axis=0, return_inverse=True)[1].reshape(-1)
@@ -226,6 +235,15 @@ class Readings:
             else:
                 parts.append(part / white)
         return parts
+
+    def variances(self, noise: FloatArray) -> FloatArray:
+        """Variances (M,) of the readings as they are weighted, mm² and rad²."""
+        parts = []
+        for white, factor in zip(self._whiten, noise, strict=False):
+            each = np.linalg.inv(white) ** 2 if white.ndim == 3 else white**-2.0
+            parts.append(factor**2 * (each.sum(axis=2) if each.ndim == 3 else each).ravel())
+        variances: FloatArray = np.concatenate(parts)[self.present]
+        return variances
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""

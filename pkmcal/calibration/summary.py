@@ -138,6 +138,28 @@ def limits(
         yield filled("outliers: ", f"rows {first_rows(outliers, 10)}{where}")
 
 
+def sessions(names: Sequence[str]) -> str:
+    """Which sessions there are, and of which the robot is."""
+    shown = ", ".join(map(display.printable, names))
+    last = display.printable(names[-1])
+    return filled("sessions: ", f"{shown}; numbers without an @ are common, the robot is {last}'s")
+
+
+def own_numbers(holdout: HeldOut) -> Table:
+    """Numbers of sessions that were held out."""
+    rows = []
+    for name, (value, sigma) in holdout.own.items():
+        unit = holdout.units[name]
+        number, shown = display.displayed(value, unit)
+        deviation, _ = display.displayed(sigma, unit)
+        label = f"{name} [{shown}]" if shown != "mm" else name
+        text = display.with_uncertainty(number, deviation)
+        if not np.isfinite(deviation):
+            text = f"{display.fixed(number, 4)} ± {deviation:g}"
+        rows.append([label, text])
+    return Table(["found for the points held out", "value"], rows, left=1)
+
+
 def bounds(names: Sequence[str]) -> str:
     """Which parameters ended at a bound."""
     return filled("at a bound, ± as if it were not there: ", ", ".join(names))

@@ -33,6 +33,8 @@ from pkmcal.cli.measured import (
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
+from pkmcal.cli.sessions import in_sessions
+from pkmcal.display import printable
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurements import Measurements
@@ -66,7 +68,7 @@ def calibrate(
         typer.Option(
             metavar="WORD",
             help="unknown: identify the frame of the instrument, too. Of several files one word"
-            " each, with commas, if not the same for all.",
+            " each, with commas, if they have different frames.",
         ),
     ] = "known",
     target: Annotated[
@@ -80,6 +82,22 @@ def calibrate(
             help="unknown: identify where distances end, too.",
         ),
     ] = "known",
+    per_session: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Find this number anew in each session, such as 'offset*' or 'frame*'; all others"
+            " are common. Repeat it, or separate names with commas.",
+        ),
+    ] = None,
+    session: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="The session of a file: once for each file. Else files have a column session, or"
+            " their own names.",
+        ),
+    ] = None,
     covariance: Annotated[
         str,
         typer.Option(
@@ -174,6 +192,9 @@ def calibrate(
     for doubt in doubts:
         say(f"pkmcal: {doubt.message}", err=True)
     held = None if holdout is None else _read_holdout(holdout, read, machine, reading)
+    anew = [name.strip() for text in per_session or [] for name in text.split(",")]
+    if session or anew:
+        measured, held = in_sessions(csv, measured, session or [], holdout, held)
     urdf = isinstance(given, pk.SerialArm) and given.source is not None
     names = ["robot.toml", "residuals.png", *["robot.urdf"] * urdf]
     output = None if out is None else Output(out, names, read, force)
@@ -206,6 +227,7 @@ def calibrate(
             attachment=_known("--attachment", attachment, measured),
             holdout=held,
             covariance=word("--covariance", covariance, RULES),
+            per_session=anew,
             fix=fixed,
             datum=word("--datum", datum, DATUMS),
             drop="outliers" if drop_outliers else dropped,
@@ -225,7 +247,8 @@ def calibrate(
     else:
         say(found.summary())
         if output is not None:
-            say(f"\ncalibrated robot: {output.paths[0]}")
+            last = f" (of session {printable(found.sessions[-1])})" if found.sessions else ""
+            say(f"\ncalibrated robot{last}: {output.paths[0]}")
             say(f"residuals: {output.paths[1]}")
             if urdf:
                 say(f"URDF with the joint errors in its origins: {output.paths[2]}")
@@ -240,8 +263,9 @@ def _save(found: pk.Identification, path: Path, read: Inputs, robot: str) -> Non
     if isinstance(calibrated, pk.SerialArm) or isinstance(source, str):
         calibrated.save(path, read.comment())
         return
-    sigmas = zip(found.free, found.stderr.tolist(), strict=True)
-    known = {name: sigma for name, sigma in sigmas if name in calibrated.geometry.names}
+    columns = found.fit.parameters.geometry_of()
+    names = [calibrated.geometry.names[place] for place in found.fit.parameters.places]
+    known = dict(zip(names, found.stderr[columns].tolist(), strict=True))
     calibrated.save(path, read.comment(), like=source, deviations=known)
 
 

@@ -95,7 +95,8 @@ def _unit_of(pattern: str, robot: Calibratable, names: Sequence[str]) -> str:
     units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
     known = {name: str(units[name]) for name in names}
     known |= {f"frame.{name}": unit for name, unit in _FRAME.items()}
-    covered = {known[name] for name in known if fnmatchcase(name, pattern)}
+    number = pattern.partition("@")[0]  # of whatever session
+    covered = {known[name] for name in known if fnmatchcase(name, number)}
     if len(covered) > 1:
         raise ArgumentError(
             "covers lengths, angles or ratios together; name them apart, or give one number"
