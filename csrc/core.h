@@ -10,6 +10,7 @@
 #include "readings.h"
 #include "serial.h"
 #include "chain_response.h"
+#include "laws.h"
 #include "measured.h"
 #include "tpr2tps.h"
 #include "row_loops.h"

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import prod
 from typing import Literal
 
-from . import frames, measured, tpr2tps
+from . import frames, laws, measured, tpr2tps
 from .emit import Function
 
 Given = Literal["each", "either", "shared"]
@@ -160,6 +160,15 @@ def calls() -> list[Call]:
                 " their derivatives by the twist, the target and the anchor", measured.distance,
                 "pose target anchor distance by_twist by_target by_anchor",
                 ((), (6,), (3,), (3,)), {"target": "either", "anchor": "either"}),
+        formula("law_drive", "the way of drives without corrections, with its derivatives by"
+                " q, gain, quadratic, spool, buildup, and twice by q", laws.drive,
+                "x way by_x bend", ((), (5,), ())),
+        formula("law_drive_inverse", "the reading of drives at a way, without corrections",
+                laws.drive_inverse, "x q", ((),)),
+        formula("law_harmonic", "errors with a period, with their derivatives by q, cos, sin, and"
+                " twice by q", laws.harmonic, "x error by_x bend", ((), (3,), ())),
+        formula("law_segment", "corrections of a table, with their derivatives by q and by the two"
+                " numbers beside", laws.segment, "x error by_x", ((), (3,))),
         formula("tpr2tps_lengths", "2TPR&2TPS: eq. 8", tpr2tps.lengths, "size free lengths",
                 ((4,),), {"size": "shared"}),
         formula("tpr2tps_jacobian", "2TPR&2TPS: eq. 12", tpr2tps.by_free, "size free jacobian",

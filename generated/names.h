@@ -35,6 +35,10 @@ enum { MAP_SPATIAL, MAP_TRANSLATION, MAP_PLANAR, MAP_2TPR2TPS, MAP_SPHERICAL, MA
     "points pose:6 target:3* -> point:3 by_twist:3,6 by_target:3,3\n" \
     "seen_points frame:6! point:3 -> seen:3 by_frame:3,6 by_point:3,3\n" \
     "distances pose:6 target:3* anchor:3* -> distance: by_twist:6 by_target:3 by_anchor:3\n" \
+    "law_drive x:5 -> way: by_x:5 bend:\n" \
+    "law_drive_inverse x:5 -> q:\n" \
+    "law_harmonic x:4 -> error: by_x:3 bend:\n" \
+    "law_segment x:5 -> error: by_x:3\n" \
     "tpr2tps_lengths size:6! free:4 -> lengths:4\n" \
     "tpr2tps_jacobian size:6! free:4 -> jacobian:4,4\n" \
     "exp twist:6 -> motion:4,4\n" \

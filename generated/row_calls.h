@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 4294e55101d87985
+ * derivation 28f59fb76b20a451
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* a (n, 6) or (6), b (n, 6) or (6) -> out (n, 6): A followed by B. */
@@ -35,6 +35,21 @@ int CALL(seen_points)(ptrdiff_t n, const double *frame, const double *point, dou
 int CALL(distances)(ptrdiff_t n, const double *pose, const double *target, ptrdiff_t target_stride,
                     const double *anchor, ptrdiff_t anchor_stride, double *distance,
                     double *by_twist, double *by_target, double *by_anchor);
+
+/* x (n, 5) -> way (n), by_x (n, 5), bend (n): the way of drives without corrections, with its
+ * derivatives by q, gain, quadratic, spool, buildup, and twice by q. */
+int CALL(law_drive)(ptrdiff_t n, const double *x, double *way, double *by_x, double *bend);
+
+/* x (n, 5) -> q (n): the reading of drives at a way, without corrections. */
+int CALL(law_drive_inverse)(ptrdiff_t n, const double *x, double *q);
+
+/* x (n, 4) -> error (n), by_x (n, 3), bend (n): errors with a period, with their derivatives by
+ * q, cos, sin, and twice by q. */
+int CALL(law_harmonic)(ptrdiff_t n, const double *x, double *error, double *by_x, double *bend);
+
+/* x (n, 5) -> error (n), by_x (n, 3): corrections of a table, with their derivatives by q and
+ * by the two numbers beside. */
+int CALL(law_segment)(ptrdiff_t n, const double *x, double *error, double *by_x);
 
 /* size (6), free (n, 4) -> lengths (n, 4): 2TPR&2TPS: eq. 8. */
 int CALL(tpr2tps_lengths)(ptrdiff_t n, const double *size, const double *free, double *lengths);

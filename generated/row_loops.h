@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 4294e55101d87985
+ * derivation 28f59fb76b20a451
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
@@ -119,6 +119,63 @@ int CALL(distances)(ptrdiff_t n, const double *pose, const double *target, ptrdi
         scatter_row(lane_by_twist, 6, by_twist, 6, row, count);
         scatter_row(lane_by_target, 3, by_target, 3, row, count);
         scatter_row(lane_by_anchor, 3, by_anchor, 3, row, count);
+    }
+    return 0;
+}
+
+int CALL(law_drive)(ptrdiff_t n, const double *x, double *way, double *by_x, double *bend)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_x[5], lane_way[1], lane_by_x[5], lane_bend[1];
+        const int count = block_rows(first, n, row);
+        gather_row(x, 5, 5, row, lane_x);
+        FN(law_drive)(lane_x, lane_way, lane_by_x, lane_bend);
+        scatter_row(lane_way, 1, way, 1, row, count);
+        scatter_row(lane_by_x, 5, by_x, 5, row, count);
+        scatter_row(lane_bend, 1, bend, 1, row, count);
+    }
+    return 0;
+}
+
+int CALL(law_drive_inverse)(ptrdiff_t n, const double *x, double *q)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_x[5], lane_q[1];
+        const int count = block_rows(first, n, row);
+        gather_row(x, 5, 5, row, lane_x);
+        FN(law_drive_inverse)(lane_x, lane_q);
+        scatter_row(lane_q, 1, q, 1, row, count);
+    }
+    return 0;
+}
+
+int CALL(law_harmonic)(ptrdiff_t n, const double *x, double *error, double *by_x, double *bend)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_x[4], lane_error[1], lane_by_x[3], lane_bend[1];
+        const int count = block_rows(first, n, row);
+        gather_row(x, 4, 4, row, lane_x);
+        FN(law_harmonic)(lane_x, lane_error, lane_by_x, lane_bend);
+        scatter_row(lane_error, 1, error, 1, row, count);
+        scatter_row(lane_by_x, 3, by_x, 3, row, count);
+        scatter_row(lane_bend, 1, bend, 1, row, count);
+    }
+    return 0;
+}
+
+int CALL(law_segment)(ptrdiff_t n, const double *x, double *error, double *by_x)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_x[5], lane_error[1], lane_by_x[3];
+        const int count = block_rows(first, n, row);
+        gather_row(x, 5, 5, row, lane_x);
+        FN(law_segment)(lane_x, lane_error, lane_by_x);
+        scatter_row(lane_error, 1, error, 1, row, count);
+        scatter_row(lane_by_x, 3, by_x, 3, row, count);
     }
     return 0;
 }

@@ -17,8 +17,11 @@ BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.intp]
 Int32Array = NDArray[np.int32]  # what the core writes
 Int64Array = NDArray[np.int64]
+TextArray = NDArray[np.str_]
 
-Unit = Literal["mm", "rad", "1"]
+Unit = Literal["mm", "rad", "1", "1/mm", "1/rad", "1/mm2"]
+
+_ALIKE = 1e-6  # share by which entries of a direction differ that are not equal
 
 
 def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:
@@ -98,6 +101,33 @@ def first_largest(values: FloatArray, alike: float) -> int:
     1
     """
     return int(np.argmax(values >= values.max() - alike))
+
+
+def largest_first(values: FloatArray, alike: float) -> IntArray:
+    """Order of values, the largest first; of those within `alike` of the next, as they come.
+
+    Examples
+    --------
+    >>> largest_first(np.array([1.0, 3.0, 1.0 + 1e-15]), 1e-9)
+    array([1, 0, 2])
+    """
+    order = np.argsort(-values, kind="stable")
+    step = np.diff(values[order], prepend=values[order[:1]]) < -alike
+    group = np.empty(len(values), dtype=np.intp)
+    group[order] = np.cumsum(step)
+    return np.argsort(group, kind="stable")
+
+
+def furthest_axis(direction: FloatArray) -> int:
+    """Coordinate axis, 0 to 2, that is furthest from a direction; of those alike, the first.
+
+    Examples
+    --------
+    >>> furthest_axis(np.array([1e-17, 0.0, 1.0])), furthest_axis(np.ones(3))
+    (0, 0)
+    """
+    along = np.abs(direction)
+    return first_largest(-along, _ALIKE * float(along.max()))
 
 
 def rms(values: FloatArray) -> float:

@@ -8,6 +8,7 @@ from pkmcal.controllers.import_printer import Printer
 from pkmcal.controllers.klipper import klipper
 from pkmcal.controllers.linuxcnc import linuxcnc
 from pkmcal.controllers.loss import Loss
+from pkmcal.controllers.maslow import maslow
 from pkmcal.controllers.mjcf import mjcf
 from pkmcal.controllers.urdf import urdf
 
@@ -20,6 +21,7 @@ __all__ = [
     "klipper",
     "linuxcnc",
     "marlin",
+    "maslow",
     "mjcf",
     "reprap",
     "universal_robots",

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal import screw
 from pkmcal.arguments import shown, word, words
-from pkmcal.arrays import FloatArray, as_numbers, as_rows
+from pkmcal.arrays import FloatArray, as_numbers, as_rows, furthest_axis
 from pkmcal.core.screws import FRAMES
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_table import unit_vector
@@ -123,10 +123,10 @@ def frame_number(frame: str) -> int:
 def joint_frames(axes: FloatArray) -> FloatArray:
     """Right-handed axes (n, 3, 3) whose third column is the joint's axis.
 
-    The first is the coordinate axis furthest from the third, made orthogonal to it: axes along
-    coordinates get coordinate axes, without rounding.
+    The first is the coordinate axis furthest from the third (`furthest_axis`), made orthogonal to
+    it: axes along coordinates get coordinate axes, without rounding.
     """
-    furthest = np.eye(3)[np.argmin(np.abs(axes), axis=1)]
+    furthest = np.eye(3)[[furthest_axis(axis) for axis in axes]]
     across = furthest - axes * (axes * furthest).sum(axis=1, keepdims=True)
     first = across / np.linalg.norm(across, axis=1, keepdims=True)
     return np.ascontiguousarray(np.stack([first, np.cross(axes, first), axes], axis=2))

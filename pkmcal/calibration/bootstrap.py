@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,11 +25,10 @@ from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.labels import labels, poses_of_rows
+from pkmcal.calibration.labels import labels
 from pkmcal.calibration.least_squares import Search
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.observation import corrected
 from pkmcal.result import Result
 
 _TOGETHER = 20  # replicates that one task computes
@@ -145,15 +144,9 @@ def bootstrap(
     """
     instance("found", found, Identification)
     whole("replicates", replicates, 2)
-    if len(found.redundancy) > len(found.noise):
-        raise ArgumentError(
-            "found: its rows have poses of their own, from which no residuals are drawn yet;"
-            " stderr and covariance have the poses' part in them"
-        )
-    if (
-        not (found.fit.estimate.freedom > _LEFT).all()
-        or not np.isfinite(found.fit.covariance).all()
-    ):
+    freedom = found.fit.estimate.freedom
+    left = freedom.sum() if found.fit.uncertainty.mixed else freedom.min()
+    if not left > _LEFT or not np.isfinite(found.fit.covariance).all():
         raise ArgumentError("found: no degrees of freedom are left, so no residuals to draw from")
     seeds = np.random.SeedSequence(checked_seed(seed)).spawn(replicates)
     parts = [seeds[k : k + _TOGETHER] for k in range(0, replicates, _TOGETHER)]
@@ -188,19 +181,17 @@ class Replicate:
     """
 
     def __init__(self, fit: Fit) -> None:
-        self._equations, self._estimate = equations, estimate = fit.equations, fit.estimate
-        # rows of one pose take one sign
-        self._pose = poses_of_rows(equations)
-        self._residuals = equations.unwhiten(self._corrected(), estimate.state.noise)
+        self._equations, self._estimate = fit.uncertainty.equations, fit.estimate
+        self._pose = labels(self._equations).pose  # equations of one pose take one sign
+        self._left = self._corrected()
 
     def _corrected(self) -> FloatArray:
         """Whitened residuals (M,) with the deviation that the noise has."""
-        estimate, equations = self._estimate, self._equations
-        every = labels(equations).pose
-        root = np.sqrt(np.repeat(estimate.weights, equations.components))
+        estimate = self._estimate
+        root = np.sqrt(np.repeat(estimate.weights, self._equations.components))
         out = np.empty_like(estimate.residual)
         for pose in range(int(self._pose.max()) + 1):
-            mine = np.flatnonzero(every == pose)
+            mine = np.flatnonzero(self._pose == pose)
             jacobian = root[mine, None] * estimate.jacobian[mine]
             left = np.eye(len(mine)) - jacobian @ estimate.covariance @ jacobian.T
             size, axes = np.linalg.eigh(left)
@@ -219,14 +210,10 @@ class Replicate:
         centre = at.theta.copy()
         centre[stated] += random.standard_normal(int(stated.sum())) * prior[stated]
         signs = np.where(random.integers(0, 2, int(self._pose.max()) + 1), 1.0, -1.0)
-        of_rows = np.split(signs[self._pose], np.cumsum([len(m) for m in equations.sets])[:-1])
-        drawn = tuple(s[:, None] * r for s, r in zip(of_rows, self._residuals, strict=True))
-        kinds = [measured.kind for measured in equations.sets]
-        values = [
-            corrected(kind, seen.values, residual)
-            for kind, seen, residual in zip(kinds, at.predicted, drawn, strict=True)
-        ]
-        return self._solved(equations.with_readings(values, centre), replace(at, residuals=drawn))
+        left = signs[self._pose] * self._left
+        bent = equations.parameters.bends(at.theta)
+        bent = bent + random.standard_normal(len(bent))
+        return self._solved(*equations.redrawn(at, self._estimate.state.noise, left, centre, bent))
 
     def _solved(self, equations: Equations, at: Evaluation) -> FloatArray:
         state = self._estimate.state

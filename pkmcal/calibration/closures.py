@@ -8,12 +8,19 @@ and with the numbers of the geometry. There are three cases:
   is that of the forward kinematics.
 * `NoisyActuators`: the same closures, actuators with a stated deviation. The unknowns are where the
   actuators really are; closures hold exactly, for the pose is that of the forward kinematics there.
-* `FreePoses`: more closures than free coordinates, which no pose can meet at once. The unknowns are
-  the free coordinates; each closure is an equation in units of the actuator that it is read by.
+* `FreePoses`: more actuators than ways to move, whose closures no pose can meet at once. The
+  unknowns are the coordinates that joints leave free; each closure that is read is an equation in
+  units of its actuator.
+
+Closures beyond the free coordinates do not make the third case by themselves. An over-constrained
+machine has them between passive joints, which read nothing: with errors of the geometry they give
+way, and the pose that misses them least is that of the forward kinematics. To take what they miss
+for noise would make small whatever geometry lets them agree.
 """
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -47,11 +54,20 @@ class RowStates:
 
     def chosen(self, rows: BoolArray, others: RowStates) -> RowStates:
         """These where `rows` (K,), else the others."""
+        if rows.all():
+            return self
+        actuators = self.actuators
+        if actuators is not others.actuators:
+            actuators = np.where(rows[:, None], actuators, others.actuators)
         return RowStates(
             np.where(rows[:, None], self.pose, others.pose),
-            np.where(rows[:, None], self.actuators, others.actuators),
+            actuators,
             np.where(rows, self.status, others.status),
         )
+
+
+_HELD = 1e-9  # of the size: a step back onto held rows after which its square is rounding
+_STEPS = 30  # back onto them
 
 
 class Closures(Protocol):
@@ -69,6 +85,9 @@ class Closures(Protocol):
 
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """The equations (K, equations), whitened, and their derivative by the unknowns."""
+
+    def shifted(self, by: FloatArray) -> Closures:
+        """The same with whitened equations (K, equations) that are larger: of other readings."""
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Factors (equations,) to mm of the equations times their sigma."""
@@ -107,6 +126,10 @@ class Commanded:
         """No equations."""
         return np.empty((len(self.read), 0)), np.empty((len(self.read), 0, 0))
 
+    def shifted(self, by: FloatArray) -> Commanded:
+        """No equations."""
+        return self
+
     def lengths(self, robot: Calibratable) -> FloatArray:
         """No equations."""
         return np.empty(0)
@@ -142,6 +165,7 @@ class NoisyActuators:
         self._free = np.flatnonzero(sigma.any(axis=0))
         self.sigma: FloatArray | None = sigma[:, self._free]
         self._white = 1.0 / self.sigma
+        self._shift: FloatArray | float = 0.0
         self.unknowns = self.equations = len(self._free)
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
@@ -158,7 +182,13 @@ class NoisyActuators:
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """Where they are less what they read."""
         off = (states.actuators - self.read)[:, self._free]
-        return off * self._white, self._white[:, :, None] * np.eye(self.unknowns)
+        return off * self._white + self._shift, self._white[:, :, None] * np.eye(self.unknowns)
+
+    def shifted(self, by: FloatArray) -> NoisyActuators:
+        """The same with larger equations."""
+        other = copy.copy(self)
+        other._shift = self._shift + by
+        return other
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units."""
@@ -180,7 +210,11 @@ class NoisyActuators:
 
 
 class FreePoses:
-    """Poses of a machine with more closures than free coordinates.
+    """Poses of a machine with more actuators than ways to move, which no pose can meet at once.
+
+    The unknowns are steps of the pose that keep what passive joints hold, if they hold anything:
+    those across the gradients of the held rows, with Newton's steps of least norm back onto them
+    where a pose or the geometry has moved.
 
     Parameters
     ----------
@@ -194,53 +228,119 @@ class FreePoses:
 
     def __init__(self, robot: Robot, read: FloatArray, sigma: FloatArray) -> None:
         self.read = read
-        self.unknowns, self.equations = robot.machine.m, robot.machine.rows
-        # rows beside a limb's own are as sure as the file weighs them against the actuators
-        of_rows = pose_steps.sphere_actuators(robot)
-        common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
-        self.sigma: FloatArray | None = np.stack(
-            [sigma[:, a] if a >= 0 else common for a in of_rows], axis=1
-        )
+        self._roles = pose_steps.row_roles(robot)
+        self._held = len(self._roles.held)
+        self._mixed = not np.array_equal(self._roles.read, np.eye(robot.machine.rows))
+        self._arcs = 1.0 / mm_per_unit(pose_steps.step_units(robot), robot.length)
+        self.unknowns = robot.machine.m - self._held
+        self.equations = len(self._roles.read)
+        self.sigma: FloatArray | None = sigma
+        if self._roles.actuator != tuple(range(sigma.shape[1])):
+            # passive rows that give way are as sure as the file weighs them against the actuators
+            common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
+            each = [sigma[:, a] if a >= 0 else common for a in self._roles.actuator]
+            self.sigma = np.stack(each, axis=1)
         self._white = 1.0 / self.sigma
+        self._shift: FloatArray | float = 0.0
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
-        """Poses stay where they are until they are fitted."""
-        known = np.isfinite(states.pose).all(axis=1)
-        return RowStates(states.pose, self.read, np.where(known, 0, states.status))
+        """Poses stay where they are, or where joints hold them, until they are fitted."""
+        return self._kept(robot, states.pose, states.status)
 
     def moved(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
         """Move the poses."""
+        if self._held:
+            step = (self._allowed(robot, states)[0] @ step[:, :, None])[:, :, 0]
         pose = pose_steps.moved(_machine(robot), states.pose, step)
-        return RowStates(pose, self.read, states.status)
+        return self._kept(robot, pose, states.status)
 
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """What the limbs would read at the poses less what they read."""
         off, by_step = pose_steps.readings(_machine(robot), states.pose, self.read)
+        if self._mixed:
+            off, by_step = off @ self._roles.read.T, self._roles.read @ by_step
+        if self._held:
+            by_step = by_step @ self._allowed(robot, states)[0]
         off *= self._white
+        off += self._shift
         by_step *= self._white[:, :, None]
         return off, by_step
+
+    def shifted(self, by: FloatArray) -> FreePoses:
+        """The same with larger equations."""
+        other = copy.copy(self)
+        other._shift = self._shift + by
+        return other
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units; the other rows are in mm."""
         of_actuators = mm_per_unit(robot.actuator_units, robot.length)
-        of_rows = pose_steps.sphere_actuators(_machine(robot))
-        return np.array([of_actuators[a] if a >= 0 else 1.0 for a in of_rows])
+        return np.array([of_actuators[a] if a >= 0 else 1.0 for a in self._roles.actuator])
 
     def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
         """Twists by steps of the pose."""
-        return pose_steps.step_twists(_machine(robot), states.pose)
+        twists = pose_steps.step_twists(_machine(robot), states.pose)
+        return twists @ self._allowed(robot, states)[0] if self._held else twists
 
     def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
-        """What the limbs would read, poses held."""
-        by_free = pose_steps.readings_by_numbers(_machine(robot), states.pose, self.read, places)
-        by_free *= self._white[:, :, None]
-        return by_free
+        """What the limbs would read, unknowns held."""
+        machine = _machine(robot)
+        by_free = pose_steps.readings_by_numbers(machine, states.pose, self.read, places)
+        found = self._roles.read @ by_free if self._mixed else by_free
+        if self._held:
+            by_step = pose_steps.readings(machine, states.pose, self.read)[1]
+            found += self._roles.read @ by_step @ self._following(robot, states, by_free)
+        found *= self._white[:, :, None]
+        return found
 
     def twists_by_numbers(
         self, robot: Calibratable, states: RowStates, places: IntArray
     ) -> FloatArray | None:
-        """Poses are held."""
-        return None
+        """Poses are held, or go with the joints that hold them."""
+        if not self._held:
+            return None
+        machine = _machine(robot)
+        by_free = pose_steps.readings_by_numbers(machine, states.pose, self.read, places)
+        steps = self._following(robot, states, by_free)
+        return pose_steps.step_twists(machine, states.pose) @ steps
+
+    def _following(self, robot: Calibratable, states: RowStates, by_free: FloatArray) -> FloatArray:
+        """Steps of the pose by numbers that keep what is held, (K, m, p)."""
+        return -self._allowed(robot, states)[1] @ (self._roles.held @ by_free)
+
+    def _allowed(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
+        """Steps that keep the held rows (K, m, unknowns), and those that undo them (K, m, h)."""
+        by_step = pose_steps.readings(_machine(robot), states.pose, self.read)[1]
+        return self._split(by_step)
+
+    def _split(self, by_step: FloatArray) -> tuple[FloatArray, FloatArray]:
+        across = (self._roles.held @ by_step * self._arcs).transpose(0, 2, 1)
+        known = np.isfinite(across).all(axis=(1, 2))
+        across[~known] = np.eye(*across.shape[1:])
+        q, r = np.linalg.qr(across, mode="complete")
+        square = r[:, : self._held].transpose(0, 2, 1)
+        undo = q[:, :, : self._held] @ np.linalg.inv(square)
+        undo[~known] = np.nan
+        arcs = self._arcs[:, None]
+        return arcs * q[:, :, self._held :], arcs * undo
+
+    def _kept(self, robot: Calibratable, pose: FloatArray, status: Int32Array) -> RowStates:
+        """Poses (K, 6) moved back to where joints hold them; NaN where they do not get there."""
+        machine = _machine(robot)
+        if self._held:
+            limit = _HELD * machine.machine.struct.size
+            for _ in range(_STEPS):
+                off, by_step = pose_steps.readings(machine, pose, self.read)
+                missed = off @ self._roles.held.T
+                step = -(self._split(by_step)[1] @ missed[:, :, None])[:, :, 0]
+                pose = pose_steps.moved(machine, pose, step)
+                short = np.abs(step / self._arcs).max(axis=1) <= limit
+                if (short | np.isnan(step).any(axis=1)).all():
+                    break
+            pose = np.where(short[:, None], pose, np.nan)
+        known = np.isfinite(pose).all(axis=1)
+        lost = np.where(status == 0, 1, status)
+        return RowStates(pose, self.read, np.where(known, 0, lost).astype(np.int32))
 
 
 def _machine(robot: Calibratable) -> Robot:
@@ -267,14 +367,13 @@ def closures_of(
         Distinct rows.
     sigma : ndarray (K, n) or None
         Standard deviations of what was read. None: nothing is stated, which is 0 where the
-        closures are as many as the free coordinates, and 1 mm, to be estimated, where they are
-        more.
+        actuators are as many as the ways to move, and 1 mm, to be estimated, where they are more.
     """
     if isinstance(robot, Robot) and pose_steps.surplus(robot) > 0:
         if sigma is not None and not sigma.all():
             raise ArgumentError(
-                f"measurements: {robot.name} has more closures than free coordinates, which"
-                " actuators without noise cannot meet: actuator_sigma must be positive, or None"
+                f"measurements: {robot.name} has more actuators than ways to move, which cannot"
+                " be met without noise: actuator_sigma must be positive, or None"
             )
         if sigma is None:
             sigma = np.tile(1.0 / mm_per_unit(robot.actuator_units, robot.length), (len(read), 1))

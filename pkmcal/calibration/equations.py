@@ -15,17 +15,21 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
-from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_poses
-from pkmcal.calibration.closures import Closures, Commanded, RowStates, closures_of
+from pkmcal.calibration.closures import RowStates
 from pkmcal.calibration.elimination import Blocks, Shares
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.first_frames import aligned
 from pkmcal.calibration.parameters import FitData, Parameters
 from pkmcal.calibration.readings import ROUNDING, Readings, of_read
-from pkmcal.core import instruments
+from pkmcal.calibration.session_machines import (
+    Machines,
+    SessionClosures,
+    closures_of_sessions,
+    commanded_closures,
+)
 from pkmcal.core.library import STATUS
 from pkmcal.measurements import orientation
-from pkmcal.measurements.calibratable import Calibratable
-from pkmcal.measurements.observation import by_difference, distance_per_point
+from pkmcal.measurements.observation import by_difference, corrected, distance_per_point
 from pkmcal.result import failed_rows
 
 
@@ -43,7 +47,7 @@ class Equations(Readings):
 
     Attributes
     ----------
-    closures : Closures
+    closures : SessionClosures
         What the closures say of the poses.
     components : ndarray of int (U,)
         Equations of each unit. A unit is what counts together: a row where poses follow from the
@@ -77,9 +81,12 @@ class Equations(Readings):
             m.sigma is None and bool(np.isfinite(m.values).any()) for m in self.sets
         ])  # fmt: skip
         sigma = self.actuator_sigma
-        self._take(closures_of(parameters.robot, self.actuators, sigma), sigma is None)
+        machines = range(len(self.machine_columns))
+        self._own = tuple(np.flatnonzero(self.machine_of_pose == s) for s in machines)
+        closures = closures_of_sessions(parameters.robot, self._own, self.actuators, sigma)
+        self._take(closures, sigma is None)
 
-    def _take(self, closures: Closures, estimated: bool) -> None:
+    def _take(self, closures: SessionClosures, estimated: bool) -> None:
         """Build the units for these closures; `estimated`: their deviations are not known."""
         self.closures = closures
         of_row, pose_of_row = self.count, np.concatenate(self.pose_of)
@@ -112,7 +119,7 @@ class Equations(Readings):
         if not self.closures.unknowns:
             return self
         other = copy.copy(self)
-        other._take(Commanded(self.actuators), estimated=False)
+        other._take(commanded_closures(self._own, self.actuators), estimated=False)
         return other
 
     def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
@@ -145,31 +152,34 @@ class Equations(Readings):
 
         `noise` (G,) multiplies the stated deviations of each group, as in `whitened`.
         """
-        robot = self.parameters.robot.with_values(self.parameters.values_at(theta))
-        states = self.closures.settled(robot, self._states)
+        p = self.parameters
+        robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
+        machines = Machines(tuple(robots), self._own, self.approach)
+        states = self.closures.settled(machines, self._states)
         if self.closures.unknowns:
             factors = np.ones(len(self.unstated)) if noise is None else noise
 
             def system(states: RowStates) -> tuple[FloatArray, FloatArray]:
-                return self._system(robot, states, theta, factors)
+                return self._system(machines, states, theta, factors)
 
-            states = self._blocks.best(self.closures, robot, states, system)
+            states = self._blocks.best(self.closures, machines, states, system)
         predicted = self.predicted(states.pose, theta)
         residuals = self.residuals(predicted)
         return Evaluation(
-            theta, robot, states.pose, states.actuators, states.status, predicted, residuals
+            theta, machines, states.pose, states.actuators, states.status, predicted, residuals
         )
 
     def _system(
-        self, robot: Calibratable, states: RowStates, theta: FloatArray, noise: FloatArray
+        self, machines: Machines, states: RowStates, theta: FloatArray, noise: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
-        off, by_unknown = self.closures.residual(robot, states)
-        u = self.closures.unknowns
-        equation, by_unknown = off.reshape(-1) / noise[-1], by_unknown.reshape(-1, u) / noise[-1]
+        off, by_unknown = self.closures.residual(machines, states)
+        off /= noise[-1]
+        by_unknown /= noise[-1]
+        equation, by_unknown = off.reshape(-1), by_unknown.reshape(-1, self.closures.unknowns)
         if not self.count.any():
             return equation, by_unknown
-        twists = self.closures.twists(robot, states)
+        twists = self.closures.twists(machines, states)
         predicted = self.predicted(states.pose, theta)
         residuals = self.residuals(predicted)
         by_pose = [
@@ -183,11 +193,14 @@ class Equations(Readings):
             np.concatenate([by_unknown, self.whitened(by_pose, noise)]),
         )
 
+    def _at(self, evaluation: Evaluation, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+        return self._system(evaluation.machines, evaluation.states, evaluation.theta, noise)
+
     def residual(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Measured less predicted (M,), whitened: what is left when poses have taken their part."""
         if not self.closures.unknowns:
             return self.whitened(evaluation.residuals, noise)
-        off, by_unknown = self._system(evaluation.robot, evaluation.states, evaluation.theta, noise)
+        off, by_unknown = self._at(evaluation, noise)
         return -self._blocks.left(by_unknown, off)
 
     def squares(self, residual: FloatArray) -> FloatArray:
@@ -201,12 +214,14 @@ class Equations(Readings):
         readings = self.whitened(self.jacobian(evaluation), noise)
         if not self.closures.unknowns:
             return readings
-        p, robot, states = self.parameters, evaluation.robot, evaluation.states
-        _, by_unknown = self._system(robot, states, evaluation.theta, noise)
-        by_all, own = np.zeros((len(by_unknown), len(p))), len(by_unknown) - len(readings)
-        of_closures = self.closures.by_numbers(robot, states, p.places)
-        np.divide(of_closures.reshape(own, -1), noise[-1], out=by_all[:own, : len(p.places)])
-        by_all[own:] = readings
+        p, (_, by_unknown) = self.parameters, self._at(evaluation, noise)
+        of_closures = self.closures.by_numbers(
+            evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
+        )
+        of_closures /= noise[-1]
+        by_all = of_closures.reshape(-1, len(p))
+        if len(readings):
+            by_all = np.concatenate([by_all, readings])
         return self._blocks.left(by_unknown, by_all)
 
     def start_from(self, rows: IntArray, poses: FloatArray) -> None:
@@ -215,15 +230,47 @@ class Equations(Readings):
         guess[rows] = poses
         self._states = replace(self._states, pose=guess)
 
-    def with_readings(self, values: Sequence[FloatArray], prior_centre: FloatArray) -> Equations:
-        """The same with other measured values (N, k) of each set, and another centre (n,)."""
-        other = copy.copy(self)
+    def redrawn(
+        self,
+        at: Evaluation,
+        noise: FloatArray,
+        left: FloatArray,
+        prior_centre: FloatArray,
+        bent: FloatArray | None = None,
+    ) -> tuple[Equations, Evaluation]:
+        """The same with other readings, and evaluated where these have been drawn.
+
+        Parameters
+        ----------
+        at : Evaluation
+            Where the machine is taken to be.
+        noise : ndarray (G,)
+            See `whitened`.
+        left : ndarray (M,)
+            What its readings leave there, as `residual`.
+        bent : ndarray (s,), optional
+            That of `Parameters`.
+        prior_centre : ndarray (n,)
+            Another centre of the prior.
+        """
+        other, errors, unknowns = copy.copy(self), left, self.closures.unknowns
+        if unknowns:
+            off, by_unknown = self._system(at.machines, at.states, at.theta, noise)
+            errors = self._blocks.spread(by_unknown, left)
+            own = len(self.actuators) * self.closures.equations
+            change = -noise[-1] * (errors + off)[:own]
+            other.closures = self.closures.shifted(change.reshape(len(self.actuators), -1))
+            errors = errors[own:]
+        residuals = tuple(self.unwhiten(errors, noise[: len(self.sets)]))
         other.sets = tuple(
-            replace(measured, values=given.reshape(measured.values.shape))
-            for measured, given in zip(self.sets, values, strict=True)
+            replace(m, values=corrected(m.kind, seen.values, residual).reshape(m.values.shape))
+            for m, seen, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
-        other.parameters = replace(self.parameters, start=prior_centre)
-        return other
+        other.parameters = replace(self.parameters, start=prior_centre, bent=bent)
+        other.warm_start(at)
+        if unknowns:
+            return other, other.at(at.theta, noise)
+        return other, replace(at, residuals=residuals)
 
     def reweighted(self, deviations: Sequence[FloatArray]) -> Equations:
         """The same where the components (k,) of each set have other relative deviations."""
@@ -233,66 +280,22 @@ class Equations(Readings):
         other.deviations = tuple(deviations)
         return other
 
-    def start(self) -> Evaluation:
-        """Evaluate at the present parameters, an unknown frame aligned with the readings.
+    def start(self, near: FloatArray | None = None, own: BoolArray | None = None) -> Evaluation:
+        """Evaluate at the present parameters, unknown frames aligned with the readings.
 
         Rows that fail from a measured pose are tried from home, those that then miss grossly in
-        every assembly mode.
+        every assembly mode. `near` (n,) are other parameters to start from, of which only `own`
+        (n,) are aligned.
         """
-        theta = self.parameters.start.copy()
+        theta = self.parameters.start.copy() if near is None else near.copy()
         evaluation = self.at(theta)
         if not evaluation.ok:
             self.start_from(np.flatnonzero(evaluation.status), self.parameters.robot.home)
             evaluation = self.at(theta)
-        if self.parameters.frame is None or not evaluation.ok:
+        if not self.parameters.frames or not evaluation.ok:
             return evaluation
-        frame, theta = self._aligned(evaluation)
-        self.parameters, theta = self.parameters.aligned(theta, frame)
+        self.parameters, theta = aligned(self, evaluation, own)
         return self.at(theta)
-
-    def _aligned(self, evaluation: Evaluation) -> tuple[FloatArray, FloatArray]:
-        """The frame (6,) nearest to the readings, and parameters with unknown targets shifted."""
-        theta = evaluation.theta.copy()
-        framed = {
-            kind: [i for i, m in enumerate(self.sets) if self._framed[i] and m.kind == kind]
-            for kind in ("position", "pose", "height")
-        }
-        if not framed["position"]:
-            kind = "pose" if framed["pose"] else "height"
-            values = np.concatenate([self.sets[i].values for i in framed[kind]])
-            if kind == "pose":
-                poses = np.concatenate([evaluation.pose[self.pose_of[i]] for i in framed[kind]])
-                return of_poses(values, poses), theta
-            points = np.concatenate([self.targets_at(evaluation, i)[0] for i in framed[kind]])
-            return of_heights(values, points), theta
-        columns = np.concatenate([
-            self._columns[i]["target"][:, 0]
-            if "target" in self._columns[i]
-            else np.full(len(self.sets[i]), -1)
-            for i in framed["position"]
-        ])  # fmt: skip
-        sought, target = np.unique(columns, return_inverse=True)
-        target = target.reshape(-1) - int(sought[0] < 0)
-        parts = [self.targets_at(evaluation, i) for i in framed["position"]]
-        seen = PointPairs(
-            values=np.concatenate([self.sets[i].values for i in framed["position"]]),
-            point=np.concatenate([places for places, _ in parts]),
-            turn=np.concatenate([turn for _, turn in parts]),
-            target=target,
-        )
-        frame, shifts = of_points(seen)
-        for first, shift in zip(sought[sought >= 0], shifts, strict=True):
-            mine = slice(first, first + 3)
-            moved = theta[mine] + shift
-            theta[mine] = np.clip(moved, self.parameters.lower[mine], self.parameters.upper[mine])
-        return frame, theta
-
-    def targets_at(self, evaluation: Evaluation, i: int) -> tuple[FloatArray, FloatArray]:
-        """Where the targets of set `i` are in the base frame (N, 3), and how they are turned."""
-        sought = self._columns[i].get("target")
-        target = self._known[i]["target"] if sought is None else evaluation.theta[sought]
-        places, _, turn = instruments.points(evaluation.pose[self.pose_of[i]], target)
-        return places, turn
 
     def warm_start(self, evaluation: Evaluation) -> None:
         """Start the forward kinematics of later calls of `at` from its poses."""
@@ -303,21 +306,24 @@ class Equations(Readings):
 
         With the opposite sign that of the residuals.
         """
-        p, robot = self.parameters, evaluation.robot
-        by_geometry = self.closures.twists_by_numbers(robot, evaluation.states, p.places)
+        p, numbers = self.parameters, self.spread.columns.shape[1]
+        by_geometry = self.closures.twists_by_numbers(
+            evaluation.machines, evaluation.states, p.places
+        )
         parts = []
         for i, seen in enumerate(evaluation.predicted):
             rows, k = seen.values.shape
-            part = np.zeros((rows, k, len(p)))
+            part = np.zeros((rows, k, numbers))
             if by_geometry is not None:
                 part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
             if seen.by_frame is not None and p.frame is not None:
                 part[:, :, p.frame : p.frame + 6] = seen.by_frame
-            for name, columns in self._columns[i].items():
+            for name, mine in self._numbers[i].items():
                 by_point = seen.by_target if name == "target" else seen.by_anchor
                 assert by_point is not None
-                np.put_along_axis(part, np.repeat(columns[:, None, :], k, axis=1), by_point, axis=2)
-            parts.append(by_difference(self.sets[i].kind, part, evaluation.residuals[i]))
+                np.put_along_axis(part, np.repeat(mine[:, None, :], k, axis=1), by_point, axis=2)
+            wide = self.spread.of_rows(part, i)
+            parts.append(by_difference(self.sets[i].kind, wide, evaluation.residuals[i]))
         return parts
 
     def by_groups(
@@ -352,7 +358,7 @@ class Equations(Readings):
             freedom = np.bincount(group, left, count).astype(np.float64)
             squares = np.bincount(group, residual**2, count).astype(np.float64)
             return Shares(squares, freedom, np.diag(freedom))
-        _, by_unknown = self._system(evaluation.robot, evaluation.states, evaluation.theta, noise)
+        _, by_unknown = self._at(evaluation, noise)
         group = self._group_of_equation
         return self._blocks.by_groups(by_unknown, group, weights, residual, taken)
 
@@ -391,9 +397,9 @@ class Equations(Readings):
         return off.max(axis=1) if off.shape[1] else np.full(len(off), np.nan)
 
     def _closures_off(self, evaluation: Evaluation) -> FloatArray:
-        sigma, robot = self.closures.sigma, evaluation.robot
-        off, _ = self.closures.residual(robot, evaluation.states)
-        return off if sigma is None else off * sigma * self.closures.lengths(robot)
+        sigma, machines = self.closures.sigma, evaluation.machines
+        off, _ = self.closures.residual(machines, evaluation.states)
+        return off if sigma is None else off * sigma * self.closures.lengths(machines)
 
     def status(self, evaluation: Evaluation) -> Int32Array:
         """Of the forward kinematics, for each row."""

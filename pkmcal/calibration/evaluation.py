@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from pkmcal.arrays import FloatArray, Int32Array
 from pkmcal.calibration.closures import RowStates
+from pkmcal.calibration.session_machines import Machines
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.observation import Predicted
 
@@ -18,7 +19,7 @@ class Evaluation:
     ----------
     theta : ndarray (n,)
         The parameters, mm and rad.
-    robot : Calibratable
+    machines : Machines
         With their geometry.
     pose : ndarray (K, 6)
         Where the machine is at each distinct row of actuators; NaN where it cannot be.
@@ -33,7 +34,7 @@ class Evaluation:
     """
 
     theta: FloatArray
-    robot: Calibratable
+    machines: Machines
     pose: FloatArray
     actuators: FloatArray
     status: Int32Array
@@ -44,6 +45,11 @@ class Evaluation:
     def ok(self) -> bool:
         """Whether the forward kinematics solved every row."""
         return not self.status.any()
+
+    @property
+    def robot(self) -> Calibratable:
+        """The machine; that of the last session where some of its numbers are of sessions."""
+        return self.machines.robots[-1]
 
     @property
     def states(self) -> RowStates:

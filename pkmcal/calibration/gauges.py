@@ -62,8 +62,9 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
     chain = robot.geometry.chain[:, parameters.places]
     change = np.linalg.pinv(chain) @ numbers  # of the free numbers, as far as they can follow
     left = numbers - chain @ change
+    own = parameters.geometry
     scaled = np.zeros((len(parameters), change.shape[1]))
-    scaled[: len(change)] = change / parameters.scale[: len(change), None]
+    scaled[own] = change[parameters.number_of[own]] / parameters.scale[own, None]
     size = np.linalg.norm(scaled, axis=0)
     there = size > 0  # the machine has what would move, and some of it is free
     scaled, left = scaled[:, there] / size[there], left[:, there] / size[there]
@@ -82,7 +83,7 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
 
 
 def _motions(robot: Robot) -> FloatArray:
-    """Changes (limbs, SLOTS, 7) of all numbers: shifts and turns of the base, and the scale."""
+    """Changes of all numbers (*slots, 7): shifts and turns of the base, and the scale."""
     slots = robot.slots
     change = np.zeros((*slots.shape, 7))
     change[:, 0:3, 0:3] = np.eye(3)
@@ -92,6 +93,13 @@ def _motions(robot: Robot) -> FloatArray:
         change[:, 0:3, 3:6] = turned.transpose(0, 2, 1)
     if all(KINDS[limb.kind].actuator_unit == "mm" for limb in robot.model.limbs):
         change[:, _SCALED, _SCALE] = slots[:, _SCALED]
+        for number, place in zip(robot.geometry.numbers, robot.geometry.slot_index, strict=True):
+            spool = robot.model.limbs[number.limb].law
+            turns = spool is not None and spool.spool  # gain and quadratic number turn a spool
+            key = number.slot.removeprefix("drive.")
+            if key != number.slot or key == "gain":
+                grows = not (turns and key in ("gain", "quadratic"))
+                change.reshape(-1, 7)[place, _SCALE] = slots.flat[place] * grows
     return change
 
 
@@ -133,6 +141,8 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
     joints = robot.slots[:, 3:6]
     if robot.model.map not in ("translation", "xy") or np.ptp(joints, axis=0).any():
         return False
+    if any(name.startswith("base") and "@" in name for name in parameters.names):
+        return False  # anchors of each session: not looked at
     cost = float((equations.residual(evaluation, noise) ** 2).sum())
     for k, axis in enumerate(robot.coordinates):
         names = [f"base{i + 1}.{axis}" for i in range(len(robot.slots))]

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -13,10 +13,10 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.labels import Labels, labels
-from pkmcal.calibration.mode_slips import in_their_modes
+from pkmcal.calibration.later import Later, OwnNumbers, compared, later
 from pkmcal.calibration.parameters import FitData
 from pkmcal.calibration.uncertainty import Uncertainty, stated_variances
 from pkmcal.measurements.calibratable import Calibratable
@@ -26,6 +26,8 @@ from pkmcal.statistics.holdout_test import HoldoutTest, Lengths, holdout_test
 from pkmcal.statistics.linear_fit import numbered
 from pkmcal.statistics.noise import Noise, noise
 
+_LOOSE = 1e-6  # share of a number in combinations that its session's rows do not show
+_NOTHING = 1e-6  # share of a variance below which nothing is left of a reading
 _ODD = 0.01  # chance of naming any held-out row that is as far off as expected
 
 
@@ -51,10 +53,14 @@ class HeldOut:
         The distances in short.
     test : HoldoutTest or None
         Whether they contradict the fit; None where that cannot be said.
-    data : tuple of FitData
-        The sets of measurements.
-    like : tuple of int
-        The fitted set of each.
+    later : Later or None
+        The rows.
+    end : Evaluation or None
+        They at the estimate, their own parameters found.
+    own : mapping of str to (float, float)
+        These parameters, of sessions that were not fitted: value and standard deviation.
+    spare : float
+        Lengths that are left to compare when these parameters have taken theirs.
     drawn : bool
         Whether they are of the same measurements as the fitted points, drawn at random.
     """
@@ -70,9 +76,24 @@ class HeldOut:
     before: Distances = field(default_factory=Distances)
     after: Distances = field(default_factory=Distances)
     test: HoldoutTest | None = None
-    data: tuple[FitData, ...] = ()
-    like: tuple[int, ...] = ()
+    later: Later | None = None
+    end: Evaluation | None = None
+    own: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    spare: float = float("nan")
     drawn: bool = False
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each parameter of the rows: "mm", "rad" or "1"."""
+        if self.later is None:
+            return {}
+        chosen = self.later.parameters
+        return dict(zip(chosen.names, chosen.units, strict=True))
+
+    @property
+    def data(self) -> tuple[FitData, ...]:
+        """The sets of measurements."""
+        return () if self.later is None else self.later.data
 
     @property
     def contradicts(self) -> bool:
@@ -116,12 +137,13 @@ def evaluate(
     """
     if not held:
         return HeldOut()
-    parameters = estimator.equations.parameters
-    equations = Equations([data for data, _ in held], parameters).commanded()
-    after = in_their_modes(equations, equations.at(estimate.evaluation.theta))
-    before = equations.at(estimator.start.theta)
+    rows = later(estimator.equations.parameters, held)
+    whole = rows.equations(estimator.equations)
+    before = whole.commanded().start(rows.at(estimator.start.theta), rows.own)
+    equations, after, own = compared(rows, whole, estimate, uncertainty)
+    rows = replace(rows, parameters=equations.parameters)  # their own frames have been laid
     named = labels(equations)
-    points = _points(equations, after, named, [like for _, like in held], uncertainty)
+    points = _points(rows, equations, after, named, own, uncertainty)
     row = named.row[named.length]
     count = len(equations.rows)
     off_before, off = equations.distances(before), equations.distances(after)
@@ -131,7 +153,8 @@ def evaluate(
         chi2_tail(k * d**2 / e, k) < _ODD / count if np.isfinite(d) and e > 0 else False
         for d, e, k in zip(off, expected, np.bincount(row, minlength=count), strict=True)
     ])  # fmt: skip
-    usable = uncertainty.known and bool(good.any())
+    spare = float((1.0 - points.taken[good[row]]).sum()) if good.any() else float("nan")
+    usable = uncertainty.known and spare >= LEAST_FREEDOM
     return HeldOut(
         rms_before=equations.rms(before),
         rms=equations.rms(after),
@@ -144,8 +167,10 @@ def evaluate(
         before=distances(off_before, odd),
         after=distances(off, odd),
         test=_test(points, named, good[row], uncertainty) if usable else None,
-        data=tuple(data for data, _ in held),
-        like=tuple(like for _, like in held),
+        later=rows,
+        end=after,
+        own=_of_own(rows, after, own, uncertainty),
+        spare=spare,
     )
 
 
@@ -154,19 +179,20 @@ class _Points:
     """Lengths (M,) of the points held out; of a pose its position.
 
     Residuals and design in mm, the variance of a reading and of what actuators add to it in mm²,
-    and the fitted set that each is like.
+    the share of each that numbers of its own session took, and the fitted set that each is like.
     """
 
     residual: FloatArray
     design: FloatArray
     reading: FloatArray
     by_actuators: FloatArray
+    taken: FloatArray
     like: IntArray
 
     @property
     def own(self) -> FloatArray:
-        """Variance of a length whatever the parameters are."""
-        return self.reading + self.by_actuators
+        """Variance of a residual whatever the parameters of the fit are."""
+        return (self.reading + self.by_actuators) * (1.0 - self.taken)
 
     def by_fit(self, uncertainty: Uncertainty) -> FloatArray:
         """Variance that the parameters' errors add."""
@@ -177,35 +203,70 @@ class _Points:
 
 
 def _points(
+    rows: Later,
     equations: Equations,
     after: Evaluation,
     named: Labels,
-    like: Sequence[int],
+    own: OwnNumbers | None,
     uncertainty: Uncertainty,
 ) -> _Points:
     """The lengths at the solution."""
-    scale = equations.parameters.scale
-    by_actuators = after.robot.actuator_twists(after.pose, after.actuators)
+    like = rows.like
+    by_actuators = after.machines.actuator_twists(after.states)
     variances, added = [], []
     for i, measured in enumerate(equations.sets):
-        rows, k = after.residuals[i].shape
+        count, k = after.residuals[i].shape
         variances.append(np.repeat(_variances(measured, uncertainty, like[i]), k))
         sigma = _of_actuators(measured, after.robot, uncertainty)
         moved = after.predicted[i].by_twist @ by_actuators[equations.pose_of[i]]
-        part = np.zeros((rows, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
+        part = (
+            np.zeros((count, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
+        )
         added.append(part.ravel())
-    jacobian = [part.reshape(-1, part.shape[2]) for part in equations.jacobian(after)]
+    jacobian = np.concatenate([
+        part.reshape(-1, part.shape[2]) for part in equations.jacobian(after)
+    ])[equations.present]  # fmt: skip
+    back = uncertainty.fit.back
+    by_all = (jacobian * equations.parameters.scale)[named.length]
+    by_fitted = rows.by_fitted(by_all, len(back))
 
     def lengths(parts: Sequence[FloatArray]) -> FloatArray:
         return np.concatenate(parts)[equations.present][named.length]
 
+    by_sigma, taken = lengths(added), np.zeros(len(by_all))
+    if own is not None:
+        by_own = by_all[:, rows.own]
+        by_fitted += by_own @ own.follow
+        weighted = equations.variances(own.noise)[named.length]
+        if uncertainty.mixed:
+            weighted += by_sigma / uncertainty.excess.total
+        taken = np.clip(((by_own @ own.half) ** 2).sum(axis=1) / weighted, 0.0, 1.0)
     return _Points(
         residual=lengths([part.ravel() for part in after.residuals]),
-        design=(lengths(jacobian) * scale) @ uncertainty.fit.back,
+        design=by_fitted @ back,
         reading=lengths(variances),
-        by_actuators=lengths(added),
+        by_actuators=by_sigma,
+        taken=taken,
         like=np.array(like)[named.set_of[named.length]],
     )
+
+
+def _of_own(
+    rows: Later, after: Evaluation, own: OwnNumbers | None, uncertainty: Uncertainty
+) -> dict[str, tuple[float, float]]:
+    """Values and deviations of parameters that the fit has not; inf where nothing shows them."""
+    if own is None:
+        return {}
+    chosen, mine = rows.parameters, np.flatnonzero(rows.own)
+    follow, widened = own.follow @ uncertainty.fit.back, uncertainty.covariance.scale
+    matrix = widened**2 * own.half @ own.half.T + follow @ uncertainty.by_cluster @ follow.T
+    rates = (chosen.reported_rates(after.theta) * chosen.scale)[np.ix_(mine, mine)]
+    deviation = np.sqrt(np.maximum(np.diagonal(rates @ matrix @ rates.T), 0.0))
+    shown = np.diagonal(own.half @ np.linalg.pinv(own.half)) > 1.0 - _LOOSE
+    deviation[~shown | (not uncertainty.known)] = np.inf
+    values = chosen.reported(after.theta)[mine].tolist()
+    names = [chosen.names[c] for c in mine]
+    return dict(zip(names, zip(values, deviation.tolist(), strict=True), strict=True))
 
 
 def _variances(measured: Measurements, uncertainty: Uncertainty, like: int) -> FloatArray:
@@ -235,7 +296,7 @@ def _test(
 ) -> HoldoutTest | None:
     """Test lengths of the rows that were reached; None where their noise is not known."""
     own = points.own[good]
-    if not (own > 0).all():
+    if not (own > _NOTHING * np.median(own)).all():
         return None
     fitted, split = _fitted_lengths(uncertainty, np.unique(points.like))
     unit = np.sqrt(own)
@@ -249,7 +310,8 @@ def _test(
     # rows at the same actuators have their errors in common
     common = split.shared + float(np.mean(points.by_actuators[good] / own)) * split.total
     of_held = Noise(split.total, min(common, split.total))
-    return holdout_test(fitted, held, split, uncertainty.by_cluster, of_held)
+    taken = float(points.taken[good].mean())
+    return holdout_test(fitted, held, split, uncertainty.by_cluster, of_held, taken)
 
 
 def _fitted_lengths(uncertainty: Uncertainty, sets: IntArray) -> tuple[Lengths, Noise]:

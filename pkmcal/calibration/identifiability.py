@@ -188,6 +188,7 @@ def _reduced(basis: FloatArray) -> FloatArray:
 
 def _family(name: str) -> str:
     """The kind of a parameter: its name without the limb; the frame is one kind, as are targets."""
+    name = name.partition("@")[0]
     first = name.split(".")[0]
     if first == "frame" or first.startswith(("target", "anchor")):
         return re.sub("(frame|target|anchor).*", r"\1", first)

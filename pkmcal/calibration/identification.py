@@ -12,15 +12,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import arguments
+from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
+from pkmcal.calibration.law_tests import LawTest, law_tests
 from pkmcal.calibration.moved import Moved, moved
 from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import robust_check
 from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.verdict import Verdict, judge
 from pkmcal.display import Table
-from pkmcal.exceptions import ArgumentTypeError
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.observation import predict
 from pkmcal.result import Result
@@ -52,9 +55,22 @@ class Identification(Parts, Result):
 
         Empty where nothing did, or where the points held out were drawn from the same measurements.
         """
-        if self.holdout.drawn or not self.holdout.data or not self.fit.uncertainty.known:
+        later, end = self.holdout.later, self.holdout.end
+        if self.holdout.drawn or later is None or end is None or not self.fit.uncertainty.known:
             return ()
-        return moved(self.fit, self.holdout.data, self.holdout.like)
+        return moved(self.fit, later, end)
+
+    @cached_property
+    def law_tests(self) -> tuple[LawTest, ...]:
+        """Whether the free numbers of drive laws are needed: an F test of each kind against 0.
+
+        Nothing is said of kinds with a prior, or that the measurements do not determine.
+        """
+        if isinstance(self.robot, SerialArm):
+            return ()
+        prior = np.asarray(self.fit.parameters.prior_rows.any(axis=0))
+        given = (self.robot.geometry, self.table, self.covariance, prior, self.covariance_rule)
+        return law_tests(*given)
 
     @property
     def loss(self) -> str:
@@ -103,7 +119,31 @@ class Identification(Parts, Result):
             "change": self.values - self.start,
         }
 
-    def accuracy(self, poses: ArrayLike, target: ArrayLike | None = None) -> FloatArray:
+    def robot_of(self, session: str) -> Robot | SerialArm:
+        """The machine with the numbers that it had in a session.
+
+        Parameters
+        ----------
+        session : str
+            One of `sessions`, or one that was held out.
+
+        Raises
+        ------
+        ValueError
+            Another name.
+        """
+        if session not in self.robots:
+            known = ", ".join(map(repr, self.robots)) or "per_session found none"
+            raise ArgumentError(f"session: expected one of {known}; found {session!r}")
+        return self.robots[session]
+
+    def accuracy(
+        self,
+        poses: ArrayLike,
+        target: ArrayLike | None = None,
+        *,
+        session: str | None = None,
+    ) -> FloatArray:
         """Standard deviation of a point of the identified machine at any pose.
 
         Parameters
@@ -112,6 +152,8 @@ class Identification(Parts, Result):
             mm and rad; they need not have been measured. Of an arm its joint coordinates.
         target : array_like (3,), optional
             A point of the platform, mm; its origin by default.
+        session : str, optional
+            One of `sessions`; by default the last, whose machine `robot` is.
 
         Returns
         -------
@@ -122,14 +164,19 @@ class Identification(Parts, Result):
         """
         place = np.zeros(3) if target is None else as_rows("target", target, 3)[0][0]
         chosen = self.fit.parameters
-        machine = as_machine(self.robot)
+        if session is not None and session not in self.sessions:
+            raise ArgumentError(
+                f"session: expected one of {', '.join(map(repr, self.sessions)) or 'none'}; found"
+                f" {session!r}"
+            )
+        machine = as_machine(self.robot if session is None else self.robots[session])
         at, actuators, shape = machine.commanded(poses)
         by_numbers = machine.error_twists(at, actuators)[:, :, chosen.places]
         by_geometry = predict("position", at, place).by_twist @ by_numbers
-        k = len(chosen.places)
-        deviation = np.sqrt(propagate(by_geometry, self.fit.covariance[:k, :k]))
+        own = chosen.geometry_of(session)
+        deviation = np.sqrt(propagate(by_geometry, self.fit.covariance[np.ix_(own, own)]))
         undetermined = self.fit.undetermined() * chosen.scale[:, None]
-        moved = np.linalg.norm(by_geometry @ undetermined[:k], axis=(1, 2))
+        moved = np.linalg.norm(by_geometry @ undetermined[own], axis=(1, 2))
         return np.where(moved < _UNIDENTIFIABLE, deviation, np.inf).reshape(shape)
 
     def plot(self, path: str | PathLike[str]) -> None:
@@ -195,20 +242,30 @@ class Identification(Parts, Result):
             f"{self.robot.name}: {len(self.free)} parameters from {count} {what}"
             f"{'s' if count > 1 else ''}"
         )
+        if self.sessions:
+            yield summary.sessions(self.sessions)
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)
-        datasets = self.fit.equations.datasets
+        datasets, chosen = self.fit.equations.datasets, self.fit.parameters
+        framed = len(self.free) > len(chosen.places) or isinstance(self.robot, SerialArm)
+        if self.datum.names:
+            yield summary.filled("", str(self.datum))
         yield from summary.limits(
             self.identifiability,
             len(self.free),
             self.correlations,
             row_names(datasets, self.outliers),
             self.outliers,
+            frames=framed and not self.datum.names and not np.isfinite(self.stderr).all(),
         )
+        yield from (summary.filled("", str(test)) for test in self.law_tests)
         if self.at_bounds:
             yield summary.bounds(self.at_bounds)
         yield ""
         yield from summary.parameter_rows(self.table)
+        if self.holdout.own:
+            yield ""
+            yield summary.own_numbers(self.holdout)
 
     def __repr__(self) -> str:
         return (

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.arguments import instance, word
+from pkmcal.arguments import word, words
 from pkmcal.arms.arm import SerialArm
-from pkmcal.calibration.closures import has_equations
+from pkmcal.calibration.begin import begun, estimator_at
+from pkmcal.calibration.datasets import as_fit_data, as_fitted, by_set, informative
+from pkmcal.calibration.datum import DATUMS, NO_DATUM, DatumRule
+from pkmcal.calibration.datum import datum as choose_datum
+from pkmcal.calibration.dropped import (
+    OUTLIERS,
+    Drop,
+    held_without,
+    named_rows,
+    robust_outliers,
+    without,
+)
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_statistics import (
@@ -26,8 +37,8 @@ from pkmcal.calibration.fit_statistics import (
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.loss import LIMITS, LossName
-from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
-from pkmcal.calibration.parameters import KNOWN, Bounds, FitData, Known, Prior, parameters
+from pkmcal.calibration.mode_slips import in_other_modes
+from pkmcal.calibration.parameters import Asked, Bounds, FitData, Known, Prior, parameters
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
     contradicted_prior,
@@ -37,10 +48,11 @@ from pkmcal.calibration.plausibility import (
     likely_unit_errors,
 )
 from pkmcal.calibration.row_errors import likely_row_errors
+from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import Calibratable, as_given, as_machine
+from pkmcal.measurements.calibratable import as_given, as_machine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import RULES, CovarianceRule
 
@@ -61,6 +73,10 @@ def identify(
     bounds: Bounds = None,
     attachment: Known | Sequence[Known] = "known",
     covariance: CovarianceRule = "auto",
+    per_session: str | Sequence[str] = (),
+    fix: str | Sequence[str] = (),
+    datum: DatumRule = "none",
+    drop: Drop = None,
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -85,12 +101,13 @@ def identify(
         Weight of rows with large residuals, by the length of the whole measured vector.
     frame : {"known", "unknown"} or a sequence of them
         Whether the instrument's frame is the robot's base frame or is to be found: six parameters
-        ``frame.x`` … ``frame.gamma``, the pose of the base in the instrument's frame. With
-        several sets one word each, if not the same for all. No start near it is needed.
+        ``frame.x`` … ``frame.gamma``, the pose of the base in the instrument's frame. Of several
+        sets one word says that all have the same frame; one word each, that each unknown one is
+        another, ``frame.x@2``. No start near it is needed.
     target : {"known", "unknown"} or a sequence of them
         Whether the measured points of the platform are known or to be found, from where
         `Measurements.target` puts them: ``target1.x`` …; for distances the fixed point,
-        ``anchor1.x`` ….
+        ``anchor1.x`` …. One word, or one each, as for frames.
     holdout : float or Measurements, optional
         A fraction of the poses of each set, drawn at random with repeats kept together, or other
         measurements: they are not fitted, only compared.
@@ -104,6 +121,25 @@ def identify(
         several targets and repeats do. "classical": all errors are independent. "auto": cluster
         where the residuals show a shared error or the loss is robust, else classical. The values
         are the same.
+    per_session : str or sequence of str
+        Names or wildcards, ``"offset*"``, ``"frame*"``, of what is found anew in each
+        `Measurements.session`: ``offset5@thursday``. A set without sessions is one, named after its
+        file or counted from 1. All else is common. Priors and bounds hold for each session's
+        number; of a session that is held out such numbers are found from its rows, before these
+        are compared with the fit.
+    fix : str or sequence of str
+        Numbers of the geometry, by name or wildcard, that keep their present values though `free`
+        or the robot's default set has them.
+    datum : {"none", "auto"}
+        "auto": also hold as many numbers as the measurements leave open of where the base frame and
+        the platform frame lie, and of how the frames between an arm's joints are drawn: about
+        3-2-1 of the joints of each. What is predicted of a measurement stays the same, and the
+        other numbers have finite deviations, in the frames that the held ones define. They are
+        `Identification.datum`. "none": such combinations move as little as possible.
+    drop : sequence of int or "outliers", optional
+        Rows that are left out, fitted or drawn to be held out: by their numbers, counted from 0
+        through all sets, or those that the others contradict in a robust fit. They are
+        `Identification.dropped`.
 
     Returns
     -------
@@ -136,31 +172,39 @@ def identify(
     0.3
     """
     machine = as_machine(robot)
-    datasets, unread = _informative(
-        machine, _datasets(machine, measurements, frame, target, attachment)
-    )
+    unknown = {"frame": frame, "target": target, "attachment": attachment}
+    anew = words("per_session", per_session)
+    asked = Asked(free, prior, bounds, anew, by_set(unknown), words("fix", fix))
+    given = as_fit_data(machine, measurements, unknown, sessions=bool(anew))
+    dropped = named_rows(drop, sum(len(data.rows) for data in given))
+    datasets, unread = informative(machine, given)
     held: list[tuple[FitData, int]] = []
     if isinstance(holdout, Measurements):
-        held = [_as_fitted(machine, holdout, datasets)]
+        held = [as_fitted(machine, holdout, datasets, sessions=bool(anew))]
     elif holdout is not None:
         pairs = [draw(data, holdout) for data in datasets]
         datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
-    chosen = parameters(machine, datasets, free, prior, bounds)
+    datasets = without(datasets, dropped)
+    chosen = parameters(machine, datasets, asked)
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
-    equations = Equations(datasets, chosen, unread)
-    commanded = equations.commanded()
-    start = commanded.start()
-    if in_their_modes(commanded, start) is not start:
-        start = commanded.start()  # an unknown frame was laid with rows of other modes
+    word("datum", datum, DATUMS)
+    equations, commanded, start = begun(datasets, chosen, unread)
+    held_numbers = NO_DATUM
     try:
-        if not start.ok and commanded is equations:
-            raise ArgumentError(commanded.failures(start))
-        own = equations.begin(commanded, start)
-        if not own.ok:
-            raise ArgumentError(equations.failures(own))
-        estimator = Estimator(equations, own, loss)
+        if drop == OUTLIERS:
+            dropped = robust_outliers(equations, commanded, start)
+            datasets = without(datasets, dropped)
+            equations, commanded, start = begun(datasets, chosen, unread)
+        estimator = estimator_at(equations, commanded, start, loss)
         estimate = estimator.solve()
+        if datum == "auto":
+            held_numbers = choose_datum(estimator, estimate)
+        if held_numbers.names:
+            chosen = parameters(machine, datasets, held_numbers.asked(asked))
+            equations, commanded, start = begun(datasets, chosen, unread)
+            estimator = estimator_at(equations, commanded, start, loss)
+            estimate = estimator.solve()
     except ValueError as error:
         hint = likely_unit_errors(datasets, chosen, start) or likely_row_errors(datasets, chosen)
         if not hint and not start.ok:
@@ -169,13 +213,22 @@ def identify(
     unlike = unlike_components(estimator, estimate)
     if unlike is not None:
         commanded = equations.reweighted(unlike[1])
-        estimator = Estimator(commanded, own, loss)
+        estimator = Estimator(commanded, estimator.start, loss)
         estimate = estimator.solve(estimate.evaluation)
     sure = uncertainty(estimator, estimate, covariance, None if unlike is None else unlike[0])
-    outside = replace(
-        evaluate(held, estimator, estimate, sure), drawn=not isinstance(holdout, Measurements)
+    drawn = not isinstance(holdout, Measurements)
+    held = held_without(held, dropped) if drawn else held
+    outside = evaluate(held, estimator, estimate, sure)
+    if drop == OUTLIERS and drawn and outside.odd:
+        dropped = tuple(sorted({*dropped, *outside.odd}))
+        outside = evaluate(held_without(held, dropped), estimator, estimate, sure)
+    result = _result(estimator, estimate, commanded, start, replace(outside, drawn=drawn), sure)
+    result = replace(
+        result,
+        datum=held_numbers,
+        dropped=dropped,
+        dropped_names=row_names(given, dropped),
     )
-    result = _result(estimator, estimate, commanded, start, outside, sure)
     notes = _warnings(result, estimator, estimate, datasets)
     for text in notes:
         warnings.warn(text, CalibrationWarning, stacklevel=2)
@@ -221,6 +274,11 @@ def _warnings(
         notes.append("the least squares did not converge: the result is not to be trusted")
     if result.holdout_unreached:
         notes.append(f"holdout: {result.holdout_unreached}; left out")
+    if result.holdout.spare < LEAST_FREEDOM:
+        notes.append(
+            f"holdout: {len(result.holdout.own)} numbers of its own session take all of its"
+            " readings, nothing is left to compare; hold out more rows of it"
+        )
     return notes
 
 
@@ -237,98 +295,6 @@ def _remedy(result: Identification) -> str:
     return cure
 
 
-def _datasets(
-    robot: Calibratable,
-    measurements: Measurements | Sequence[Measurements],
-    frame: Known | Sequence[Known],
-    target: Known | Sequence[Known],
-    attachment: Known | Sequence[Known],
-) -> list[FitData]:
-    sets = list(measurements) if isinstance(measurements, Iterable) else [measurements]
-    for measured in sets:
-        _check(robot, measured, "measurements")
-    if not sets:
-        raise ArgumentError("measurements: none given")
-    datasets, first = [], 0
-    said = {"frame": frame, "target": target, "attachment": attachment}
-    unknown = zip(*(_unknown(name, given, len(sets)) for name, given in said.items()), strict=True)
-    for measured, unknowns in zip(sets, unknown, strict=True):
-        datasets.append(FitData(measured, np.arange(first, first + len(measured)), *unknowns))
-        first += len(measured)
-    known = [data.measured.actuator_sigma is not None for data in datasets]
-    if any(known) and not all(known):
-        raise ArgumentError("measurements: state actuator_sigma of all sets, or of none")
-    if any(data.unknown_frame for data in datasets) and not any(data.framed for data in datasets):
-        raise ArgumentError("frame: distances do not depend on it, it cannot be unknown")
-    distances = any(data.measured.kind == "distance" for data in datasets)
-    if any(data.unknown_attachment for data in datasets) and not distances:
-        raise ArgumentError("attachment: distances alone have one, it cannot be unknown")
-    return datasets
-
-
-def _informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[FitData], int]:
-    """Leave rows out that say nothing: unread, where poses follow from the actuators exactly.
-
-    And count them.
-    """
-    if has_equations(machine, [data.measured.actuator_sigma for data in datasets]):
-        return datasets, 0
-    kept, unread = [], 0
-    for data in datasets:
-        values = data.measured.values.reshape(len(data.measured), -1)
-        read = np.isfinite(values).any(axis=1)
-        unread += int((~read).sum())
-        if read.all():
-            kept.append(data)
-        elif read.any():
-            measured = data.measured.select(read)
-            kept.append(replace(data, measured=measured, rows=data.rows[read]))
-    if not kept:
-        raise ArgumentError(
-            f"measurements: nothing was read but the actuators; poses of {machine.name} follow from"
-            " these, which then say nothing of its geometry: measure poses, points, heights or"
-            " distances"
-        )
-    return kept, unread
-
-
-def _as_fitted(
-    robot: Calibratable, holdout: Measurements, datasets: Sequence[FitData]
-) -> tuple[FitData, int]:
-    """Hold other measurements out, with what is unknown of the fitted set of their kind.
-
-    And with the noise of its actuators, where their own is not stated.
-    """
-    _check(robot, holdout, "holdout")
-    alike = [i for i, data in enumerate(datasets) if data.measured.kind == holdout.kind]
-    i = alike[0] if alike else 0
-    of_actuators = datasets[i].measured.actuator_sigma
-    if holdout.actuator_sigma is None and of_actuators is not None:
-        holdout = replace(holdout, actuator_sigma=np.sqrt(np.mean(of_actuators**2, axis=0)))
-    return replace(datasets[i], measured=holdout, rows=np.arange(len(holdout))), i
-
-
-def _check(robot: Calibratable, measured: Measurements, argument: str) -> None:
-    n = instance(argument, measured, Measurements).actuators.shape[1]
-    if n != robot.n_actuators:
-        raise ArgumentError(
-            f"{argument}: {robot.name} has {robot.n_actuators} actuators, found {n} per row"
-        )
-    if measured.actuator_units not in (None, robot.actuator_units):
-        raise ArgumentError(
-            f"{argument}: the actuators of {robot.name} are in {', '.join(robot.actuator_units)},"
-            f" found {', '.join(measured.actuator_units or ())}"
-        )
-
-
-def _unknown(argument: str, given: str | Sequence[str], count: int) -> list[bool]:
-    alone = isinstance(given, str) or not isinstance(given, Iterable)
-    said = [given] * count if alone else list(given)
-    if len(said) != count:
-        raise ArgumentError(f"{argument}: one word for each of {count} sets, found {len(said)}")
-    return [word(argument, each, KNOWN) == "unknown" for each in said]
-
-
 def _result(
     estimator: Estimator,
     estimate: Estimate,
@@ -338,15 +304,14 @@ def _result(
     sure: Uncertainty,
 ) -> Identification:
     chosen, search = estimator.equations.parameters, estimator.search
-    robot = as_given(chosen.robot.replace(chosen.values_at(estimate.evaluation.theta)))
-    if isinstance(robot, Robot):
-        robot = robot.closing(commanded.actuators, estimate.evaluation.pose)
     end = estimate.evaluation
+    robots = _robots(commanded, end)
     if commanded is not estimator.equations:
         commanded.warm_start(end)
         end = commanded.at(end.theta)
     return Identification(
-        robot=robot,
+        robot=robots[chosen.sessions[-1] if chosen.sessions else ""],
+        robots=_of_sessions(robots, held),
         prior_test=tested_prior(estimator, estimate),
         table=parameter_table(estimator, estimate, sure),
         identifiability=identifiability(estimator, estimate),
@@ -356,3 +321,30 @@ def _result(
         search=SearchRecord(search.converged, search.evaluations, tuple(search.history)),
         fit=Fit(commanded, start, end, estimate, sure),
     )
+
+
+def _of_sessions(
+    robots: Mapping[str, Robot | SerialArm], held: HeldOut
+) -> dict[str, Robot | SerialArm]:
+    """The machines of all sessions by name, those that were held out with them."""
+    found = {name: robot for name, robot in robots.items() if name}
+    if found and held.later is not None and held.end is not None:
+        chosen = held.later.parameters
+        for name in chosen.sessions:
+            if name not in found:
+                values = chosen.values_at(held.end.theta, chosen.geometry_of(name))
+                found[name] = as_given(chosen.robot.replace(values))
+    return found
+
+
+def _robots(commanded: Equations, end: Evaluation) -> dict[str, Robot | SerialArm]:
+    """The machine of each session, "" where there are none, at the parameters of an evaluation."""
+    chosen, found = commanded.parameters, {}
+    for session in chosen.sessions or ("",):
+        columns = chosen.geometry_of(session)
+        robot = as_given(chosen.robot.replace(chosen.values_at(end.theta, columns)))
+        own = (commanded.machine_columns == columns).all(axis=1)[commanded.machine_of_pose]
+        if isinstance(robot, Robot):
+            robot = robot.closing(commanded.actuators[own], end.pose[own])
+        found[session] = robot
+    return found

@@ -42,7 +42,7 @@ def poses_of_rows(equations: Equations) -> IntArray:
 
     Rows at the same actuators are one pose in all sets.
     """
-    pose = np.concatenate(equations.pose_of)
+    pose = equations.command_of_pose[np.concatenate(equations.pose_of)]
     for k, measured in enumerate(equations.sets):
         if measured.group is not None:
             pose[equations.set_of == k] = measured.pose_index + pose.max() + 1

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.loss import Loss
@@ -24,9 +24,13 @@ class Search:
         What is fitted.
     start : Evaluation
         θ0, where all rows are reached.
+    columns : ndarray of int, optional
+        The parameters that are found, n of them; all by default. The others stay at θ0.
 
     Attributes
     ----------
+    scale : ndarray (n,)
+        That of `Parameters`.
     prior : ndarray (p, n)
         A row for each parameter with a prior, in units of its deviation.
     evaluations : int
@@ -38,18 +42,25 @@ class Search:
         the closures where nothing else was read.
     """
 
-    def __init__(self, equations: Equations, start: Evaluation) -> None:
+    def __init__(
+        self, equations: Equations, start: Evaluation, columns: IntArray | None = None
+    ) -> None:
         parameters = equations.parameters
-        self.equations, self.start, self.scale = equations, start, parameters.scale
-        self.prior = parameters.prior_rows
-        self._centre = self.prior @ ((parameters.start - start.theta) / self.scale)
-        lower, upper = ((end - start.theta) / self.scale for end in parameters.bounds)
+        self._found: IntArray | slice = slice(None) if columns is None else columns
+        self.equations, self.start = equations, start
+        self.scale = parameters.scale[self._found]
+        rows = parameters.prior_rows[:, self._found]
+        held = rows.any(axis=1)
+        self.prior = rows[held]
+        self._centre = parameters.prior_left(start.theta)[held]
+        lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
         self._method: Literal["trf", "lm"] = "trf" if bounded else "lm"
         ones = np.ones(len(equations.unstated))
         self._last: tuple[FloatArray, FloatArray, Evaluation]
         self._last = (np.zeros(len(self.scale)), ones, start)
+        self._last_jacobian: tuple[Evaluation, FloatArray, FloatArray] | None = None
         self._refused = np.zeros(len(equations.components), dtype=bool)
         self.evaluations = 0
         self.converged = False
@@ -59,7 +70,9 @@ class Search:
         """The equations at scaled parameters (n,), poses found with this noise (G,)."""
         same = not self.equations.closures.unknowns or np.array_equal(noise, self._last[1])
         if not (same and np.array_equal(u, self._last[0])):
-            there = self.equations.at(self.start.theta + self.scale * u, noise)
+            theta = self.start.theta.copy()
+            theta[self._found] += self.scale * u
+            there = self.equations.at(theta, noise)
             self._last = (u.copy(), noise, there)
             self.evaluations += 1
         return self._last[2]
@@ -74,16 +87,24 @@ class Search:
         ValueError
             It does not exist, at a singularity of the machine.
         """
-        equations = self.equations
-        jacobian = equations.by_parameters(evaluation, noise) * self.scale
-        if aside is not None:
-            jacobian[np.repeat(aside, equations.components)] = 0.0
+        jacobian = self._whole_jacobian(evaluation, noise)
+        if aside is not None and aside.any():
+            jacobian = np.where(np.repeat(aside, self.equations.components)[:, None], 0.0, jacobian)
         if not np.isfinite(jacobian).all():
             raise ArgumentError(
                 "no geometry near the present one agrees: the fit runs into poses"
                 " where the actuators do not hold the machine (type-2 singular)"
             )
         return jacobian
+
+    def _whole_jacobian(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """The same of all units; the last is kept, for the statistics ask for it again."""
+        last = self._last_jacobian
+        if last is None or last[0] is not evaluation or not np.array_equal(last[1], noise):
+            by_parameters = self.equations.by_parameters(evaluation, noise)[:, self._found]
+            by_parameters *= self.scale
+            last = self._last_jacobian = evaluation, noise, by_parameters
+        return last[2]
 
     def best(self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray) -> FloatArray:
         """Where the cost is least, from `u` (n,).
@@ -130,10 +151,15 @@ class Search:
         offset = np.concatenate([self._centre, np.zeros(len(pins))])
         without = np.repeat(aside, equations.components)
 
+        last: tuple[Evaluation, FloatArray] | None = None
+
         def data(evaluation: Evaluation) -> FloatArray:
-            whitened = equations.residual(evaluation, noise)
-            whitened[without] = 0.0
-            return whitened
+            nonlocal last
+            if last is None or last[0] is not evaluation:
+                whitened = equations.residual(evaluation, noise)
+                whitened[without] = 0.0
+                last = evaluation, whitened
+            return last[1]
 
         # a cost that nothing lowers: by less than rounding it need not fall
         floor = equations.rounding(noise) / np.sqrt(_FTOL)

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arguments import instance
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, largest_first
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.display import first_rows
@@ -20,6 +21,7 @@ _LEAST = 1e-3  # mm; misfits of measurements without noise
 _HALF = 0.5  # of the misfit that another mode may leave
 _FITTING = 4.0  # times what is gross, beyond which no mode fits
 _NEIGHBOURS = 6  # rows from whose poses a machine is solved whose modes are not known
+_ALIKE = 1e-6  # share of the spread by which rows differ that are not equally far
 _MOST = 0.5  # share of the poses that may miss grossly: of more, something else is wrong
 
 
@@ -48,9 +50,9 @@ def in_other_modes(equations: Equations, evaluation: Evaluation) -> list[str]:
 
 def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, FloatArray]:
     """Distinct rows of actuators (s,) that another mode fits better, and their poses there."""
-    robot, pose = evaluation.robot, evaluation.pose
+    machines, pose = evaluation.machines, evaluation.pose
     none = np.empty(0, dtype=np.intp), np.empty((0, 6))
-    if not isinstance(robot, Robot):
+    if not isinstance(evaluation.robot, Robot):
         return none  # an arm has one pose
     misfit = equations.misfit(pose, evaluation.theta)
     solved, read = np.isfinite(misfit), ~np.isnan(misfit)
@@ -61,7 +63,12 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
     if not 0 < len(gross) <= _MOST * np.count_nonzero(read):
         return none
     least, best = np.where(solved, misfit, np.inf), pose.copy()
-    modes = [_modes(robot, equations.actuators, pose, int(k), misfit <= limit) for k in gross]
+    modes = [
+        _modes(
+            instance("robot", machines.at(k), Robot), equations.actuators, pose, k, misfit <= limit
+        )
+        for k in gross.tolist()
+    ]
     for j in range(max(map(len, modes))):
         trial = pose.copy()
         for k, of_row in zip(gross, modes, strict=True):
@@ -84,6 +91,6 @@ def _modes(
     there = np.flatnonzero(sound)
     spread = np.maximum(np.ptp(actuators, axis=0), np.finfo(float).tiny)
     apart = np.linalg.norm((actuators[there] - actuators[k]) / spread, axis=1)
-    near = there[np.argsort(apart, kind="stable")[:_NEIGHBOURS]]
+    near = there[largest_first(-apart, _ALIKE)[:_NEIGHBOURS]]
     solved = robot.forward(np.tile(actuators[k], (len(near), 1)), pose[near])
     return np.vstack([found.poses, solved.pose[solved.ok]])

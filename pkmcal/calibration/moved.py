@@ -14,12 +14,12 @@ from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.labels import labels
+from pkmcal.calibration.later import Later, noise_factors
 from pkmcal.calibration.mode_slips import in_their_modes
-from pkmcal.calibration.parameters import FitData
 from pkmcal.statistics.shifts import shifted
 
-_MAY_MOVE = re.compile(
-    r"(offset|gain)\d*$|joint\d+\.dpsi$|(frame|target.*|anchor.*|attachment.*)\."
+_MAY_MOVE = re.compile(  # what is found anew in each session has an @ in its name
+    r"(offset|gain)\d*$|joint\d+\.dpsi$|(frame|target[^@]*|anchor[^@]*|attachment[^@]*)\.\w+$"
 )
 
 
@@ -51,6 +51,14 @@ class Moved:
     chance: float
     also: tuple[str, ...]
 
+    @property
+    def per_session(self) -> str:
+        """What finds such numbers anew in each session: a wildcard for `identify`."""
+        first, point, rest = self.names[0].partition(".")
+        if first.startswith("joint"):
+            return f"joint*.{rest}"
+        return f"{first}.*" if point else re.sub(r"\d+$", "*", first)
+
     def __str__(self) -> str:
         return named(self.names, self.together)
 
@@ -61,40 +69,47 @@ def named(names: Sequence[str], together: bool) -> str:
     return f"{shown} alike" if together and len(names) > 1 else shown
 
 
-def moved(fit: Fit, held: Sequence[FitData], like: Sequence[int]) -> tuple[Moved, ...]:
+def moved(fit: Fit, later: Later, end: Evaluation) -> tuple[Moved, ...]:
     """Find what moved.
 
     Parameters
     ----------
     fit : Fit
         Of the first session.
-    held : sequence of FitData
+    later : Later
         The second session.
-    like : sequence of int
-        The fitted set of each, whose noise it has.
+    end : Evaluation
+        It at the fit, its own numbers found.
     """
-    later, evaluation, noise = _later_session(fit, held, like)
-    solved = evaluation.status[later.pose_of_unit] == 0
+    second, evaluation, noise = _later_session(fit, later, end)
+    solved = evaluation.status[second.pose_of_unit] == 0
     chosen = fit.parameters
     candidates = _candidates(chosen.names)
     if not solved.any() or not candidates:
         return ()
-    use = np.repeat(solved, later.components)
-    jacobian = later.by_parameters(evaluation, noise)[use] * chosen.scale
-    residual = later.residual(evaluation, noise)[use]
-    cluster = labels(later).pose[use]
+    use = np.repeat(solved, second.components)
+    whole = second.by_parameters(evaluation, noise)[use] * later.parameters.scale
+    # the second session's own numbers follow those of the fit
+    jacobian = np.hstack([later.by_fitted(whole, len(chosen)), whole[:, later.own]])
+    residual = second.residual(evaluation, noise)[use]
+    cluster = labels(second).pose[use]
+    n, own = len(chosen), int(later.own.sum())
     rates = chosen.reported_rates(fit.end.theta) * chosen.scale
-    by_reported = np.asarray(np.linalg.inv(rates), dtype=np.float64)
+    by_reported = np.vstack([np.linalg.inv(rates), np.zeros((own, n))])
     directions = [
         by_reported[:, columns] @ np.ones((len(columns), 1))
         if together
         else by_reported[:, columns]
         for columns, together in candidates
     ]
+    first, squares, clusters = _first_session(fit)
+    identifiable = fit.estimate.state.determined.identifiable
+    basis = np.zeros((n + own, identifiable.shape[1] + own))
+    basis[:n, : -own or None], basis[n:, identifiable.shape[1] :] = identifiable, np.eye(own)
     shifts = shifted(
-        _first_session(fit),
+        (np.hstack([first, np.zeros((len(first), own))]), squares, clusters),
         (jacobian, residual, cluster),
-        fit.estimate.state.determined.identifiable,
+        basis,
         directions,
     )
     names = [tuple(chosen.names[i] for i in columns) for columns, _ in candidates]
@@ -123,55 +138,29 @@ def _candidates(names: Sequence[str]) -> list[tuple[list[int], bool]]:
 
 
 def _later_session(
-    fit: Fit, held: Sequence[FitData], like: Sequence[int]
+    fit: Fit, later: Later, end: Evaluation
 ) -> tuple[Equations, Evaluation, FloatArray]:
     """The equations of the second session at the fit, and the noise of their groups (G,).
 
     Their poses have unknowns where those of the first have.
     """
-    of_fit = fit.uncertainty.equations
-    whole = Equations(held, fit.parameters).reweighted([
-        np.ones(len(data.measured.components)) if _differs(fit, data, i) else of_fit.deviations[i]
-        for data, i in zip(held, like, strict=True)
-    ])  # fmt: skip
+    sure = fit.uncertainty
+    whole = later.equations(sure.equations)
     commanded = whole.commanded()
-    evaluation = in_their_modes(commanded, commanded.at(fit.end.theta))
-    if not of_fit.closures.unknowns:
-        return commanded, evaluation, _noise_factors(fit, commanded, held, like)
-    noise = _noise_factors(fit, whole, held, like)
+    commanded.warm_start(end)
+    evaluation = in_their_modes(commanded, commanded.at(end.theta))
+    if not sure.equations.closures.unknowns:
+        return commanded, evaluation, noise_factors(later, commanded, sure)
+    noise = noise_factors(later, whole, sure)
     begun = whole.begin(commanded, evaluation)
     return whole, whole.at(begun.theta, noise), noise
-
-
-def _noise_factors(
-    fit: Fit, later: Equations, held: Sequence[FitData], like: Sequence[int]
-) -> FloatArray:
-    """What multiplies the deviations of each group of equations of the later session."""
-    sure = fit.uncertainty
-    factors = []
-    for data, i in zip(held, like, strict=True):
-        if not _differs(fit, data, i):
-            factors.append(float(sure.factors[i]))
-        else:
-            stated = data.measured.sigma is not None
-            factors.append(1.0 if stated else float(np.sqrt(sure.noises[i].total)))
-    if len(later.unstated) > len(held):  # the actuators, whose noise was stated or estimated alike
-        of_fit = sure.factors[len(sure.equations.sets) :]
-        factors += [float(of_fit[0])] if later.unstated[-1] and len(of_fit) else [1.0]
-    return np.array(factors)
-
-
-def _differs(fit: Fit, data: FitData, like: int) -> bool:
-    """Whether kind or stated sigma of a set are not those of the fitted set."""
-    own, of_fit = data.measured, fit.equations.sets[like]
-    return own.kind != of_fit.kind or (own.sigma is None) != (of_fit.sigma is None)
 
 
 def _first_session(fit: Fit) -> tuple[FloatArray, FloatArray, np.ndarray]:
     """Jacobian, residuals and clusters of the fitted rows and of the prior."""
     chosen, sure = fit.parameters, fit.uncertainty
     rows = chosen.prior_rows
-    pulled = rows @ ((chosen.start - fit.end.theta) / chosen.scale)
+    pulled = chosen.prior_left(fit.end.theta)
     own = np.arange(len(rows)) + sure.fit.clusters
     return (
         np.vstack([fit.estimate.jacobian, rows]),

@@ -1,16 +1,22 @@
-"""The parameter vector of a calibration: geometry, instrument frame, targets and attachments."""
+"""The parameter vector of a calibration: geometry, instrument frame, targets and attachments.
+
+What one row depends on, its *numbers*, and what the search finds, the *parameters*, are the same
+unless some numbers are found anew in each session or set: see `sessions`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
+from pkmcal.calibration.sessions import NONE, Scope, Spread, label, matches, scopes
+from pkmcal.calibration.smoothness import smoothness_rows
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import Calibratable
@@ -47,6 +53,8 @@ class FitData:
         Their numbers in what the user gave, counted through all sets.
     unknown_frame, unknown_target, unknown_attachment : bool
         Which of them `identify` was asked to find along.
+    set_name : str
+        Of the set, where it has a frame or points of its own.
     """
 
     measured: Measurements
@@ -54,6 +62,7 @@ class FitData:
     unknown_frame: bool
     unknown_target: bool
     unknown_attachment: bool = False
+    set_name: str = ""
 
     @property
     def framed(self) -> bool:
@@ -71,9 +80,36 @@ class FitData:
         return tuple(role for role in POINTS[self.measured.kind].values() if unknown[role])
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What `identify` was asked for: its arguments of the same names.
+
+    Attributes
+    ----------
+    free, prior, bounds
+        Of `identify`.
+    per_session : tuple of str
+        Names or wildcards.
+    by_set : frozenset of str
+        Of "frame", "target", "attachment" and "anchor", what each set has for itself.
+    fix : tuple of str
+        Names or wildcards of numbers of the geometry that are held.
+    held_points : frozenset of (str, str)
+        Unknown points that are held where the user puts them, by role and name.
+    """
+
+    free: str | Sequence[str] | None = None
+    prior: Prior = None
+    bounds: Bounds = None
+    per_session: tuple[str, ...] = ()
+    by_set: frozenset[str] = frozenset()
+    fix: tuple[str, ...] = ()
+    held_points: frozenset[tuple[str, str]] = frozenset()
+
+
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """The parameter vector: numbers of the geometry first, then frame and points.
+    """The parameter vector: numbers of the geometry first, then frames and points.
 
     Attributes
     ----------
@@ -87,17 +123,30 @@ class Parameters:
         Standard deviation around the present value; inf where there is none.
     lower, upper : ndarray (n,)
         Bounds; infinite where there are none.
+    number_of : ndarray of int (n,)
+        Which number of a row each parameter is.
+    scope : tuple of str, m
+        Of each number of a row, whether it is common to all.
+    column : mapping
+        The parameter that a number is, by the number and what stands behind its @.
+    sessions : tuple of str
+        For each of which some numbers were found; empty where all are common.
     places : ndarray of int
-        Places in the geometry's values of the first names.
+        Places in the geometry's values of the first numbers.
     frame : int or None
-        Column of frame.x; None where the frame is known.
-    origin : ndarray (6,)
-        Where the frame's six numbers count from: the base in the instrument's frame is at `origin`
-        followed by them. Near it they are small, and their angles regular.
+        Number of frame.x; None where the frame is known.
     points : mapping
-        Column of the x of each unknown point, by "target", "attachment" or "anchor" and its name.
+        Number of the x of each unknown point, by "target", "attachment" or "anchor" and its name.
+    origin : mapping
+        Where the six parameters of a frame count from, by the first: the base in the instrument's
+        frame is at this pose (6,) followed by them. Near it they are small, and their angles
+        regular.
     robot : Calibratable
         The machine they belong to.
+    asked : Asked
+        What they were made of.
+    bent : ndarray (s,) or None
+        By how much tables of drive laws bend, in standard deviations, where that is not 0.
     """
 
     names: tuple[str, ...]
@@ -107,11 +156,17 @@ class Parameters:
     prior: FloatArray
     lower: FloatArray
     upper: FloatArray
+    number_of: IntArray
+    scope: tuple[Scope, ...]
+    column: Mapping[tuple[int, str], int]
+    sessions: tuple[str, ...]
     places: IntArray
     frame: int | None
-    origin: FloatArray
     points: Mapping[tuple[str, str], int]
+    origin: Mapping[int, FloatArray]
     robot: Calibratable
+    asked: Asked
+    bent: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.names)
@@ -127,72 +182,194 @@ class Parameters:
         sigma = self.prior / self.scale
         stated = np.flatnonzero(np.isfinite(sigma))
         rows: FloatArray = np.eye(len(sigma))[stated] / sigma[stated, None]
-        return rows
+        return np.vstack([rows, self._smooth[0] * self.scale])
 
-    def values_at(self, theta: FloatArray) -> FloatArray:
-        """The geometry's values (p,) for `theta` (n,)."""
+    def prior_left(self, theta: FloatArray) -> FloatArray:
+        """What the prior misses (p,) at `theta`, in standard deviations."""
+        own = len(self.prior_rows) - len(self._smooth[1])
+        left: FloatArray = self.prior_rows[:own] @ ((self.start - theta) / self.scale)
+        return np.concatenate([left, (0.0 if self.bent is None else self.bent) - self.bends(theta)])
+
+    def bends(self, theta: FloatArray) -> FloatArray:
+        """How far tables of drive laws bend (s,), in standard deviations."""
+        rows, constant = self._smooth
+        found: FloatArray = rows @ theta + constant
+        return found
+
+    @cached_property
+    def _smooth(self) -> tuple[FloatArray, FloatArray]:
+        columns = [self.geometry_of(name) for name in self.sessions or (None,)]
+        return smoothness_rows(self.robot, self.places, columns, len(self))
+
+    @property
+    def geometry(self) -> slice:
+        """The parameters that are of the geometry: the first ones."""
+        return slice(0, int(np.count_nonzero(self.number_of < len(self.places))))
+
+    @property
+    def frames(self) -> tuple[int, ...]:
+        """The first parameter of each frame."""
+        return tuple(np.flatnonzero(self.number_of == self.frame).tolist())
+
+    def spread(self, datasets: Sequence[FitData]) -> Spread:
+        """Which parameters hold in the rows of these sets."""
+        place: dict[tuple[str, str], int] = {}
+        part_of = []
+        for data in datasets:
+            session = data.measured.session if "session" in self.scope else None
+            names = [""] * len(data.measured) if session is None else session.tolist()
+            one = data.set_name if "set" in self.scope else ""
+            part_of.append(
+                np.array(
+                    [place.setdefault((name, one), len(place)) for name in names], dtype=np.intp
+                )
+            )
+        columns = np.array([
+            [
+                self.column.get((number, label(scope, *part)), NONE)
+                for number, scope in enumerate(self.scope)
+            ]
+            for part in place
+        ])  # fmt: skip
+        return Spread(columns, tuple(part_of), len(self))
+
+    def geometry_of(self, session: str | None = None) -> IntArray:
+        """Parameters (g,) of the geometry in a session; in the last one by default."""
+        last = self.sessions[-1] if self.sessions else ""
+        name = last if session is None else session
+        return np.array([
+            self.column[number, label(self.scope[number], name, "")]
+            for number in range(len(self.places))
+        ])  # fmt: skip
+
+    def values_at(self, theta: FloatArray, columns: IntArray | None = None) -> FloatArray:
+        """The geometry's values (p,) for `theta` (n,), of a machine whose numbers are `columns`.
+
+        By default that of the last session.
+        """
         values: FloatArray = self.robot.geometry.values.copy()
-        values[self.places] = theta[: len(self.places)]
+        values[self.places] = theta[self.geometry_of() if columns is None else columns]
         return values
 
-    def frame_at(self, theta: FloatArray) -> FloatArray | None:
-        """Pose (6,) of the base counted from `origin`; None where the frame is known."""
-        return None if self.frame is None else theta[self.frame : self.frame + 6]
+    def aligned(
+        self, theta: FloatArray, first: int, frame: FloatArray
+    ) -> tuple[Parameters, FloatArray]:
+        """Put the base at `frame` (6,) and count from there, unless a prior or bound is stated.
 
-    def aligned(self, theta: FloatArray, frame: FloatArray) -> tuple[Parameters, FloatArray]:
-        """Put the base at `frame` (6,) and count from there, unless a prior or bound is stated."""
-        assert self.frame is not None
-        mine, theta = slice(self.frame, self.frame + 6), theta.copy()
+        `first` is the first parameter of that frame.
+        """
+        mine, theta = slice(first, first + 6), theta.copy()
         stated = np.isfinite([self.prior[mine], self.lower[mine], self.upper[mine]]).any()
         theta[mine] = frame if stated else 0.0
-        return replace(self, origin=np.zeros(6) if stated else frame), theta
+        origin = {**self.origin, first: np.zeros(6) if stated else frame}
+        return replace(self, origin=origin), theta
 
     def reported(self, theta: FloatArray) -> FloatArray:
-        """The parameters (n,) with the frame's numbers counted from zero."""
-        if self.frame is None:
-            return theta
+        """The parameters (n,) with the frames' numbers counted from zero."""
         out: FloatArray = theta.copy()
-        mine = slice(self.frame, self.frame + 6)
-        out[mine] = compose(self.origin, np.ascontiguousarray(theta[None, mine]))[0]
+        for first in self.frames:
+            mine = slice(first, first + 6)
+            out[mine] = compose(self.origin[first], np.ascontiguousarray(theta[None, mine]))[0]
         return out
 
     def reported_rates(self, theta: FloatArray) -> FloatArray:
         """Derivative (n, n) of `reported` to the parameters (n,)."""
         rates = np.eye(len(self))
-        if self.frame is not None:
-            mine, nowhere = slice(self.frame, self.frame + 6), np.zeros(6)
-            at = np.ascontiguousarray(theta[None, mine])
-            whole = compose(self.origin, at)
-            rates[mine, mine] = compose_rates(self.origin, at, nowhere, whole)[0]
+        for first in self.frames:
+            mine, nowhere = slice(first, first + 6), np.zeros(6)
+            at, origin = np.ascontiguousarray(theta[None, mine]), self.origin[first]
+            whole = compose(origin, at)
+            rates[mine, mine] = compose_rates(origin, at, nowhere, whole)[0]
         return rates
 
-    def columns_of(self, role: str, measured: Measurements) -> IntArray:
-        """Columns of the unknown point of each row, (N, 3)."""
+    def numbers_of(self, role: str, measured: Measurements) -> IntArray:
+        """Numbers of the unknown point of each row, (N, 3)."""
         places, index = _points_of(role, measured)
         for name in places:
             if (role, name) not in self.points:
                 known = did_you_mean(name, (other for _, other in self.points))
                 raise ArgumentError(f"holdout: its {role} {name!r} was not fitted{known}")
         first = np.array([self.points[role, name] for name in places])
-        columns: IntArray = first[index][:, None] + np.arange(3)
-        return columns
+        numbers: IntArray = first[index][:, None] + np.arange(3)
+        return numbers
 
 
 def parameters(
-    robot: Calibratable,
-    datasets: Sequence[FitData],
-    free: str | Sequence[str] | None,
-    prior: Prior,
-    bounds: Bounds,
+    robot: Calibratable, datasets: Sequence[FitData], asked: Asked, like: Parameters | None = None
 ) -> Parameters:
-    """The parameters of a calibration; the arguments are those of `identify`.
+    """The parameters of a calibration.
+
+    Parameters
+    ----------
+    robot : Calibratable
+        The machine.
+    datasets : sequence of FitData
+        What is fitted; or, with `like`, held out.
+    asked : Asked
+        The arguments of `identify`.
+    like : Parameters, optional
+        Of the fit, where `datasets` are held out: those of the same names are the same.
 
     Raises
     ------
     ValueError, TypeError
         An unknown or tied name, nothing free, a prior or a bound that does not fit.
     """
-    geometry = robot.geometry
+    row = _numbers_of_a_row(robot, datasets, asked)
+    blocks = [("frame", slice(row.frame, row.frame + 6))] if row.frame is not None else []
+    blocks += [(role, slice(first, first + 3)) for (role, _), first in row.points.items()]
+    scope = scopes(row.names, blocks, asked.per_session, asked.by_set)
+    entries = _entries(row, scope, blocks, datasets, asked.held_points)
+    number_of = np.array([number for number, _ in entries], dtype=np.intp)
+    names = tuple(row.names[j] + (f"@{behind}" if behind else "") for j, behind in entries)
+    units = tuple(row.units[j] for j in number_of)
+    travel = max(_travel(robot, data.measured) for data in datasets)
+    of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
+    of_unit |= {"1/mm": 1.0 / travel**2, "1/rad": robot.length / travel**2}
+    of_unit["1/mm2"] = of_unit["1/mm"] / robot.length
+    scale = np.array([of_unit[unit] for unit in units])
+    if like is not None:
+        known = dict(zip(like.names, like.scale.tolist(), strict=True))
+        scale = np.array([known.get(n, own) for n, own in zip(names, scale.tolist(), strict=True)])
+    values = np.array(row.start, dtype=np.float64)[number_of]
+    count = int(np.count_nonzero(number_of < len(row.places)))
+    lower, upper = _bounds(asked.bounds, names, values, strict=like is None)
+    made = Parameters(
+        names=names,
+        units=units,
+        start=values,
+        scale=scale,
+        prior=_prior(asked.prior, names, scale, count, strict=like is None),
+        lower=lower,
+        upper=upper,
+        number_of=number_of,
+        scope=tuple(scope),
+        column={entry: c for c, entry in enumerate(entries)},
+        sessions=_sessions(datasets) if "session" in scope else (),
+        places=row.places,
+        frame=row.frame,
+        points=row.points,
+        origin={},
+        robot=robot,
+        asked=asked,
+    )
+    return replace(made, origin={first: np.zeros(6) for first in made.frames})
+
+
+@dataclass(frozen=True, eq=False)
+class _Row:
+    """The numbers that a row depends on; see `Parameters`."""
+
+    names: list[str]
+    units: list[str]
+    start: list[float]
+    places: IntArray
+    frame: int | None
+    points: dict[tuple[str, str], int]
+
+
+def _numbers_of_a_row(robot: Calibratable, datasets: Sequence[FitData], asked: Asked) -> _Row:
+    geometry, free = robot.geometry, asked.free
     if free is None:
         free = robot.model.free
         if not free:
@@ -200,6 +377,11 @@ def parameters(
     chosen = geometry.match(free, "free")
     if not chosen:
         raise ArgumentError("free: name at least one parameter")
+    if asked.fix:
+        held = geometry.match(asked.fix, "fix")
+        chosen = [name for name in chosen if name not in held]
+        if not chosen:
+            raise ArgumentError("fix: no parameter is left free")
     places = np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)
     names, units = list(chosen), [str(geometry.units[i]) for i in places]
     start = list(geometry.values[places])
@@ -224,25 +406,56 @@ def parameters(
             names += [f"{role}{name}.{axis}" for axis, _ in _POINT]
             units += [unit for _, unit in _POINT]
             start += list(place)
-    travel = max(_travel(robot, data.measured) for data in datasets)
-    of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
-    scale = np.array([of_unit[unit] for unit in units])
-    values = np.array(start, dtype=np.float64)
-    lower, upper = _bounds(bounds, names, values)
-    return Parameters(
-        names=tuple(names),
-        units=tuple(units),
-        start=values,
-        scale=scale,
-        prior=_prior(prior, names, scale, len(chosen)),
-        lower=lower,
-        upper=upper,
-        places=places,
-        frame=frame,
-        origin=np.zeros(6),
-        points=points,
-        robot=robot,
-    )
+    return _Row(names, units, start, places, frame, points)
+
+
+def _sessions(datasets: Sequence[FitData]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(name for data in datasets for name in data.measured.sessions))
+
+
+def _entries(
+    row: _Row,
+    scope: Sequence[Scope],
+    blocks: Sequence[tuple[str, slice]],
+    datasets: Sequence[FitData],
+    held: frozenset[tuple[str, str]],
+) -> list[tuple[int, str]]:
+    """The parameters: the number of a row that each is, and what stands behind the @ of its name.
+
+    Those of the geometry session by session, behind what is common. Points that are held are none.
+    """
+    own = range(len(row.places))
+    found = [(j, "") for j in own if scope[j] == "common"]
+    found += [(j, name) for name in _sessions(datasets) for j in own if scope[j] == "session"]
+    of_point = {first: (role, name) for (role, name), first in row.points.items()}
+    for _, block in blocks:
+        kind, point = scope[block.start], of_point.get(block.start)
+        if point in held:
+            continue
+        behind = dict.fromkeys(
+            label(kind, session, data.set_name)
+            for data in datasets
+            for session in _where_read(data, point)
+        )
+        found += [(j, each) for each in behind for j in range(block.start, block.stop)]
+    return found
+
+
+def _where_read(data: FitData, point: tuple[str, str] | None) -> tuple[str, ...]:
+    """The sessions in which a set has readings of a point, or of the frame (None)."""
+    if point is None:
+        return (data.measured.sessions or ("",)) if data.framed else ()
+    role, name = point
+    if role not in data.sought:
+        return ()
+    places, index = _points_of(role, data.measured)
+    if name not in places:
+        return ()
+    mine = index == list(places).index(name)
+    session = data.measured.session
+    if session is None:
+        return ("",) if mine.any() else ()
+    return tuple(dict.fromkeys(session[mine].tolist()))
 
 
 def _travel(robot: Calibratable, measured: Measurements) -> float:
@@ -268,24 +481,33 @@ def _points_of(role: str, measured: Measurements) -> tuple[dict[str, FloatArray]
     return dict(zip(names, places, strict=True)), index
 
 
-def _matching(argument: str, pattern: object, names: Sequence[str]) -> list[int]:
+def places_of(role: str, measured: Measurements) -> FloatArray:
+    """Where the user puts the unknown point of each row, (N, 3)."""
+    places, index = _points_of(role, measured)
+    of_rows: FloatArray = np.array(list(places.values()))[index]
+    return of_rows
+
+
+def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool) -> list[int]:
     if not isinstance(pattern, str):
         raise ArgumentTypeError(f"{argument}: names must be str, found {pattern!r}")
-    hits = [i for i, name in enumerate(names) if fnmatchcase(name, pattern)]
-    if not hits:
+    hits = [i for i, name in enumerate(names) if matches(pattern, name)]
+    if strict and not hits:
         raise ArgumentError(
             f"{argument}: no free parameter matches {pattern!r}{did_you_mean(pattern, names)}"
         )
     return hits
 
 
-def _prior(prior: Prior, names: Sequence[str], scale: FloatArray, of_machine: int) -> FloatArray:
+def _prior(
+    prior: Prior, names: Sequence[str], scale: FloatArray, of_machine: int, strict: bool
+) -> FloatArray:
     sigma = np.full(len(names), np.inf)
     if prior is None:
         return sigma
     if isinstance(prior, Mapping):
         for pattern, value in prior.items():
-            hits = _matching("prior", pattern, names)
+            hits = _matching("prior", pattern, names, strict)
             sigma[hits] = _positive(f"prior of {pattern}", value)
     else:
         sigma[:of_machine] = _positive("prior", prior) * scale[:of_machine]
@@ -301,7 +523,7 @@ def _positive(what: str, value: object) -> float:
 
 
 def _bounds(
-    bounds: Bounds, names: Sequence[str], start: FloatArray
+    bounds: Bounds, names: Sequence[str], start: FloatArray, strict: bool
 ) -> tuple[FloatArray, FloatArray]:
     lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     if bounds is None:
@@ -317,7 +539,7 @@ def _bounds(
             raise ArgumentError(
                 f"bounds of {pattern} must be (lower, upper); found {pair!r}"
             ) from None
-        for i in _matching("bounds", pattern, names):
+        for i in _matching("bounds", pattern, names, strict):
             if not low <= start[i] <= high or not low < high:
                 raise ArgumentError(
                     f"bounds of {names[i]} must enclose its present value {start[i]:.9g};"

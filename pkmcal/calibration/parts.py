@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
+from pkmcal.calibration.datum import NO_DATUM, Datum
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_statistics import (
     Identifiability,
@@ -34,6 +36,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "covariance_rule",
     "rank",
     "gap",
+    "datum",
     "unidentifiable",
     "gauges",
     "rms",
@@ -65,6 +68,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "residuals",
     "rows",
     "outliers",
+    "dropped",
     "distances_before",
     "distances",
     "holdout_distances_before",
@@ -74,6 +78,10 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "evaluations",
     "history",
     "moved",
+    "sessions",
+    "robots",
+    "holdout_parameters",
+    "law_tests",
     "warnings",
 )
 
@@ -85,7 +93,7 @@ class Parts(MisfitNames):
     Attributes
     ----------
     robot : Robot or SerialArm
-        The machine with the identified geometry.
+        The machine with the identified geometry; that of the last session.
     table : ParameterTable
         The parameters, before and after.
     identifiability : Identifiability
@@ -104,6 +112,14 @@ class Parts(MisfitNames):
         What looks wrong with measurements or result.
     prior_test : PriorTest or None
         Whether the measurements contradict the prior, where there is one.
+    robots : mapping of str to Robot or SerialArm
+        The machine of each session, those that were held out too; empty without `per_session`.
+    datum : Datum
+        Numbers that are held because they only say where frames lie.
+    dropped : tuple of int
+        Rows that were left out, by their numbers.
+    dropped_names : str
+        The same by lines of files, poses and targets.
     """
 
     robot: Robot | SerialArm
@@ -116,6 +132,21 @@ class Parts(MisfitNames):
     fit: Fit
     warnings: tuple[str, ...] = ()
     prior_test: PriorTest | None = None
+    robots: Mapping[str, Robot | SerialArm] = field(default_factory=dict)
+    datum: Datum = NO_DATUM
+    dropped: tuple[int, ...] = ()
+    dropped_names: str = ""
+
+    @property
+    def sessions(self) -> tuple[str, ...]:
+        """The fitted sessions, in the order of their first rows; empty without `per_session`."""
+        return self.fit.parameters.sessions
+
+    @property
+    def holdout_parameters(self) -> dict[str, dict[str, float]]:
+        """Numbers that were found of held-out sessions, as `Identification.parameters`."""
+        own = self.holdout.own.items()
+        return {name: {"value": value, "stderr": stderr} for name, (value, stderr) in own}
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit, rms
+from pkmcal.arguments import instance
+from pkmcal.arrays import BoolArray, FloatArray, largest_first, mm_per_unit, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.parameters import FitData, Parameters
-from pkmcal.display import chance_text, first_rows
+from pkmcal.display import chance_text, first_rows, printable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.prior_test import PriorTest
@@ -25,7 +26,7 @@ _LEAST_FREEDOM = 0.5  # degrees of freedom from which residuals show how good a 
 MISFIT_RATIO = 0.2  # of the misfit that another reading may leave to be named as what was meant
 _REMOTE = 3.0  # times a machine's reach within which a point of its platform is
 _PULLED = 2.0  # times what is expected, from which a pull on a prior is worth a word
-_ALIKE = 1e-6  # share by which misfits differ that are not equal
+_ALIKE = 1e-6  # share by which misfits, or pulls, differ that are not equal
 _FACTORS = {
     "mm": (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)),
     "rad": (
@@ -122,13 +123,13 @@ def beyond_strokes(equations: Equations, start: Evaluation, end: Evaluation) -> 
     Both with the nominal machine, whose offsets may be unknown, and with the identified one,
     which may have been misled.
     """
-    robot, calibrated = start.robot, end.robot
-    if not isinstance(robot, Robot) or not isinstance(calibrated, Robot):
+    robot = start.robot
+    if not isinstance(robot, Robot):
         return []  # the file of an arm states no strokes
-    out = _out_of_stroke(calibrated, calibrated.feasible(end.pose).drive)
+    out = _out_of_stroke(robot, _drives(end))
     if not out.any():
         return []
-    drive = robot.feasible(start.pose).drive
+    drive = _drives(start)
     out &= _out_of_stroke(robot, drive)
     if not out.any():
         return []
@@ -151,6 +152,13 @@ def beyond_strokes(equations: Equations, start: Evaluation, end: Evaluation) -> 
     ]
 
 
+def _drives(evaluation: Evaluation) -> FloatArray:
+    """Drive coordinates (K, limbs) at the poses, each of its session's machine."""
+    return evaluation.machines.joined(
+        lambda robot, own: instance("robot", robot, Robot).feasible(evaluation.pose[own]).drive
+    )
+
+
 def _out_of_stroke(robot: Robot, drive: FloatArray) -> BoolArray:
     """Which drives (K, limbs) are beyond their strokes by more than errors explain."""
     strokes = [limb.stroke or (-np.inf, np.inf) for limb in robot.model.limbs]
@@ -162,8 +170,7 @@ def _out_of_stroke(robot: Robot, drive: FloatArray) -> BoolArray:
 
 def implausible_changes(start: Evaluation, end: Evaluation, parameters: Parameters) -> list[str]:
     """Find numbers of the geometry that moved further than errors of manufacture explain."""
-    k = len(parameters.places)
-    moved = np.abs((end.theta - start.theta) / parameters.scale)[:k]
+    moved = np.abs((end.theta - start.theta) / parameters.scale)[parameters.geometry]
     far = np.flatnonzero(moved > FAR * parameters.robot.length)
     if not len(far):
         return []
@@ -184,11 +191,15 @@ def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
     lengths = np.abs(geometry.values[np.array(geometry.units) == "mm"]).max(initial=0.0)
     size = _REMOTE * max(reach, parameters.robot.length, float(lengths))
     found = []
-    for (role, name), first in parameters.points.items():
-        place = end.theta[first : first + 3]
-        moved = float(np.linalg.norm(place - parameters.start[first : first + 3]))
-        far = float(np.linalg.norm(place))
-        if role != "anchor" and min(moved, far) > size:
+    for (role, point), number in parameters.points.items():
+        for first in np.flatnonzero(parameters.number_of == number).tolist():
+            place = end.theta[first : first + 3]
+            moved = float(np.linalg.norm(place - parameters.start[first : first + 3]))
+            far = float(np.linalg.norm(place))
+            if role == "anchor" or min(moved, far) <= size:
+                continue
+            behind = parameters.names[first].partition("@")[2]
+            name = f"{point} of {printable(behind)}" if behind else point
             found.append(
                 f"{role} {name} was found {far:.3g} mm from the platform's origin, beyond the"
                 f" machine's size ({size:.0f} mm): measure poses that turn more, or state where it"
@@ -204,9 +215,10 @@ def contradicted_prior(
     if test is None or not test.contradicted:
         return []
     pulls = np.nan_to_num(test.pulls)
-    stated = [i for i, sigma in enumerate(parameters.prior) if np.isfinite(sigma)]
-    worst = [k for k in np.argsort(-np.abs(pulls), kind="stable")[:3] if abs(pulls[k]) > _PULLED]
-    shown = ", ".join(f"{parameters.names[stated[k]]} {abs(pulls[k]):.1f}" for k in worst)
+    stated = [n for n, s in zip(parameters.names, parameters.prior, strict=True) if np.isfinite(s)]
+    stated += ["the smoothness of a table"] * (len(pulls) - len(stated))
+    worst = [k for k in largest_first(np.abs(pulls), _ALIKE)[:3] if abs(pulls[k]) > _PULLED]
+    shown = ", ".join(f"{stated[k]} {abs(pulls[k]):.1f}" for k in worst)
     pulled = f" and pull {shown} times as far as prior and noise let expect" if worst else ""
     return [
         f"the measurements contradict the prior ({chance_text(test.chance_of_either)}){pulled}: a"

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
-from pkmcal.calibration.parameters import POINTS, FitData, Parameters
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
+from pkmcal.calibration.parameters import POINTS, FitData, Parameters, places_of
+from pkmcal.calibration.sessions import NONE
 from pkmcal.measurements import orientation
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import Predicted, difference, predict
+from pkmcal.measurements.observation import Predicted, difference, joined, predict
 
 ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
 
@@ -36,8 +37,16 @@ class Readings:
         Distinct rows of what the actuators read.
     actuator_sigma : ndarray (K, n) or None
         Its stated deviations.
+    approach : ndarray (K, n) or None
+        From where the actuators came.
     pose_of : list of ndarray of int
         Which pose each row of each set is at.
+    spread : Spread
+        Which parameters hold in each row.
+    machine_columns : ndarray of int (S, g)
+        The parameters of the geometry of each machine: one, or one a session.
+    machine_of_pose, command_of_pose : ndarray of int (K,)
+        Which of them each pose is of, and which poses are at the same actuators.
     set_of : ndarray of int (N,)
         Which set each row is of.
     count : ndarray of int (N,)
@@ -52,20 +61,30 @@ class Readings:
         self.sets = tuple(data.measured for data in datasets)
         self.rows = np.concatenate([data.rows for data in datasets])
         self.parameters = parameters
+        self.spread = parameters.spread(datasets)
         self._framed = [data.framed for data in datasets]
-        self._columns = [  # of the points that are sought, by what `predict` calls them
+        self._frames = [self._frames_of(i) for i in range(len(datasets))]
+        self._numbers = [  # of the points that are sought, by what `predict` calls them
             {
-                name: parameters.columns_of(role, data.measured)
+                name: parameters.numbers_of(role, data.measured)
                 for name, role in POINTS[data.measured.kind].items()
                 if role in data.sought
             }
             for data in datasets
         ]
+        self._columns = [  # the parameters that these are
+            {
+                name: np.take_along_axis(self.spread.columns[part], numbers, axis=1)
+                for name, numbers in of_set.items()
+            }
+            for of_set, part in zip(self._numbers, self.spread.part_of, strict=True)
+        ]
         self._known = [
             {
-                name: m.attachments if role == "attachment" else m.targets
+                name: places_of(role, m)  # of points that are held
+                if name in columns
+                else (m.attachments if role == "attachment" else m.targets)
                 for name, role in POINTS[m.kind].items()
-                if name not in columns
             }
             for m, columns in zip(self.sets, self._columns, strict=True)
         ]
@@ -73,11 +92,29 @@ class Readings:
         actuators = np.concatenate([m.actuators for m in self.sets])
         noises = [m.actuator_sigma for m in self.sets]
         stated = [sigma for sigma in noises if sigma is not None]
-        key = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
-        distinct, inverse = np.unique(key, axis=0, return_inverse=True)
-        n = actuators.shape[1]
+        commands = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
+        directions = [m.approach for m in self.sets]
+        if any(each is not None for each in directions):  # backlash is between their poses
+            known = [np.zeros(m.actuators.shape) if m.approach is None else m.approach
+                     for m in self.sets]  # fmt: skip
+            commands = np.hstack([commands, np.concatenate(known)])
+        self.machine_columns, machine_of = self.spread.machines(len(parameters.places))
+        machine = np.concatenate(machine_of)
+        # machines of different sessions are not at the same pose at the same actuators
+        several = len(self.machine_columns) > 1
+        key = np.column_stack([commands, machine]) if several else commands
+        distinct, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        n, width = actuators.shape[1], commands.shape[1]
         self.actuators = np.ascontiguousarray(distinct[:, :n])
-        self.actuator_sigma = np.ascontiguousarray(distinct[:, n:]) if stated else None
+        self.actuator_sigma = np.ascontiguousarray(distinct[:, n : 2 * n]) if stated else None
+        own = n * (1 + bool(stated))
+        self.approach = np.ascontiguousarray(distinct[:, own:width]) if width > own else None
+        self.machine_of_pose: IntArray = machine[first]
+        self.command_of_pose: IntArray = (
+            np.unique(distinct[:, :width], axis=0, return_inverse=True)[1].reshape(-1)
+            if several
+            else np.arange(len(distinct))
+        )
         edges = np.cumsum([0, *map(len, self.sets)])
         self.pose_of = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
         self.deviations = tuple(np.ones(len(m.components)) for m in self.sets)
@@ -91,20 +128,56 @@ class Readings:
             np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in self.sets
         ])  # fmt: skip
 
+    def _frames_of(self, i: int) -> list[tuple[int, IntArray]]:
+        """The first parameter of each frame of a set, and the rows that have it."""
+        number = self.parameters.frame
+        if number is None or not self._framed[i]:
+            return []
+        first = self.spread.columns[self.spread.part_of[i], number]
+        return [(int(each), np.flatnonzero(first == each)) for each in np.unique(first)]
+
+    @property
+    def frames(self) -> dict[int, dict[int, IntArray]]:
+        """Rows of each set that have each frame, by its first parameter."""
+        found: dict[int, dict[int, IntArray]] = {}
+        for i, frames in enumerate(self._frames):
+            for first, rows in frames:
+                found.setdefault(first, {})[i] = rows
+        return found
+
+    def columns_of(self, i: int, name: str) -> IntArray | None:
+        """Parameters (N, 3) of a point of each row of set `i`; `NONE` where it is held.
+
+        None where it is known.
+        `name` is what `predict` calls it.
+        """
+        return self._columns[i].get(name)
+
+    def points_of(self, i: int, name: str, theta: FloatArray) -> FloatArray:
+        """Where that point is (N, 3), mm."""
+        known, columns = self._known[i][name], self._columns[i].get(name)
+        return known if columns is None else np.where(columns == NONE, known, theta[columns])
+
     def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Readings of each set at poses (K, 6)."""
-        frame = self.parameters.frame_at(theta)
-        return tuple(
+        return tuple(self._predicted_of(i, pose, theta) for i in range(len(self.sets)))
+
+    def _predicted_of(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
+        places = {name: self.points_of(i, name, theta) for name in self._known[i]}
+        kind, mine = self.sets[i].kind, pose[self.pose_of[i]]
+        if not self._frames[i]:
+            return predict(kind, mine, **places)
+        parts = [
             predict(
-                measured.kind,
-                pose[self.pose_of[i]],
-                frame=frame if self._framed[i] else None,
-                origin=self.parameters.origin,
-                **self._known[i],
-                **{name: theta[columns] for name, columns in self._columns[i].items()},
+                kind,
+                mine[rows],
+                frame=theta[first : first + 6],
+                origin=self.parameters.origin[first],
+                **{name: place[rows] for name, place in places.items()},
             )
-            for i, measured in enumerate(self.sets)
-        )
+            for first, rows in self._frames[i]
+        ]
+        return joined(parts, [rows for _, rows in self._frames[i]])
 
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
         """Measured less predicted of each set."""
@@ -162,6 +235,15 @@ class Readings:
             else:
                 parts.append(part / white)
         return parts
+
+    def variances(self, noise: FloatArray) -> FloatArray:
+        """Variances (M,) of the readings as they are weighted, mm² and rad²."""
+        parts = []
+        for white, factor in zip(self._whiten, noise, strict=False):
+            each = np.linalg.inv(white) ** 2 if white.ndim == 3 else white**-2.0
+            parts.append(factor**2 * (each.sum(axis=2) if each.ndim == 3 else each).ravel())
+        variances: FloatArray = np.concatenate(parts)[self.present]
+        return variances
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""

@@ -147,9 +147,11 @@ def _moved_text(moved: tuple[Moved, ...]) -> str:
         sizes = ", ".join(map(_size, each.shift, each.stderr, each.units))
         also = f" (or as well {', '.join(each.also)})" if each.also else ""
         parts.append(f"{each} by {sizes}{also}")
+    anew = ", ".join(repr(each) for each in dict.fromkeys(each.per_session for each in moved))
     return (
         "between the fitted and the held-out points moved, or the model is wrong there:"
-        f" {'; '.join(parts)}"
+        f" {'; '.join(parts)}; per_session={anew if ',' not in anew else f'[{anew}]'} finds such"
+        " numbers anew in each session"
     )
 
 
@@ -252,6 +254,9 @@ def _disagreement(found: Parts, robust: RobustCheck) -> str:
 
 def _remarks(found: Parts, robust: RobustCheck | None) -> tuple[str, ...]:
     remarks = []
+    if found.dropped:
+        many = f"{len(found.dropped)} rows were" if len(found.dropped) > 1 else "1 row was"
+        remarks.append(f"{many} left out, as asked: {found.dropped_names}")
     if robust is not None and _DISAGREES < robust.ratio <= _CARRIED:
         remarks.append(_disagreement(found, robust))
     if found.holdout_outliers and not found.holdout_contradicts:

@@ -13,6 +13,7 @@ from pkmcal.checks.finding import Finding
 from pkmcal.checks.function import (
     not_closed,
     singular,
+    turning,
     unreachable,
     unusual_size,
     wrong_unit,
@@ -39,6 +40,7 @@ CHECKS = (
     off_circle,
     unlike,
     not_closed,
+    turning,
     unreachable,
     singular,
     contradicted,
@@ -110,6 +112,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
         home      a home that the constraints of limbs do not allow
         stroke    home, or a stroke's ends, that the inverse kinematics cannot use
         singular  home, or every pose, is singular; affinely similar base and platform
+        drive     drive laws that may turn back within their stroke: they have no inverse
         stated    numbers that contradict what the robot file states
         ========  ==========================================================================
 

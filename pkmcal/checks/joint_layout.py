@@ -108,7 +108,7 @@ def along_axis(robot: Robot) -> tuple[Joints, Joints]:
     flat = spread[2] <= _FLAT * spread[1] if count > 3 else np.ptp(turned.radii) <= 2 * room
     if not flat:
         return base, platform
-    at_home = platform.points @ screw.from_pose(robot.model.home)[:3, :3].T
+    at_home = platform.points @ screw.from_pose(robot.own_home)[:3, :3].T
     return turned, Joints("platform", at_home @ turn.T)
 
 
@@ -217,7 +217,7 @@ def traits(robot: Robot) -> list[Trait]:
     ]  # fmt: skip
     drive = robot.feasible(robot.home).drive
     ends = np.array([limb.stroke or (np.nan, np.nan) for limb in limbs])
-    slot = dict(zip(SLOTS, robot.geometry.slots.T, strict=True))
+    slot = dict(zip(SLOTS, robot.geometry.slots.T[: len(SLOTS)], strict=True))
     for driver in DRIVERS:
         mine = [KINDS[limb.kind].driver == driver for limb in limbs]
         if not any(mine):

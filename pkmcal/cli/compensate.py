@@ -27,7 +27,7 @@ from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
 
 PROGRAMS = (".ngc", ".nc", ".gcode", ".g", ".tap")
-_BESIDE = re.compile(r"q\d+|sigma(\..+)?|group")  # in a file of measurements, and not needed here
+_BESIDE = re.compile(r"q\d+|sigma(\..+)?|group|session")  # of measurements, and not needed here
 
 
 def compensate(

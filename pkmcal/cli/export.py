@@ -19,12 +19,14 @@ from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
 _OF_ARMS = ("urdf", "dh", "dh-modified", "ur")
-TARGETS = ("c", "klipper", "reprap", "marlin", "hangprinter", "linuxcnc", "mjcf", *_OF_ARMS)
+_FIRMWARE = ("klipper", "reprap", "marlin", "hangprinter", "maslow")
+TARGETS = ("c", *_FIRMWARE, "linuxcnc", "mjcf", *_OF_ARMS)
 _LINES = {
     "reprap": pk.export.reprap,
     "marlin": pk.export.marlin,
     "hangprinter": pk.export.hangprinter,
 }
+_IN_A_FILE = {"klipper": pk.export.klipper, "maslow": pk.export.maslow}  # of the user's
 
 
 def export(
@@ -43,8 +45,8 @@ def export(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Of Klipper: your printer.cfg, which is written with the changed numbers and"
-            " otherwise as it is; by default the lines alone.",
+            help="Of Klipper or a Maslow: your printer.cfg or maslow.yaml, written with the changed"
+            " numbers and otherwise as it is; by default the lines alone.",
         ),
     ] = None,
     project: Annotated[
@@ -60,9 +62,10 @@ def export(
 
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
     linear or rotary delta for Klipper or Kalico; reprap, marlin: its M665 and M666, or M669;
-    hangprinter: M669. linuxcnc: a kinematics component, and a simulation that runs it. mjcf: a
-    model for MuJoCo. Of serial arms: urdf, a tree of links; dh and dh-modified, a table of
-    Denavit-Hartenberg numbers; ur, the lists of a calibration.conf of Universal Robots.
+    hangprinter: M669. maslow: the anchors of a maslow.yaml. linuxcnc: a kinematics component, and
+    a simulation that runs it. mjcf: a model for MuJoCo. Of serial arms: urdf, a tree of links; dh
+    and dh-modified, a table of Denavit-Hartenberg numbers; ur, the lists of a calibration.conf of
+    Universal Robots.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -70,8 +73,8 @@ def export(
     """
     word("--as", target, TARGETS)
     _only(target, ("c",), number=number)
-    _only(target, ("klipper",), config=config)
-    _only(target, ("klipper", "reprap", "marlin", "hangprinter"), project=project or None)
+    _only(target, tuple(_IN_A_FILE), config=config)
+    _only(target, _FIRMWARE, project=project or None)
     read = Inputs()
     if target in _OF_ARMS:
         return _export_arm(read.robot(robot), target, out, read, force, json)
@@ -137,8 +140,8 @@ def _write(
         pk.export.c_header(machine, path, _number(number))
     elif target == "mjcf":
         pk.export.mjcf(machine, path)
-    elif target == "klipper":
-        return pk.export.klipper(machine, path, config, project)
+    elif target in _IN_A_FILE:
+        return _IN_A_FILE[target](machine, path, config, project)
     else:
         return _LINES[target](machine, path, project)
     return None

@@ -23,7 +23,7 @@ def import_file(
     ] = Path("."),
     firmware: Annotated[
         str,
-        typer.Option("--from", metavar="FIRMWARE", help="klipper, reprap, marlin or hangprinter."),
+        typer.Option("--from", metavar="FIRMWARE", help=f"{', '.join(get_args(Firmware))}."),
     ] = "klipper",
     force: Force = False,
     json: Json = False,
@@ -31,29 +31,29 @@ def import_file(
     """Make a robot file and measurements out of a printer's configuration.
 
     Of a linear or rotary delta with Klipper or Kalico, of a linear one with the M665 and M666 of
-    RepRapFirmware or Marlin, or of a Hangprinter with M669.
+    RepRapFirmware or Marlin, of a Hangprinter with M669, or of a Maslow with its maslow.yaml or
+    the log of its calibration.
     robot.toml has the firmware's numbers; probe.csv the heights that a DELTA_CALIBRATE stored, if
-    there are any.
+    there are any; belts.csv the belts of a Maslow's log.
 
     Example: pkmcal import examples/linear-delta/printer.cfg
     """
     read = Inputs()
     printer = pk.import_printer(read.file(file), word("--from", firmware, get_args(Firmware)))
-    names = ["robot.toml"] if printer.measurements is None else ["robot.toml", "probe.csv"]
+    measured = printer.measurements
+    table = "belts.csv" if measured is not None and measured.kind == "closure" else "probe.csv"
+    names = ["robot.toml"] if measured is None else ["robot.toml", table]
     output = Output(out, names, read, force)
     with output.draft() as draft:
         (draft / "robot.toml").write_text(read.comment() + printer.text, encoding="utf-8")
-        if printer.measurements is not None:
-            printer.measurements.write(draft / "probe.csv", comment=read.comment())
+        if measured is not None:
+            measured.write(draft / table, comment=read.comment())
     if json:
-        heights = 0 if printer.measurements is None else len(printer.measurements)
-        parts = {"files": [str(path) for path in output.paths], "heights": heights}
-        say(
-            as_json(
-                {"robot": printer.robot.name, **parts, "distances": printer.distances},
-                schema="import",
-            )
-        )
+        rows = 0 if measured is None else len(measured)
+        places = rows if table == "belts.csv" else 0
+        counts = {"heights": rows - places, "distances": printer.distances, "places": places}
+        files = [str(path) for path in output.paths]
+        say(as_json({"robot": printer.robot.name, "files": files, **counts}, schema="import"))
     else:
         say(printer)
         say("written: " + ", ".join(map(str, output.paths)))

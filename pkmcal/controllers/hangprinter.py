@@ -15,6 +15,7 @@ import numpy as np
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers.laws import require_no_laws
 from pkmcal.controllers.loss import Loss, cylinder, loss, nearest
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
@@ -131,6 +132,7 @@ def robot_text(anchors: FloatArray, name: str, head: str) -> str:
 
 
 def _require(robot: Robot) -> None:
+    require_no_laws(robot, "M669")
     limbs = [(limb.kind, limb.actuator) for limb in robot.model.limbs]
     lines_of_its_own = limbs == [("UPS", i) for i in range(len(_LETTERS))]
     if robot.model.map != "translation" or not lines_of_its_own or not robot.frames.trivial:

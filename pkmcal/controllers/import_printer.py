@@ -12,7 +12,7 @@ import numpy as np
 
 from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
-from pkmcal.controllers import rotary_delta, rotary_gcode
+from pkmcal.controllers import maslow, rotary_delta, rotary_gcode
 from pkmcal.controllers.delta_gcode import of_marlin, of_reprap
 from pkmcal.controllers.hangprinter import as_robot as robot_of_anchors
 from pkmcal.controllers.hangprinter import of_text, robot_text
@@ -57,12 +57,23 @@ _ANCHORS_HEAD = """\
 # Imported from {file} by pkmcal: the anchors of M669.
 # An actuator coordinate is the line let out since the origin, mm; `offset` is its length there.
 """
-Firmware = Literal["klipper", "reprap", "marlin", "hangprinter"]
+_BELTS_HEAD = """\
+# Imported from {file} by pkmcal: the anchors of a Maslow, top left, top right, bottom left, right.
+# An actuator coordinate is the length of a belt in the plane, from the anchor to the middle of the
+# sled, mm. The frame begins at the anchor bottom left; the one bottom right says where x points.
+"""
+Firmware = Literal["klipper", "reprap", "marlin", "hangprinter", "maslow"]
+_KINDS = {  # of limbs: what the machine is, and what its firmware stores
+    "PUS": ("linear delta", "heights"),
+    "RUS": ("rotary delta", "heights"),
+    "UPS": ("Hangprinter", "heights"),
+    "cable": ("Maslow", "places"),
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Printer(Result):
-    """What a printer.cfg says.
+    """What a printer.cfg says, or what another firmware keeps.
 
     Attributes
     ----------
@@ -71,7 +82,7 @@ class Printer(Result):
         end stops.
     measurements : Measurements or None
         Heights of the nozzle that the firmware has stored: the probe's offset, and heights
-        entered by hand.
+        entered by hand. Of a Maslow the belts of its log, at places that nobody measured.
     distances : int
         How many distances of a printed part are stored, which are not among the measurements.
     text : str
@@ -85,9 +96,8 @@ class Printer(Result):
 
     def _parts(self) -> Iterator[str]:
         stored = "no" if self.measurements is None else str(len(self.measurements))
-        kinds = {"PUS": "linear delta", "RUS": "rotary delta", "UPS": "Hangprinter"}
-        kind = kinds[self.robot.model.limbs[0].kind]
-        yield f"{self.robot.name}: a {kind}, {stored} stored heights"
+        kind, what = _KINDS[self.robot.model.limbs[0].kind]
+        yield f"{self.robot.name}: a {kind}, {stored} stored {what}"
         if self.distances:
             yield (
                 f"{self.distances} distances of a printed part are left out: a distance between two"
@@ -103,8 +113,9 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     path : str or path
         A printer.cfg of Klipper or Kalico: the block of SAVE_CONFIG at its end is read too,
         included files are not. Or a file with the M665 and M666 of the other firmwares; actuator
-        coordinates are then mm down from the end stops. Or the M669 of a Hangprinter.
-    firmware : {"klipper", "reprap", "marlin", "hangprinter"}
+        coordinates are then mm down from the end stops. Or the M669 of a Hangprinter, or the
+        maslow.yaml of a Maslow or the log of its calibration.
+    firmware : {"klipper", "reprap", "marlin", "hangprinter", "maslow"}
         Whose file it is.
 
     Raises
@@ -133,6 +144,12 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
         anchors = of_text(text_in(path), str(where))
         text = robot_text(anchors, where.stem, _ANCHORS_HEAD.format(file=where.name))
         return Printer(robot_of_anchors(anchors, where.stem), None, 0, text)
+    if firmware == "maslow":
+        where = as_path("path", path)
+        anchors, belts = maslow.of_text(text_in(path), str(where))
+        text = maslow.robot_text(anchors, where.stem, _BELTS_HEAD.format(file=where.name))
+        log = Measurements(belts, None, "closure") if len(belts) else None
+        return Printer(maslow.as_robot(anchors, where.stem), log, 0, text)
     if firmware != "klipper":
         where, text = as_path("path", path), text_in(path)
         if firmware == "reprap" and rotary_gcode.is_rotary(text):

@@ -9,8 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pkmcal.arguments import path as as_path
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, furthest_axis
 from pkmcal.controllers.c_header import prepared
+from pkmcal.controllers.laws import require_no_laws
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
@@ -63,6 +64,7 @@ def mjcf(robot: Robot, path: str | PathLike[str]) -> None:
 def text_of(robot: Robot) -> str:
     """The MJCF text."""
     _require(robot)
+    require_no_laws(robot, "this model")
     home = robot.own_home
     drives, directions, _ = robot.limb_machine.limbs(robot.slots, home[None])
     if not np.isfinite(drives).all():
@@ -160,7 +162,7 @@ def _swinging(
     parent: Xml.Element, name: str, at: FloatArray, along: FloatArray, normal: FloatArray
 ) -> Xml.Element:
     """A body whose z points along the leg: on two hinges, or on one about a normal."""
-    other = normal if normal.any() else np.eye(3)[np.argmin(abs(along))]
+    other = normal if normal.any() else np.eye(3)[furthest_axis(along)]
     x = np.cross(np.cross(along, other), along)
     x /= np.linalg.norm(x)
     body = _body(

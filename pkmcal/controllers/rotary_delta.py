@@ -13,6 +13,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers.c_header import prepared
+from pkmcal.controllers.laws import require_no_laws
 from pkmcal.controllers.loss import Loss, loss, nearest
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
@@ -118,6 +119,7 @@ def of_robot(robot: Robot, project: bool, one_height: bool) -> tuple[RotaryDelta
 def require_rotary_delta(robot: Robot) -> None:
     """Refuse what is no rotary delta with three cranks of its own."""
     require_parallel(robot)
+    require_no_laws(robot, "a firmware")
     if not is_rotary_delta(robot):
         raise ArgumentError(
             f"robot: {robot.name} is no rotary delta of three RUS limbs that only translates, or"

@@ -61,7 +61,7 @@ class ChainLayout:
     zero : ndarray (actuators)
         What the actuators read at home.
     near : ndarray (actuators)
-        The coordinate that an angle is given nearest to.
+        What they read, gain and offset included, where an angle is given nearest to.
     """
 
     map: str
@@ -175,8 +175,30 @@ class ChainMachine(CoreMachine):
         return out
 
     def reference(self, slots: FloatArray) -> FloatArray:
-        """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
-        return self.layout.near
+        """The coordinate (n,) that an angle is given nearest to."""
+        drive, place = slots.ravel(), self.layout.drive_place
+        found: FloatArray = (self.layout.near - drive[place]) / drive[place + 1]
+        return found
+
+    def bare(self, slots: FloatArray, q: FloatArray) -> tuple[ChainMachine, FloatArray, FloatArray]:
+        """The machine without drive laws, its geometry, and its coordinates at q (N, n)."""
+        return self, slots, q
+
+    def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """What the actuators read with gain and offset, (N, n)."""
+        place, numbers = self.layout.drive_place, slots.ravel()
+        found: FloatArray = numbers[place + 1] * q + numbers[place]
+        return found
+
+    def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """The gain of each actuator, (N, n)."""
+        return np.tile(slots.ravel()[self.layout.drive_place + 1], (len(q), 1))
+
+    def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
+        """What the actuators read (N, n) at q̃ (N, n)."""
+        place, numbers = self.layout.drive_place, slots.ravel()
+        q: FloatArray = (way - numbers[place]) / numbers[place + 1]
+        return q
 
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m); the least squares of the closures."""

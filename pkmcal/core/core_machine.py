@@ -13,6 +13,20 @@ from pkmcal.arrays import FloatArray, Int32Array
 from pkmcal.core.library import call, in_threads, part
 
 M = TypeVar("M", bound="CoreMachine")
+_MOST_TURNS = 16  # of the first limb of an actuator, until the others have turned as well
+_WHOLE = 5e-3  # of a turn: by so much gains that were identified differ from one another
+
+
+def whole_turn(gains: FloatArray) -> float:
+    """How far an actuator goes until limbs with these gains are where they were, rad.
+
+    Infinite where no such way is known.
+    """
+    turns = np.abs(gains / gains[0])[:, None] * np.arange(1, _MOST_TURNS + 1)  # limbs, of the first
+    whole = (np.abs(turns - np.rint(turns)) <= _WHOLE).all(axis=0)
+    if not whole.any():
+        return np.inf
+    return float((1 + int(np.argmax(whole))) * 2 * np.pi / abs(gains[0]))
 
 
 class CoreMachine(ABC):
@@ -48,6 +62,18 @@ class CoreMachine(ABC):
     @abstractmethod
     def reference(self, slots: FloatArray) -> FloatArray:
         """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
+
+    @abstractmethod
+    def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """The ways q̃ of the drives at actuator coordinates (N, n), (N, drives)."""
+
+    @abstractmethod
+    def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """How far the drives go by their actuators at coordinates (N, n), (N, drives)."""
+
+    @abstractmethod
+    def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
+        """Actuator coordinates (N, n) where the drives are at their ways (N, drives)."""
 
     def nearest_turns(
         self, slots: FloatArray, q: FloatArray, near: FloatArray | None = None

@@ -8,7 +8,7 @@ import numpy as np
 
 from pkmcal._core import ffi, lib
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.core.core_machine import CoreMachine
+from pkmcal.core.core_machine import CoreMachine, whole_turn
 from pkmcal.core.library import (
     AXES,
     DRIVERS,
@@ -23,8 +23,6 @@ from pkmcal.core.library import (
 
 CLOSURE_TOLERANCE = 2e-3  # of a machine's size
 FAR_HOME = 10.0  # times the limbs' numbers: a home beyond is that of another geometry
-_MOST_TURNS = 16  # of the first limb of an actuator, until the others have turned as well
-_WHOLE = 5e-3  # of a turn: by so much gains that were identified differ from one another
 _OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 
 
@@ -145,11 +143,8 @@ class Machine(CoreMachine):
         """
         out = np.full(self.actuators, np.inf)
         for a, limbs in self._angles.items():
-            turns = np.abs(slots[limbs, _GAIN] / slots[limbs[0], _GAIN])
-            turns = turns[:, None] * np.arange(1, _MOST_TURNS + 1)  # of each limb, of the first
-            whole = (np.abs(turns - np.rint(turns)) <= _WHOLE).all(axis=0)
-            if whole.any() and all(self.struct.angle[i] for i in limbs):
-                out[a] = (1 + int(np.argmax(whole))) * 2 * np.pi / abs(slots[limbs[0], _GAIN])
+            if all(self.struct.angle[i] for i in limbs):
+                out[a] = whole_turn(slots[limbs, _GAIN])
         return out
 
     def reference(self, slots: FloatArray) -> FloatArray:
@@ -158,6 +153,27 @@ class Machine(CoreMachine):
         for a, (i, *_) in self._angles.items():
             out[a] = (self.struct.near[i] - slots[i, _OFFSET]) / slots[i, _GAIN]
         return out
+
+    def bare(self, slots: FloatArray, q: FloatArray) -> tuple[Machine, FloatArray, FloatArray]:
+        """The machine without drive laws, its geometry, and its coordinates at q (N, n)."""
+        return self, slots, q
+
+    def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """q̃ of each limb (N, limbs) at actuator coordinates (N, n)."""
+        of_limbs = list(self.struct.actuator[0 : self.struct.limbs])
+        found: FloatArray = slots[:, _GAIN] * q[:, of_limbs] + slots[:, _OFFSET]
+        return found
+
+    def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
+        """The gain of each limb, (N, limbs)."""
+        return np.tile(slots[:, _GAIN], (len(q), 1))
+
+    def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
+        """Actuator coordinates (N, n) of q̃ (N, limbs); of limbs that share one the mean."""
+        q = (way - slots[:, _OFFSET]) / slots[:, _GAIN]
+        of_limbs = np.array(list(self.struct.actuator[0 : self.struct.limbs]))
+        each = [q[:, of_limbs == a].mean(axis=1) for a in range(self.actuators)]
+        return np.stack(each, axis=1)
 
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m)."""

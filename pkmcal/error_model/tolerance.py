@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal import display
 from pkmcal.arguments import checked_seed, number, whole
-from pkmcal.arrays import FloatArray, IntArray, as_numbers, rms
+from pkmcal.arrays import FloatArray, IntArray, as_numbers, largest_first, rms
 from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.error_model.monte_carlo import Draw, Progress, simulate
@@ -22,6 +22,7 @@ from pkmcal.result import Result
 
 WORST = 3.0  # standard deviations by which every number is off in the worst case
 SHARES = {"interval95": (0.025, 0.975), "interval997": (0.0015, 0.9985)}
+_ALIKE = 1e-6  # per cent by which shares differ that are not equal
 _NONE = 1e-12  # of the largest effect on a position or an orientation: no effect
 _LISTED = 12  # numbers of the geometry that are printed
 
@@ -138,7 +139,7 @@ class Tolerance(Result):
             f" {within997}\n"
         )
         share = self.position_share
-        order = np.argsort(-share, kind="stable")[:_LISTED]
+        order = largest_first(share, _ALIKE)[:_LISTED]
         listed = [[*self._with_unit(k), display.fixed(float(share[k]), 1)] for k in order]
         yield Table(["number", "sigma", "share of position [%]"], listed, left=1)
         if self.failures():

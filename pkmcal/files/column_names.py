@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pkmcal.core.library import POSE
 
 BESIDE = ("index", "time", "date", "comment", "name", "collection")  # not looked at by themselves
-RESERVED = ("sigma", "cov", "target", "attachment", "actuator_sigma")
+RESERVED = ("sigma", "cov", "target", "attachment", "actuator_sigma", "approach")
 EULER = (("rx", "ry", "rz"), ("a", "b", "c"), ("w", "p", "r"))  # in the order of their letters
 VECTOR = ("rvx", "rvy", "rvz")
 QUATERNION = ("qw", "qx", "qy", "qz")
@@ -37,6 +37,7 @@ _SYNONYMS: dict[str, str] = {
     "distance": "dist|length measured|measured length|measured distance|ball bar length",
     "sigma": "std|stdev|stddev|std dev|standard deviation|sigma xyz",
     "group": "pose|pose id|pose no|pose nr|pose number|pose name|configuration|config",
+    "session": "session id|session name|session no|session number|sitting",
     "target": "reflector|smr|target name|reflector name|marker|prism",
     "name": "point id|point|point name|pointname|point no|pt|pt id|pt name|id|label|object name"
     "|measurement|measurement name|feature|feature name|element|step|step no|punkt|messpunkt"

@@ -28,7 +28,14 @@ class Units:
 
     def factor(self, unit: Unit) -> float:
         """Factor from the file's unit to `unit`."""
-        return {"mm": self.length, "rad": self.angle, "1": 1.0}[unit]
+        return {
+            "mm": self.length,
+            "rad": self.angle,
+            "1": 1.0,
+            "1/mm": 1.0 / self.length,
+            "1/rad": 1.0 / self.angle,
+            "1/mm2": 1.0 / self.length**2,
+        }[unit]
 
 
 def shown(value: object) -> str:

@@ -14,9 +14,10 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Unit
+from pkmcal.arrays import FloatArray, Unit, furthest_axis
 from pkmcal.core.chains import ChainLayout
 from pkmcal.display import Table, fixed
+from pkmcal.geometry.laws import Law, LawNumber
 from pkmcal.geometry.ties import LimbNumber
 from pkmcal.screw import from_pose
 
@@ -58,6 +59,8 @@ class Joint:
         How far U and S bend from home, rad.
     soft : float
         Compliance beside that of other joints.
+    law : Law or None
+        Of an actuated joint, what lies between the reading and the drive.
     """
 
     kind: JointKind
@@ -69,6 +72,7 @@ class Joint:
     stroke: tuple[float, float] | None = None
     cone: float | None = None
     soft: float = 1.0
+    law: Law | None = None
 
     @property
     def ball(self) -> bool:
@@ -218,7 +222,11 @@ class Chains:
                 if first == i:
                     place = places[f"drive{a + 1}"]
                     made.append(LimbNumber(f"offset{a + 1}", joint.unit, i, "offset", None, place))
-                    made.append(LimbNumber(f"gain{a + 1}", "1", i, "gain", None, place + 1))
+                    unit = "1" if joint.law is None else joint.law.gain_unit(joint.unit)
+                    made.append(LimbNumber(f"gain{a + 1}", unit, i, "gain", None, place + 1))
+                    for j, number in enumerate(self._law_numbers(a)):
+                        place, slot = self._law_start(a) + j, f"drive.{number.key}"
+                        made.append(LimbNumber(number.name, number.unit, i, slot, None, place))
         return tuple(made)
 
     @cached_property
@@ -240,6 +248,14 @@ class Chains:
             ends[f"limb{i + 1}.platform"] = ends[f"limb{first + 1}.platform"]
         return ends
 
+    def _law_numbers(self, a: int) -> tuple[LawNumber, ...]:
+        joint = self.actuated[a][1]
+        return () if joint.law is None else joint.law.numbers(a + 1, joint.unit)
+
+    def _law_start(self, a: int) -> int:
+        """Where the numbers of an actuator's law begin, behind those of the core."""
+        return self.count + sum(len(self._law_numbers(before)) for before in range(a))
+
     @property
     def count(self) -> int:
         """How many numbers the core has of the machine, those that are always 0 included."""
@@ -247,8 +263,8 @@ class Chains:
 
     @cached_property
     def blank(self) -> FloatArray:
-        """The numbers of the core without errors, (1, count): gains are 1."""
-        blank = np.zeros((1, self.count))
+        """The numbers without errors, those of the core and of the laws, (1, …): gains are 1."""
+        blank = np.zeros((1, self._law_start(self.n_actuators)))
         for a in range(self.n_actuators):
             blank[0, self._places[f"drive{a + 1}"] + 1] = 1.0
         return blank
@@ -366,8 +382,7 @@ def _same_end(a: tuple[Joint, ...], b: tuple[Joint, ...]) -> bool:
 
 def across(direction: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Two unit vectors at right angles to a unit vector, and to each other."""
-    least = np.eye(3)[int(np.argmin(np.abs(direction)))]
-    one = np.cross(direction, least)
+    one = np.cross(direction, np.eye(3)[furthest_axis(direction)])
     one /= np.linalg.norm(one)
     return one, np.cross(direction, one)
 

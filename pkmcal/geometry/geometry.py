@@ -49,7 +49,7 @@ class _Layout:
             blank[:, SLOTS.index("gain")] = 1.0
         self.blank = _frozen(blank)
         places = [
-            n.limb * len(SLOTS) + SLOTS.index(n.slot) if n.place is None else n.place
+            n.limb * blank.shape[1] + SLOTS.index(n.slot) if n.place is None else n.place
             for n in self.numbers
         ]
         self.slot_index = _frozen(np.array(places, dtype=np.intp))
@@ -91,6 +91,7 @@ class Geometry:
         True where a named parameter drives a limb's number.
     slots : ndarray (n_limbs, len(SLOTS)), or (1, numbers) of a machine of chains
         The same numbers as the core takes them; an unused gain is 1, other unused slots are 0.
+        Those of drive laws are behind them, in as many columns as the longest law needs.
     slot_index : ndarray of int (k,)
         Places in the flattened `slots` of the k limb numbers, which are the first k names.
     chain : ndarray (k, p)

@@ -96,7 +96,7 @@ class LimbKind:
             + (("branch",) if self.has_branch else ())
             + (("couple",) if self.couple else ())
             + (("weights",) if self.rows or self.couple else ())
-            + ("stroke", "base_cone", "platform_cone")
+            + ("drive", "stroke", "base_cone", "platform_cone")
         )
 
     def numbers(self, limb: int | Literal[""], couple: bool) -> tuple[tuple[str, str, Unit], ...]:

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, Unit
+from pkmcal.core.laws import Drive, Laws
 from pkmcal.display import Table, fixed
 from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.geometry import Geometry
+from pkmcal.geometry.laws import Law, drive
 from pkmcal.geometry.limb_kinds import KINDS
 
 CHAIN = "chain"  # the kind of a limb that is a chain of joints: see `pkmcal.geometry.chains`
@@ -62,6 +64,9 @@ class Limb:
         Limits of q̃; mm or rad.
     base_cone, platform_cone : Cone or None
         Limits of the joints.
+    law : Law or None
+        What lies between the actuator's reading and q̃ beside gain and offset; of chains their
+        joints have it.
     """
 
     kind: str
@@ -73,6 +78,7 @@ class Limb:
     stroke: tuple[float, float] | None = None
     base_cone: Cone | None = None
     platform_cone: Cone | None = None
+    law: Law | None = None
 
     @property
     def frame(self) -> FloatArray:
@@ -148,6 +154,44 @@ class Model:
             return tuple(joint.unit for _, joint in self.chains.actuated)
         units = {limb.actuator: KINDS[limb.kind].actuator_unit for limb in self.limbs}
         return tuple(units[i] for i in range(self.n_actuators))
+
+    @property
+    def laws(self) -> tuple[Law | None, ...]:
+        """The law of each drive: of each limb, or of each actuator of chains."""
+        if self.chains is not None:
+            return tuple(joint.law for _, joint in self.chains.actuated)
+        return tuple(limb.law for limb in self.limbs)
+
+    @property
+    def driven(self) -> bool:
+        """Whether any drive has a law beside its gain and offset."""
+        return any(law is not None for law in self.laws)
+
+    @property
+    def drives(self) -> tuple[Drive, ...]:
+        """The drives as the core takes them."""
+        if self.chains is not None:
+            return tuple(
+                drive(joint.law, a + 1, joint.unit, a, self.geometry, joint.stroke)
+                for a, (_, joint) in enumerate(self.chains.actuated)
+            )
+        return tuple(
+            drive(
+                limb.law, i, KINDS[limb.kind].actuator_unit, limb.actuator, self.geometry,
+                limb.stroke,
+            )
+            for i, limb in enumerate(self.limbs, 1)
+        )  # fmt: skip
+
+    def doubts(self) -> dict[int, str]:
+        """Drives whose law has no inverse over their stroke, counted from 0, and why."""
+        if not self.driven:
+            return {}
+        return Laws(self.drives, self.geometry.slots.size).doubts(self.geometry.slots)
+
+    def limb_of_drive(self, d: int) -> int:
+        """The limb, counted from 0, that a drive is in."""
+        return d if self.chains is None else self.chains.actuated[d][0]
 
     def table(self) -> Table:
         """Kind, actuator and joints of each limb; the joints in the frames of base and platform.

@@ -23,6 +23,7 @@ from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import CHAIN, Limb, Model
 from pkmcal.geometry.robot_file_chains import chain_limbs, read_chains
+from pkmcal.geometry.robot_file_laws import refuse_turning
 from pkmcal.geometry.robot_file_limbs import Limbs, Parameters, read_limbs
 from pkmcal.geometry.robot_file_writer import text_of
 
@@ -148,17 +149,16 @@ def parse(source: Source, file: str | None) -> Model:
     chains = None
     if any(table.data.get("kind") == CHAIN for table in described):
         chains, own = read_chains(described, parameters, pose_map, home)
-        limbs = Limbs(chain_limbs(chains), list(chains.numbers), own)
+        limbs = Limbs(chain_limbs(chains), list(chains.numbers), own, chains.blank)
     else:
         limbs = read_limbs(described, parameters)
         _check_rows(pose, pose_map, limbs.limbs)
     values = parameters.finish([number.name for number in limbs.numbers])
     units = parameters.ordered_units()
-    blank = None if chains is None else chains.blank
-    geometry = Geometry(limbs.numbers, units, limbs.values | values, blank)
+    geometry = Geometry(limbs.numbers, units, limbs.values | values, limbs.blank)
     frames = _section(top, "frames")
     frames.only(("base", "tool"))
-    return Model(
+    model = Model(
         name=top.text("name"),
         map=pose_map,
         home=home,
@@ -173,6 +173,8 @@ def parse(source: Source, file: str | None) -> Model:
         closure_tolerance=_read_tolerance(top),
         file=file,
     )
+    refuse_turning(model, described)
+    return model
 
 
 def _read_tolerance(top: Table) -> float | None:

@@ -8,6 +8,7 @@ from typing import Any
 from pkmcal.geometry.chains import PARTS, Chains, Joint
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import CHAIN
+from pkmcal.geometry.robot_file_laws import law_table
 
 
 def chain_tables(chains: Chains, geometry: Geometry) -> Iterator[dict[str, Any]]:
@@ -52,6 +53,9 @@ def _joint(joint: Joint, geometry: Geometry) -> dict[str, Any]:
         data["home_value"] = joint.home_value
         data["offset"] = geometry[f"offset{joint.actuator + 1}"]
         data["gain"] = geometry[f"gain{joint.actuator + 1}"]
+    if joint.law is not None:
+        start = f"drive{(joint.actuator or 0) + 1}."
+        data["drive"] = law_table(joint.law, joint.unit, lambda name: geometry[start + name])
     if joint.stroke is not None:
         data["stroke"] = list(joint.stroke)
     if joint.cone is not None:

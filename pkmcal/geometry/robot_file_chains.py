@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any, NamedTuple
@@ -22,14 +23,16 @@ from pkmcal.core.library import MAPS, MAX_LIMBS
 from pkmcal.files.toml_table import Table, shown
 from pkmcal.geometry.chains import ERRORS, KINDS, Chains, Joint, across, towards
 from pkmcal.geometry.model import CHAIN, Limb
+from pkmcal.geometry.robot_file_laws import read_law
 from pkmcal.geometry.robot_file_limbs import PARAMETER_NAME, Parameters
 
 LIMB_KEYS = ("kind", "copies", "about", "group", "joints", "errors")
 JOINT_KEYS = (
     "kind", "at", "axis", "axes", "actuator", "share", "home_value", "stroke", "cone", "soft",
-    "offset", "gain",
+    "offset", "gain", "drive",
 )  # fmt: skip
 AXES = {"R": 1, "P": 1, "C": 1, "U": 2, "S": 3}
+_DRIVEN = re.compile(r"(offset|gain|drive)(\d+)((?:\..*)?)")  # numbers of actuators
 FORMS = {1: "one axis, `axis = [x, y, z]`", 2: "two `axes`", 3: "three `axes`, or none of a ball"}
 
 
@@ -97,8 +100,13 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
                 continue
             if joint.actuator is None:
                 each.fail(key, "only an actuated joint has this")
-            unit = joint.unit if key == "offset" else "1"
+            gain_unit = "1" if joint.law is None else joint.law.gain_unit(joint.unit)
+            unit = joint.unit if key == "offset" else gain_unit
             values[f"{key}{joint.actuator + 1}"] = each.number(key, unit, standard)
+        if joint.law is not None:
+            names = [n.name for n in joint.law.numbers((joint.actuator or 0) + 1, joint.unit)]
+            found = read_law(each, joint.unit, Table.as_number)[1]
+            values |= dict(zip(names, found, strict=True))
         if values.get(f"gain{(joint.actuator or 0) + 1}", 1.0) == 0.0:
             each.fail("gain", "must not be 0: the actuator would not move the limb")
         if k + 1 > MAX_CHAIN:
@@ -150,7 +158,7 @@ def _joint(table: Table, parameters: Parameters, map: str, before: Sequence[Join
     if (actuator is not None and AXES[kind] > 1) or (actuator is not None and kind == "C"):
         table.fail("actuator", f"a joint {kind} has several axes: list the actuated one as R or P")
     joint = Joint(kind, at, (), actuator, _share(table))
-    for key in ("home_value", "offset", "gain"):
+    for key in ("home_value", "offset", "gain", "drive"):
         if key in table and actuator is None:
             table.fail(key, "only an actuated joint has this")
     stroke = cone = None
@@ -170,7 +178,8 @@ def _joint(table: Table, parameters: Parameters, map: str, before: Sequence[Join
     if not soft > 0.0:
         table.fail("soft", f"must be positive, found {shown(table['soft'])}")
     home_value = table.number("home_value", joint.unit, 0.0)
-    return replace(joint, stroke=stroke, cone=cone, soft=soft, home_value=home_value)
+    law = read_law(table, joint.unit, Table.as_number)[0]
+    return replace(joint, stroke=stroke, cone=cone, soft=soft, home_value=home_value, law=law)
 
 
 def _with_axes(table: Table, joints: Sequence[Joint], k: int, map: str) -> Joint:
@@ -279,9 +288,8 @@ def _copied(listed: Sequence[_Limb]) -> tuple[list[tuple[Joint, ...]], list[Any]
 
 
 def _named(name: str, limb: int, of: _Limb, copy: int, copies: int, used: int) -> str:
-    for key in ("offset", "gain"):
-        if name.startswith(key) and name[len(key) :].isdigit():
-            return f"{key}{int(name[len(key) :]) + copy * used}"
+    if driven := _DRIVEN.fullmatch(name):
+        return f"{driven[1]}{int(driven[2]) + copy * used}{driven[3]}"
     head, _, error = name.partition(".")
     for k, joint in enumerate(of.joints, 1):
         for suffix in ("", "b", "c"):

@@ -19,6 +19,7 @@ from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table, Units
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
+from pkmcal.geometry.laws import LawNumber
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Limb, Model
 from pkmcal.geometry.ties import LimbNumber
@@ -79,6 +80,7 @@ class _Edit:
         self._units, self._old, self._new = units, old, new
         self._deviations = deviations
         self._unit_of = dict(zip(new.names, new.units, strict=True))
+        self._tied = {number.name for number in new.numbers if number.tie is not None}
 
     def parameters(self, table: Any) -> None:
         """The section of named parameters."""
@@ -97,6 +99,24 @@ class _Edit:
         for key in (*kind.lengths, "offset", "gain"):
             if key in numbers and self._concerns(name := numbers[key].name):
                 self._put(table, key, self._written(name), [name])
+        if limb.law is not None:
+            of_law = limb.law.numbers(i + 1, kind.actuator_unit)
+            self._law(table["drive"], [n for n in of_law if n.name not in self._tied])
+
+    def _law(self, drive: Any, numbers: list[LawNumber]) -> None:
+        for number in numbers:
+            if not self._changed(number.name):
+                continue
+            value = self._written(number.name)
+            if number.key in ("cos", "sin"):
+                self._put(drive["harmonics"][number.entry], number.key, value, [])
+            elif number.key == "table":
+                drive["table"][number.entry][1] = value
+            else:
+                self._put(drive, number.key, value, [])
+        names = [number.name for number in numbers]
+        if any(map(self._concerns, names)):
+            self._comment(drive, names)
 
     def _point(self, table: Any, key: str, numbers: list[LimbNumber | None]) -> None:
         polar = isinstance(table[key], Mapping)

@@ -10,17 +10,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pkmcal.arguments import did_you_mean
-from pkmcal.arrays import FloatArray, Unit
-from pkmcal.core.library import AXES
+from pkmcal.arrays import FloatArray, Unit, furthest_axis
+from pkmcal.core.library import AXES, SLOTS
 from pkmcal.files.toml_table import Table, shown, unit_vector
 from pkmcal.geometry.limb_kinds import ALIASES, KINDS, LimbKind
 from pkmcal.geometry.model import Cone, Limb
+from pkmcal.geometry.robot_file_laws import read_law
 from pkmcal.geometry.ties import LimbNumber, Term, Tie
 
 PARAMETER_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 CHAIN_HELP = "chain of joints (docs/machines.md)"
 RIGHT_ANGLE = 1e-3  # how far a crank's zero direction may be from a right angle to its axis, rad
-UNIT_WORDS: dict[Unit, str] = {"mm": "a length", "rad": "an angle", "1": "a ratio"}
+UNIT_WORDS: dict[Unit, str] = {
+    "mm": "a length",
+    "rad": "an angle",
+    "1": "a ratio",
+    "1/mm": "per length",
+    "1/rad": "per angle",
+    "1/mm2": "per square of length",
+}
 
 
 class Entry(NamedTuple):
@@ -102,26 +110,39 @@ class Limbs(NamedTuple):
     limbs: tuple[Limb, ...]
     numbers: list[LimbNumber]
     values: dict[str, float]
+    blank: FloatArray | None
 
 
 def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
     """Read every ``[[limb]]`` table."""
-    limbs: list[Limb] = []
+    read = [_read_limb(table, i, parameters) for i, table in enumerate(tables)]
+    limbs = [limb for limb, _, _ in read]
+    width = len(SLOTS) + max(len(of_law) for _, _, of_law in read)
     numbers: list[LimbNumber] = []
     values: dict[str, float] = {}
-    for i, table in enumerate(tables):
-        limb, entries = _read_limb(table, i, parameters)
-        limbs.append(limb)
-        for slot, name, unit in KINDS[limb.kind].numbers(i + 1, limb.couple > 0.0):
-            entry = entries[slot]
-            numbers.append(LimbNumber(name, unit, i, slot, entry.tie))
-            if entry.tie is None:
-                values[name] = entry.value
+    for i, (limb, entries, of_law) in enumerate(read):
+        kind, law = KINDS[limb.kind], limb.law
+        for slot, name, unit in kind.numbers(i + 1, limb.couple > 0.0):
+            unit = law.gain_unit(unit) if law is not None and slot == "gain" else unit
+            numbers.append(LimbNumber(name, unit, i, slot, entries[slot].tie))
+            values[name] = entries[slot].value
+        of = () if law is None else law.numbers(i + 1, kind.actuator_unit)
+        for j, (number, entry) in enumerate(zip(of, of_law, strict=True)):
+            slot, place = f"drive.{number.name.partition('.')[2]}", i * width + len(SLOTS) + j
+            numbers.append(LimbNumber(number.name, number.unit, i, slot, entry.tie, place))
+            values[number.name] = entry.value
     _check_actuators(tables, limbs)
-    return Limbs(tuple(limbs), numbers, values)
+    blank = None
+    if width > len(SLOTS):
+        blank = np.zeros((len(limbs), width))
+        blank[:, SLOTS.index("gain")] = 1.0
+    free = {number.name for number in numbers if number.tie is None}
+    return Limbs(tuple(limbs), numbers, {n: v for n, v in values.items() if n in free}, blank)
 
 
-def _read_limb(table: Table, i: int, parameters: Parameters) -> tuple[Limb, dict[str, Entry]]:
+def _read_limb(
+    table: Table, i: int, parameters: Parameters
+) -> tuple[Limb, dict[str, Entry], list[Entry]]:
     name = table.text("kind")
     if name not in (known := (*KINDS, *ALIASES)):
         near = did_you_mean(name, known)
@@ -129,7 +150,13 @@ def _read_limb(table: Table, i: int, parameters: Parameters) -> tuple[Limb, dict
     kind = KINDS[ALIASES.get(name, name)]
     table.only(kind.keys(), f"a {name} limb")
     couple = _positive(table, "couple", table.number("couple", "mm")) if "couple" in table else 0.0
-    entries = _read_numbers(table, kind, couple > 0.0, parameters)
+
+    def entry(of: Table, key: str, value: object, unit: Unit) -> Entry:
+        return parameters.entry(parameters.term(of, key, value, unit))
+
+    law, of_law = read_law(table, kind.actuator_unit, entry)
+    gain_unit: Unit = "1" if law is None else law.gain_unit(kind.actuator_unit)
+    entries = _read_numbers(table, kind, couple > 0.0, parameters, gain_unit)
 
     axes = kind.axes_of(couple > 0.0)
     for axis in kind.axes.keys() - axes.keys():
@@ -157,14 +184,15 @@ def _read_limb(table: Table, i: int, parameters: Parameters) -> tuple[Limb, dict
         stroke=_stroke(table, kind.actuator_unit),
         base_cone=_cone(table, "base_cone"),
         platform_cone=_cone(table, "platform_cone"),
+        law=law,
     )
     for array in frames.values():
         array.flags.writeable = False
-    return limb, entries
+    return limb, entries, of_law
 
 
 def _read_numbers(
-    table: Table, kind: LimbKind, couple: bool, parameters: Parameters
+    table: Table, kind: LimbKind, couple: bool, parameters: Parameters, gain_unit: Unit
 ) -> dict[str, Entry]:
     def entry(key: str, value: object, unit: Unit) -> Entry:
         return parameters.entry(parameters.term(table, key, value, unit))
@@ -174,7 +202,7 @@ def _read_numbers(
         for coordinate, found in zip("xyz", _point(table, point, parameters), strict=True):
             entries[f"{point}.{coordinate}"] = found
     entries["offset"] = entry("offset", table.data.get("offset", 0.0), kind.actuator_unit)
-    entries["gain"] = entry("gain", table.data.get("gain", 1.0), "1")
+    entries["gain"] = entry("gain", table.data.get("gain", 1.0), gain_unit)
     if entries["gain"].value == 0.0:
         table.fail("gain", "must not be 0: the actuator would not move the limb")
     for key in kind.lengths:
@@ -219,7 +247,8 @@ def _frame(table: Table, key: str, zero: str | None = None) -> FloatArray:
     """Right-handed orthonormal axes (columns) whose third is the direction under `key`.
 
     The first is the direction under `zero`; without one it is the coordinate axis that is
-    furthest from the third, made orthogonal to it. Axes that are orthonormal keep their bits.
+    furthest from the third (`furthest_axis`), made orthogonal to it. Axes that are orthonormal
+    keep their bits.
     """
     e3 = table.vector(key)
     if zero is not None:
@@ -228,7 +257,7 @@ def _frame(table: Table, key: str, zero: str | None = None) -> FloatArray:
             angle = math.degrees(math.acos(max(-1.0, min(1.0, _dot(given, e3)))))
             table.fail(zero, f"must be at a right angle to {key}, found {angle:.4g} degrees")
     else:
-        k = min(range(3), key=lambda axis: abs(e3[axis]))
+        k = furthest_axis(np.array(e3))
         given = (float(k == 0), float(k == 1), float(k == 2))
     along = _dot(given, e3)
     if abs(along) > 1e-15:

@@ -11,6 +11,7 @@ from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Cone, Limb, Model
 from pkmcal.geometry.robot_file_chain_writer import chain_tables
+from pkmcal.geometry.robot_file_laws import law_table
 from pkmcal.geometry.ties import LimbNumber, Term
 
 HEADER = "# A robot for pkmcal: lengths in mm, angles in rad.\n"
@@ -96,6 +97,9 @@ def _limb(limb: Limb, i: int, geometry: Geometry) -> dict[str, Any]:
     if kind.driver == "crank":
         data["zero"] = limb.frame[:, 0].tolist()
     data.update({key: entry(key) for key in (*kind.lengths, "offset", "gain")})
+    if limb.law is not None:
+        unit = kind.actuator_unit
+        data["drive"] = law_table(limb.law, unit, lambda name: entry(f"drive.{name}"))
     if couple:
         data["couple"] = limb.couple
     if limb.weights:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import ChainMachine
 from pkmcal.geometry.chains import PARTS, Chains, Joint, towards
-from pkmcal.kinematics.limits import ROUNDING, Feasibility
+from pkmcal.kinematics.limits import Feasibility, kept, margin_of
 from pkmcal.screw import from_pose
 
 
@@ -28,10 +28,10 @@ def feasibility(
         Poses and coordinates; NaN out of reach.
     """
     passive, frames = machine.frames(slots, own, q)
-    drive = drives(machine, slots, q)
+    drive = machine.drives(slots, q)
     shape = (len(own), len(chains.limbs))
     stroke, before, last = (np.full(shape, np.inf) for _ in range(3))
-    room = np.zeros((3, shape[1]))
+    in_stroke = np.ones(shape, dtype=bool)
     turned, platform = _turned(machine, frames), _platform(machine, own)
     for i, limb in enumerate(chains.limbs):
         at = 0
@@ -39,45 +39,24 @@ def feasibility(
             count = 0 if joint.ball and joint is limb[-1] else joint.parts
             if joint.stroke is not None:
                 value = _value(chains, machine, i, k, passive, drive)
-                low, high = joint.stroke
-                stroke[:, i] = np.fmin(stroke[:, i], np.minimum(value - low, high - value))
-                room[0, i] = max(room[0, i], abs(low) + abs(high))
+                margin = margin_of(joint.stroke, value)
+                stroke[:, i] = np.fmin(stroke[:, i], margin)
+                in_stroke[:, i] &= kept(margin, joint.unit, chains.size) | np.isnan(margin)
             if joint.cone is not None:
                 start = machine.layout.first[i] + i + at
                 behind = turned[:, start + count] if count else platform
                 bend = _bend(limb, k, turned[:, start], behind)
-                where, row = (last, 2) if joint is limb[-1] else (before, 1)
+                where = last if joint is limb[-1] else before
                 where[:, i] = np.fmin(where[:, i], joint.cone - bend)
-                room[row, i] = max(room[row, i], joint.cone)
             at += count
-    margins = (stroke, before, last)
-    kept = [
-        np.asarray(margin >= -ROUNDING * size) for margin, size in zip(margins, room, strict=True)
-    ]
     reach = np.asarray(np.isfinite(q).all(axis=1) & np.isfinite(frames).all(axis=(1, 2)))
     first = np.array([_first_actuator(limb) for limb in chains.limbs])
     shown = np.where(first >= 0, drive[:, np.maximum(first, 0)], 0.0)
     return Feasibility(
-        np.broadcast_to(reach[:, None], shape).copy(), kept[0], kept[1], kept[2],
+        np.broadcast_to(reach[:, None], shape).copy(), in_stroke,
+        kept(before, "rad", chains.size), kept(last, "rad", chains.size),
         np.where(reach[:, None], shown, np.nan), stroke, before, last,
     )  # fmt: skip
-
-
-def drives(machine: ChainMachine, slots: FloatArray, q: FloatArray) -> FloatArray:
-    """What the actuators read with gain and offset, (N, n)."""
-    place, numbers = machine.layout.drive_place, slots.ravel()
-    found: FloatArray = numbers[place + 1] * q + numbers[place]
-    return found
-
-
-def in_strokes(
-    chains: Chains, machine: ChainMachine, slots: FloatArray, q: FloatArray
-) -> BoolArray:
-    """Which actuators (n,) keep the strokes of their joints at coordinates (n,)."""
-    limits = [joint.stroke or (-np.inf, np.inf) for _, joint in chains.actuated]
-    low, high = np.array(limits).T
-    drive = drives(machine, slots, q[None])[0]
-    return np.asarray((low <= drive) & (drive <= high))
 
 
 def _first_actuator(limb: tuple[Joint, ...]) -> int:

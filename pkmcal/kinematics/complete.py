@@ -13,7 +13,7 @@ import numpy as np
 
 from pkmcal.arguments import did_you_mean, words
 from pkmcal.arrays import BoolArray, FloatArray, wrapped
-from pkmcal.core.chains import AnyMachine
+from pkmcal.core.driven import CompiledMachine
 from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Closure
 from pkmcal.exceptions import ArgumentError
@@ -65,7 +65,7 @@ class Completed(NamedTuple):
 
 
 def complete(
-    machine: AnyMachine,
+    machine: CompiledMachine,
     map: str,
     slots: FloatArray,
     frames: Frames,
@@ -144,7 +144,7 @@ def complete(
 
 
 def _to_map(
-    machine: AnyMachine,
+    machine: CompiledMachine,
     slots: FloatArray,
     frames: Frames,
     own: FloatArray,
@@ -235,7 +235,7 @@ def _kept_by_free(
 
 
 def completed_rates(
-    machine: AnyMachine,
+    machine: CompiledMachine,
     map: str,
     slots: FloatArray,
     frames: Frames,
@@ -283,7 +283,7 @@ def _acceleration(motion: FloatArray) -> FloatArray:
 
 
 def _correct_actuators(
-    machine: AnyMachine,
+    machine: CompiledMachine,
     slots: FloatArray,
     frames: Frames,
     own: FloatArray,

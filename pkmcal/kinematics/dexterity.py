@@ -101,9 +101,10 @@ def dexterity(robot: Robot, poses: ArrayLike) -> Dexterity:
 
 def _measures(robot: Robot, poses: FloatArray) -> FloatArray:
     """The five measures, one per row (5, N)."""
-    own, _ = robot.own_rows(poses)
+    own = robot.on_map(robot.own_rows(poses)[0])
     slots = robot.slots
-    closure = robot.machine.closure(slots, own, robot.machine.inverse(slots, own))
+    q = robot.machine.inverse(slots, own)
+    closure = robot.machine.closure(slots, own, q)
     out = np.full((5, len(own)), np.nan)
     numbers = np.concatenate([closure.by_step, closure.by_q], axis=-1)
     good = np.isfinite(numbers).all(axis=(1, 2))
@@ -114,35 +115,31 @@ def _measures(robot: Robot, poses: FloatArray) -> FloatArray:
     out[2, good] = sigma.prod(axis=1)
     if steps.shape[1] == steps.shape[2]:
         out[3, good] = np.linalg.det(steps)
+    slopes = np.abs(robot.machine.slopes(slots, q[good]))
     if robot.model.chains is None:
-        out[4, good] = _transmission(robot, closure.by_q[good])
+        out[4, good] = _transmission(robot, closure.by_q[good], slopes)
     else:
-        out[4, good] = _chain_transmission(robot, closure.by_q[good])
+        out[4, good] = _chain_transmission(robot, closure.by_q[good], slopes)
     return out
 
 
-def _chain_transmission(robot: Robot, by_q: FloatArray) -> FloatArray:
+def _chain_transmission(robot: Robot, by_q: FloatArray, slopes: FloatArray) -> FloatArray:
     """How much of an actuator's motion, at its arm, reaches the closures that it moves."""
     chains = robot.model.chains
     assert chains is not None
-    arms = np.array(
-        [
-            abs(float(robot.geometry[f"gain{a + 1}"])) * (1.0 if joint.unit == "mm" else arm)
-            for a, (joint, arm) in enumerate(chains.arms)
-        ]
-    )
+    arms = slopes * [1.0 if joint.unit == "mm" else arm for joint, arm in chains.arms]
     found: FloatArray = np.linalg.norm(by_q, axis=1) / arms
     return np.asarray(found.min(axis=1))
 
 
-def _transmission(robot: Robot, by_q: FloatArray) -> FloatArray:
+def _transmission(robot: Robot, by_q: FloatArray, slopes: FloatArray) -> FloatArray:
     least = np.full(len(by_q), np.inf)
     row = 0
     for i, limb in enumerate(robot.model.limbs):
         kind = KINDS[limb.kind]
-        arm = abs(float(robot.geometry[f"gain{i + 1}"]))
+        arm = slopes[:, i]
         if kind.driver == "crank":
-            arm *= abs(float(robot.geometry[f"crank{i + 1}"]))
+            arm = arm * abs(float(robot.geometry[f"crank{i + 1}"]))
         least = np.minimum(least, np.abs(by_q[:, row, limb.actuator]) / arm)
         row += 1 + len(kind.all_rows(limb.couple > 0))
     return least

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, first_largest
 from pkmcal.kinematics.robot import Robot
 
 INDEPENDENT = 1e-7  # least part of a number's effect that the others cannot have
-POSES = 40
+_ALIKE = 1e-6  # share by which effects differ that are not equal
+POSES = 40  # at least
+_HALVINGS = 8
+_KNOWN = ("gain", "drive")  # better than what an arm of a machine is
 SHARE = 0.2  # of the characteristic length, and rad: how far from home the actuators go
-ERRORS = {"mm": 0.1, "rad": 1e-3, "1": 1e-4}  # sizes at which effects are compared
+ERRORS = {"mm": 0.1, "rad": 1e-3}  # sizes at which effects are compared
 
 
 def independent_numbers(robot: Robot) -> tuple[str, ...]:
     """Names of numbers that poses of the workspace tell apart, as many as there are.
 
-    The gains are not among them: they are known better than what an arm of a machine is. Chosen by
-    QR with exchanges of columns, in which the largest effect that is left comes next.
+    Gains and drive laws are not among them: they are known better than what an arm of a machine
+    is. Of the effects that are left, the largest is taken next, of those alike the first.
 
     Parameters
     ----------
@@ -35,39 +38,60 @@ def independent_numbers(robot: Robot) -> tuple[str, ...]:
     >>> len(independent_numbers(pk.load("five-bar")))
     13
     """
-    from scipy.linalg import qr
-
     geometry = robot.geometry
     places = np.array(
         [
             i
             for i, (name, tied) in enumerate(zip(geometry.names, geometry.tied, strict=True))
-            if not tied and not name.startswith("gain")
+            if not tied and not name.startswith(_KNOWN)
         ]
     )
     effects = near_home(robot)[:, :, places]
     effects[:, 3:] *= robot.length
     scale = np.array([ERRORS[geometry.units[i]] for i in places])
     columns = effects.reshape(-1, len(places)) * scale
-    R, order = qr(columns, mode="r", pivoting=True)
-    diagonal = np.abs(np.diag(R))
-    rank = int((diagonal > INDEPENDENT * diagonal[0]).sum())
-    return tuple(geometry.names[places[i]] for i in sorted(order[:rank]))
+    return tuple(geometry.names[places[i]] for i in sorted(_independent(columns)))
+
+
+def _independent(columns: FloatArray) -> list[int]:
+    """Which columns are taken. LAPACK's exchanges decide between equal ones by rounding."""
+    left = np.asarray(np.linalg.qr(columns, mode="r"))
+    found: list[int] = []
+    least = INDEPENDENT * float(np.linalg.norm(left, axis=0).max(initial=0.0))
+    while len(found) < min(left.shape):
+        size = np.linalg.norm(left, axis=0)
+        size[found] = 0.0
+        if not size.max() > least:
+            break
+        found.append(first_largest(size, _ALIKE * float(size.max())))
+        along = left[:, found[-1]] / size[found[-1]]
+        left -= np.outer(along, along @ left)
+    return found
 
 
 def near_home(robot: Robot) -> FloatArray:
     """Effects (N, 6, p) of every number at random coordinates near home, as twists (v, ω).
 
     By the linear model, also where there are more closures than coordinates: which effects are
-    independent does not hang on what is missed.
+    independent does not hang on what is missed. The coordinates are so near that the machine can be
+    solved at half of them, and so many that the poses do not limit what is independent.
     """
-    random = np.random.default_rng(0)
     home = robot.inverse(robot.home)
     way = np.array([SHARE * (robot.length if u == "mm" else 1.0) for u in robot.actuator_units])
-    q = home + random.uniform(-way, way, (POSES, robot.n_actuators))
-    solved = robot.forward(q)
-    good = np.asarray(solved.ok)
-    own, _ = robot.own_rows(solved.pose[good])
     columns = robot.geometry.slot_index.astype(np.int32)
-    given = (robot.slots, own, np.ascontiguousarray(q[good]), columns, True)
-    return robot.machine.error_jacobian(*given)[:, [3, 4, 5, 0, 1, 2]]
+    poses = max(POSES, len(columns) // 2)
+    found = np.empty((0, 6, len(columns)))
+    for _ in range(_HALVINGS):
+        q = home + np.random.default_rng(0).uniform(-way, way, (poses, robot.n_actuators))
+        solved = robot.forward(q)
+        good = np.asarray(solved.ok)
+        own, _ = robot.own_rows(solved.pose[good])
+        given = (robot.slots, own, np.ascontiguousarray(q[good]), columns, True)
+        effects = robot.machine.error_jacobian(*given)[:, [3, 4, 5, 0, 1, 2]]
+        effects = effects[np.isfinite(effects).all(axis=(1, 2))]
+        if len(effects) > len(found):
+            found = effects
+        if 2 * len(found) >= poses:
+            break
+        way = way / 2
+    return found

@@ -9,19 +9,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
-from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows
+from pkmcal.arrays import BoolArray, FloatArray, Unit, as_numbers, as_rows
 from pkmcal.core.chains import ChainMachine
-from pkmcal.core.library import MAPS, POSE, SLOTS
+from pkmcal.core.driven import DrivenMachine
+from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import CHAIN, Model
-from pkmcal.kinematics.chain_limits import drives as chain_drives
-from pkmcal.kinematics.chain_limits import in_strokes
 from pkmcal.kinematics.complete import Completed, complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
-from pkmcal.kinematics.limits import stroke_margin
+from pkmcal.kinematics.limits import kept, margin_of
 from pkmcal.kinematics.machines import machine_of
 from pkmcal.modes.find import AssemblyProblem
 
@@ -56,11 +55,11 @@ class Kinematics:
         self.model = instance("model", model, Model, " (see pkmcal.load)")
         self.slots = np.ascontiguousarray(model.geometry.slots)
         self.frames = Frames(model.base_frame, model.tool_frame)
-        self.own_home = np.ascontiguousarray(model.home, dtype=np.float64)
         self.machine = machine_of(model, self.slots, self.length)
+        self.own_home = self.on_map(np.array(model.home, dtype=np.float64)[None])[0].copy()
 
     @property
-    def limb_machine(self) -> Machine:
+    def limb_machine(self) -> Machine | DrivenMachine:
         """The compiled machine of limbs in closed form.
 
         Raises
@@ -68,7 +67,7 @@ class Kinematics:
         ValueError
             The limbs are chains of joints.
         """
-        if isinstance(self.machine, ChainMachine):
+        if self.model.chains is not None or isinstance(self.machine, ChainMachine):
             raise ArgumentError(f"robot: {self.model.name} has limbs that are chains of joints")
         return self.machine
 
@@ -354,8 +353,9 @@ class Kinematics:
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (n,) or (N, n), for certificates and searches for modes."""
         limbs = self.model.limbs
+        machine, slots, at = self.machine.bare(self.slots, np.atleast_2d(q))
         return AssemblyProblem(
-            self.machine,
+            machine,
             self.model.map,
             [
                 () if limb.kind == CHAIN else KINDS[limb.kind].all_rows(limb.couple > 0)
@@ -363,8 +363,8 @@ class Kinematics:
             ],
             [limb.couple for limb in limbs],
             self.length,
-            self.slots,
-            q,
+            slots,
+            at if q.ndim == 2 else at[0],
         )
 
     @property
@@ -382,14 +382,16 @@ class Kinematics:
 
         Each chain closed for itself, in the posture that is reached from home.
         """
-        if not isinstance(self.machine, ChainMachine):
+        machine, slots, at = self.machine.bare(self.slots, q)
+        if not isinstance(machine, ChainMachine):
             raise ArgumentError(f"{self.model.name}: its limbs are no chains of joints")
-        return self.machine.frames(self.slots, np.ascontiguousarray(own), q)[0]
+        return machine.frames(slots, np.ascontiguousarray(own), at)[0]
 
     def chain_points(self, own: FloatArray, q: FloatArray) -> list[FloatArray]:
         """Where the joints of each chain are at own poses (N, 6), in own axes: (N, joints, 3)."""
-        assert isinstance(self.machine, ChainMachine) and self.model.chains is not None
-        frames = self.machine.frames(self.slots, np.ascontiguousarray(own), q)[1]
+        machine, slots, at = self.machine.bare(self.slots, q)
+        assert isinstance(machine, ChainMachine) and self.model.chains is not None
+        frames = machine.frames(slots, np.ascontiguousarray(own), at)[1]
         found, start = [], 0
         for limb, parts in zip(self.model.chains.limbs, self.model.chains.members, strict=True):
             first = np.cumsum([0, *(joint.parts for joint in limb[:-1])])
@@ -403,24 +405,28 @@ class Kinematics:
         By default q is the inverse of the poses as the pose map has them.
         """
         if q is None:
-            on_map = own.copy()
-            if self.model.map in ("translation", "planar", "xy"):  # what these do not move is 0
-                on_map[:, [i for i, name in enumerate(POSE) if name not in self.coordinates]] = 0.0
-            q = self.machine.inverse(self.slots, on_map)
+            q = self.machine.inverse(self.slots, self.on_map(own))
         return self.machine.closure(self.slots, own, q).by_step
+
+    def on_map(self, own: FloatArray) -> FloatArray:
+        """Own poses (N, 6) as the pose map has them: what it does not move is not looked at."""
+        if self.model.map == "2tpr2tps":  # has x follow z and β
+            q = np.zeros((len(own), self.n_actuators))
+            return np.asarray(self.machine.closure(self.slots, own, q).pose)
+        found: FloatArray = own.copy()
+        found[:, [i for i, name in enumerate(POSE) if name not in self.coordinates]] = 0.0
+        return found
 
     def drives(self, q: FloatArray) -> FloatArray:
         """q̃ of each limb (N, limbs) at actuator coordinates (N, n).
 
         Of a chain that of its first actuator, 0 where it has none.
         """
-        actuators = [limb.actuator for limb in self.model.limbs]
-        if isinstance(self.machine, ChainMachine):
-            each = np.hstack([chain_drives(self.machine, self.slots, q), np.zeros((len(q), 1))])
-            return np.asarray(each[:, actuators])
-        offset, gain = self.slots[:, SLOTS.index("offset")], self.slots[:, SLOTS.index("gain")]
-        found: FloatArray = gain * q[:, actuators] + offset
-        return found
+        found = self.machine.drives(self.slots, q)
+        if self.model.chains is None:
+            return found
+        each = np.hstack([found, np.zeros((len(q), 1))])
+        return np.asarray(each[:, [limb.actuator for limb in self.model.limbs]])
 
     def short_way(self, start: FloatArray, end: FloatArray) -> FloatArray:
         """Coordinates (n,) of `end` at the turn nearest to `start`, unless a stroke forbids it."""
@@ -430,13 +436,19 @@ class Kinematics:
 
     def _in_strokes(self, q: FloatArray) -> BoolArray:
         """Which actuators (n,) keep the strokes of all their limbs at coordinates (n,)."""
-        if isinstance(self.machine, ChainMachine):
-            assert self.model.chains is not None
-            return in_strokes(self.model.chains, self.machine, self.slots, q)
-        kept = np.ones(self.n_actuators, dtype=bool)
-        for limb, drive in zip(self.model.limbs, self.drives(q[None])[0], strict=True):
-            kept[limb.actuator] &= bool(stroke_margin(limb, drive) >= 0.0)
-        return kept
+        inside = np.ones(self.n_actuators, dtype=bool)
+        drives = self.machine.drives(self.slots, q[None])[0]
+        for (actuator, stroke, unit), drive in zip(self._strokes(), drives, strict=True):
+            margin = margin_of(stroke, drive)
+            inside[actuator] &= bool(kept(margin, unit, self.machine.struct.size))
+        return inside
+
+    def _strokes(self) -> list[tuple[int, tuple[float, float] | None, Unit]]:
+        """Actuator, stroke and unit of each drive: of limbs, of chains those of the actuators."""
+        if self.model.chains is not None:
+            return [(a, j.stroke, j.unit) for a, (_, j) in enumerate(self.model.chains.actuated)]
+        limbs = self.model.limbs
+        return [(limb.actuator, limb.stroke, KINDS[limb.kind].actuator_unit) for limb in limbs]
 
 
 def _for_each(

@@ -6,21 +6,87 @@ map in the machine's own frame, m numbers a row, mm and rad.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
+from pkmcal.core.chains import ChainMachine
+from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.machine import Machine
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 
+_DEPENDENT = 1e-2  # of unit rows: what errors of the geometry make of rows that depend
+
+
+@dataclass(frozen=True, eq=False)
+class RowRoles:
+    """What the rows of `readings` are to a machine whose actuators are read.
+
+    Attributes
+    ----------
+    read : ndarray (s, rows)
+        Combinations that an error of reading moves: of each actuator the mean over its limbs, then
+        passive rows that give way.
+    actuator : tuple of int, s
+        Whose error it is; -1 of passive rows.
+    held : ndarray (h, rows)
+        Combinations that hold whatever the actuators read: passive rows, and how limbs that share
+        an actuator differ. Independent of one another.
+    surplus : int
+        How many actuators there are beyond the ways in which the platform can move.
+    """
+
+    read: FloatArray
+    actuator: tuple[int, ...]
+    held: FloatArray
+    surplus: int
+
 
 def surplus(robot: Robot) -> int:
-    """How many closures a machine has beyond its free coordinates, which its limbs cannot meet.
+    """How many actuators a machine has beyond the ways in which its platform can move.
 
-    None where limbs are chains: their joints give way, and the pose follows from that.
+    What they read can contradict itself. Closures beyond the free coordinates alone do not make it:
+    of an over-constrained machine they are those of passive joints, which give way, and the pose
+    follows from that. None where limbs are chains.
     """
-    machine = robot.machine
-    return machine.rows - machine.m if isinstance(machine, Machine) else 0
+    return row_roles(robot).surplus if robot.model.chains is None else 0
+
+
+def row_roles(robot: Robot) -> RowRoles:
+    """Tell rows that are read from rows that hold.
+
+    Passive rows hold, but for those that the file weighs by another number than 1, and for all of
+    them where they depend on one another: joints with errors can then not meet them all at once.
+    """
+    unit = np.eye(robot.machine.rows)
+    of_rows = np.array(sphere_actuators(robot))
+    of_actuators = [unit[of_rows == a] for a in range(robot.n_actuators)]
+    differ = [row - mine[0] for mine in of_actuators for row in mine[1:]]
+    beside = unit[of_rows < 0]
+    passive = np.concatenate([np.reshape(differ, (-1, len(unit))), beside])
+    home = robot.home[None]
+    slopes = readings(robot, home, robot.inverse(home))[1][0]
+    along = passive @ slopes / mm_per_unit(step_units(robot), robot.length)
+    sizes = np.linalg.svd(along / np.linalg.norm(along, axis=1, keepdims=True))[1]
+    rank = int((sizes > _DEPENDENT).sum())
+    weighted = [weight != 1.0 for limb in robot.model.limbs for weight in limb.weights]
+    gives = np.array([False] * len(differ) + weighted, dtype=bool) | (rank < len(passive))
+    owners = [int(of_rows[row.nonzero()[0][0]]) for row in passive[gives]]
+    return RowRoles(
+        read=np.concatenate(
+            [np.array([mine.mean(axis=0) for mine in of_actuators]), passive[gives]]
+        ),
+        actuator=(*range(len(of_actuators)), *owners),
+        held=passive[~gives],
+        surplus=len(of_actuators) - robot.machine.m + rank,
+    )
+
+
+def step_units(robot: Robot) -> list[str]:
+    """Unit of each of the m numbers of a step, "mm" or "rad"."""
+    return ["mm" if name in ("x", "y", "z") else "rad" for name in robot.coordinates]
 
 
 def moved(robot: Robot, pose: FloatArray, step: FloatArray) -> FloatArray:
@@ -57,8 +123,10 @@ def readings_by_numbers(
     columns = robot.geometry.slot_index[moving].astype(np.int32)
     by_number = _of_limbs(robot).readings(robot.slots, own, q, columns)[2]
     assert by_number is not None
-    by_places: FloatArray = by_number @ chain[moving]
-    return by_places
+    if np.array_equal(chain[moving], np.eye(len(places))):
+        return by_number
+    by_places: FloatArray = by_number.reshape(-1, len(moving)) @ chain[moving]
+    return by_places.reshape(*by_number.shape[:2], len(places))
 
 
 def sphere_actuators(robot: Robot) -> list[int]:
@@ -70,6 +138,6 @@ def sphere_actuators(robot: Robot) -> list[int]:
     return of_rows
 
 
-def _of_limbs(robot: Robot) -> Machine:
-    assert isinstance(robot.machine, Machine)  # `surplus` is 0 otherwise
+def _of_limbs(robot: Robot) -> Machine | DrivenMachine:
+    assert not isinstance(robot.machine, ChainMachine)  # `surplus` is 0 otherwise
     return robot.machine

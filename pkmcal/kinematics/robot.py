@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
-from pkmcal.core.chains import AnyMachine, ChainMachine
+from pkmcal.core.chains import ChainMachine
+from pkmcal.core.driven import CompiledMachine, DrivenMachine
 from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
@@ -145,7 +146,8 @@ class Robot(Kinematics, Result):
         Returns
         -------
         Feasibility
-            ``.ok`` for each pose; reach, stroke and joint cones for each limb.
+            ``.ok`` for each pose; reach, stroke and joint cones for each limb. What exceeds a
+            limit by rounding, 1e-10 of the machine's size or rad, keeps it.
         """
         rows, shape = self.own_rows(pose)
         chains = self.model.chains
@@ -155,15 +157,17 @@ class Robot(Kinematics, Result):
                 if actuators is None
                 else (self._batch(actuators, shape))
             )
-            assert isinstance(self.machine, ChainMachine)
-            found = chain_limits.feasibility(chains, self.machine, self.slots, rows, q)
+            machine, slots, at = self.machine.bare(self.slots, q)
+            assert isinstance(machine, ChainMachine)
+            found = chain_limits.feasibility(chains, machine, slots, rows, at)
             return _shaped(found, shape)
         drive, on_base, on_platform = self.limb_machine.limbs(self.slots, rows)
         if actuators is not None:
             there = self.drives(self._batch(actuators, shape))
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
             drive = np.where(angle, there + wrapped(drive - there), drive)
-        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform), shape)
+        size = self.machine.struct.size
+        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform, size), shape)
 
     def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
         """Every assembly mode at given actuator coordinates, with proof.
@@ -214,7 +218,9 @@ class Robot(Kinematics, Result):
                 begin = self.short_way(rows[0], self.machine.inverse(self.slots, own)[0])[None]
             else:
                 begin = as_rows("actuators", actuators, self.n_actuators)[0]
-            end = continue_path(problem, own, begin, steps)
+            part = np.arange(steps + 1)[:, None] / steps
+            way = self.machine.bare(self.slots, begin + (rows - begin) * part)[2]
+            end = continue_path(problem, own, way)
             outward: FloatArray = self.frames.outward(end)[0]
             return outward
 
@@ -224,7 +230,7 @@ class Robot(Kinematics, Result):
             order,
             poses=poses,
             distance=lambda pose: pose_distance(own, self.frames.inward(pose), self.length),
-            feasible=lambda: self.feasible(poses).ok,
+            feasible=lambda: self.feasible(poses, np.tile(rows, (len(poses), 1))).ok,
             continued=continued,
         )
 
@@ -449,8 +455,39 @@ class Robot(Kinematics, Result):
         changed.slots = np.ascontiguousarray(changed.model.geometry.slots)
         return changed
 
+    def approaching(self, approach: ArrayLike) -> Robot:
+        """The robot with actuators that come from a known direction, for laws with backlash.
+
+        Parameters
+        ----------
+        approach : array_like (n,) or (..., n)
+            Of each actuator +1 where its reading grew before it stopped, -1 where it fell, 0 where
+            that is not known, which is half way between. A batch goes with calls of as many rows.
+
+        Returns
+        -------
+        Robot
+            What `replace` and `load` make of it knows no directions.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")  # without backlash
+        >>> bool(robot.approaching([1] * 6).forward(robot.inverse(robot.home)).ok)
+        True
+        """
+        rows, shape = as_rows("approach", approach, self.n_actuators)
+        if not np.isin(rows, (-1.0, 0.0, 1.0)).all():
+            raise ArgumentError("approach must be 1, -1 or 0 for each actuator")
+        if not isinstance(self.machine, DrivenMachine):
+            return self
+        other = copy(self)
+        other.__dict__.pop("_of_any_misfit", None)  # of the same directions
+        other.machine = self.machine.approaching(rows[0] if shape == () else rows)
+        return other
+
     @cached_property
-    def _of_any_misfit(self) -> AnyMachine:
+    def _of_any_misfit(self) -> CompiledMachine:
         return self.machine.with_tolerance(np.inf)
 
     @property
@@ -502,8 +539,12 @@ class Robot(Kinematics, Result):
         Raises
         ------
         ValueError
-            `like` describes another robot.
+            `like` describes another robot; a drive law has no inverse over its stroke, so that
+            the file could not be read.
         """
+        for d, why in self.model.doubts().items():
+            limb = self.model.limb_of_drive(d) + 1
+            raise ArgumentError(f"robot: limb {limb} of {self.name}: its drive law: {why}")
         if like is None or self.model.chains is not None:
             robot_file.write(self.model, path, comment)
             return

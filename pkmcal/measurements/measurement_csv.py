@@ -15,6 +15,8 @@ columns                               meaning
 ``actuator_sigma [mm]``               standard deviation of what every actuator read
 ``actuator_sigma.q1 [mm]`` …          … or of each of them
 ``group``                             a whole number, the same for repeats of one pose
+``session``                           when the row was measured, by a name
+``approach.q1`` …                     1 or -1: the reading had grown or fallen; 0: not known
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
@@ -44,7 +46,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal import arguments
 from pkmcal.arguments import word
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, TextArray
 from pkmcal.exceptions import ArgumentTypeError, FileError
 from pkmcal.files.column_names import SYNONYMS
 from pkmcal.files.csv_table import Table
@@ -169,6 +171,8 @@ def read_measurements(
     fields["actuator_sigma"] = _read_actuator_sigma(table, actuator_units)
     if "group" in table.columns:
         fields["group"] = table.integers("group")
+    fields["session"] = _read_session(table)
+    fields["approach"] = _read_approach(table, len(actuator_units))
     values: FloatArray | None
     if several:
         actuators, values, fields = read_several(table, several, actuators, fields)
@@ -235,8 +239,13 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
         f"{table.columns['probe'].name!r} taken as the firmware's z when the probe triggered: the"
         " actuators are those that the robot file has there, and the probe's tip is at 0"
     )
-    lines = np.array(table.lines)
-    return replace(measured, notes=_notes(table), lines=lines, file=table.path.name)
+    return replace(
+        measured,
+        notes=_notes(table),
+        lines=np.array(table.lines),
+        file=table.path.name,
+        session=_read_session(table),
+    )
 
 
 def _table(
@@ -272,8 +281,10 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     components = _AXES + _ANGLES
     names = {f"q{i + 1}" for i in range(len(table.columns))}
     names |= {name for name in table.columns if ACTUATOR.fullmatch(name)}
-    names |= {*components, "distance", "sigma", "group", "target", "probe", "actuator_sigma"}
-    names |= {f"actuator_sigma.{name}" for name in names if ACTUATOR.fullmatch(name)}
+    names |= {*components, "distance", "sigma", "group", "session", "target", "probe"}
+    names |= {"actuator_sigma", "approach"}
+    of_actuators = [name for name in names if ACTUATOR.fullmatch(name)]
+    names |= {f"{what}.{q}" for what in ("actuator_sigma", "approach") for q in of_actuators}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
     names |= {f"sigma.{name}" for name in components}
@@ -392,6 +403,24 @@ def _read_actuator_sigma(table: Table, units: tuple[str, ...]) -> FloatArray | N
             raise table.header_error("column 'actuator_sigma' does not go with those of actuators")
         columns = [table.numbers(name, unit)[0] for name, unit in zip(each, units, strict=True)]
     return np.stack(columns, axis=1)
+
+
+def _read_approach(table: Table, count: int) -> FloatArray | None:
+    """From where each actuator came (rows, n)."""
+    each = [f"approach.q{i + 1}" for i in range(count)]
+    given = [name for name in table.columns if name.startswith("approach")]
+    if not given:
+        return None
+    if given != ["approach"]:
+        table.require(each)
+        if len(given) > len(each):
+            raise table.header_error("column 'approach' does not go with those of actuators")
+    names = ["approach"] * count if given == ["approach"] else each
+    return np.stack([table.integers(name) for name in names], axis=1).astype(np.float64)
+
+
+def _read_session(table: Table) -> TextArray | None:
+    return np.array(table.texts("session")) if "session" in table.columns else None
 
 
 def _read(table: Table, name: str, *quantities: str, blank: bool = False) -> tuple[Any, str]:

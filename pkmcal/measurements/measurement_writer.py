@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from os import PathLike
 from typing import Protocol
 
-from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.files.csv_writer import write_csv
 from pkmcal.measurements.components import COMPONENTS, Kind
 
@@ -68,6 +68,14 @@ class Writable(Protocol):
     def group(self) -> Int64Array | None:
         """Which rows repeat one pose."""
 
+    @property
+    def approach(self) -> FloatArray | None:
+        """From where each actuator came."""
+
+    @property
+    def session(self) -> TextArray | None:
+        """When each row was measured."""
+
 
 def write_measurements(
     measurements: Writable, path: str | PathLike[str], comment: str = ""
@@ -122,6 +130,11 @@ def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
             yield f"{point}.{name} [mm]", _exact(rows[:, axis])
     if m.group is not None:
         yield "group", [str(number) for number in m.group]
+    if m.session is not None:
+        yield "session", m.session.tolist()
+    if m.approach is not None:
+        for i, each in enumerate(m.approach.T):
+            yield f"approach.q{i + 1}", [f"{direction:.0f}" for direction in each]
 
 
 def _actuator_sigma(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:

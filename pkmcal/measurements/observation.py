@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose
 from pkmcal.measurements import orientation
@@ -114,6 +115,19 @@ def _poses(pose: FloatArray, frame: FloatArray | None, origin: FloatArray) -> Pr
     by_frame = np.zeros((len(pose), 6, 6))
     by_frame[:, :3], by_frame[:, 3:, 3:] = place.by_frame, by_angles
     return Predicted(compose(compose(origin, frame[None])[0], pose), by_twist, by_frame=by_frame)
+
+
+def joined(parts: Sequence[Predicted], rows: Sequence[IntArray]) -> Predicted:
+    """Readings of one kind whose rows stand in several parts: in which rows each part's are."""
+    if len(parts) == 1:
+        return parts[0]
+    whole: dict[str, FloatArray] = {}
+    for part, mine in zip(parts, rows, strict=True):
+        for name, values in vars(part).items():
+            if values is not None:
+                count = sum(map(len, rows))
+                whole.setdefault(name, np.empty((count, *values.shape[1:])))[mine] = values
+    return Predicted(**whole)
 
 
 def difference(kind: Kind, values: FloatArray, predicted: FloatArray) -> FloatArray:

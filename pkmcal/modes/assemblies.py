@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pkmcal.arguments import whole
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, as_rows, first_largest
 from pkmcal.display import POSE_HEADER, Table, pose_cells
 from pkmcal.exceptions import ArgumentError
 from pkmcal.result import Result
+
+_ALIKE = 1e-9  # of the largest distance: modes that differ by less are equally far
 
 Signs = NDArray[np.int8]
 
@@ -83,7 +85,8 @@ class Assemblies(Result):
             raise ArgumentError(f"pose must have shape (6,), found {(*shape, 6)}")
         if not len(self):
             raise ArgumentError("there are no modes to choose from")
-        return int(np.argmin(self._distance(rows)))
+        apart = self._distance(rows)
+        return first_largest(-apart, _ALIKE * float(apart.max()))
 
     def reached_from(
         self, pose: ArrayLike, actuators: ArrayLike | None = None, steps: int = 200
@@ -116,7 +119,7 @@ class Assemblies(Result):
         if not np.isfinite(end).all() or not len(self):
             return None
         apart = self._distance(end[None])
-        best = int(np.argmin(apart))
+        best = first_largest(-apart, _ALIKE * float(apart.max()))
         return best if apart[best] <= 1e-6 + 10.0 * np.nan_to_num(self.error[best]) else None
 
     def _parts(self) -> Iterator[str | Table]:

@@ -314,17 +314,14 @@ def mirror_images(problem: AssemblyProblem, poses: FloatArray) -> Int32Array:
     return np.where(near.min(axis=1) < 1e-7, which, none).astype(np.int32)
 
 
-def continue_path(
-    problem: AssemblyProblem, pose: FloatArray, begin: FloatArray, steps: int
-) -> FloatArray:
-    """Follow a pose (1, 6) while the actuators go straight from `begin` (1, n) to `problem.q`.
+def continue_path(problem: AssemblyProblem, pose: FloatArray, way: FloatArray) -> FloatArray:
+    """Follow a pose (1, 6) while the actuators go by the rows of `way` (N, n) to `problem.q`.
 
     The pose there; NaN where a type-2 singularity is on the way.
     """
     machine, slots = problem.machine, problem.slots
     at, side = pose, 0.0
-    for k in range(steps + 1):
-        q = begin + (problem.q - begin) * (k / steps)
+    for q in way[:, None]:
         at, status, _, _ = machine.forward(slots, q, at, threads=1)
         if status[0]:
             return np.full((1, 6), np.nan)

@@ -9,9 +9,10 @@ import numpy as np
 
 from pkmcal import display
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import FloatArray, propagate, rms
+from pkmcal.arrays import FloatArray, largest_first, propagate, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.parameters import FitData
 from pkmcal.core.library import POSE
 from pkmcal.display import printable
 from pkmcal.kinematics.workspace import reach, sample_poses, workspace
@@ -20,6 +21,7 @@ from pkmcal.measurements.iso9283 import performance
 from pkmcal.measurements.repeats import groups
 
 _WORST = 10  # rows that are listed
+_ALIKE = 1e-6  # mm by which distances differ that are not equal
 _CELLS, _DRAWN = 30, 500  # of the map of the workspace along an axis; of poses for its quantiles
 _SHARE = 0.9  # of the way from home to the ends of the workspace
 _MOSTLY, _ONLY = 0.5, 0.99  # of the prior's deviation, above which the prior dominates
@@ -73,7 +75,7 @@ def verdict(found: Identification) -> tuple[str, str]:
 
 def instrument_identified(found: Identification) -> bool:
     """Say whether a frame or points of the instrument are among the parameters."""
-    return len(found.free) > len(found.fit.parameters.places)
+    return len(found.free) > int(found.fit.parameters.geometry.stop)
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:
@@ -119,7 +121,8 @@ def points(found: Identification) -> list[dict[str, Any]]:
 
 def worst(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Select the rows with the largest distances after the calibration."""
-    return sorted(rows, key=lambda row: -row["after"])[:_WORST]
+    off = np.array([row["after"] for row in rows])
+    return [rows[i] for i in largest_first(off, _ALIKE)[:_WORST]]
 
 
 def moved(rows: list[dict[str, Any]]) -> list[tuple[int, str, str, int]]:
@@ -177,13 +180,19 @@ def correlation(found: Identification) -> FloatArray:
 
 
 def iso9283(found: Identification) -> list[dict[str, Any]]:
-    """Compute AP, RP and AD of every set of positions or poses, before and after."""
+    """Compute AP, RP and AD of every set of positions or poses, before and after.
+
+    Without outliers, which are errors of the measurement.
+    """
     equations = found.fit.equations
     scores = []
     for i, measured in enumerate(equations.sets):
         if measured.kind not in ("position", "pose"):
             continue
         read = np.isfinite(measured.values).all(axis=1)
+        odd = np.isin(equations.rows[equations.set_of == i], found.outliers)
+        left_out = int((read & odd).sum())
+        read &= ~odd
         if not read.any():
             continue
         group = np.unique(groups(measured)[read], return_inverse=True)[1]
@@ -192,6 +201,7 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
         last = performance(values, values - found.residuals[i][read, :3], group)
         scores.append({
             "set": i + 1,
+            "outliers": left_out,
             "poses": len(first.repeats),
             "repeats": [int(first.repeats.min()), int(first.repeats.max())],
             "accuracy_before": first.accuracy.tolist(),
@@ -219,11 +229,14 @@ def expected(found: Identification, places: FloatArray) -> FloatArray:
 
 
 def as_seen(found: Identification, places: FloatArray) -> FloatArray:
-    """Predict that of the first row's target in the instrument's frame, as `expected` does."""
+    """Predict that of the first row's target in the instrument's frame, as `expected` does.
+
+    Of sessions that of the last.
+    """
     known = found.fit.equations
     at, q, _ = as_machine(found.robot).commanded(places)
-    like = known.datasets[0]
-    rows = np.zeros(len(q), dtype=np.intp)
+    like, first = _first_of_last(found)
+    rows = np.full(len(q), first)
     measured = replace(like.measured.select(rows), actuators=q, group=np.arange(len(q)))
     equations = Equations([replace(like, measured=measured, rows=rows)], known.parameters)
     equations = equations.commanded()
@@ -236,6 +249,30 @@ def as_seen(found: Identification, places: FloatArray) -> FloatArray:
     distance = np.abs(point.pose[equations.pose_of[0]] - at)[:, :3].max(axis=1)
     sure &= (distance < _ELSEWHERE) & found.fit.uncertainty.known
     return np.where(sure, np.sqrt(variance), np.inf)
+
+
+def _first_of_last(found: Identification) -> tuple[FitData, int]:
+    """A set and the number of its first row that is of the last session, whose is the robot."""
+    for data in found.fit.equations.datasets:
+        session = data.measured.session
+        if not found.sessions:
+            return data, 0
+        if session is not None and (session == found.sessions[-1]).any():
+            return data, int(np.argmax(session == found.sessions[-1]))
+    raise AssertionError("a session without rows")
+
+
+def held_out_numbers(found: Identification) -> list[dict[str, Any]]:
+    """List numbers that were found of sessions held out."""
+    return [
+        {
+            "name": printable(name),
+            "unit": found.holdout.units[name],
+            "value": value,
+            "stderr": stderr,
+        }
+        for name, (value, stderr) in found.holdout.own.items()
+    ]
 
 
 def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice | None] | str:

@@ -14,6 +14,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.row_names import row_names
+from pkmcal.core import instruments
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_given
 from pkmcal.report.drawing import sample
@@ -26,8 +27,13 @@ _POSES = 200  # measured poses that can be visited
 
 
 def element(found: Identification) -> tuple[str, str]:
-    """The element of the report, and the hash by which its policy names the script."""
+    """The element of the report, and the hash by which its policy names the script.
+
+    Nothing, and "none", of a machine that the page cannot hold: the still pictures stay.
+    """
     robot = found.robot
+    if isinstance(robot, Robot) and any(law is not None for law in robot.model.laws):
+        return "", "none"
     data = page.machine(robot)
     data.pop("cloud", None)  # the report has its own pictures of the workspace
     data["places"] = _measured(found)
@@ -58,7 +64,8 @@ def measured_places(found: Identification) -> FloatArray:
         if measured.kind in ("pose", "closure"):
             parts.append(end.pose[equations.pose_of[i], :3])
         else:
-            parts.append(equations.targets_at(end, i)[0])
+            target = np.ascontiguousarray(equations.points_of(i, "target", end.theta))
+            parts.append(instruments.points(end.pose[equations.pose_of[i]], target)[0])
     return np.concatenate(parts)
 
 

@@ -67,6 +67,7 @@ def gather(found: Identification, files: Mapping[str, bytes]) -> dict[str, Any]:
         "moved": contents.moved(points),
         "directions": contents.directions(found),
         "parameters": contents.parameters(found),
+        "held_out_numbers": contents.held_out_numbers(found),
         "correlation": contents.correlation(found),
         "iso9283": contents.iso9283(found),
         "accuracy": None if isinstance(predicted, str) else predicted[0],

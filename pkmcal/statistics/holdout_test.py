@@ -86,6 +86,7 @@ def holdout_test(
     split: Noise,
     covariance: FloatArray,
     of_held: Noise | None = None,
+    taken: float = 0.0,
 ) -> HoldoutTest:
     """Compare.
 
@@ -99,12 +100,14 @@ def holdout_test(
         Of the parameters in the basis of the fit, in the unit of `held`.
     of_held : Noise, optional
         Variances of the errors of `held`, where they share another part of the same total.
+    taken : float
+        Share of the equations of `held` that numbers found from these took.
     """
     expected = split.total + float(
         np.einsum("ij,jk,ik->", held.design, covariance, held.design)
     ) / len(held.residual)
     ratio = float(np.sqrt(np.mean(held.residual**2) / expected))
-    first = _of_sum(held, of_held or split, covariance)
+    first = _of_sum(held, of_held or split, covariance) * (1.0 - taken)
     second = _of_residuals(fitted, split)
     poses = np.bincount(fitted.pose)
     squares = np.bincount(fitted.pose, fitted.residual**2)[poses > 0] / poses[poses > 0]

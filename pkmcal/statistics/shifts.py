@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, largest_first
 from pkmcal.statistics.clusters import Sandwich
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import ROUNDING, LinearFit, column_basis, triangle
@@ -22,6 +22,7 @@ from pkmcal.statistics.prior_test import data_alone
 
 _CHANCE = 0.01  # among all candidates, below which one has shifted …
 _SHARE, _FALL = 0.05, 0.03  # … if it is so much of the disagreement, and the rms falls so much
+_EQUAL = 1e-6  # share by which drops and chances differ that are not equal
 _ALIKE = 6.63  # drop in units of the variance by which candidates differ that can be told apart
 _FEW = 30  # equations up to which clusters are too few for their own variances
 _SAME = 1e-6  # share of a candidate that must be left beside what is there
@@ -116,7 +117,7 @@ def shifted(
         same = best.basis.shape[1]
         also = tuple(
             other.candidate
-            for other in sorted(trials, key=lambda trial: -trial.drop)
+            for other in (trials[i] for i in _most(trials))
             if other.candidate != best.candidate
             and other.basis.shape[1] <= same
             and best.drop - other.drop < _ALIKE * variance
@@ -144,14 +145,22 @@ def _trial(
     return _Trial(j, drop, f_tail(min(ratio, 1e300), basis.shape[1], freedom), basis)
 
 
+def _most(trials: Sequence[_Trial]) -> IntArray:
+    """Order of candidates by what they explain; of those alike, as they come."""
+    drops = np.array([trial.drop for trial in trials])
+    return largest_first(drops, _EQUAL * float(drops.max()))
+
+
 def _best(
     trials: Sequence[_Trial], few: bool, left: FloatArray, common: FloatArray, cluster: IntArray
 ) -> _Trial:
     """The candidate that explains most, and its chance by cluster where there are enough."""
     if few:
-        return min(trials, key=lambda trial: (trial.chance, -trial.drop))
+        least = min(trial.chance for trial in trials) * (1 + _EQUAL)
+        alike = [trial for trial in trials if trial.chance <= least]
+        return alike[int(_most(alike)[0])]
     alone = [trial for trial in trials if trial.basis.shape[1] == 1] or list(trials)
-    best = max(alone, key=lambda trial: trial.drop)
+    best = alone[int(_most(alone)[0])]
     design = np.column_stack([common, best.basis])
     after = left - best.basis @ (best.basis.T @ left)
     sandwich = Sandwich(_fit(design, after, cluster))

@@ -7,9 +7,11 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.core.chains import ChainMachine
+from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
+from pkmcal.core.machine import Machine
 from pkmcal.core.poses import invert
+from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Cone
 from pkmcal.kinematics.dexterity import dexterity
@@ -25,12 +27,14 @@ _TRACK = 25  # points of the path of a crank's end
 def data(robot: Robot) -> dict[str, Any]:
     """All that the page needs of a robot, as JSON has it; mm and rad."""
     model, machine = robot.model, robot.machine
+    if isinstance(machine, DrivenMachine):
+        raise ArgumentError(f"robot: {model.name} has drive laws, which the page cannot hold")
     size = float(machine.struct.size)
     spans = ranges.poses(robot, size)
-    if model.chains is None:
-        blob, numbers, strokes = memory.limbs(robot.limb_machine, robot.slots), 0, _strokes(robot)
+    if isinstance(machine, Machine):
+        blob, numbers, strokes = memory.limbs(machine, robot.slots), 0, _strokes(robot)
     else:
-        assert isinstance(machine, ChainMachine)
+        assert model.chains is not None
         blob, numbers = memory.chains(machine, robot.slots)
         strokes = chains.strokes(model.chains, robot.slots)
     moves = ranges.actuators(robot, strokes, spans)

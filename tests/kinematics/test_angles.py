@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -303,3 +306,37 @@ def test_limbs_geared_to_one_actuator_stand_where_they_agree(at_home: float, rat
     assert missed(robot, found.pose, back).max() < CLOSED
     np.testing.assert_allclose(robot.nearest_turns(back, near=q), q, rtol=0, atol=1e-9)
     assert missed(robot, found.pose, back + robot.turns).max() < CLOSED
+
+
+@pytest.mark.parametrize("home_value", [0.0, 200.0, -170.0])
+@pytest.mark.parametrize("name", ["five-bar", "agile-eye", "eclipse"])
+def test_turning_joints_of_chains_stay_in_their_strokes_whatever_gain_and_offset(
+    name: str, home_value: float, tmp_path: Path
+) -> None:
+    text = Path(pk.__file__).with_name("builtin").joinpath("machines", f"{name}.toml").read_text()
+    turned = re.sub(
+        r'kind = "R",(.*)stroke = \[-(\d+).0, (\d+).0\]',
+        lambda m: (
+            f'kind = "R",{m[1]}home_value = {home_value}, stroke = '
+            f"[{home_value - float(m[2])}, {home_value + float(m[3])}]"
+        ),
+        text,
+    )
+    file = tmp_path / "robot.toml"
+    file.write_text(turned)
+    robot = pk.load(file)
+    rng = np.random.default_rng(0)
+    for gains in ((-1.0,) * 6, rng.choice([-1, 1], 6) * rng.uniform(0.5, 2, 6)):
+        count = range(1, robot.n_actuators + 1)
+        changes = {f"gain{i}": float(gains[i - 1]) for i in count}
+        changes |= {
+            f"offset{i}": float(rng.uniform(-4, 4)) for i in count if is_angle(robot)[i - 1]
+        }
+        other = robot.replace(changes)
+        q = other.inverse(other.home, match=True)
+        assert other.feasible(other.home).ok
+        assert other.feasible(other.home, q).ok
+        np.testing.assert_allclose(
+            other.drives(q[None])[0], robot.drives(robot.inverse(robot.home)[None])[0], atol=1e-9
+        )
+        assert other.forward(q).ok

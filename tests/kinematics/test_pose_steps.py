@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -67,6 +69,34 @@ def test_derivatives_are_those_of_differences(name: str) -> None:
             ends.append(pose_steps.readings(robot.with_values(values), pose, q)[0])
         slope = (ends[0] - ends[1]) / (2 * STEP)
         np.testing.assert_allclose(by_numbers[:, :, k], slope, rtol=1e-5, atol=1e-4)
+
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+@pytest.mark.parametrize(
+    ("name", "surplus", "held"),
+    [
+        ("hexapod", 0, 0),
+        ("3prs", 0, 3),
+        ("linear-delta-6", 0, 3),  # two rods a carriage
+        (str(EXAMPLES / "belts" / "robot.toml"), 2, 0),
+        (str(EXAMPLES / "2tpr2tps-eight-rows.toml"), 0, 0),  # over-constrained
+    ],
+)
+@pytest.mark.parametrize("errors", [0.0, 3.0])
+def test_surplus_actuators_are_counted_not_surplus_closures(
+    name: str, surplus: int, held: int, errors: float
+) -> None:
+    robot = pk.load(name)
+    points = [n for n in robot.geometry.match("base*") if n[-1] in "xyz"]
+    shifts = np.random.default_rng(2).normal(0, errors, len(points))
+    robot = robot.replace({
+        n: robot.geometry[n] + shift for n, shift in zip(points, shifts, strict=True)
+    })  # fmt: skip
+    roles = pose_steps.row_roles(robot)
+    assert (roles.surplus, len(roles.held)) == (surplus, held)
+    assert pose_steps.surplus(robot) == surplus
 
 
 @pytest.mark.parametrize("name", ["hexapod", "3prs", "linear-delta-6", "rotary-delta"])

@@ -64,10 +64,12 @@ def test_a_prior_costs_nothing(arm: pk.SerialArm, log: Measurements) -> None:
 
 @pytest.mark.filterwarnings("ignore:the measurements contradict the prior")  # joint2.dphi
 @pytest.mark.slow
-@pytest.mark.parametrize("prior, limit", [(None, 0.25), (PRIOR, 0.23)])
+@pytest.mark.parametrize("prior, limit", [(None, 0.25), (PRIOR, 0.24)])
 def test_every_pose_left_out_in_turn(
     arm: pk.SerialArm, log: Measurements, prior: float | None, limit: float
 ) -> None:
+    # 0.235 mm with the prior; below 0.23 while the noise was estimated with the prior's help, which
+    # let a contradicted prior (this one is) and the noise excuse each other
     squares = []
     for pose in range(24):
         left_out = log.pose_index == pose

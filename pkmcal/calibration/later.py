@@ -1,0 +1,164 @@
+"""Rows that were not fitted: which of their parameters the fit has found, which are their own.
+
+A session that no fitted row is of has numbers of its own (`per_session`): they are found from its
+rows, all others held as they were fitted, before the rows are compared with the fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.estimator import Estimate
+from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.least_squares import Search
+from pkmcal.calibration.loss import Loss
+from pkmcal.calibration.mode_slips import in_their_modes
+from pkmcal.calibration.parameters import FitData, Parameters, parameters
+from pkmcal.calibration.sessions import NONE
+from pkmcal.calibration.uncertainty import Uncertainty
+from pkmcal.statistics.linear_fit import ROUNDING
+
+
+@dataclass(frozen=True, eq=False)
+class Later:
+    """Rows that were not fitted.
+
+    Attributes
+    ----------
+    data : tuple of FitData
+        The sets of measurements.
+    like : tuple of int
+        The fitted set of each, whose noise it has.
+    parameters : Parameters
+        Of these rows.
+    fitted : ndarray of int (n,)
+        Which parameter of the fit each of them is; `NONE` if it is their own.
+    """
+
+    data: tuple[FitData, ...]
+    like: tuple[int, ...]
+    parameters: Parameters
+    fitted: IntArray
+
+    @property
+    def own(self) -> BoolArray:
+        """Which parameters the fit has not (n,)."""
+        own: BoolArray = self.fitted == NONE
+        return own
+
+    def at(self, theta: FloatArray) -> FloatArray:
+        """Parameters (n,) at those of the fit; their own ones where they start."""
+        return np.where(self.own, self.parameters.start, theta[self.fitted])
+
+    def by_fitted(self, derivative: FloatArray, size: int) -> FloatArray:
+        """Columns (M, size) of the parameters of the fit, of a derivative (M, n)."""
+        columns = np.zeros((len(derivative), size))
+        columns[:, self.fitted[~self.own]] = derivative[:, ~self.own]
+        return columns
+
+    def equations(self, fitted: Equations) -> Equations:
+        """Their equations, weighted as those of the fit."""
+        deviations = [
+            np.ones(len(data.measured.components))
+            if differs(fitted, data, i)
+            else fitted.deviations[i]
+            for data, i in zip(self.data, self.like, strict=True)
+        ]
+        return Equations(self.data, self.parameters).reweighted(deviations)
+
+
+def later(fitted: Parameters, held: Sequence[tuple[FitData, int]]) -> Later:
+    """Rows that were not fitted, each set with the fitted one that it is like."""
+    data = tuple(each for each, _ in held)
+    mine = parameters(fitted.robot, data, fitted.asked, like=fitted)
+    place = {name: column for column, name in enumerate(fitted.names)}
+    columns = np.array([place.get(name, NONE) for name in mine.names], dtype=np.intp)
+    known = {first: columns[first] for first in mine.frames if columns[first] != NONE}
+    origin = dict(mine.origin) | {first: fitted.origin[there] for first, there in known.items()}
+    return Later(data, tuple(like for _, like in held), replace(mine, origin=origin), columns)
+
+
+def differs(fitted: Equations, data: FitData, like: int) -> bool:
+    """Whether kind or stated sigma of a set are not those of the fitted set."""
+    own, of_fit = data.measured, fitted.sets[like]
+    return own.kind != of_fit.kind or (own.sigma is None) != (of_fit.sigma is None)
+
+
+def noise_factors(rows: Later, equations: Equations, sure: Uncertainty) -> FloatArray:
+    """What multiplies the deviations of each group of their equations."""
+    factors = []
+    for data, i in zip(rows.data, rows.like, strict=True):
+        if not differs(sure.equations, data, i):
+            factors.append(float(sure.factors[i]))
+        else:
+            stated = data.measured.sigma is not None
+            factors.append(1.0 if stated else float(np.sqrt(sure.noises[i].total)))
+    if len(equations.unstated) > len(rows.data):  # the actuators: stated or estimated alike
+        of_fit = sure.factors[len(sure.equations.sets) :]
+        factors += [float(of_fit[0])] if equations.unstated[-1] and len(of_fit) else [1.0]
+    return np.array(factors)
+
+
+@dataclass(frozen=True, eq=False)
+class OwnNumbers:
+    """How the rows' d own parameters follow from them, scaled.
+
+    Attributes
+    ----------
+    half : ndarray (d, r)
+        Their covariance for fitted parameters without error is half halfᵀ.
+    follow : ndarray (d, n)
+        By how much they answer errors of the fitted parameters.
+    noise : ndarray (G,)
+        That the equations were weighted by.
+    """
+
+    half: FloatArray
+    follow: FloatArray
+    noise: FloatArray
+
+
+def compared(
+    rows: Later, whole: Equations, estimate: Estimate, sure: Uncertainty
+) -> tuple[Equations, Evaluation, OwnNumbers | None]:
+    """The rows at the fit, poses following from the actuators, and what they say of own parameters.
+
+    None where they have none. Where poses have unknowns, closures speak of them as well as readings
+    (`whole`).
+    """
+    commanded, theta = whole.commanded(), rows.at(estimate.evaluation.theta)
+    if not rows.own.any():
+        return commanded, in_their_modes(commanded, commanded.at(theta)), None
+    start = commanded.start(theta, rows.own)
+    if in_their_modes(commanded, start) is not start:
+        start = commanded.start(theta, rows.own)
+    found, own = _own_numbers(rows, whole, whole.begin(commanded, start), estimate, sure)
+    commanded.warm_start(found)
+    return commanded, commanded.at(found.theta), own
+
+
+def _own_numbers(
+    rows: Later, equations: Equations, start: Evaluation, estimate: Estimate, sure: Uncertainty
+) -> tuple[Evaluation, OwnNumbers]:
+    """The least squares of the rows' own parameters, all others held."""
+    noise, columns = noise_factors(rows, equations, sure), np.flatnonzero(rows.own)
+    search = Search(equations, start, columns)
+    found, jacobian = start, np.zeros((0, len(columns)))
+    if len(equations.components):
+        loss = estimate.state.loss
+        width = np.full(len(equations.components), float(np.median(loss.width)))
+        same = Loss(loss.name, equations.components, width)
+        none = np.zeros((0, len(columns)))
+        found = search.at(search.best(np.zeros(len(columns)), noise, same, none), noise)
+        jacobian = search.jacobian(found, noise)
+    left, singular, right = np.linalg.svd(np.vstack([jacobian, search.prior]), full_matrices=False)
+    kept = singular > ROUNDING * singular.max(initial=0.0)
+    half, taken = right[kept].T / singular[kept], left[: len(jacobian), kept]
+    by_all = equations.by_parameters(found, noise) * equations.parameters.scale
+    by_fitted = rows.by_fitted(by_all, len(sure.fit.back))
+    return found, OwnNumbers(half, -half @ (taken.T @ by_fitted), noise)
