@@ -466,7 +466,7 @@ def _bounds(
     for pattern, pair in bounds.items():
         try:
             low, high = (float(end) for end in pair)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ArgumentError(
                 f"bounds of {pattern} must be (lower, upper); found {pair!r}"
             ) from None
