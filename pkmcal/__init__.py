@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.calibration.anchors import locate_anchors as locate_anchors
     from pkmcal.calibration.bootstrap import Bootstrap as Bootstrap
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
+    from pkmcal.calibration.datum import Datum as Datum
     from pkmcal.calibration.distances import Distances as Distances
     from pkmcal.calibration.identification import Identification as Identification
     from pkmcal.calibration.identify import identify as identify
@@ -76,6 +77,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.moves.events import Event as Event
     from pkmcal.moves.move import Move as Move
     from pkmcal.moves.move import MoveSample as MoveSample
+    from pkmcal.view.show import show as show
 
 _HOMES = {
     "arms.arm": ("SerialArm",),
@@ -83,6 +85,7 @@ _HOMES = {
     "arms.inverse": ("ArmInverse",),
     "calibration.anchors": ("LocatedAnchors", "locate_anchors"),
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
+    "calibration.datum": ("Datum",),
     "calibration.distances": ("Distances",),
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),
@@ -124,6 +127,7 @@ _HOMES = {
     "modes.certificate": ("Certificate",),
     "moves.events": ("Event",),
     "moves.move": ("Move", "MoveSample"),
+    "view.show": ("show",),
 }
 _HOME_OF = {name: f"pkmcal.{home}" for home, names in _HOMES.items() for name in names}
 _MODULES = ("export", "screw", "trajectory")

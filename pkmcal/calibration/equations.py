@@ -154,7 +154,7 @@ class Equations(Readings):
         """
         p = self.parameters
         robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
-        machines = Machines(tuple(robots), self._own)
+        machines = Machines(tuple(robots), self._own, self.approach)
         states = self.closures.settled(machines, self._states)
         if self.closures.unknowns:
             factors = np.ones(len(self.unstated)) if noise is None else noise
@@ -231,7 +231,12 @@ class Equations(Readings):
         self._states = replace(self._states, pose=guess)
 
     def redrawn(
-        self, at: Evaluation, noise: FloatArray, left: FloatArray, prior_centre: FloatArray
+        self,
+        at: Evaluation,
+        noise: FloatArray,
+        left: FloatArray,
+        prior_centre: FloatArray,
+        bent: FloatArray | None = None,
     ) -> tuple[Equations, Evaluation]:
         """The same with other readings, and evaluated where these have been drawn.
 
@@ -243,6 +248,8 @@ class Equations(Readings):
             See `whitened`.
         left : ndarray (M,)
             What its readings leave there, as `residual`.
+        bent : ndarray (s,), optional
+            That of `Parameters`.
         prior_centre : ndarray (n,)
             Another centre of the prior.
         """
@@ -259,7 +266,7 @@ class Equations(Readings):
             replace(m, values=corrected(m.kind, seen.values, residual).reshape(m.values.shape))
             for m, seen, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
-        other.parameters = replace(self.parameters, start=prior_centre)
+        other.parameters = replace(self.parameters, start=prior_centre, bent=bent)
         other.warm_start(at)
         if unknowns:
             return other, other.at(at.theta, noise)

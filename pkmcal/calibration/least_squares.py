@@ -50,9 +50,9 @@ class Search:
         self.equations, self.start = equations, start
         self.scale = parameters.scale[self._found]
         rows = parameters.prior_rows[:, self._found]
-        self.prior = rows[rows.any(axis=1)]
-        away = (parameters.start - start.theta)[self._found] / self.scale
-        self._centre = self.prior @ away
+        held = rows.any(axis=1)
+        self.prior = rows[held]
+        self._centre = parameters.prior_left(start.theta)[held]
         lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
-from pkmcal.calibration.parameters import POINTS, FitData, Parameters
+from pkmcal.calibration.parameters import POINTS, FitData, Parameters, places_of
+from pkmcal.calibration.sessions import NONE
 from pkmcal.measurements import orientation
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import Predicted, difference, joined, predict
@@ -36,6 +37,8 @@ class Readings:
         Distinct rows of what the actuators read.
     actuator_sigma : ndarray (K, n) or None
         Its stated deviations.
+    approach : ndarray (K, n) or None
+        From where the actuators came.
     pose_of : list of ndarray of int
         Which pose each row of each set is at.
     spread : Spread
@@ -78,9 +81,10 @@ class Readings:
         ]
         self._known = [
             {
-                name: m.attachments if role == "attachment" else m.targets
+                name: places_of(role, m)  # of points that are held
+                if name in columns
+                else (m.attachments if role == "attachment" else m.targets)
                 for name, role in POINTS[m.kind].items()
-                if name not in columns
             }
             for m, columns in zip(self.sets, self._columns, strict=True)
         ]
@@ -89,6 +93,11 @@ class Readings:
         noises = [m.actuator_sigma for m in self.sets]
         stated = [sigma for sigma in noises if sigma is not None]
         commands = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
+        directions = [m.approach for m in self.sets]
+        if any(each is not None for each in directions):  # backlash is between their poses
+            known = [np.zeros(m.actuators.shape) if m.approach is None else m.approach
+                     for m in self.sets]  # fmt: skip
+            commands = np.hstack([commands, np.concatenate(known)])
         self.machine_columns, machine_of = self.spread.machines(len(parameters.places))
         machine = np.concatenate(machine_of)
         # machines of different sessions are not at the same pose at the same actuators
@@ -97,7 +106,9 @@ class Readings:
         distinct, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
         n, width = actuators.shape[1], commands.shape[1]
         self.actuators = np.ascontiguousarray(distinct[:, :n])
-        self.actuator_sigma = np.ascontiguousarray(distinct[:, n:width]) if stated else None
+        self.actuator_sigma = np.ascontiguousarray(distinct[:, n : 2 * n]) if stated else None
+        own = n * (1 + bool(stated))
+        self.approach = np.ascontiguousarray(distinct[:, own:width]) if width > own else None
         self.machine_of_pose: IntArray = machine[first]
         self.command_of_pose: IntArray = (
             np.unique(distinct[:, :width], axis=0, return_inverse=True)[1].reshape(-1)
@@ -135,23 +146,24 @@ class Readings:
         return found
 
     def columns_of(self, i: int, name: str) -> IntArray | None:
-        """Parameters (N, 3) of a point of each row of set `i`; None where it is known.
+        """Parameters (N, 3) of a point of each row of set `i`; `NONE` where it is held.
 
+        None where it is known.
         `name` is what `predict` calls it.
         """
         return self._columns[i].get(name)
 
     def points_of(self, i: int, name: str, theta: FloatArray) -> FloatArray:
         """Where that point is (N, 3), mm."""
-        columns = self._columns[i].get(name)
-        return self._known[i][name] if columns is None else theta[columns]
+        known, columns = self._known[i][name], self._columns[i].get(name)
+        return known if columns is None else np.where(columns == NONE, known, theta[columns])
 
     def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Readings of each set at poses (K, 6)."""
         return tuple(self._predicted_of(i, pose, theta) for i in range(len(self.sets)))
 
     def _predicted_of(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
-        places = self._known[i] | {name: theta[own] for name, own in self._columns[i].items()}
+        places = {name: self.points_of(i, name, theta) for name in self._known[i]}
         kind, mine = self.sets[i].kind, pose[self.pose_of[i]]
         if not self._frames[i]:
             return predict(kind, mine, **places)
@@ -223,6 +235,15 @@ class Readings:
             else:
                 parts.append(part / white)
         return parts
+
+    def variances(self, noise: FloatArray) -> FloatArray:
+        """Variances (M,) of the readings as they are weighted, mm² and rad²."""
+        parts = []
+        for white, factor in zip(self._whiten, noise, strict=False):
+            each = np.linalg.inv(white) ** 2 if white.ndim == 3 else white**-2.0
+            parts.append(factor**2 * (each.sum(axis=2) if each.ndim == 3 else each).ravel())
+        variances: FloatArray = np.concatenate(parts)[self.present]
+        return variances
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""

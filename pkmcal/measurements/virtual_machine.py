@@ -13,6 +13,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import ArmMachine, Solvable
 from pkmcal.measurements.components import COMPONENTS, Kind
 from pkmcal.measurements.fields import numbers
@@ -81,6 +82,7 @@ class VirtualMachine:
         target: ArrayLike | None = None,
         *,
         attachment: ArrayLike | None = None,
+        approach: ArrayLike | None = None,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.
 
@@ -95,6 +97,8 @@ class VirtualMachine:
             distances the fixed point of the base frame, and required.
         attachment : (3,) or (N, 3) array, optional
             The point in the platform frame, mm, from which distances are measured.
+        approach : scalar, (n,) or (N, n) array, or "order", optional
+            From where the actuators come; see `Measurements`.
 
         Returns
         -------
@@ -118,8 +122,12 @@ class VirtualMachine:
             target=target,
             actuator_units=getattr(self._machine, "actuator_units", None),
             attachment=attachment,
+            approach=approach,
         )
-        solved = self._machine.forward(actuators)
+        machine = self._machine
+        if blank.approach is not None and isinstance(machine, Robot):
+            machine = machine.approaching(blank.approach)
+        solved = machine.forward(actuators)
         failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
         if len(failed):
             raise ArgumentError(

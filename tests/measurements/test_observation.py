@@ -7,7 +7,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.parameters import FitData, parameters
+from pkmcal.calibration.parameters import Asked, FitData, parameters
 from pkmcal.core import instruments
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -50,7 +50,7 @@ def test_analytic_jacobian_equals_differences(kind: str, unknown: bool) -> None:
     robot = pk.load("hexapod")
     readings = measured(robot, kind, rng)
     share = FitData(readings, np.arange(12), unknown and kind != "distance", unknown, unknown)
-    chosen = parameters(robot, [share], ["base*", "offset*", "gain*"], None, None)
+    chosen = parameters(robot, [share], Asked(["base*", "offset*", "gain*"]))
     equations = Equations([share], chosen)
     theta = chosen.start.copy()
     if chosen.frame is not None:
@@ -67,7 +67,7 @@ def test_jacobian_passes_through_ties() -> None:
     poses = np.array([[10.0, 20, 100, 0, 0, 0], [-40.0, 5, 80, 0, 0, 0], [0, -50.0, 120, 0, 0, 0]])
     readings = Measurements(robot.inverse(poses), poses[:, 2], "height")
     share = FitData(readings, np.arange(3), False, False)
-    chosen = parameters(robot, [share], None, None, None)
+    chosen = parameters(robot, [share], Asked())
     equations = Equations([share], chosen)
     (jacobian,) = equations.jacobian(equations.at(chosen.start))
     expected = differences(equations, chosen.start, chosen.scale)
