@@ -153,6 +153,17 @@ class Readings:
                 found.setdefault(first, {})[i] = rows
         return found
 
+    @property
+    def tools(self) -> dict[int, dict[int, IntArray]]:
+        """Rows of each set that have each tool, by its first parameter."""
+        found: dict[int, dict[int, IntArray]] = {}
+        for i, columns in enumerate(self._columns):
+            if "tool" in columns:
+                first = columns["tool"][:, 0]
+                for each in np.unique(first).tolist():
+                    found.setdefault(each, {})[i] = np.flatnonzero(first == each)
+        return found
+
     def columns_of(self, i: int, name: str) -> IntArray | None:
         """Parameters (N, w) of what rows of set `i` depend on; `NONE` where a number is held.
 
@@ -168,6 +179,9 @@ class Readings:
         found = dict(self._given[i])
         for name, columns in self._columns[i].items():
             found[name] = np.where(columns == NONE, found[name], theta[columns])
+        if "tool" in self._columns[i]:
+            first = self._columns[i]["tool"][:, 0].tolist()
+            found["tool_origin"] = np.array([self.parameters.origin[column] for column in first])
         return found
 
     def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
