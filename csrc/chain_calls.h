@@ -39,19 +39,45 @@ INLINE void chain_prepare(const chain_geometry *of, ptrdiff_t first, const ptrdi
     if (first == 0 || of->stride) prepare_chains(of->machine, of->geometry, of->stride, row, numbers);
 }
 
-/* A guess: the pose, its passive joints, and the drives that lead there. What is no number there is
- * as at home. */
-SHARED void chain_guess(const pkm_chains *machine, const chain_numbers *numbers, const real *pose,
-                        chain_state *at, real *from)
+#define AT_HOME 0.1  /* rad, of the length: passive joints so near those of home are of its posture */
+#define POSTURE 1e-2 /* of the size: actuators that are farther from those of a posture may be another's */
+#define LIKELY 1e-2  /* of that way: what the other then misses at most */
+
+/* A guess: the pose, its passive joints, and the drives that lead there. Of chains that have several
+ * postures at the pose it is that which is found from home; unless it is not found, or its drives are
+ * far from those that are asked for, `to`, and of another posture they are not. What is no number is as
+ * at home. Returns where `to` may matter: not at home. */
+SHARED mask chain_guess(const pkm_chains *machine, const chain_numbers *numbers, const real *pose,
+                        const real *to, chain_state *at, real *from)
 {
-    real R[9], p[3];
+    real R[9], p[3], theta[PKM_MAX_JOINTS], drive[PKM_MAX_LIMBS];
+    real missed, moved = fill(0.0), way = fill(0.0);
     map_from_pose(machine->map, pose, at->state);
     FN(map_frame)(machine->map, at->state, R, p);
-    chains_assembled(machine, numbers, R, p, 0, at->theta, from);
-    for (int c = 0; c < machine->passive; c++)
+    const mask good = chains_assembled(machine, numbers, R, p, NULL, 0, at->theta, from);
+    for (int j = 0; j < machine->joints; j++) {
+        const int a = machine->actuator[j], c = machine->coordinate[j];
+        const double arm = machine->prismatic[j] ? 1.0 : machine->length;
+        real off = a < 0 ? at->theta[c] : to[a] - from[a];
+        if (a < 0) moved = larger(moved, absolute(off) * arm);
+        else if (!machine->prismatic[j]) off = nearest_turn(off, fill(0.0), fill(TWO_PI));
+        if (a >= 0) way = larger(way, absolute(off) * arm);
+    }
+    const mask other = ~(good & (moved <= AT_HOME * machine->length));
+    const mask far = ~(good & (way <= POSTURE * machine->size));
+    if (!any(other & far)) return other;
+    memcpy(drive, to, sizeof(real) * machine->actuators);
+    chains_assembled(machine, numbers, R, p, &missed, 1, theta, drive);
+    const mask taken = other & far & (~good | (missed <= LIKELY * way));
+    for (int c = 0; c < machine->passive; c++) {
+        at->theta[c] = select(taken, theta[c], at->theta[c]);
         at->theta[c] = select(finite(at->theta[c]), at->theta[c], fill(0.0));
-    for (int a = 0; a < machine->actuators; a++)
+    }
+    for (int a = 0; a < machine->actuators; a++) {
+        from[a] = select(taken, to[a], from[a]);
         from[a] = select(finite(from[a]), from[a], fill(0.0));
+    }
+    return other;
 }
 
 /* One block of forward kinematics: Newton from the guess, then, for what that does not solve, the
@@ -112,6 +138,7 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
     chain_state start = {{{0}}, {{0}}};
     chain_prediction predicted;
     real from[PKM_MAX_LIMBS];
+    int own = 0; /* is what follows of the guess each row's own? */
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
         real lane_q[PKM_MAX_LIMBS], drive[PKM_MAX_LIMBS], begin[6], found[6], steps, worst;
@@ -121,11 +148,11 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
         chain_prepare(&of, first, row, &numbers);
         gather_row(q, machine->actuators, machine->actuators, row, lane_q);
         gather_row(guess, guess_stride, 6, row, begin);
-        if (first == 0 || geometry_stride || guess_stride) {
-            chain_guess(machine, &numbers, begin, &start, from);
+        chain_drives(machine, &numbers, lane_q, drive);
+        if (first == 0 || geometry_stride || guess_stride || own) {
+            own = any(chain_guess(machine, &numbers, begin, drive, &start, from));
             chain_predict(machine, &numbers, &start, from, &predicted);
         }
-        chain_drives(machine, &numbers, lane_q, drive);
         for (int a = 0; a < machine->actuators; a++) valid &= finite(drive[a]) & finite(lane_q[a]);
         for (int k = 0; k < 6; k++) valid &= finite(begin[k]);
         for (int k = 0; geometry_stride && k < machine->numbers; k++)
@@ -158,7 +185,7 @@ int CALL(chain_inverse)(const pkm_chains *machine, ptrdiff_t n, const double *ge
         chain_prepare(&of, first, row, &numbers);
         gather_row(pose, 6, 6, row, lane_pose);
         FN(pose_frame)(lane_pose, R, p);
-        const mask good = chains_assembled(machine, &numbers, R, p, 0, theta, drive);
+        const mask good = chains_assembled(machine, &numbers, R, p, NULL, 0, theta, drive);
         for (int a = 0; a < machine->actuators; a++) {
             drive[a] = (drive[a] + machine->zero[a] - numbers.offset[a]) / numbers.gain[a];
             drive[a] = select(good, drive[a], fill(NAN));
@@ -169,10 +196,13 @@ int CALL(chain_inverse)(const pkm_chains *machine, ptrdiff_t n, const double *ge
     return 0;
 }
 
-/* What inspection starts from: a block of poses and coordinates, with the passive joints there. */
+#define HELD 1e-4 /* of the size: a chain that misses by more is not where its pose and actuators say */
+
+/* What inspection starts from: a block of poses and coordinates, with the passive joints there; `held`
+ * says where these are found. */
 INLINE mask chain_inspect(const pkm_chains *machine, const chain_numbers *numbers,
                           const double *pose, const double *q, const ptrdiff_t *row, real *lane_q,
-                          real *drive, chain_state *at)
+                          real *drive, chain_state *at, mask *held)
 {
     real lane_pose[6], R[9], p[3];
     gather_row(pose, 6, 6, row, lane_pose);
@@ -180,7 +210,10 @@ INLINE mask chain_inspect(const pkm_chains *machine, const chain_numbers *number
     map_from_pose(machine->map, lane_pose, at->state);
     FN(map_frame)(machine->map, at->state, R, p);
     chain_drives(machine, numbers, lane_q, drive);
-    return chains_assembled(machine, numbers, R, p, 1, at->theta, drive);
+    real missed;
+    const mask good = chains_assembled(machine, numbers, R, p, &missed, 0, at->theta, drive);
+    *held = machine->over ? fill_mask(-1) : missed <= fill(HELD * machine->size);
+    return good;
 }
 
 int CALL(chain_frames)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
@@ -197,8 +230,9 @@ int CALL(chain_frames)(const pkm_chains *machine, ptrdiff_t n, const double *geo
         chain_state at;
         const int count = block_rows(first, n, row);
         chain_prepare(&of, first, row, &numbers);
-        const mask good = chain_inspect(machine, &numbers, pose, q, row, lane_q, drive, &at);
-        const real zero = select(good, fill(0.0), fill(NAN));
+        mask held;
+        const mask good = chain_inspect(machine, &numbers, pose, q, row, lane_q, drive, &at, &held);
+        const real zero = select(good & held, fill(0.0), fill(NAN));
         for (int c = 0; c < machine->passive; c++) at.theta[c] += zero;
         scatter_row(at.theta, machine->passive, passive, machine->passive, row, count);
         for (int l = 0; l < machine->chains; l++) {

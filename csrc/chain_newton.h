@@ -6,7 +6,7 @@
 #include "chain_system.h"
 #include "newton.h"
 
-enum { MAX_ASSEMBLY = 40, FEW_ASSEMBLY = 14, PATH_PARTS = 8, PATH_STEPS = 5 };
+enum { MAX_ASSEMBLY = 40, FEW_ASSEMBLY = 14, FEW_POSTURES = 6, MOST_POSTURES = 24, PATH_PARTS = 8, PATH_STEPS = 5 };
 #define CHAIN_CLOSED 2e-13 /* residual at which chains close, relative to the machine's size */
 #define LEAST_COLUMN 1e-6  /* of a passive joint beside the others: below, they do not say where it is */
 
@@ -288,52 +288,76 @@ SHARED mask chain_assemble(const pkm_chains *machine, int l, const chain_numbers
     return count ? good : fill_mask(-1);
 }
 
-/* The passive joints of a chain with its actuators at `drive`, from `theta`. Where that does not close,
- * from home and two turned postures, of which one that closes is taken: a leg that points the other
- * way is a place where Gauss and Newton rest too. */
-SHARED mask chain_reclose(const pkm_chains *machine, int l, const chain_numbers *numbers,
-                          const real *R, const real *p, const real *drive, real *theta)
+/* A posture of a chain to start from: home, turned ones, and others that spread over all turns. */
+INLINE void chain_posture(const pkm_chains *machine, int l, int attempt, real *theta)
 {
     static const double turned[] = {0.0, 2.0, -2.0};
-    const real closed = fill(1e-9 * machine->size);
+    for (int j = machine->first[l]; j < machine->first[l + 1]; j++) {
+        const int joint = machine->member[j], c = machine->coordinate[joint];
+        const double step = (j - machine->first[l] + 1) * 0.7548776662466927; /* of a sequence that */
+        double place = attempt * (step - (int)step);                          /* fills a cube evenly */
+        place = 2.0 * (place - (int)place) - 1.0;
+        if (c < 0) continue;
+        if (attempt < 3) theta[c] = fill(machine->prismatic[joint] ? 0.0 : turned[attempt]);
+        else theta[c] = fill(place * (machine->prismatic[joint] ? machine->length : 3.14159265358979));
+    }
+}
+
+/* The passive joints of a chain with its actuators at `drive`, from `theta`. Where that does not close,
+ * from where the chain alone is assembled from home, as for the inverse, and from other postures, of
+ * which one that closes is taken, or if `nearly` one that misses less: a leg that points the other way
+ * is a place where Gauss and Newton rest too. Returns where they rest, and what is missed there. */
+SHARED mask chain_reclose(const pkm_chains *machine, int l, const chain_numbers *numbers,
+                          const real *R, const real *p, const real *drive, int nearly, real *theta,
+                          real *missed)
+{
+    const real closed = fill(machine->over ? machine->closure_tolerance : 1e-9 * machine->size);
     real trial[PKM_MAX_JOINTS], own[PKM_MAX_LIMBS];
     memcpy(own, drive, sizeof(real) * machine->actuators);
     mask good = chain_assemble(machine, l, numbers, R, p, drive, MAX_ASSEMBLY, theta, own);
-    mask open = ~(chain_missed(machine, l, numbers, R, p, theta, drive) <= closed);
-    for (int attempt = 0; attempt < 3 && any(open) && !machine->over; attempt++) {
+    *missed = chain_missed(machine, l, numbers, R, p, theta, drive);
+    for (int attempt = -1; attempt < (nearly ? FEW_POSTURES : MOST_POSTURES); attempt++) {
+        const mask open = *missed > closed;
+        if (!any(open)) break;
         memcpy(trial, theta, sizeof(real) * machine->passive);
-        for (int j = machine->first[l]; j < machine->first[l + 1]; j++) {
-            const int joint = machine->member[j], c = machine->coordinate[joint];
-            if (c >= 0) trial[c] = fill(machine->prismatic[joint] ? 0.0 : turned[attempt]);
-        }
-        const mask settled = chain_assemble(machine, l, numbers, R, p, drive, FEW_ASSEMBLY, trial, own);
-        const mask found = open & settled
-                           & (chain_missed(machine, l, numbers, R, p, trial, drive) <= closed);
+        chain_posture(machine, l, attempt < 0 ? 0 : attempt, trial);
+        for (int a = 0; a < machine->actuators; a++) own[a] = attempt < 0 ? fill(0.0) : drive[a];
+        if (attempt < 0)
+            chain_assemble(machine, l, numbers, R, p, NULL, MAX_ASSEMBLY, trial, own);
+        const mask settled = chain_assemble(machine, l, numbers, R, p, drive,
+                                            attempt < 3 ? FEW_ASSEMBLY : MAX_ASSEMBLY, trial, own);
+        const real misses = chain_missed(machine, l, numbers, R, p, trial, drive);
+        const mask found = settled & open & (misses <= (nearly ? *missed : closed));
         for (int c = 0; c < machine->passive; c++) theta[c] = select(found, trial[c], theta[c]);
+        *missed = select(found, misses, *missed);
         good |= found;
-        open &= ~found;
     }
     return good;
 }
 
-/* Every chain alone, and the mean of what they share. Where the actuators are not `given` they
- * follow, into `drive`. */
+/* Every chain alone, and the mean of what they share. Where the actuators are not given, with `missed`
+ * NULL, they follow, into `drive`. Else `nearly` is that of chain_reclose, and what chains miss is told
+ * that reach every pose. */
 SHARED mask chains_assembled(const pkm_chains *machine, const chain_numbers *numbers, const real *R,
-                             const real *p, int given, real *theta, real *drive)
+                             const real *p, real *missed, int nearly, real *theta, real *drive)
 {
     real sum[PKM_MAX_LIMBS], joint_sum[PKM_MAX_SHARED];
     double drives[PKM_MAX_LIMBS] = {0}, times[PKM_MAX_SHARED] = {0};
     mask good = fill_mask(-1);
+    if (missed) *missed = fill(0.0);
     for (int a = 0; a < machine->actuators; a++) sum[a] = fill(0.0);
     for (int s = 0; s < machine->shared; s++) joint_sum[s] = fill(0.0);
     for (int c = 0; c < machine->passive; c++) theta[c] = fill(0.0);
     for (int l = 0; l < machine->chains; l++) {
-        real own[PKM_MAX_LIMBS];
-        for (int a = 0; a < machine->actuators; a++) own[a] = given ? drive[a] : fill(0.0);
+        const int k = machine->first[l + 1] - machine->first[l], *which;
+        const int rows = machine->ball[l] ? 3 : group_rows(machine->map, &which);
+        real own[PKM_MAX_LIMBS], misses;
+        for (int a = 0; a < machine->actuators; a++) own[a] = missed ? drive[a] : fill(0.0);
         for (int s = 0; s < machine->shared; s++) theta[s] = fill(0.0);
         const mask settled = chain_assemble(machine, l, numbers, R, p, NULL, MAX_ASSEMBLY, theta, own);
-        if (!given) good &= settled;
-        if (given) good &= chain_reclose(machine, l, numbers, R, p, drive, theta);
+        if (!missed) good &= settled;
+        else good &= chain_reclose(machine, l, numbers, R, p, drive, nearly, theta, &misses);
+        if (missed && k >= rows) *missed = larger(*missed, misses);
         for (int j = machine->first[l]; j < machine->first[l + 1]; j++) {
             const int joint = machine->member[j], a = machine->actuator[joint];
             const int c = machine->coordinate[joint];
@@ -342,7 +366,7 @@ SHARED mask chains_assembled(const pkm_chains *machine, const chain_numbers *num
         }
     }
     for (int a = 0; a < machine->actuators; a++)
-        if (!given) drive[a] = sum[a] / drives[a];
+        if (!missed) drive[a] = sum[a] / drives[a];
     for (int s = 0; s < machine->shared; s++) theta[s] = joint_sum[s] / times[s];
     return good;
 }

@@ -46,8 +46,9 @@ int CALL(chain_closure)(const pkm_chains *machine, ptrdiff_t n, const double *ge
         chain_state at;
         const int count = block_rows(first, n, row);
         chain_prepare(&of, first, row, &numbers);
-        const mask good = chain_inspect(machine, &numbers, pose, q, row, lane_q, drive, &at);
-        const real zero = select(good, fill(0.0), fill(NAN));
+        mask held;
+        const mask good = chain_inspect(machine, &numbers, pose, q, row, lane_q, drive, &at, &held);
+        const real zero = select(good, fill(0.0), fill(NAN)), sure = select(held, zero, fill(NAN));
         const int rows = chain_views(machine, &numbers, &at, drive, NULL, view, phi, jacobian, &worst,
                                      &flat);
         real found[6], by_free_of_pose[36];
@@ -65,6 +66,7 @@ int CALL(chain_closure)(const pkm_chains *machine, ptrdiff_t n, const double *ge
             map_free(machine->map, at.state, step, free);
             scatter_row(free, m, by_free + r * m, rows * m, row, count);
             scatter(phi[r], residual + r, rows, row, count);
+            for (int j = 0; j < m; j++) jacobian[r * unknowns + j] += sure;
             scatter_row(jacobian + r * unknowns, unknowns, by_step + r * unknowns, rows * unknowns,
                         row, count);
         }
@@ -212,7 +214,8 @@ int CALL(chain_response)(const pkm_chains *machine, ptrdiff_t n, const double *g
         chain_state at;
         const int count = block_rows(first, n, row);
         chain_prepare(&of, first, row, &numbers);
-        mask good = chain_inspect(machine, &numbers, pose, q, row, lane_q, drive, &at);
+        mask held;
+        mask good = chain_inspect(machine, &numbers, pose, q, row, lane_q, drive, &at, &held) & held;
         const int rows = chain_views(machine, &numbers, &at, drive, NULL, view, phi, jac, &worst, &flat);
         normal_system(unknowns, rows, rows, jac, phi, A, X);
         solve(unknowns, rows, A, X, &pivot);

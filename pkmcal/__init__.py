@@ -21,9 +21,11 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.calibration.anchors import locate_anchors as locate_anchors
     from pkmcal.calibration.bootstrap import Bootstrap as Bootstrap
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
+    from pkmcal.calibration.datum import Datum as Datum
     from pkmcal.calibration.distances import Distances as Distances
     from pkmcal.calibration.identification import Identification as Identification
     from pkmcal.calibration.identify import identify as identify
+    from pkmcal.calibration.law_tests import LawTest as LawTest
     from pkmcal.calibration.moved import Moved as Moved
     from pkmcal.calibration.plan_poses import Plan as Plan
     from pkmcal.calibration.plan_poses import plan_poses as plan_poses
@@ -39,6 +41,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.compensation.program import compensate_program as compensate_program
     from pkmcal.compensation.pso import SwarmResult as SwarmResult
     from pkmcal.compensation.pso import pso as pso
+    from pkmcal.controllers.comp_file import ScrewTable as ScrewTable
+    from pkmcal.controllers.comp_file import import_comp_file as import_comp_file
     from pkmcal.controllers.import_printer import import_printer as import_printer
     from pkmcal.core.swarm import CONSTRICTION as CONSTRICTION
     from pkmcal.core.swarm import SwarmSettings as SwarmSettings
@@ -78,6 +82,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.moves.events import Event as Event
     from pkmcal.moves.move import Move as Move
     from pkmcal.moves.move import MoveSample as MoveSample
+    from pkmcal.view.show import show as show
 
 _HOMES = {
     "arms.arm": ("SerialArm",),
@@ -85,9 +90,11 @@ _HOMES = {
     "arms.inverse": ("ArmInverse",),
     "calibration.anchors": ("LocatedAnchors", "locate_anchors"),
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
+    "calibration.datum": ("Datum",),
     "calibration.distances": ("Distances",),
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),
+    "calibration.law_tests": ("LawTest",),
     "calibration.moved": ("Moved",),
     "calibration.plan_poses": ("Plan", "plan_poses"),
     "calibration.verdict": ("Verdict",),
@@ -108,6 +115,7 @@ _HOMES = {
         "Error",
         "FileError",
     ),
+    "controllers.comp_file": ("ScrewTable", "import_comp_file"),
     "controllers.import_printer": ("import_printer",),
     "geometry.geometry": ("Geometry",),
     "kinematics.dexterity": ("Dexterity", "dexterity"),
@@ -127,6 +135,7 @@ _HOMES = {
     "modes.certificate": ("Certificate",),
     "moves.events": ("Event",),
     "moves.move": ("Move", "MoveSample"),
+    "view.show": ("show",),
 }
 _HOME_OF = {name: f"pkmcal.{home}" for home, names in _HOMES.items() for name in names}
 _MODULES = ("export", "screw", "trajectory")

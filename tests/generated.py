@@ -26,9 +26,12 @@ FREE = {
     "pairs": (0, 1, 2),
     "redundant": (0, 1, 2, 3, 4, 5),
     "tripod": (2, 3, 4),
+    "spherical": (3, 4, 5),
+    "xy": (0, 1),
 }
 KINDS = tuple(FREE)
-SQUARE = ("six", "translation", "planar")  # every pose of the map can be taken
+MAPS = {kind: kind for kind in ("translation", "planar", "spherical", "xy")}  # others: spatial
+SQUARE = ("six", "translation", "planar", "spherical", "xy")  # every pose of the map can be taken
 CONSTRAINED = ("pairs", "tripod")  # what is not matched is determined by the limbs
 
 
@@ -77,6 +80,10 @@ def _drawn(kind: str, rng: np.random.Generator) -> pk.Robot:
     home = {"z": SIZE * rng.uniform(0.8, 1.4)}
     if kind == "planar":
         home = {"x": rng.uniform(-20, 20), "y": rng.uniform(-20, 20), "gamma": rng.uniform(-3, 3)}
+    if kind == "spherical":
+        home = {name: rng.uniform(-0.3, 0.3) for name in COORDINATES[3:]}
+    if kind == "xy":
+        home = {"x": rng.uniform(-20, 20), "y": rng.uniform(-20, 20)}
     turned = rng.random() if kind in ("six", "redundant") else 1.0
     if turned < 0.3:
         home |= {"alpha": rng.uniform(-3, 3), "gamma": rng.uniform(-3, 3)}
@@ -91,7 +98,8 @@ def _drawn(kind: str, rng: np.random.Generator) -> pk.Robot:
         limbs = [each for i in range(3) for each in _pair(i, home, rng)]
         sections["match"] = ["x", "y", "z"]
     else:
-        count = {"six": 6, "translation": 3, "planar": 3, "redundant": int(rng.integers(7, 10))}
+        count = {"six": 6, "translation": 3, "planar": 3, "spherical": 3, "xy": 2}
+        count["redundant"] = int(rng.integers(7, 10))
         limbs = [_limb(*_joints(kind, i, count[kind], rng), home, kind, rng)
                  for i in range(count[kind])]  # fmt: skip
     if rng.random() < 0.3:
@@ -102,8 +110,7 @@ def _drawn(kind: str, rng: np.random.Generator) -> pk.Robot:
         }  # fmt: skip
         if rng.random() < 0.3:
             sections["frames"]["base"]["beta"] = np.pi / 2
-    map = {"translation": "translation", "planar": "planar"}.get(kind, "spatial")
-    return made(map, home, limbs, **sections)
+    return made(MAPS.get(kind, "spatial"), home, limbs, **sections)
 
 
 def _joints(
@@ -114,7 +121,9 @@ def _joints(
     other = angle + rng.choice([-0.6, 0.6]) * (i % 2 or rng.random()) + rng.uniform(-0.2, 0.2)
     base = SIZE * np.array([np.cos(angle), np.sin(angle), rng.uniform(-0.2, 0.2)])
     platform = 0.5 * SIZE * np.array([np.cos(other), np.sin(other), rng.uniform(-0.2, 0.2)])
-    if kind == "planar":
+    if kind == "spherical":
+        base[2] -= SIZE
+    if kind in ("planar", "xy"):
         base[2] = platform[2] = 0.0
     return base, platform
 
@@ -145,7 +154,7 @@ def _limb(
 
 def _direction(kind: str, rng: np.random.Generator) -> np.ndarray:
     found = rng.normal(size=3)
-    found[2] *= kind != "planar"
+    found[2] *= kind not in ("planar", "xy")
     return found / np.linalg.norm(found)
 
 
@@ -164,7 +173,7 @@ def _slider(h: np.ndarray, kind: str, rng: np.random.Generator) -> dict[str, Any
 
 def _crank(h: np.ndarray, kind: str, rng: np.random.Generator) -> dict[str, Any] | None:
     """Half of the cranks are at home near half a turn; half have strokes, of any turn."""
-    axis = np.array([0.0, 0.0, 1.0]) if kind == "planar" else _direction(kind, rng)
+    axis = np.array([0.0, 0.0, 1.0]) if kind in ("planar", "xy") else _direction(kind, rng)
     zero = np.cross(axis, rng.normal(size=3))
     zero /= np.linalg.norm(zero)
     drive = np.pi + rng.uniform(-0.4, 0.4) if rng.random() < 0.5 else rng.uniform(-np.pi, np.pi)

@@ -12,6 +12,7 @@ import json
 import os
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,13 @@ from pkmcal.arms.inputs import joint_frames
 from pkmcal.calibration.alignment import PointPairs, of_points
 from pkmcal.calibration.optimal_design import CRITERIA
 from pkmcal.geometry.chains import across
+from pkmcal.geometry.model import Cone
 from pkmcal.kinematics.independent import independent_numbers
 from pkmcal.modes.find import frames_of
 from pkmcal.statistics.shifts import shifted
 
 from .robots import made, ring
-from .workspaces import WORKSPACE
+from .workspaces import CHAINS, WORKSPACE, poses
 
 KERNELS = {  # and what a processor needs for them
     "Nehalem": "sse4_2",
@@ -273,3 +275,58 @@ def test_choices_are_the_same_with_every_kernel_of_the_linear_algebra_library() 
         )
         found[kernel] = ran.stdout
     assert len(set(found.values())) == 1, {kernel: hash(text) for kernel, text in found.items()}
+
+
+LIMITED = (*WORKSPACE, *CHAINS)
+
+
+def limited(robot: pk.Robot, at: np.ndarray) -> pk.Robot:
+    """The machine with strokes and cones whose ends are those of these poses."""
+    there = robot.feasible(at)
+    low, high = there.drive.min(axis=0), there.drive.max(axis=0)
+    if robot.model.chains is None:
+        limbs = []
+        for i, limb in enumerate(robot.model.limbs):
+            cones = {}
+            for side in ("base_cone", "platform_cone"):
+                axis = (np.array([0.0, 0.0, 1.0]) if getattr(limb, side) is None
+                        else getattr(limb, side).axis)  # fmt: skip
+                wide = replace(limb, **{side: Cone(axis, np.pi)})
+                model = replace(robot.model, limbs=(*robot.model.limbs[:i], wide,
+                                                    *robot.model.limbs[i + 1 :]))  # fmt: skip
+                margin = getattr(pk.Robot(model).feasible(at), f"{side}_margin")[:, i]
+                cones[side] = Cone(axis, float((np.pi - margin).max()))
+            limbs.append(replace(limb, stroke=(low[i], high[i]), **cones))
+        return pk.Robot(replace(robot.model, limbs=tuple(limbs)))
+    chains = robot.model.chains
+    joints = []
+    for limb in chains.limbs:
+        made_of = []
+        for joint in limb:
+            if joint.actuator is None:
+                made_of.append(replace(joint, stroke=None, cone=None))
+                continue
+            drive = robot.machine.drives(robot.slots, robot.inverse(at))[:, joint.actuator]
+            made_of.append(replace(joint, stroke=(drive.min(), drive.max())))
+        joints.append(tuple(made_of))
+    return pk.Robot(replace(robot.model, chains=replace(chains, limbs=tuple(joints))))
+
+
+@pytest.mark.parametrize("name", LIMITED)
+def test_the_last_bit_does_not_move_a_pose_across_a_limit(name: str) -> None:
+    robot = pk.load(name)
+    at = pk.sample_poses(robot, 12) if name in CHAINS else poses(name, 12)
+    at = robot.forward(robot.inverse(at, True if robot.model.match else None)).pose
+    tight = limited(robot, at)
+    q = tight.inverse(at)
+    there = tight.feasible(at)
+    least = np.abs(there.stroke_margin).min(axis=0)
+    assert ((least < 1e-9) == (there.drive != 0).any(axis=0)).all()  # each driven limb's limit
+    for seed in (0, *SEEDS):
+        assert tight.feasible(moved(at, seed)).ok.all()
+        assert tight.feasible(tight.forward(moved(q, seed), guess=at).pose).ok.all()
+        modes = tight.forward_all(moved(q[seed], seed))
+        assert modes.feasible[modes.nearest(at[seed])]
+    plans = [pk.plan_poses(tight, moved(at, seed), 4, kind="pose").indices.tolist()
+             for seed in (0, *SEEDS)]  # fmt: skip
+    assert all(plan == plans[0] for plan in plans)

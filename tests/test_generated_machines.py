@@ -32,7 +32,7 @@ def missed(robot: pk.Robot, own: np.ndarray, q: np.ndarray) -> np.ndarray:
 def determinant_sides(robot: pk.Robot, own: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Sign of the closures' determinant by differences of the twin, by a twist, (N,)."""
     columns = []
-    for i in generated.FREE[kind_of(robot)]:
+    for i in generated.FREE[generated.MAPS.get(robot.model.map, "six")]:
         step = np.zeros(6)
         step[i] = 1e-3 if i < 3 else 1e-5
         change = twin_rows.closures(robot.model, own + step, q)
@@ -41,10 +41,6 @@ def determinant_sides(robot: pk.Robot, own: np.ndarray, q: np.ndarray) -> np.nda
     with np.errstate(invalid="ignore"):  # out of reach
         by_coordinates = np.linalg.det(np.stack(columns, axis=-1))
     return by_coordinates * np.sign(np.cos(own[:, 4]))  # cos β is that of α β γ by the turning
-
-
-def kind_of(robot: pk.Robot) -> str:
-    return {"translation": "translation", "planar": "planar"}.get(robot.model.map, "six")
 
 
 def judged(kind: str, seed: int, rows: int) -> Counter[str]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import partial
 from os import PathLike
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,6 +23,10 @@ from pkmcal.files.reading import Input
 from pkmcal.result import Result
 
 _SAME = 1e-9  # mm, and mm per rad: by so much the arm of a source may differ
+
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class SerialArm(SerialChain, Result):
@@ -219,6 +224,50 @@ class SerialArm(SerialChain, Result):
         """
         real = self.corrected()
         return table_of(real.axes, real.points, real.home, convention)
+
+    def show(
+        self, path: str | PathLike[str] | None = None, *, poses: ArrayLike | None = None
+    ) -> Path:
+        """Write the arm as a page that moves it, as `pkmcal.show` does.
+
+        Parameters
+        ----------
+        path : str or path, optional
+            Where to write; an existing file is replaced. By default a temporary file, which is
+            opened in the browser.
+        poses : array_like (N, n), optional
+            Joint coordinates to be shown and gone to one by one, mm and rad.
+        """
+        from pkmcal.view.show import show
+
+        return show(self, path, poses=poses)
+
+    def plot(
+        self,
+        axes: Axes | None = None,
+        theta: ArrayLike | None = None,
+        *,
+        color: str | None = None,
+    ) -> Axes:
+        """Draw the arm as lines with matplotlib, for papers.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Of three dimensions, or of two: then it is seen from above. By default new ones.
+        theta : array_like (n,), optional
+            Its joint coordinates, rad and mm; zero by default.
+        color : str, optional
+            Of all lines; by default the next of the axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes, in mm, with equal scales.
+        """
+        from pkmcal.view.plot import of_arm
+
+        return of_arm(self, axes, theta, color)
 
     # files --------------------------------------------------------------------------------------
 

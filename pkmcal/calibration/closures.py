@@ -54,9 +54,14 @@ class RowStates:
 
     def chosen(self, rows: BoolArray, others: RowStates) -> RowStates:
         """These where `rows` (K,), else the others."""
+        if rows.all():
+            return self
+        actuators = self.actuators
+        if actuators is not others.actuators:
+            actuators = np.where(rows[:, None], actuators, others.actuators)
         return RowStates(
             np.where(rows[:, None], self.pose, others.pose),
-            np.where(rows[:, None], self.actuators, others.actuators),
+            actuators,
             np.where(rows, self.status, others.status),
         )
 
@@ -160,7 +165,7 @@ class NoisyActuators:
         self._free = np.flatnonzero(sigma.any(axis=0))
         self.sigma: FloatArray | None = sigma[:, self._free]
         self._white = 1.0 / self.sigma
-        self._shift = np.zeros_like(self._white)
+        self._shift: FloatArray | float = 0.0
         self.unknowns = self.equations = len(self._free)
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
@@ -225,16 +230,18 @@ class FreePoses:
         self.read = read
         self._roles = pose_steps.row_roles(robot)
         self._held = len(self._roles.held)
+        self._mixed = not np.array_equal(self._roles.read, np.eye(robot.machine.rows))
         self._arcs = 1.0 / mm_per_unit(pose_steps.step_units(robot), robot.length)
         self.unknowns = robot.machine.m - self._held
         self.equations = len(self._roles.read)
-        # passive rows that give way are as sure as the file weighs them against the actuators
-        common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
-        self.sigma: FloatArray | None = np.stack(
-            [sigma[:, a] if a >= 0 else common for a in self._roles.actuator], axis=1
-        )
+        self.sigma: FloatArray | None = sigma
+        if self._roles.actuator != tuple(range(sigma.shape[1])):
+            # passive rows that give way are as sure as the file weighs them against the actuators
+            common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
+            each = [sigma[:, a] if a >= 0 else common for a in self._roles.actuator]
+            self.sigma = np.stack(each, axis=1)
         self._white = 1.0 / self.sigma
-        self._shift = np.zeros_like(self._white)
+        self._shift: FloatArray | float = 0.0
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
         """Poses stay where they are, or where joints hold them, until they are fitted."""
@@ -250,7 +257,8 @@ class FreePoses:
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """What the limbs would read at the poses less what they read."""
         off, by_step = pose_steps.readings(_machine(robot), states.pose, self.read)
-        off, by_step = off @ self._roles.read.T, self._roles.read @ by_step
+        if self._mixed:
+            off, by_step = off @ self._roles.read.T, self._roles.read @ by_step
         if self._held:
             by_step = by_step @ self._allowed(robot, states)[0]
         off *= self._white
@@ -278,7 +286,7 @@ class FreePoses:
         """What the limbs would read, unknowns held."""
         machine = _machine(robot)
         by_free = pose_steps.readings_by_numbers(machine, states.pose, self.read, places)
-        found: FloatArray = self._roles.read @ by_free
+        found = self._roles.read @ by_free if self._mixed else by_free
         if self._held:
             by_step = pose_steps.readings(machine, states.pose, self.read)[1]
             found += self._roles.read @ by_step @ self._following(robot, states, by_free)

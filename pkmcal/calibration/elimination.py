@@ -100,35 +100,44 @@ class Blocks:
             none,
             *(np.full(len(e.poses), e.equations.shape[1] - unknowns) for e in left),
         ]).astype(np.intp)  # fmt: skip
+        self._equations_left = int(self.components.sum())
         self.idle = poses - len(self.pose_of_unit)
 
-    def rotations(self, by_unknown: FloatArray) -> Iterator[tuple[IntArray, FloatArray]]:
-        """Equations (G, k) of alike poses and Q₂ (G, k, k - u), across their unknowns.
+    def left(self, by_unknown: FloatArray, part: FloatArray) -> FloatArray:
+        """What is left (M, ...) of equations (E, ...) when the poses have taken theirs.
 
         `by_unknown` is (E, u).
         """
+        width, found = part.shape[1:], np.empty((self._equations_left, *part.shape[1:]))
+        first = 0
         for each in self._left:
-            q = np.linalg.qr(by_unknown[each.equations], mode="complete")[0]
-            yield each.equations, q[:, :, self.unknowns :]
-
-    def left(self, by_unknown: FloatArray, part: FloatArray) -> FloatArray:
-        """What is left (M, ...) of equations (E, ...) when the poses have taken theirs."""
-        width = part.shape[1:]
-        found = [np.empty((0, *width))]
-        for equations, rest in self.rotations(by_unknown):
-            mine = part[equations].reshape(*equations.shape, -1)
-            found.append((rest.transpose(0, 2, 1) @ mine).reshape(-1, *width))
-        return np.concatenate(found)
+            mine = part[each.equations].reshape(*each.equations.shape, -1)
+            for mirror in _mirrors(by_unknown[each.equations]):
+                _reflect(mirror, mine)
+            rest = mine[:, self.unknowns :].reshape(-1, *width)
+            found[first : first + len(rest)] = rest
+            first += len(rest)
+        return found
 
     def spread(self, by_unknown: FloatArray, left: FloatArray) -> FloatArray:
         """Equations (E,) of which so much is left (M,), and nothing for the poses to take."""
         spread, first = np.zeros(len(self.pose_of)), 0
-        for equations, rest in self.rotations(by_unknown):
+        for equations, rest in self._bases(by_unknown):
             count, _, most = rest.shape
             mine = left[first : first + count * most].reshape(count, most, 1)
             spread[equations] = (rest @ mine)[:, :, 0]
             first += count * most
         return spread
+
+    def _bases(self, by_unknown: FloatArray) -> Iterator[tuple[IntArray, FloatArray]]:
+        """Equations (G, k) of alike poses and Q₂ (G, k, k - u), across their unknowns."""
+        for each in self._left:
+            count, k = each.equations.shape
+            rest = np.zeros((count, k, k - self.unknowns))
+            rest[:, self.unknowns :] = np.eye(k - self.unknowns)
+            for mirror in reversed(_mirrors(by_unknown[each.equations])):
+                _reflect(mirror, rest)
+            yield each.equations, rest
 
     def by_groups(
         self,
@@ -163,7 +172,7 @@ class Blocks:
         information = np.zeros((count_of, count_of))
         outer = np.zeros((count_of, taken.shape[1], taken.shape[1]))
         unit = first = 0
-        for equations, rest in self.rotations(by_unknown):
+        for equations, rest in self._bases(by_unknown):
             count, _, left = rest.shape
             last = first + count * left
             mine, plain = residual[first:last].reshape(count, left, 1), rest
@@ -227,9 +236,9 @@ class Blocks:
             damping = np.where(better | settled, damping, np.maximum(10.0 * damping, 1e-3))
             states = trial.chosen(better, states)
             moved = better[self.pose_of]
-            residual = np.where(moved, residual_there, residual)
-            by_unknown = np.where(moved[:, None], by_unknown_there, by_unknown)
-            cost = np.where(better, cost_there, cost)
+            np.copyto(residual, residual_there, where=moved)
+            np.copyto(by_unknown, by_unknown_there, where=moved[:, None])
+            np.copyto(cost, cost_there, where=better)
             if not better.any() and damping[~settled].min() > 1e8:
                 break
         else:
@@ -252,10 +261,34 @@ class Blocks:
         matrix, pull = np.zeros((self.poses, u, u)), np.zeros((self.poses, u))
         for poses, equations in self._alike:
             j = by_unknown[equations]
-            turned = j.transpose(0, 2, 1)
-            matrix[poses] = turned @ j
-            pull[poses] = (turned @ residual[equations][:, :, None])[:, :, 0]
+            matrix[poses] = np.einsum("gki,gkj->gij", j, j)
+            pull[poses] = np.einsum("gki,gk->gi", j, residual[equations])
         return matrix, pull
+
+
+def _mirrors(columns: FloatArray) -> list[FloatArray]:
+    """Householder's mirrors that take columns (G, k, u) to a triangle, one after another.
+
+    Each is normal to a vector (G, k - j) of length √2 and acts on what is behind the first j. Own
+    code, for LAPACK through NumPy forms all of Q, one pose after another: the fit of 100 000 poses
+    takes twice as long.
+    """
+    columns, mirrors = columns.copy(), list[FloatArray]()
+    for j in range(columns.shape[2]):
+        mirror = columns[:, j:, j].copy()
+        mirror[:, 0] += np.copysign(np.sqrt(np.einsum("gk,gk->g", mirror, mirror)), mirror[:, 0])
+        square = np.einsum("gk,gk->g", mirror, mirror)
+        mirror *= np.sqrt(2.0 / np.where(square == 0.0, 1.0, square))[:, None]
+        mirrors.append(mirror)
+        _reflect(mirror, columns)
+    return mirrors
+
+
+def _reflect(mirror: FloatArray, parts: FloatArray) -> None:
+    """Reflect the last rows of parts (G, k, c) in mirrors (G, k - j), in place."""
+    behind = parts[:, parts.shape[1] - mirror.shape[1] :]
+    along = np.einsum("gk,gkc->gc", mirror, behind)
+    behind -= mirror[:, :, None] * along[:, None, :]
 
 
 def _size(states: RowStates) -> float:
@@ -273,9 +306,11 @@ def _steps(
     ridge = _RIDGE * size.sum(axis=1, keepdims=True) + np.finfo(float).tiny
     damped = matrix + (damping[:, None] * size + ridge)[:, :, None] * np.eye(u)
     good = np.isfinite(damped).all(axis=(1, 2)) & np.isfinite(pull).all(axis=1)
-    step = np.zeros_like(pull)
-    step[good] = -np.linalg.solve(damped[good], pull[good][:, :, None])[:, :, 0]
-    bend = (matrix[good] @ step[good][:, :, None])[:, :, 0]
-    gain = np.full(len(pull), np.nan)
-    gain[good] = -(step[good] * (2.0 * pull[good] + bend)).sum(axis=1)
+    if not good.all():
+        damped[~good], pull = np.eye(u), np.where(good[:, None], pull, np.nan)
+    step = -np.linalg.solve(damped, pull[:, :, None])[:, :, 0]
+    bend = np.einsum("kij,kj->ki", matrix, step)
+    gain = -np.einsum("ki,ki->k", step, 2.0 * pull + bend)
+    if not good.all():
+        step[~good] = 0.0
     return step, gain

@@ -164,7 +164,7 @@ class Equations(Readings):
         """
         p = self.parameters
         robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
-        machines = Machines(tuple(robots), self._own)
+        machines = Machines(tuple(robots), self._own, self.approach)
         states = self.closures.settled(machines, self._states)
         if self.closures.unknowns:
             factors = np.ones(len(self.unstated)) if noise is None else noise
@@ -184,8 +184,9 @@ class Equations(Readings):
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
         off, by_unknown = self.closures.residual(machines, states)
-        u = self.closures.unknowns
-        equation, by_unknown = off.reshape(-1) / noise[-1], by_unknown.reshape(-1, u) / noise[-1]
+        off /= noise[-1]
+        by_unknown /= noise[-1]
+        equation, by_unknown = off.reshape(-1), by_unknown.reshape(-1, self.closures.unknowns)
         if not self.count.any():
             return equation, by_unknown
         twists = self.closures.twists(machines, states)
@@ -223,18 +224,14 @@ class Equations(Readings):
         readings = self.whitened(self.jacobian(evaluation), noise)
         if not self.closures.unknowns:
             return readings
-        _, by_unknown = self._at(evaluation, noise)
-        by_all = np.empty((len(by_unknown), len(self.parameters)))
-        own = len(by_unknown) - len(readings)
+        p, (_, by_unknown) = self.parameters, self._at(evaluation, noise)
         of_closures = self.closures.by_numbers(
-            evaluation.machines,
-            evaluation.states,
-            self.parameters.places,
-            self.machine_columns,
-            len(self.parameters),
+            evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
         )
-        np.divide(of_closures.reshape(own, -1), noise[-1], out=by_all[:own])
-        by_all[own:] = readings
+        of_closures /= noise[-1]
+        by_all = of_closures.reshape(-1, len(p))
+        if len(readings):
+            by_all = np.concatenate([by_all, readings])
         return self._blocks.left(by_unknown, by_all)
 
     def start_from(self, rows: IntArray, poses: FloatArray) -> None:
@@ -244,7 +241,12 @@ class Equations(Readings):
         self._states = replace(self._states, pose=guess)
 
     def redrawn(
-        self, at: Evaluation, noise: FloatArray, left: FloatArray, prior_centre: FloatArray
+        self,
+        at: Evaluation,
+        noise: FloatArray,
+        left: FloatArray,
+        prior_centre: FloatArray,
+        bent: FloatArray | None = None,
     ) -> tuple[Equations, Evaluation]:
         """The same with other readings, and evaluated where these have been drawn.
 
@@ -256,6 +258,8 @@ class Equations(Readings):
             See `whitened`.
         left : ndarray (M,)
             What its readings leave there, as `residual`.
+        bent : ndarray (s,), optional
+            That of `Parameters`.
         prior_centre : ndarray (n,)
             Another centre of the prior.
         """
@@ -272,7 +276,7 @@ class Equations(Readings):
             replace(m, values=corrected(m.kind, seen.values, residual).reshape(m.values.shape))
             for m, seen, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
-        other.parameters = replace(self.parameters, start=prior_centre)
+        other.parameters = replace(self.parameters, start=prior_centre, bent=bent)
         other.warm_start(at)
         if unknowns:
             return other, other.at(at.theta, noise)

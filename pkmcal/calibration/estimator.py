@@ -307,9 +307,9 @@ class Estimator:
             return False
         if self.loss == "linear" and not len(self.prior) and len(self.unstated) == 1:
             return True  # the noise does not move the solution
-        return np.allclose(old.noise, new.noise, rtol=1e-3, atol=_LEAST_NOISE) and np.allclose(
-            old.loss.width, new.loss.width, rtol=1e-3
-        )
+        if not np.allclose(old.noise, new.noise, rtol=1e-3, atol=_LEAST_NOISE):
+            return False
+        return self.loss == "linear" or np.allclose(old.loss.width, new.loss.width, rtol=1e-3)
 
     def scaled_jacobian(self, evaluation: Evaluation) -> FloatArray:
         """Scaled Jacobian (M, n), not whitened: mm per mm, angles as their arc.

@@ -8,11 +8,11 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit, rms
 from pkmcal.calibration.distances import Distances, distances
+from pkmcal.calibration.dropped import outlying
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.gauges import MIRROR, Gauges, gauges, mirror_fits
 from pkmcal.calibration.identifiability import as_sum, observability, sparse_basis
-from pkmcal.calibration.outliers import outliers
 from pkmcal.calibration.uncertainty import Uncertainty
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
@@ -168,26 +168,17 @@ def misfit(
     """
     start, end = commanded
     equations, state = estimator.equations, estimate.state
-    chosen, fitted = equations.parameters, state.fitted.identifiable
-    moved = (estimate.evaluation.theta - chosen.start) / chosen.scale
-    prior = estimator.prior @ moved
+    prior = equations.parameters.prior_left(estimate.evaluation.theta)
     dof = float(estimate.weights @ equations.components) + len(prior) - state.fitted.rank
     squares = np.repeat(estimate.weights, equations.components) @ estimate.residual**2
     stated = equations.sigma_stated and dof > 0
-    odd = outliers(
-        estimate.residual,
-        estimate.jacobian @ fitted,
-        equations.components,
-        estimate.weights,
-        estimator.prior @ fitted,
-    )
     split = uncertainty.noises
     shown = np.where(estimator.unstated & ~uncertainty.unknown, state.noise, np.nan)
     by_component = tuple(
         tuple((sigma * relative / mm_per_unit(m.units, estimator.start.robot.length)).tolist())
         for m, relative, sigma in zip(equations.sets, equations.deviations, shown, strict=False)
     )
-    named = np.isin(equations.unit_of_row, odd)
+    named = outlying(estimator, estimate)
     return Misfit(
         rms=equations.rms(end),
         rms_before=equations.rms(start),

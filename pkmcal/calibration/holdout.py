@@ -13,7 +13,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.labels import Labels, labels
@@ -59,6 +59,8 @@ class HeldOut:
         They at the estimate, their own parameters found.
     own : mapping of str to (float, float)
         These parameters, of sessions that were not fitted: value and standard deviation.
+    spare : float
+        Lengths that are left to compare when these parameters have taken theirs.
     drawn : bool
         Whether they are of the same measurements as the fitted points, drawn at random.
     """
@@ -77,7 +79,16 @@ class HeldOut:
     later: Later | None = None
     end: Evaluation | None = None
     own: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    spare: float = float("nan")
     drawn: bool = False
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each parameter of the rows: "mm", "rad" or "1"."""
+        if self.later is None:
+            return {}
+        chosen = self.later.parameters
+        return dict(zip(chosen.names, chosen.units, strict=True))
 
     @property
     def data(self) -> tuple[FitData, ...]:
@@ -127,9 +138,9 @@ def evaluate(
     if not held:
         return HeldOut()
     rows = later(estimator.equations.parameters, held)
-    equations = rows.equations(estimator.equations).commanded()
-    before = equations.start(rows.at(estimator.start.theta), rows.own)
-    after, own = compared(rows, equations, estimate, uncertainty)
+    whole = rows.equations(estimator.equations)
+    before = whole.commanded().start(rows.at(estimator.start.theta), rows.own)
+    equations, after, own = compared(rows, whole, estimate, uncertainty)
     rows = replace(rows, parameters=equations.parameters)  # their own frames have been laid
     named = labels(equations)
     points = _points(rows, equations, after, named, own, uncertainty)
@@ -142,7 +153,8 @@ def evaluate(
         chi2_tail(k * d**2 / e, k) < _ODD / count if np.isfinite(d) and e > 0 else False
         for d, e, k in zip(off, expected, np.bincount(row, minlength=count), strict=True)
     ])  # fmt: skip
-    usable = uncertainty.known and bool(good.any())
+    spare = float((1.0 - points.taken[good[row]]).sum()) if good.any() else float("nan")
+    usable = uncertainty.known and spare >= LEAST_FREEDOM
     return HeldOut(
         rms_before=equations.rms(before),
         rms=equations.rms(after),
@@ -157,7 +169,8 @@ def evaluate(
         test=_test(points, named, good[row], uncertainty) if usable else None,
         later=rows,
         end=after,
-        own=_own_numbers(rows, equations, after, own, uncertainty),
+        own=_of_own(rows, after, own, uncertainty),
+        spare=spare,
     )
 
 
@@ -214,64 +227,43 @@ def _points(
         part.reshape(-1, part.shape[2]) for part in equations.jacobian(after)
     ])[equations.present]  # fmt: skip
     back = uncertainty.fit.back
-    design = rows.by_fitted(jacobian * equations.parameters.scale, len(back)) @ back
-    taken = np.zeros(len(design))
-    if own is not None:
-        design -= _followed(equations, after, own, rows, back)
-        taken = own.leverage
+    by_all = (jacobian * equations.parameters.scale)[named.length]
+    by_fitted = rows.by_fitted(by_all, len(back))
 
     def lengths(parts: Sequence[FloatArray]) -> FloatArray:
         return np.concatenate(parts)[equations.present][named.length]
 
+    by_sigma, taken = lengths(added), np.zeros(len(by_all))
+    if own is not None:
+        by_own = by_all[:, rows.own]
+        by_fitted += by_own @ own.follow
+        weighted = equations.variances(own.noise)[named.length]
+        if uncertainty.mixed:
+            weighted += by_sigma / uncertainty.excess.total
+        taken = np.clip(((by_own @ own.half) ** 2).sum(axis=1) / weighted, 0.0, 1.0)
     return _Points(
         residual=lengths([part.ravel() for part in after.residuals]),
-        design=design[named.length],
+        design=by_fitted @ back,
         reading=lengths(variances),
-        by_actuators=lengths(added),
-        taken=taken[named.length],
+        by_actuators=by_sigma,
+        taken=taken,
         like=np.array(like)[named.set_of[named.length]],
     )
 
 
-def _followed(
-    equations: Equations,
-    after: Evaluation,
-    own: OwnNumbers,
-    rows: Later,
-    back: FloatArray,
-) -> FloatArray:
-    """What their own numbers take of errors of the fitted ones: (M, p), mm and rad."""
-    whitened = equations.by_parameters(after, own.noise) * equations.parameters.scale
-    design = rows.by_fitted(whitened, len(back)) @ back
-    columns = [
-        np.concatenate([part.ravel() for part in equations.unwhiten(column, own.noise)])
-        for column in (design - own.left(design)).T
-    ]
-    followed: FloatArray = np.array(columns).reshape(len(columns), -1).T
-    return followed[equations.present]
-
-
-def _own_numbers(
-    rows: Later,
-    equations: Equations,
-    after: Evaluation,
-    own: OwnNumbers | None,
-    uncertainty: Uncertainty,
+def _of_own(
+    rows: Later, after: Evaluation, own: OwnNumbers | None, uncertainty: Uncertainty
 ) -> dict[str, tuple[float, float]]:
     """Values and deviations of parameters that the fit has not; inf where nothing shows them."""
     if own is None:
         return {}
-    chosen, mine = equations.parameters, np.flatnonzero(rows.own)
-    whitened = equations.by_parameters(after, own.noise) * chosen.scale
-    design = rows.by_fitted(whitened, len(uncertainty.fit.back)) @ uncertainty.fit.back
-    pulled = own.half @ (own.taken.T @ design)
-    spare = len(whitened) - own.half.shape[1]
-    matrix = own.half @ own.half.T + pulled @ uncertainty.by_cluster @ pulled.T
+    chosen, mine = rows.parameters, np.flatnonzero(rows.own)
+    follow, widened = own.follow @ uncertainty.fit.back, uncertainty.covariance.scale
+    matrix = widened**2 * own.half @ own.half.T + follow @ uncertainty.by_cluster @ follow.T
     rates = (chosen.reported_rates(after.theta) * chosen.scale)[np.ix_(mine, mine)]
     deviation = np.sqrt(np.maximum(np.diagonal(rates @ matrix @ rates.T), 0.0))
-    projector = own.half @ np.linalg.pinv(own.half)
-    loose = np.diagonal(projector) < 1.0 - _LOOSE
-    deviation[loose | (not uncertainty.known) | (spare < 0)] = np.inf
+    shown = np.diagonal(own.half @ np.linalg.pinv(own.half)) > 1.0 - _LOOSE
+    deviation[~shown | (not uncertainty.known)] = np.inf
     values = chosen.reported(after.theta)[mine].tolist()
     names = [chosen.names[c] for c in mine]
     return dict(zip(names, zip(values, deviation.tolist(), strict=True), strict=True))

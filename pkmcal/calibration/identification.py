@@ -68,7 +68,7 @@ class Identification(Parts, Result):
         """
         if isinstance(self.robot, SerialArm):
             return ()
-        prior = self.fit.parameters.prior
+        prior = np.asarray(self.fit.parameters.prior_rows.any(axis=0))
         given = (self.robot.geometry, self.table, self.covariance, prior, self.covariance_rule)
         return law_tests(*given)
 
@@ -242,21 +242,30 @@ class Identification(Parts, Result):
             f"{self.robot.name}: {len(self.free)} parameters from {count} {what}"
             f"{'s' if count > 1 else ''}"
         )
+        if self.sessions:
+            yield summary.sessions(self.sessions)
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)
-        datasets = self.fit.equations.datasets
+        datasets, chosen = self.fit.equations.datasets, self.fit.parameters
+        framed = len(self.free) > len(chosen.places) or isinstance(self.robot, SerialArm)
+        if self.datum.names:
+            yield summary.filled("", str(self.datum))
         yield from summary.limits(
             self.identifiability,
             len(self.free),
             self.correlations,
             row_names(datasets, self.outliers),
             self.outliers,
+            frames=framed and not self.datum.names and not np.isfinite(self.stderr).all(),
         )
         yield from (summary.filled("", str(test)) for test in self.law_tests)
         if self.at_bounds:
             yield summary.bounds(self.at_bounds)
         yield ""
         yield from summary.parameter_rows(self.table)
+        if self.holdout.own:
+            yield ""
+            yield summary.own_numbers(self.holdout)
 
     def __repr__(self) -> str:
         return (

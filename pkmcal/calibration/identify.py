@@ -10,9 +10,20 @@ import numpy as np
 
 from pkmcal.arguments import word, words
 from pkmcal.arms.arm import SerialArm
+from pkmcal.calibration.begin import begun, estimator_at
 from pkmcal.calibration.datasets import as_fit_data, as_fitted, by_set, informative
+from pkmcal.calibration.datum import DATUMS, NO_DATUM, DatumRule
+from pkmcal.calibration.datum import datum as choose_datum
+from pkmcal.calibration.dropped import (
+    OUTLIERS,
+    Drop,
+    held_without,
+    named_rows,
+    robust_outliers,
+    without,
+)
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_data import FitData
@@ -27,7 +38,7 @@ from pkmcal.calibration.fit_statistics import (
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.loss import LIMITS, LossName
-from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
+from pkmcal.calibration.mode_slips import in_other_modes
 from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior, parameters
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
@@ -39,6 +50,7 @@ from pkmcal.calibration.plausibility import (
     shrunk,
 )
 from pkmcal.calibration.row_errors import likely_row_errors
+from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.starts import known_distances
 from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
@@ -65,6 +77,9 @@ def identify(
     attachment: Known | Sequence[Known] = "known",
     covariance: CovarianceRule = "auto",
     per_session: str | Sequence[str] = (),
+    fix: str | Sequence[str] = (),
+    datum: DatumRule = "none",
+    drop: Drop = None,
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -116,6 +131,19 @@ def identify(
         file or counted from 1. All else is common. Priors and bounds hold for each session's
         number; of a session that is held out such numbers are found from its rows, before these
         are compared with the fit.
+    fix : str or sequence of str
+        Numbers of the geometry, by name or wildcard, that keep their present values though `free`
+        or the robot's default set has them.
+    datum : {"none", "auto"}
+        "auto": also hold as many numbers as the measurements leave open of where the base frame and
+        the platform frame lie, and of how the frames between an arm's joints are drawn: about
+        3-2-1 of the joints of each. What is predicted of a measurement stays the same, and the
+        other numbers have finite deviations, in the frames that the held ones define. They are
+        `Identification.datum`. "none": such combinations move as little as possible.
+    drop : sequence of int or "outliers", optional
+        Rows that are left out, fitted or drawn to be held out: by their numbers, counted from 0
+        through all sets, or those that the others contradict in a robust fit. They are
+        `Identification.dropped`.
 
     Returns
     -------
@@ -150,33 +178,38 @@ def identify(
     machine = as_machine(robot)
     unknown = {"frame": frame, "target": target, "attachment": attachment}
     anew = words("per_session", per_session)
-    asked = Asked(free, prior, bounds, anew, by_set(unknown))
-    datasets, unread = informative(
-        machine, as_fit_data(machine, measurements, unknown, sessions=bool(anew))
-    )
+    asked = Asked(free, prior, bounds, anew, by_set(unknown), words("fix", fix))
+    given = as_fit_data(machine, measurements, unknown, sessions=bool(anew))
+    dropped = named_rows(drop, sum(len(data.rows) for data in given))
+    datasets, unread = informative(machine, given)
     held: list[tuple[FitData, int]] = []
     if isinstance(holdout, Measurements):
         held = [as_fitted(machine, holdout, datasets, sessions=bool(anew))]
     elif holdout is not None:
         pairs = [draw(data, holdout) for data in datasets]
         datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
+    datasets = without(datasets, dropped)
     datasets += known_distances(datasets)
     chosen = parameters(machine, datasets, asked)
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
-    equations = Equations(datasets, chosen, unread)
-    commanded = equations.commanded()
-    start = commanded.start()
-    if in_their_modes(commanded, start) is not start:
-        start = commanded.start()  # an unknown frame was laid with rows of other modes
+    word("datum", datum, DATUMS)
+    equations, commanded, start = begun(datasets, chosen, unread)
+    held_numbers = NO_DATUM
     try:
-        if not start.ok and commanded is equations:
-            raise ArgumentError(commanded.failures(start))
-        own = equations.begin(commanded, start)
-        if not own.ok:
-            raise ArgumentError(equations.failures(own))
-        estimator = Estimator(equations, own, loss)
+        if drop == OUTLIERS:
+            dropped = robust_outliers(equations, commanded, start)
+            datasets = without(datasets, dropped)
+            equations, commanded, start = begun(datasets, chosen, unread)
+        estimator = estimator_at(equations, commanded, start, loss)
         estimate = estimator.solve()
+        if datum == "auto":
+            held_numbers = choose_datum(estimator, estimate)
+        if held_numbers.names:
+            chosen = parameters(machine, datasets, held_numbers.asked(asked))
+            equations, commanded, start = begun(datasets, chosen, unread)
+            estimator = estimator_at(equations, commanded, start, loss)
+            estimate = estimator.solve()
     except ValueError as error:
         hint = likely_unit_errors(datasets, chosen, start) or likely_row_errors(datasets, chosen)
         if not hint and not start.ok:
@@ -185,13 +218,22 @@ def identify(
     unlike = unlike_components(estimator, estimate)
     if unlike is not None:
         commanded = equations.reweighted(unlike[1])
-        estimator = Estimator(commanded, own, loss)
+        estimator = Estimator(commanded, estimator.start, loss)
         estimate = estimator.solve(estimate.evaluation)
     sure = uncertainty(estimator, estimate, covariance, None if unlike is None else unlike[0])
-    outside = replace(
-        evaluate(held, estimator, estimate, sure), drawn=not isinstance(holdout, Measurements)
+    drawn = not isinstance(holdout, Measurements)
+    held = held_without(held, dropped) if drawn else held
+    outside = evaluate(held, estimator, estimate, sure)
+    if drop == OUTLIERS and drawn and outside.odd:
+        dropped = tuple(sorted({*dropped, *outside.odd}))
+        outside = evaluate(held_without(held, dropped), estimator, estimate, sure)
+    result = _result(estimator, estimate, commanded, start, replace(outside, drawn=drawn), sure)
+    result = replace(
+        result,
+        datum=held_numbers,
+        dropped=dropped,
+        dropped_names=row_names(given, dropped),
     )
-    result = _result(estimator, estimate, commanded, start, outside, sure)
     notes = _warnings(result, estimator, estimate, datasets)
     for text in notes:
         warnings.warn(text, CalibrationWarning, stacklevel=2)
@@ -238,6 +280,11 @@ def _warnings(
         notes.append("the least squares did not converge: the result is not to be trusted")
     if result.holdout_unreached:
         notes.append(f"holdout: {result.holdout_unreached}; left out")
+    if result.holdout.spare < LEAST_FREEDOM:
+        notes.append(
+            f"holdout: {len(result.holdout.own)} numbers of its own session take all of its"
+            " readings, nothing is left to compare; hold out more rows of it"
+        )
     return notes
 
 

@@ -107,60 +107,59 @@ def noise_factors(rows: Later, equations: Equations, sure: Uncertainty) -> Float
 
 @dataclass(frozen=True, eq=False)
 class OwnNumbers:
-    """What rows say of their own parameters, and what is left of them to be compared.
+    """How the rows' d own parameters follow from them, scaled.
 
     Attributes
     ----------
-    taken : ndarray (M, r)
-        Orthonormal columns: what the parameters took of the whitened equations.
     half : ndarray (d, r)
-        Scaled parameters by these: their covariance from the rows alone is half halfᵀ.
+        Their covariance for fitted parameters without error is half halfᵀ.
+    follow : ndarray (d, n)
+        By how much they answer errors of the fitted parameters.
     noise : ndarray (G,)
-        By which the equations are whitened.
+        That the equations were weighted by.
     """
 
-    taken: FloatArray
     half: FloatArray
+    follow: FloatArray
     noise: FloatArray
-
-    @property
-    def leverage(self) -> FloatArray:
-        """Share (M,) of each equation that the parameters took."""
-        share: FloatArray = (self.taken**2).sum(axis=1)
-        return share
-
-    def left(self, whitened: FloatArray) -> FloatArray:
-        """What is left of whitened columns (M, p) beside them."""
-        rest: FloatArray = whitened - self.taken @ (self.taken.T @ whitened)
-        return rest
 
 
 def compared(
-    rows: Later, equations: Equations, estimate: Estimate, sure: Uncertainty
-) -> tuple[Evaluation, OwnNumbers | None]:
-    """The rows at the fit, and what they said of their own parameters; None where they have none.
+    rows: Later, whole: Equations, estimate: Estimate, sure: Uncertainty
+) -> tuple[Equations, Evaluation, OwnNumbers | None]:
+    """The rows at the fit, poses following from the actuators, and what they say of own parameters.
 
-    `equations` are theirs, poses following from the actuators.
+    None where they have none. Where poses have unknowns, closures speak of them as well as readings
+    (`whole`).
     """
-    theta = rows.at(estimate.evaluation.theta)
+    commanded, theta = whole.commanded(), rows.at(estimate.evaluation.theta)
     if not rows.own.any():
-        return in_their_modes(equations, equations.at(theta)), None
+        return commanded, in_their_modes(commanded, commanded.at(theta)), None
+    start = commanded.start(theta, rows.own)
+    if in_their_modes(commanded, start) is not start:
+        start = commanded.start(theta, rows.own)
+    found, own = _own_numbers(rows, whole, whole.begin(commanded, start), estimate, sure)
+    commanded.warm_start(found)
+    return commanded, commanded.at(found.theta), own
+
+
+def _own_numbers(
+    rows: Later, equations: Equations, start: Evaluation, estimate: Estimate, sure: Uncertainty
+) -> tuple[Evaluation, OwnNumbers]:
+    """The least squares of the rows' own parameters, all others held."""
     noise, columns = noise_factors(rows, equations, sure), np.flatnonzero(rows.own)
-    start = equations.start(theta, rows.own)
-    if in_their_modes(equations, start) is not start:
-        start = equations.start(theta, rows.own)
-    loss = estimate.state.loss
-    width = np.full(len(equations.components), float(np.median(loss.width)))
     search = Search(equations, start, columns)
-    best = search.best(
-        np.zeros(len(columns)),
-        noise,
-        Loss(loss.name, equations.components, width),
-        np.zeros((0, len(columns))),
-    )
-    found = search.at(best, noise)
-    jacobian = np.vstack([search.jacobian(found, noise), search.prior])
-    left, singular, right = np.linalg.svd(jacobian, full_matrices=False)
-    kept = singular > ROUNDING * singular[0]
-    taken = left[: len(jacobian) - len(search.prior), kept]
-    return found, OwnNumbers(taken, right[kept].T / singular[kept], noise)
+    found, jacobian = start, np.zeros((0, len(columns)))
+    if len(equations.components):
+        loss = estimate.state.loss
+        width = np.full(len(equations.components), float(np.median(loss.width)))
+        same = Loss(loss.name, equations.components, width)
+        none = np.zeros((0, len(columns)))
+        found = search.at(search.best(np.zeros(len(columns)), noise, same, none), noise)
+        jacobian = search.jacobian(found, noise)
+    left, singular, right = np.linalg.svd(np.vstack([jacobian, search.prior]), full_matrices=False)
+    kept = singular > ROUNDING * singular.max(initial=0.0)
+    half, taken = right[kept].T / singular[kept], left[: len(jacobian), kept]
+    by_all = equations.by_parameters(found, noise) * equations.parameters.scale
+    by_fitted = rows.by_fitted(by_all, len(sure.fit.back))
+    return found, OwnNumbers(half, -half @ (taken.T @ by_fitted), noise)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.calibration.fit_statistics import ParameterTable
 from pkmcal.display import chance_text
 from pkmcal.geometry.geometry import Geometry
@@ -56,7 +56,7 @@ class LawTest:
 
 
 def law_tests(
-    geometry: Geometry, table: ParameterTable, covariance: FloatArray, prior: FloatArray, rule: str
+    geometry: Geometry, table: ParameterTable, covariance: FloatArray, prior: BoolArray, rule: str
 ) -> tuple[LawTest, ...]:
     """Test the free numbers of drive laws, each kind of all limbs together.
 
@@ -68,9 +68,9 @@ def law_tests(
         The parameters.
     covariance : ndarray (n, n)
         Of them.
-    prior : ndarray (n,)
-        Deviations of what was known before; where one is finite the measurements alone do not
-        decide, and nothing is said.
+    prior : ndarray of bool (n,)
+        Of which something was known before: the measurements alone do not decide, and nothing is
+        said.
     rule : str
         By which the covariance was made; a sandwich of few poses is no sure measure of many
         numbers, as Hotelling's T² has it.
@@ -78,7 +78,7 @@ def law_tests(
     found = []
     for names in _groups(geometry, table.free):
         columns = [table.free.index(name) for name in names]
-        known = np.isfinite(prior[columns]).any()
+        known = prior[columns].any()
         own = covariance[np.ix_(columns, columns)]
         if known or not np.isfinite(own).all():
             continue

@@ -50,9 +50,9 @@ class Search:
         self.equations, self.start = equations, start
         self.scale = parameters.scale[self._found]
         rows = parameters.prior_rows[:, self._found]
-        self.prior = rows[rows.any(axis=1)]
-        away = (parameters.start - start.theta)[self._found] / self.scale
-        self._centre = self.prior @ away
+        held = rows.any(axis=1)
+        self.prior = rows[held]
+        self._centre = parameters.prior_left(start.theta)[held]
         lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
@@ -60,6 +60,7 @@ class Search:
         ones = np.ones(len(equations.unstated))
         self._last: tuple[FloatArray, FloatArray, Evaluation]
         self._last = (np.zeros(len(self.scale)), ones, start)
+        self._last_jacobian: tuple[Evaluation, FloatArray, FloatArray] | None = None
         self._refused = np.zeros(len(equations.components), dtype=bool)
         self.evaluations = 0
         self.converged = False
@@ -86,16 +87,24 @@ class Search:
         ValueError
             It does not exist, at a singularity of the machine.
         """
-        equations = self.equations
-        jacobian = equations.by_parameters(evaluation, noise)[:, self._found] * self.scale
-        if aside is not None:
-            jacobian[np.repeat(aside, equations.components)] = 0.0
+        jacobian = self._whole_jacobian(evaluation, noise)
+        if aside is not None and aside.any():
+            jacobian = np.where(np.repeat(aside, self.equations.components)[:, None], 0.0, jacobian)
         if not np.isfinite(jacobian).all():
             raise ArgumentError(
                 "no geometry near the present one agrees: the fit runs into poses"
                 " where the actuators do not hold the machine (type-2 singular)"
             )
         return jacobian
+
+    def _whole_jacobian(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """The same of all units; the last is kept, for the statistics ask for it again."""
+        last = self._last_jacobian
+        if last is None or last[0] is not evaluation or not np.array_equal(last[1], noise):
+            by_parameters = self.equations.by_parameters(evaluation, noise)[:, self._found]
+            by_parameters *= self.scale
+            last = self._last_jacobian = evaluation, noise, by_parameters
+        return last[2]
 
     def best(self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray) -> FloatArray:
         """Where the cost is least, from `u` (n,).
@@ -142,10 +151,15 @@ class Search:
         offset = np.concatenate([self._centre, np.zeros(len(pins))])
         without = np.repeat(aside, equations.components)
 
+        last: tuple[Evaluation, FloatArray] | None = None
+
         def data(evaluation: Evaluation) -> FloatArray:
-            whitened = equations.residual(evaluation, noise)
-            whitened[without] = 0.0
-            return whitened
+            nonlocal last
+            if last is None or last[0] is not evaluation:
+                whitened = equations.residual(evaluation, noise)
+                whitened[without] = 0.0
+                last = evaluation, whitened
+            return last[1]
 
         # a cost that nothing lowers: by less than rounding it need not fall
         floor = equations.rounding(noise) / np.sqrt(_FTOL)

@@ -160,7 +160,7 @@ def _first_session(fit: Fit) -> tuple[FloatArray, FloatArray, np.ndarray]:
     """Jacobian, residuals and clusters of the fitted rows and of the prior."""
     chosen, sure = fit.parameters, fit.uncertainty
     rows = chosen.prior_rows
-    pulled = rows @ ((chosen.start - fit.end.theta) / chosen.scale)
+    pulled = chosen.prior_left(fit.end.theta)
     own = np.arange(len(rows)) + sure.fit.clusters
     return (
         np.vstack([fit.estimate.jacobian, rows]),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.fit_data import Dependence, FitData, Numbers
 from pkmcal.calibration.sessions import NONE, Scope, Spread, label, matches, scopes
+from pkmcal.calibration.smoothness import smoothness_rows
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import Calibratable
@@ -43,6 +45,10 @@ class Asked:
         Names or wildcards.
     by_set : frozenset of str
         Of "frame", "target", "attachment" and "anchor", what each set has for itself.
+    fix : tuple of str
+        Names or wildcards of numbers of the geometry that are held.
+    held_points : frozenset of (str, str)
+        Unknown points that are held where the user puts them, by role and name.
     """
 
     free: str | Sequence[str] | None = None
@@ -50,6 +56,8 @@ class Asked:
     bounds: Bounds = None
     per_session: tuple[str, ...] = ()
     by_set: frozenset[str] = frozenset()
+    fix: tuple[str, ...] = ()
+    held_points: frozenset[tuple[str, str]] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +99,8 @@ class Parameters:
         The machine they belong to.
     asked : Asked
         What they were made of.
+    bent : ndarray (s,) or None
+        By how much tables of drive laws bend, in standard deviations, where that is not 0.
     """
 
     names: tuple[str, ...]
@@ -110,6 +120,7 @@ class Parameters:
     origin: Mapping[int, FloatArray]
     robot: Calibratable
     asked: Asked
+    bent: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.names)
@@ -125,7 +136,24 @@ class Parameters:
         sigma = self.prior / self.scale
         stated = np.flatnonzero(np.isfinite(sigma))
         rows: FloatArray = np.eye(len(sigma))[stated] / sigma[stated, None]
-        return rows
+        return np.vstack([rows, self._smooth[0] * self.scale])
+
+    def prior_left(self, theta: FloatArray) -> FloatArray:
+        """What the prior misses (p,) at `theta`, in standard deviations."""
+        own = len(self.prior_rows) - len(self._smooth[1])
+        left: FloatArray = self.prior_rows[:own] @ ((self.start - theta) / self.scale)
+        return np.concatenate([left, (0.0 if self.bent is None else self.bent) - self.bends(theta)])
+
+    def bends(self, theta: FloatArray) -> FloatArray:
+        """How far tables of drive laws bend (s,), in standard deviations."""
+        rows, constant = self._smooth
+        found: FloatArray = rows @ theta + constant
+        return found
+
+    @cached_property
+    def _smooth(self) -> tuple[FloatArray, FloatArray]:
+        columns = [self.geometry_of(name) for name in self.sessions or (None,)]
+        return smoothness_rows(self.robot, self.places, columns, len(self))
 
     @property
     def geometry(self) -> slice:
@@ -143,7 +171,7 @@ class Parameters:
         part_of = []
         for data in datasets:
             session = data.measured.session if "session" in self.scope else None
-            names = [""] * len(data.rows) if session is None else session.tolist()
+            names = [""] * len(data.measured) if session is None else session.tolist()
             one = data.set_name if "set" in self.scope else ""
             part_of.append(
                 np.array(
@@ -246,7 +274,7 @@ def parameters(
         for (role, name), first in row.found_along.items()
     ]
     scope = scopes(row.names, blocks, asked.per_session, asked.by_set)
-    entries = _entries(row, scope, blocks, datasets)
+    entries = _entries(row, scope, blocks, datasets, asked.held_points)
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
     names = tuple(row.names[j] + (f"@{behind}" if behind else "") for j, behind in entries)
     units = tuple(row.units[j] for j in number_of)
@@ -305,6 +333,11 @@ def _numbers_of_a_row(robot: Calibratable, datasets: Sequence[FitData], asked: A
     chosen = geometry.match(free, "free")
     if not chosen:
         raise ArgumentError("free: name at least one parameter")
+    if asked.fix:
+        held = geometry.match(asked.fix, "fix")
+        chosen = [name for name in chosen if name not in held]
+        if not chosen:
+            raise ArgumentError("fix: no parameter is left free")
     places = np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)
     names, units = list(chosen), [str(geometry.units[i]) for i in places]
     start = list(geometry.values[places])
@@ -343,10 +376,11 @@ def _entries(
     scope: Sequence[Scope],
     blocks: Sequence[tuple[str, slice]],
     datasets: Sequence[FitData],
+    held: frozenset[tuple[str, str]],
 ) -> list[tuple[int, str]]:
     """The parameters: the number of a row that each is, and what stands behind the @ of its name.
 
-    Those of the geometry session by session, behind what is common.
+    Those of the geometry session by session, behind what is common. Points that are held are none.
     """
     own = range(len(row.places))
     found = [(j, "") for j in own if scope[j] == "common"]
@@ -354,6 +388,8 @@ def _entries(
     of_point = {first: (role, name) for (role, name), first in row.found_along.items()}
     for _, block in blocks:
         kind, point = scope[block.start], of_point.get(block.start)
+        if point in held:
+            continue
         behind = dict.fromkeys(
             label(kind, session, data.set_name)
             for data in datasets

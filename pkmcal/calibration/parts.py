@@ -8,6 +8,7 @@ from typing import Any
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
+from pkmcal.calibration.datum import NO_DATUM, Datum
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_statistics import (
     Identifiability,
@@ -35,6 +36,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "covariance_rule",
     "rank",
     "gap",
+    "datum",
     "unidentifiable",
     "gauges",
     "rms",
@@ -66,6 +68,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "residuals",
     "rows",
     "outliers",
+    "dropped",
     "distances_before",
     "distances",
     "holdout_distances_before",
@@ -111,6 +114,12 @@ class Parts(MisfitNames):
         Whether the measurements contradict the prior, where there is one.
     robots : mapping of str to Robot or SerialArm
         The machine of each session, those that were held out too; empty without `per_session`.
+    datum : Datum
+        Numbers that are held because they only say where frames lie.
+    dropped : tuple of int
+        Rows that were left out, by their numbers.
+    dropped_names : str
+        The same by lines of files, poses and targets.
     """
 
     robot: Robot | SerialArm
@@ -124,6 +133,9 @@ class Parts(MisfitNames):
     warnings: tuple[str, ...] = ()
     prior_test: PriorTest | None = None
     robots: Mapping[str, Robot | SerialArm] = field(default_factory=dict)
+    datum: Datum = NO_DATUM
+    dropped: tuple[int, ...] = ()
+    dropped_names: str = ""
 
     @property
     def sessions(self) -> tuple[str, ...]:

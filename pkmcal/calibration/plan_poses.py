@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import number, whole, word, words
+from pkmcal.arguments import number, whole, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.identifiability import as_sum, sparse_basis
-from pkmcal.calibration.optimal_design import CRITERIA, Criterion, Design
-from pkmcal.calibration.parameters import Asked, Parameters, Prior, parameters
+from pkmcal.calibration.optimal_design import CRITERIA, Criterion
+from pkmcal.calibration.parameters import Parameters, Prior
+from pkmcal.calibration.planned import (
+    PLANNED,
+    Unknown,
+    design_of,
+    equations_of,
+    information,
+    planned,
+)
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError
@@ -25,18 +29,12 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.components import Kind
 from pkmcal.measurements.tracker import Tracker
-from pkmcal.measurements.virtual_machine import VirtualMachine
 from pkmcal.result import Result
-
-Unknown = Literal["frame", "target"]
-PLANNED: tuple[Kind, ...] = ("position", "pose", "height", "distance", "orientation")
-UNKNOWN: tuple[Unknown, ...] = ("frame", "target")
 
 _DRAWS = 25  # of poses at random, to compare a plan with
 _ERROR = 0.5  # mm; what numbers may be off by that have no prior
 _TIMES, _MACHINES = 2.0, 16  # so many machines with so many times these errors must get there
 _FOUND = 1e-6  # mm, rad: how near to a pose forward kinematics must end
-_UNIDENTIFIABLE = 1e-3  # mm a target moves per mm along an unidentifiable combination
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -65,6 +63,9 @@ class Plan(Result):
         near a singularity that errors of the geometry bar the way there.
     parameters : tuple of str
         What the calibration is to find.
+    own_frame : bool
+        Whether predicted errors are those in the machine's own frame, because nothing that is read
+        says where it stands.
     """
 
     robot: Robot | SerialArm
@@ -76,6 +77,7 @@ class Plan(Result):
     all_candidates: float
     left_out: int
     parameters: tuple[str, ...]
+    own_frame: bool = False
 
     def __len__(self) -> int:
         return len(self.indices)
@@ -102,6 +104,8 @@ class Plan(Result):
             f"predicted error {self.predicted:.3g} mm rms; {count} at random"
             f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g}"
         )
+        if self.own_frame:
+            yield "in the machine's own frame: nothing that is read says where it stands"
         if not np.isfinite(self.predicted):
             yield "too few to identify all of them"
         yield Table(heads, rows)
@@ -121,6 +125,7 @@ def plan_poses(
     free: str | Sequence[str] | None = None,
     prior: Prior = None,
     unknown: Unknown | Sequence[Unknown] = (),
+    actuator_noise: ArrayLike | None = None,
 ) -> Plan:
     """Choose poses to measure among candidates, by exchange.
 
@@ -147,8 +152,9 @@ def plan_poses(
         What is made least: the predicted error at the targets, the volume of the parameters'
         confidence region (largest det of the information), or the sum of their variances, scaled
         to mm at the machine.
-    kind : {"position", "pose", "height", "distance", "orientation"}
-        What will be measured; see `Measurements`.
+    kind : {"position", "pose", "height", "distance", "orientation", "closure"}
+        What will be measured; see `Measurements`. "closure" is nothing but the actuators, of a
+        machine that has more of them than ways to move.
     target : array_like (3,) or (k, 3), optional
         The measured point of the platform, mm, or several that are measured at every pose. For
         distances the fixed points of the base.
@@ -158,6 +164,9 @@ def plan_poses(
         As `identify` takes them.
     unknown : str or sequence of str
         What `identify` will have to find along: "frame", "target".
+    actuator_noise : float or array_like (n,), optional
+        Standard deviation of what the actuators read, mm or rad; see `Measurements`. Machines with
+        more actuators than ways to move need it, for their actuators are measured, too.
 
     Returns
     -------
@@ -192,9 +201,12 @@ def plan_poses(
     machine = as_machine(robot)
     poses, q, inside, offered = _within_limits(machine, candidates)
     aims = (poses, q) if targets is None else _aims(machine, targets)
-    equations = _equations(machine, q, kind, target, noise, free, prior, unknown)
+    distinct, place = np.unique(q, axis=0, return_inverse=True)
+    measured = planned(machine, distinct, kind, target, noise, actuator_noise)
+    equations = equations_of(machine, measured, free, prior, unknown)
     safe = _safe(equations.parameters, poses, q)
-    design = _design(equations, safe, *aims, criterion)
+    blocks = information(equations, len(distinct))[place.reshape(-1)[safe]]
+    design, own_frame = design_of(equations.parameters, blocks, *aims, criterion)
     poses, q, inside = poses[safe], q[safe], inside[safe]
     everything = design.predicted(np.arange(len(q)))
     if count is not None:
@@ -211,6 +223,7 @@ def plan_poses(
         all_candidates=everything,
         left_out=offered - len(inside),
         parameters=equations.parameters.names,
+        own_frame=own_frame,
     )
 
 
@@ -269,66 +282,6 @@ def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:
             "candidates: all are so near a singularity that errors bar the way there"
         )
     return safe
-
-
-def _equations(
-    robot: Calibratable,
-    q: FloatArray,
-    kind: Kind,
-    target: ArrayLike | None,
-    noise: float | Tracker,
-    free: str | Sequence[str] | None,
-    prior: Prior,
-    unknown: str | Sequence[str],
-) -> Equations:
-    """What would be measured, the rows of a pose one after another."""
-    sought = words("unknown", unknown)
-    for each in sought:
-        word("unknown", each, UNKNOWN)
-    several = None if target is None else as_rows("target", target, 3)[0]
-    count = 1 if several is None else len(several)
-    measured = VirtualMachine(robot, noise).measure(
-        np.repeat(q, count, axis=0),
-        kind,
-        None if several is None else np.tile(several, (len(q), 1)),
-    )
-    if measured.sigma is None:
-        raise ArgumentError(f"noise must be above 0, found {noise}: without it any poses will do")
-    if several is not None:
-        index = np.tile(np.arange(count), len(q))
-        measured = replace(measured, target=several, target_index=index)
-    data = FitData(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
-    return Equations([data], parameters(robot, [data], Asked(free, prior))).commanded()
-
-
-def _design(
-    equations: Equations,
-    safe: BoolArray,
-    aims: FloatArray,
-    aims_at: FloatArray,
-    criterion: Criterion,
-) -> Design:
-    chosen = equations.parameters
-    start = equations.start()
-    rows = equations.whitened(equations.jacobian(start), np.ones(1)) * chosen.scale
-    k = len(chosen.places)
-    twists = chosen.robot.error_twists(aims, aims_at)
-    by_geometry = twists[:, 3:, chosen.places] * chosen.scale[:k]
-    aimed = np.concatenate([by_geometry, np.zeros((len(aims), 3, len(chosen) - k))], axis=2)
-    if not np.isfinite(rows).all() or not np.isfinite(aimed).all():
-        raise ArgumentError(
-            "candidates or targets: one is singular, where nothing holds the platform"
-        )
-    blocks = rows.reshape(len(safe), -1, len(chosen))[safe]
-    design = Design(blocks, chosen.prior_rows, aimed, criterion, chosen.robot.length)
-    moving = np.abs(aimed @ design.unidentifiable).max(initial=0.0)
-    if moving > _UNIDENTIFIABLE:
-        basis = sparse_basis(design.unidentifiable, chosen.names)
-        raise ArgumentError(
-            f"candidates: not even all of them identify {as_sum(basis[:, 0], chosen.names)}, which"
-            " moves the targets; offer others, free fewer parameters or state a prior"
-        )
-    return design
 
 
 def _accuracy(accuracy: object, best: float, candidates: int) -> float:

@@ -245,9 +245,10 @@ def contradicted_prior(
     if test is None or not test.contradicted:
         return []
     pulls = np.nan_to_num(test.pulls)
-    stated = [i for i, sigma in enumerate(parameters.prior) if np.isfinite(sigma)]
+    stated = [n for n, s in zip(parameters.names, parameters.prior, strict=True) if np.isfinite(s)]
+    stated += ["the smoothness of a table"] * (len(pulls) - len(stated))
     worst = [k for k in largest_first(np.abs(pulls), _ALIKE)[:3] if abs(pulls[k]) > _PULLED]
-    shown = ", ".join(f"{parameters.names[stated[k]]} {abs(pulls[k]):.1f}" for k in worst)
+    shown = ", ".join(f"{stated[k]} {abs(pulls[k]):.1f}" for k in worst)
     pulled = f" and pull {shown} times as far as prior and noise let expect" if worst else ""
     return [
         f"the measurements contradict the prior ({chance_text(test.chance_of_either)}){pulled}: a"

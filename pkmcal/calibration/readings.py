@@ -41,6 +41,8 @@ class Readings:
         Distinct rows of what the actuators read.
     actuator_sigma : ndarray (K, n) or None
         Its stated deviations.
+    approach : ndarray (K, n) or None
+        From where the actuators came.
     pose_of : list of ndarray of int
         Which pose each row of each set is at.
     other_of : list of ndarray of int or None
@@ -95,6 +97,11 @@ class Readings:
         noises = [m.actuator_sigma for m in (*self.sets, *(self.sets[i] for i in double))]
         stated = [sigma for sigma in noises if sigma is not None]
         commands = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
+        directions = [m.approach for m in self.sets]
+        if any(each is not None for each in directions):  # backlash is between their poses
+            known = [np.zeros(m.actuators.shape) if m.approach is None else m.approach
+                     for m in (*self.sets, *(self.sets[i] for i in double))]  # fmt: skip
+            commands = np.hstack([commands, np.concatenate(known)])
         self.machine_columns, machine_of = self.spread.machines(len(parameters.places))
         machine = np.concatenate([*machine_of, *(machine_of[i] for i in double)])
         # machines of different sessions are not at the same pose at the same actuators
@@ -103,7 +110,9 @@ class Readings:
         distinct, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
         n, width = actuators.shape[1], commands.shape[1]
         self.actuators = np.ascontiguousarray(distinct[:, :n])
-        self.actuator_sigma = np.ascontiguousarray(distinct[:, n:width]) if stated else None
+        self.actuator_sigma = np.ascontiguousarray(distinct[:, n : 2 * n]) if stated else None
+        own = n * (1 + bool(stated))
+        self.approach = np.ascontiguousarray(distinct[:, own:width]) if width > own else None
         self.machine_of_pose: IntArray = machine[first]
         self.command_of_pose: IntArray = (
             np.unique(distinct[:, :width], axis=0, return_inverse=True)[1].reshape(-1)
@@ -144,9 +153,9 @@ class Readings:
         return found
 
     def columns_of(self, i: int, name: str) -> IntArray | None:
-        """Parameters (N, w) of what rows of set `i` depend on; None where all of it is given.
+        """Parameters (N, w) of what rows of set `i` depend on; `NONE` where it is given or held.
 
-        `name` is what `predict` calls it.
+        None where all of it is given. `name` is what `predict` calls it.
         """
         return self._columns[i].get(name)
 
@@ -193,8 +202,9 @@ class Readings:
         measured, joint = self.sets[i], str(self.sets[i].joint)
         found = np.empty(len(measured))
         for machine, rows in self._machines(i, theta):
-            at = pose[self.pose_of[i][rows]]
-            found[rows] = joint_angles.angles(machine, measured.actuators[rows], at, joint)
+            q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
+            approach = None if measured.approach is None else measured.approach[rows]
+            found[rows] = joint_angles.angles(machine, q, at, joint, approach)
         return found
 
     def by_numbers(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray | None:
@@ -205,7 +215,8 @@ class Readings:
         found = np.empty((len(measured), 1, len(places)))
         for machine, rows in self._machines(i, theta):
             q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
-            found[rows, 0] = joint_angles.rates(machine, q, at, measured.joint, places)
+            approach = None if measured.approach is None else measured.approach[rows]
+            found[rows, 0] = joint_angles.rates(machine, q, at, measured.joint, places, approach)
         return found
 
     def _machines(self, i: int, theta: FloatArray) -> Iterator[tuple[Calibratable, IntArray]]:
@@ -272,6 +283,15 @@ class Readings:
             else:
                 parts.append(part / white)
         return parts
+
+    def variances(self, noise: FloatArray) -> FloatArray:
+        """Variances (M,) of the readings as they are weighted, mm² and rad²."""
+        parts = []
+        for white, factor in zip(self._whiten, noise, strict=False):
+            each = np.linalg.inv(white) ** 2 if white.ndim == 3 else white**-2.0
+            parts.append(factor**2 * (each.sum(axis=2) if each.ndim == 3 else each).ravel())
+        variances: FloatArray = np.concatenate(parts)[self.present]
+        return variances
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pkmcal.arrays import rms
+from pkmcal.calibration.dropped import outlying
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimator
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.outliers import outliers
 from pkmcal.statistics.robust_scale import median_ratio, robust_ratio
 
 _SUSPECT = 1.25  # ratio of the linear model's noises from which the robust fit is made
@@ -67,14 +67,7 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     plain = equations.residual(estimate.evaluation, noise)
     squares = few.squares(few.residual(robust.evaluation, of_sets))
     scale = median_ratio(squares, few.components) * m / (m - p)
-    odd = outliers(
-        robust.residual,
-        robust.jacobian @ robust.state.fitted.identifiable,
-        few.components,
-        robust.weights,
-        estimator.prior @ robust.state.fitted.identifiable,
-    )
-    named = np.isin(few.unit_of_row, odd)
+    named = outlying(estimator, robust)
     commanded.warm_start(robust.evaluation)
     off = few.distances(commanded.at(robust.evaluation.theta))[~named]
     if not scale > 0:

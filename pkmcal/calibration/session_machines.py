@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -15,6 +16,7 @@ from pkmcal.arrays import FloatArray, Int32Array, IntArray
 from pkmcal.calibration.closures import Closures, Commanded, RowStates, closures_of
 from pkmcal.calibration.sessions import spread
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
 
 AnyArray = TypeVar("AnyArray", FloatArray, Int32Array)
@@ -30,18 +32,30 @@ class Machines:
         One, or one for each session.
     rows : tuple of ndarray of int
         The poses that are its own, of each.
+    approach : ndarray (K, n) or None
+        From where the actuators came.
     """
 
     robots: tuple[Calibratable, ...]
     rows: tuple[IntArray, ...]
+    approach: FloatArray | None = None
+
+    @cached_property
+    def approaching(self) -> tuple[Calibratable, ...]:
+        """The machines, each with actuators that come from where they came at its poses."""
+        return tuple(
+            _approaching(r, self.approach, own)
+            for r, own in zip(self.robots, self.rows, strict=True)
+        )
 
     def at(self, k: int) -> Calibratable:
         """The machine of pose `k`."""
-        return next(r for r, own in zip(self.robots, self.rows, strict=True) if k in own)
+        robot = next(r for r, own in zip(self.robots, self.rows, strict=True) if k in own)
+        return _approaching(robot, self.approach, np.intp(k))
 
     def joined(self, function: Callable[[Calibratable, IntArray], FloatArray]) -> FloatArray:
         """What a function of a machine and its poses gives, pose by pose."""
-        parts = [function(r, own) for r, own in zip(self.robots, self.rows, strict=True)]
+        parts = [function(r, own) for r, own in zip(self.approaching, self.rows, strict=True)]
         return _joined(parts, self.rows)
 
     def actuator_twists(self, states: RowStates) -> FloatArray:
@@ -148,7 +162,7 @@ class SessionClosures:
         self, machines: Machines, states: RowStates
     ) -> list[tuple[Closures, Calibratable, RowStates]]:
         own = [states] if len(self._rows) == 1 else [_some(states, rows) for rows in self._rows]
-        return list(zip(self._parts, machines.robots, own, strict=True))
+        return list(zip(self._parts, machines.approaching, own, strict=True))
 
     def _states(self, parts: Sequence[RowStates]) -> RowStates:
         if len(parts) == 1:
@@ -160,18 +174,31 @@ class SessionClosures:
         )
 
 
+def _approaching(
+    robot: Calibratable, approach: FloatArray | None, rows: IntArray | np.intp
+) -> Calibratable:
+    if approach is None or not isinstance(robot, Robot):
+        return robot
+    return robot.approaching(approach[rows])
+
+
 def commanded_closures(rows: Sequence[IntArray], read: FloatArray) -> SessionClosures:
     """Poses that follow from what the actuators read."""
-    return SessionClosures([Commanded(read[own]) for own in rows], rows)
+    return SessionClosures([Commanded(each) for each in _apart(read, rows)], rows)
 
 
 def closures_of_sessions(
     robot: Calibratable, rows: Sequence[IntArray], read: FloatArray, sigma: FloatArray | None
 ) -> SessionClosures:
     """What the closures say of poses at what the actuators read (K, n); see `closures_of`."""
-    return SessionClosures(
-        [closures_of(robot, read[own], None if sigma is None else sigma[own]) for own in rows], rows
-    )
+    sigmas = [None] * len(rows) if sigma is None else _apart(sigma, rows)
+    pairs = zip(_apart(read, rows), sigmas, strict=True)
+    return SessionClosures([closures_of(robot, *pair) for pair in pairs], rows)
+
+
+def _apart(whole: FloatArray, rows: Sequence[IntArray]) -> list[FloatArray]:
+    """The rows of each machine; a single one has them all."""
+    return [whole] if len(rows) == 1 else [whole[own] for own in rows]
 
 
 def _some(states: RowStates, rows: IntArray) -> RowStates:

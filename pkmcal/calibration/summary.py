@@ -109,8 +109,12 @@ def limits(
     correlations: Sequence[tuple[str, str, float]],
     odd: str,
     outliers: Sequence[int],
+    frames: bool,
 ) -> Iterator[str]:
-    """Where the result has limits: rank, correlations, outliers; `odd` names the last."""
+    """Where the result has limits: rank, correlations, outliers; `odd` names the last.
+
+    `frames`: whether a datum may be what is missing.
+    """
     yield from (filled("", text) for text in identifiability.gauges)
     if identifiability.rank < parameters:
         gap = f", gap {identifiability.gap:.0e}" if np.isfinite(identifiability.gap) else ""
@@ -119,6 +123,12 @@ def limits(
         yield from (filled("  ", text) for text in identifiability.unidentifiable[:4])
         if len(identifiability.unidentifiable) > 4:
             yield f"  and {len(identifiability.unidentifiable) - 4} more"
+        if frames and identifiability.unidentifiable:
+            yield filled(
+                "  ",
+                "--datum auto (datum='auto') holds as many numbers as only say where frames lie;"
+                " the others then have finite ±",
+            )
     if correlations:
         shown = ", ".join(f"{a} / {b} {value:+.3f}" for a, b, value in correlations[:3])
         more = f" and {len(correlations) - 3} more" if len(correlations) > 3 else ""
@@ -126,6 +136,28 @@ def limits(
     if outliers:
         where = "" if odd.startswith("row ") else f": {odd}"
         yield filled("outliers: ", f"rows {first_rows(outliers, 10)}{where}")
+
+
+def sessions(names: Sequence[str]) -> str:
+    """Which sessions there are, and of which the robot is."""
+    shown = ", ".join(map(display.printable, names))
+    last = display.printable(names[-1])
+    return filled("sessions: ", f"{shown}; numbers without an @ are common, the robot is {last}'s")
+
+
+def own_numbers(holdout: HeldOut) -> Table:
+    """Numbers of sessions that were held out."""
+    rows = []
+    for name, (value, sigma) in holdout.own.items():
+        unit = holdout.units[name]
+        number, shown = display.displayed(value, unit)
+        deviation, _ = display.displayed(sigma, unit)
+        label = f"{name} [{shown}]" if shown != "mm" else name
+        text = display.with_uncertainty(number, deviation)
+        if not np.isfinite(deviation):
+            text = f"{display.fixed(number, 4)} ± {deviation:g}"
+        rows.append([label, text])
+    return Table(["found for the points held out", "value"], rows, left=1)
 
 
 def bounds(names: Sequence[str]) -> str:

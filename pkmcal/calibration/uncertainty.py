@@ -238,9 +238,7 @@ def _linear_fit(
 
 
 def _prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:
-    chosen = estimator.equations.parameters
-    left: FloatArray = estimator.prior @ ((chosen.start - estimate.evaluation.theta) / chosen.scale)
-    return left
+    return estimator.equations.parameters.prior_left(estimate.evaluation.theta)
 
 
 def unlike_components(

@@ -254,6 +254,9 @@ def _disagreement(found: Parts, robust: RobustCheck) -> str:
 
 def _remarks(found: Parts, robust: RobustCheck | None) -> tuple[str, ...]:
     remarks = []
+    if found.dropped:
+        many = f"{len(found.dropped)} rows were" if len(found.dropped) > 1 else "1 row was"
+        remarks.append(f"{many} left out, as asked: {found.dropped_names}")
     if robust is not None and _DISAGREES < robust.ratio <= _CARRIED:
         remarks.append(_disagreement(found, robust))
     if found.holdout_outliers and not found.holdout_contradicts:

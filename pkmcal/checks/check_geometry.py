@@ -13,6 +13,7 @@ from pkmcal.checks.finding import Finding
 from pkmcal.checks.function import (
     not_closed,
     singular,
+    turning,
     unreachable,
     unusual_size,
     wrong_unit,
@@ -39,6 +40,7 @@ CHECKS = (
     off_circle,
     unlike,
     not_closed,
+    turning,
     unreachable,
     singular,
     contradicted,

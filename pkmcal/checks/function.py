@@ -12,6 +12,7 @@ from pkmcal.checks.joint_layout import ALIKE, joints, size
 from pkmcal.core.library import POSE, SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.dexterity import dexterity
+from pkmcal.kinematics.limits import kept, margin_of
 from pkmcal.kinematics.perturbed import completed
 from pkmcal.kinematics.robot import Robot
 
@@ -116,7 +117,7 @@ def _sizes(robot: Robot) -> dict[str, float]:
     sizes = {
         "base joints": float(np.linalg.norm(base.points, axis=1).max()),
         "platform joints": float(np.linalg.norm(platform.points, axis=1).max()),
-        "home": float(np.linalg.norm(robot.model.home[:3])),
+        "home": float(np.linalg.norm(robot.own_home[:3])),
         "rods": float(slots[:, SLOTS.index("rod")].max()),
         "cranks": float(slots[:, SLOTS.index("crank")].max()),
         "strokes": max(ends, default=0.0),
@@ -143,7 +144,7 @@ def _mended(robot: Robot) -> Iterator[Finding]:
     mended = []
     for name in _sizes(robot):
         for factor, unit in _FACTORS:
-            slots, home, stroke = robot.slots.copy(), robot.model.home[None].copy(), 1.0
+            slots, home, stroke = robot.slots.copy(), robot.own_home[None].copy(), 1.0
             if name in _LENGTHS:
                 columns = [SLOTS.index(slot) for slot in _LENGTHS[name]]
                 slots[:, columns] *= factor
@@ -169,7 +170,9 @@ def _in_strokes(robot: Robot, drive: FloatArray, factor: float) -> bool:
     for value, limb in zip(drive, robot.model.limbs, strict=True):
         if limb.stroke is not None:
             stated = True
-            if not factor * limb.stroke[0] <= value <= factor * limb.stroke[1]:
+            low, high = limb.stroke
+            margin = margin_of((factor * low, factor * high), value)
+            if not kept(margin, KINDS[limb.kind].actuator_unit, robot.machine.struct.size):
                 return False
     return bool(np.isfinite(drive).all()) and (stated or factor == 1.0)
 
@@ -247,6 +250,18 @@ def _reached(robot: Robot, ends: FloatArray) -> float:
             return (k - 1) / _STEPS
         pose = found.pose
     return 1.0
+
+
+def turning(robot: Robot) -> Iterator[Finding]:
+    """Drive laws without an inverse."""
+    for d, why in robot.model.doubts().items():
+        limb = robot.model.limb_of_drive(d) + 1
+        yield Finding(
+            "drive",
+            (limb,),
+            f"the drive law of limb {limb} has no inverse: {why}",
+            "such numbers fit noise: free fewer, or hold them by a prior or a smoothness",
+        )
 
 
 def singular(robot: Robot) -> Iterator[Finding]:

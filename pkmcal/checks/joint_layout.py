@@ -108,7 +108,7 @@ def along_axis(robot: Robot) -> tuple[Joints, Joints]:
     flat = spread[2] <= _FLAT * spread[1] if count > 3 else np.ptp(turned.radii) <= 2 * room
     if not flat:
         return base, platform
-    at_home = platform.points @ screw.from_pose(robot.model.home)[:3, :3].T
+    at_home = platform.points @ screw.from_pose(robot.own_home)[:3, :3].T
     return turned, Joints("platform", at_home @ turn.T)
 
 

@@ -118,7 +118,7 @@ def _legs(robot: Robot, read: dict[str, FloatArray], radii: tuple[float, float])
         ])
         for side, radius in zip(joints(robot), radii, strict=True)
     )  # fmt: skip
-    moved = platform + robot.model.home[:3]
+    moved = platform + robot.own_home[:3]
     return np.asarray(np.linalg.norm(moved - base, axis=1))
 
 

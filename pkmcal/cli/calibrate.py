@@ -13,9 +13,10 @@ import typer
 
 import pkmcal as pk
 from pkmcal.arguments import word
+from pkmcal.calibration.datum import DATUMS
 from pkmcal.calibration.loss import LIMITS
 from pkmcal.calibration.parameters import KNOWN, Known
-from pkmcal.cli.geometry_options import free_names, read_deviations
+from pkmcal.cli.geometry_options import free_names, matching, read_deviations
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.measured import (
     Columns,
@@ -27,10 +28,13 @@ from pkmcal.cli.measured import (
     Rename,
     Rotation,
     Units,
+    rows_to_drop,
 )
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
+from pkmcal.cli.sessions import in_sessions
+from pkmcal.display import printable
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurements import Measurements
@@ -63,7 +67,7 @@ def calibrate(
         typer.Option(
             metavar="WORD",
             help="unknown: identify the frame of the instrument, too. Of several files one word"
-            " each, with commas, if not the same for all.",
+            " each, with commas, if they have different frames.",
         ),
     ] = "known",
     target: Annotated[
@@ -77,6 +81,22 @@ def calibrate(
             help="unknown: identify where distances end, too.",
         ),
     ] = "known",
+    per_session: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Find this number anew in each session, such as 'offset*' or 'frame*'; all others"
+            " are common. Repeat it, or separate names with commas.",
+        ),
+    ] = None,
+    session: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="The session of a file: once for each file. Else files have a column session, or"
+            " their own names.",
+        ),
+    ] = None,
     covariance: Annotated[
         str,
         typer.Option(
@@ -85,6 +105,35 @@ def calibrate(
             " classical, where none do; auto: as the residuals show.",
         ),
     ] = "auto",
+    fix: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Hold this number as it is. Repeat it, separate names with commas, or use"
+            " wildcards.",
+        ),
+    ] = None,
+    datum: Annotated[
+        str,
+        typer.Option(
+            metavar="WORD",
+            help="auto: hold as many numbers as only say where the frames of base and platform"
+            " lie, if they are not known, and those between an arm's joints; the others then have"
+            " finite ±. none: hold none.",
+        ),
+    ] = "none",
+    drop: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="ROW|FILE:LINE",
+            help="Leave this row out: its number, as outliers are named, or a line of a file."
+            " Repeat it, or separate rows with commas.",
+        ),
+    ] = None,
+    drop_outliers: Annotated[
+        bool,
+        typer.Option("--drop-outliers", help="Leave out the rows that the others contradict."),
+    ] = False,
     controller: Controller = None,
     join: JoinBy = "auto",
     ignore: Ignore = None,
@@ -134,6 +183,9 @@ def calibrate(
     for doubt in doubts:
         say(f"pkmcal: {doubt.message}", err=True)
     held = None if holdout is None else _read_holdout(holdout, read, machine, reading)
+    anew = [name.strip() for text in per_session or [] for name in text.split(",")]
+    if session or anew:
+        measured, held = in_sessions(csv, measured, session or [], holdout, held)
     urdf = isinstance(given, pk.SerialArm) and given.source is not None
     names = ["robot.toml", "residuals.png", *["robot.urdf"] * urdf]
     output = None if out is None else Output(out, names, read, force)
@@ -141,7 +193,13 @@ def calibrate(
     if tracker is not None:
         seen = read_tracker(tracker)
         measured = [_seen_by(seen, each) for each in measured]
-    chosen = free_names(machine, free)
+    dropped = rows_to_drop(drop or [], measured)
+    if dropped and drop_outliers:
+        raise ArgumentError("--drop names rows, --drop-outliers finds them: one of the two")
+    fixed = matching("--fix", machine, fix or [])
+    chosen = [name for name in free_names(machine, free) if name not in fixed]
+    if fixed and not chosen:
+        raise ArgumentError(f"--fix {','.join(fix or [])}: no parameter is left free")
     with progress("identifying"), warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # the summary has them
         found = pk.identify(
@@ -155,6 +213,10 @@ def calibrate(
             attachment=_known("--attachment", attachment, measured),
             holdout=held,
             covariance=word("--covariance", covariance, RULES),
+            per_session=anew,
+            fix=fixed,
+            datum=word("--datum", datum, DATUMS),
+            drop="outliers" if drop_outliers else dropped,
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:
@@ -171,7 +233,8 @@ def calibrate(
     else:
         say(found.summary())
         if output is not None:
-            say(f"\ncalibrated robot: {output.paths[0]}")
+            last = f" (of session {printable(found.sessions[-1])})" if found.sessions else ""
+            say(f"\ncalibrated robot{last}: {output.paths[0]}")
             say(f"residuals: {output.paths[1]}")
             if urdf:
                 say(f"URDF with the joint errors in its origins: {output.paths[2]}")
@@ -186,8 +249,9 @@ def _save(found: pk.Identification, path: Path, read: Inputs, robot: str) -> Non
     if isinstance(calibrated, pk.SerialArm) or isinstance(source, str):
         calibrated.save(path, read.comment())
         return
-    sigmas = zip(found.free, found.stderr.tolist(), strict=True)
-    known = {name: sigma for name, sigma in sigmas if name in calibrated.geometry.names}
+    columns = found.fit.parameters.geometry_of()
+    names = [calibrated.geometry.names[place] for place in found.fit.parameters.places]
+    known = dict(zip(names, found.stderr[columns].tolist(), strict=True))
     calibrated.save(path, read.comment(), like=source, deviations=known)
 
 

@@ -35,6 +35,7 @@ MACHINE = "2tpr2tps"
 SIGMA = 0.5  # mm, of each of its 28 errors
 NOISE = 0.02  # mm, of each coordinate the tracker reads
 MEASURED, CHECKED = 30, 100  # poses
+REFLECTORS = ((0.0, 100.0, 0.0), (0.0, -100.0, 0.0))  # on the platform, mm: one tells no tilt
 
 # Where poses are drawn: y and z in mm, alpha and beta in degrees
 _LOWEST = np.array([-80.0, 330.0, -20.0, -20.0])
@@ -46,7 +47,7 @@ FILES = {
     "error.png": "the error of each pose before and after",
     "robot.toml": "the calibrated machine",
     "report.json": "all results as data",
-    "report.html": "the report: open it in a browser",
+    "report.html": "the report, which moves the machine: open it in a browser",
 }
 _MARGIN = 5.0  # mm that a leg keeps from the ends of its stroke, for its errors
 
@@ -62,7 +63,8 @@ def demo(
     """Calibrate a simulated machine from beginning to end.
 
     A 2TPR&2TPS with 28 unknown errors is measured by a tracker, identified, and sent to poses
-    that were not measured; its error there before and after is printed.
+    that were not measured; its error there before and after is printed. The report that it writes
+    shows the machine and moves it.
 
     Example: pkmcal demo --seed 7 --out my-demo
     """
@@ -132,8 +134,8 @@ class Demonstration(Result):
         yield "\n".join([
             f"{self.true_robot.name} with {len(found.free)} unknown errors of its geometry,"
             f" sigma {SIGMA} mm (simulated, seed {self.seed})",
-            f"measured    {len(self.measured)} tilted poses within the strokes, by a tracker good"
-            f" to {NOISE} mm a coordinate",
+            f"measured    {MEASURED} tilted poses within the strokes, two reflectors at each, by a"
+            f" tracker good to {NOISE} mm a coordinate",
             f"identified  misfit {found.rms_before:.3f} -> {found.rms:.3f} mm rms; rank"
             f" {found.rank} of {len(found.free)} parameters",
             f"commanded   {len(self.poses)} other poses, by leg lengths of the identified geometry",
@@ -150,10 +152,10 @@ class Demonstration(Result):
             f"The mean falls by {gone:.1f} %. Expected: rms {self.expected:.3f} mm; the noise of"
             f" one measured point is {NOISE * np.sqrt(3):.3f} mm."
         )
-        tilts = (f"{np.degrees(rms(tilt)):.2f}" for tilt in (self.tilt_before, self.tilt_after))
+        tilts = (f"{np.degrees(rms(tilt)):.3f}" for tilt in (self.tilt_before, self.tilt_after))
         yield (
-            f"Orientation error {' -> '.join(tilts)} deg rms: positions of one point do not"
-            " determine it, those of two do."
+            f"Orientation error {' -> '.join(tilts)} deg rms: positions of two points determine it,"
+            " those of one do not."
         )
 
     def write(self, folder: Path) -> None:
@@ -186,7 +188,7 @@ def demonstrate(seed: int = 1) -> Demonstration:
     --------
     >>> result = demonstrate()
     >>> result.identification.rank, bool(result.after.max() < 0.1 * result.before.max())
-    (25, True)
+    (26, True)
     """
     random = np.random.default_rng(checked_seed(seed))
     nominal = load(MACHINE)
@@ -195,9 +197,9 @@ def demonstrate(seed: int = 1) -> Demonstration:
     true = nominal.replace({name: nominal.geometry[name] + error for name, error in drawn.items()})
 
     machine = VirtualMachine(true, noise=NOISE, seed=int(random.integers(2**32)))
-    measured = machine.measure(nominal.inverse(_poses(random, nominal, MEASURED)))
+    measured = _both(machine, nominal.inverse(_poses(random, nominal, MEASURED)))
     poses = _poses(random, nominal, CHECKED)
-    checked = machine.measure(nominal.inverse(poses))
+    checked = _both(machine, nominal.inverse(poses))
     found = identify(nominal, measured, prior=SIGMA, holdout=checked)
 
     assert isinstance(found.robot, Robot)  # as was given
@@ -220,6 +222,12 @@ def demonstrate(seed: int = 1) -> Demonstration:
         tilt_after=tilt_after,
         expected=rms(found.accuracy(poses)),
     )
+
+
+def _both(machine: VirtualMachine, q: FloatArray) -> Measurements:
+    """Measure both reflectors at each row of coordinates."""
+    rows = np.repeat(q, len(REFLECTORS), axis=0)
+    return machine.measure(rows, target=np.tile(REFLECTORS, (len(q), 1)))
 
 
 def _poses(random: np.random.Generator, robot: Robot, count: int) -> FloatArray:

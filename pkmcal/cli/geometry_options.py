@@ -26,13 +26,22 @@ def free_names(robot: Calibratable, given: Sequence[str] | None) -> list[str]:
     ValueError
         A name that the robot does not have, or that a parameter drives.
     """
-    if not given:
-        return list(robot.model.free)
+    return matching("--free", robot, given) if given else list(robot.model.free)
+
+
+def matching(option: str, robot: Calibratable, given: Sequence[str]) -> list[str]:
+    """Names of the geometry that an option chooses: repeated, with commas, or wildcards.
+
+    Raises
+    ------
+    ValueError
+        A name that the robot does not have, or that a parameter drives.
+    """
     patterns = [name.strip() for text in given for name in text.split(",")]
     try:
         return robot.geometry.match(patterns)
     except ValueError as error:
-        raise ArgumentError(f"--free: {error}") from None
+        raise ArgumentError(f"{option}: {error}") from None
 
 
 def read_deviations(
@@ -86,7 +95,8 @@ def _unit_of(pattern: str, robot: Calibratable, names: Sequence[str]) -> str:
     units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
     known = {name: str(units[name]) for name in names}
     known |= {f"frame.{name}": unit for name, unit in _FRAME.items()}
-    covered = {known[name] for name in known if fnmatchcase(name, pattern)}
+    number = pattern.partition("@")[0]  # of whatever session
+    covered = {known[name] for name in known if fnmatchcase(name, number)}
     if len(covered) > 1:
         raise ArgumentError(
             "covers lengths, angles or ratios together; name them apart, or give one number"

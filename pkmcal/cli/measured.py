@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 import pkmcal as pk
@@ -101,6 +102,33 @@ class Reading:
         for note in measured.notes:
             say(f"pkmcal: {note}", err=True)
         return measured
+
+
+def rows_to_drop(given: Sequence[str], measured: Sequence[Measurements]) -> list[int]:
+    """Numbers, through all files, of the rows that ``--drop`` names.
+
+    Raises
+    ------
+    ValueError
+        No such row, file or line.
+    """
+    rows: list[int] = []
+    for text in (part.strip() for each in given for part in each.split(",")):
+        if text.isdecimal():
+            rows.append(int(text))
+            continue
+        file, colon, line = text.rpartition(":")
+        if not colon or not line.isdecimal():
+            raise ArgumentError(f"--drop {text}: expected the number of a row, or FILE:LINE")
+        first, found = 0, list[int]()
+        for each in measured:
+            if each.lines is not None and Path(each.file).name == Path(file).name:
+                found += [first + int(i) for i in np.flatnonzero(each.lines == int(line))]
+            first += len(each)
+        if not found:
+            raise ArgumentError(f"--drop {text}: no row was read from there")
+        rows += found
+    return rows
 
 
 def _offset(text: str) -> list[float]:

@@ -13,7 +13,8 @@ from pkmcal.arguments import word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.optimal_design import CRITERIA
-from pkmcal.calibration.plan_poses import PLANNED, UNKNOWN, Plan, plan_poses
+from pkmcal.calibration.plan_poses import Plan, plan_poses
+from pkmcal.calibration.planned import PLANNED, UNKNOWN
 from pkmcal.cli.geometry_options import free_names, read_deviations
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
@@ -56,11 +57,16 @@ def plan(
         str, typer.Option(metavar="WORD", help="prediction, D or A: what is minimised.")
     ] = "prediction",
     kind: Annotated[
-        str, typer.Option(metavar="KIND", help="What is measured: position, pose or height.")
+        str,
+        typer.Option(metavar="KIND", help="What is measured: position, pose, height or closure."),
     ] = "position",
     noise: Annotated[
         float, typer.Option(metavar="MM", help="Of the instrument, one standard deviation.")
     ] = 0.02,
+    actuator_noise: Annotated[
+        float | None,
+        typer.Option(metavar="X", help="Of the actuators, mm or rad; closure needs it."),
+    ] = None,
     free: Free = None,
     prior: Prior = None,
     unknown: Annotated[
@@ -100,6 +106,7 @@ def plan(
             criterion=word("--criterion", criterion, CRITERIA),
             kind=word("--kind", kind, PLANNED),
             noise=noise,
+            actuator_noise=actuator_noise,
             free=chosen or None,
             prior=read_deviations("--prior", prior or [], seen, chosen),
             unknown=[word("--unknown", each, UNKNOWN) for each in unknown or ()],

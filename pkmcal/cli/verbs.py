@@ -15,6 +15,7 @@ from pkmcal.cli.output import say
 _VERBS = {  # where each is: file and function
     "demo": "demonstration.demo",
     "machines": "machines.machines",
+    "show": "show.show",
     "new": "new.new",
     "check": "check.check",
     "sensitivity": "sensitivity.sensitivity",

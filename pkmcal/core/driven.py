@@ -232,6 +232,20 @@ class DrivenMachine(CoreMachine):
             out[..., of_laws] = by_way[..., drive] * by_number[:, None]
         return out
 
+    def as_offsets(
+        self, slots: FloatArray, q: FloatArray, columns: Int32Array
+    ) -> tuple[Int32Array, FloatArray]:
+        """Numbers of laws as the offset of their drive, and what it moves by each, (N, columns).
+
+        Other numbers as they are, by 1.
+        """
+        _, of_laws, drive = self._sorted(columns)
+        alike, factor = columns.copy(), np.ones((len(q), len(columns)))
+        if of_laws:
+            alike[of_laws] = [self.laws.drives[d].offset for d in drive]
+            factor[:, of_laws] = self._by_number(slots, q, columns[of_laws])
+        return alike, factor
+
     def _sorted(self, columns: Int32Array) -> tuple[list[int], list[int], list[int]]:
         """Which of the columns are the inner machine's, which those of laws, and their drives."""
         drives = [self.laws.drive_of(column) for column in columns.tolist()]

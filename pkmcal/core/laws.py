@@ -257,12 +257,13 @@ class Laws:
             return -np.inf, np.inf
         if drive.stroke is None:
             return (-np.inf, np.inf) if not drive.corrected else (np.nan, np.nan)
-        reach = np.array([drive.stroke]).T - numbers[0, drive.offset] + [[-most], [most]]
-        ends = self._uncorrected(numbers, np.tile(reach, len(self.drives)), slice(None))[:, d]
-        if np.isnan(ends).any() or not drive.corrected:
-            return (np.nan, np.nan) if np.isnan(ends).any() else (-np.inf, np.inf)
-        low, high = float(ends.min()), float(ends.max())
-        places = np.linspace(low, high, _CELLS + 1)
+        wanted = self._ends(numbers, d, 0.0, most)
+        if np.isnan(wanted).any() or not drive.corrected:
+            return (np.nan, np.nan) if np.isnan(wanted).any() else (-np.inf, np.inf)
+        room = max(drive.stroke[1] - drive.stroke[0], np.pi if drive.angle else 0.0)
+        beyond = self._ends(numbers, d, room, most)  # as far as it goes on
+        low, high = float(np.fmin(wanted[0], beyond[0])), float(np.fmax(wanted[1], beyond[1]))
+        places = np.union1d(np.linspace(low, high, _CELLS + 1), wanted)
         if drive.table is not None:
             inside = drive.table[(drive.table > low) & (drive.table < high)]
             places = np.union1d(places, inside)
@@ -272,8 +273,22 @@ class Laws:
         wound = [radius + 0.5 * buildup * (gain + quadratic * e) * e for e in (low, high)]
         bend = 0.5 * abs(buildup) * turn**2 + 2.0 * abs(quadratic) * np.abs(wound).max()
         bend += float(k**2 @ size)
-        rising = sign * found.slope[:, d] - 0.5 * bend * np.diff(places)
-        return (low, high) if (rising > 0.0).all() else (np.nan, np.nan)
+        turns = np.flatnonzero(~(sign * found.slope[:, d] - 0.5 * bend * np.diff(places) > 0.0))
+        before, behind = turns[middle[turns] < wanted[0]], turns[middle[turns] > wanted[1]]
+        if len(before) + len(behind) < len(turns):
+            return np.nan, np.nan
+        first = 0 if not before.size else int(before[-1]) + 1
+        last = len(middle) if not behind.size else int(behind[0])
+        return float(places[first]), float(places[last])
+
+    def _ends(self, numbers: FloatArray, d: int, room: float, most: float) -> FloatArray:
+        """Readings (2,) at the ends of a drive's stroke and of `room` beyond, whatever corrections.
+
+        NaN beyond a turning point.
+        """
+        low, high = self.drives[d].stroke or (0.0, 0.0)
+        rest = np.array([[low - room - most], [high + room + most]]) - numbers[0, self._offset[d]]
+        return np.sort(self._uncorrected(numbers, rest, [d])[:, 0])
 
     # ----------------------------------------------------------------------------------------------
 
@@ -331,6 +346,8 @@ class Laws:
     def _newton(self, numbers: FloatArray, way: FloatArray, d: int, span: FloatArray) -> FloatArray:
         """The readings of a drive with corrections, within brackets that Newton's method keeps."""
         drive = self.drives[d]
+        if np.isnan(span).any():
+            return np.full(len(way), np.nan)
         values = numbers[0, [p for _, a, b in drive.harmonics for p in (a, b)]]
         most = float(np.abs(values).sum())
         if drive.table is not None:
@@ -338,8 +355,9 @@ class Laws:
         ends = [self._uncorrected(numbers, way[:, None] + e, [d])[:, 0] for e in (-most, most)]
         rising = numbers[0, drive.gain] * numbers[0, self._base[d, 2]] > 0.0
         low, high = ends if rising else ends[::-1]
-        low = np.where(np.isnan(low), span[0], np.maximum(low, span[0]))
-        high = np.where(np.isnan(high), span[1], np.minimum(high, span[1]))
+        if np.isfinite(span).all():  # beyond a turning point the proof ends
+            low = np.where(np.isnan(low), span[0], np.maximum(low, span[0]))
+            high = np.where(np.isnan(high), span[1], np.minimum(high, span[1]))
         q: FloatArray = 0.5 * (low + high)
         offset, sign = numbers[0, drive.offset], 1.0 if rising else -1.0
         scale = np.abs(way) + most + abs(offset)
@@ -353,7 +371,7 @@ class Laws:
             inside = (step >= low) & (step <= high)
             over = done.all()
             done = np.abs(off) <= _ROUNDING * scale
-            q = np.asarray(np.where(inside, step, np.where(done, q, 0.5 * (low + high))))
+            q = np.where(inside, step, np.where(done, q, 0.5 * (low + high)))
             if over or not np.isfinite(q).any():
                 break
         q[~done | (q < span[0]) | (q > span[1])] = np.nan

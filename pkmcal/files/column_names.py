@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pkmcal.core.library import POSE
 
 BESIDE = ("index", "time", "date", "comment", "name", "collection")  # not looked at by themselves
-RESERVED = ("sigma", "cov", "target", "attachment", "actuator_sigma", "to", "touch")
+RESERVED = ("sigma", "cov", "target", "attachment", "actuator_sigma", "approach", "to", "touch")
 EULER = (("rx", "ry", "rz"), ("a", "b", "c"), ("w", "p", "r"))  # in the order of their letters
 VECTOR = ("rvx", "rvy", "rvz")
 QUATERNION = ("qw", "qx", "qy", "qz")

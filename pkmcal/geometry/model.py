@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, Unit
-from pkmcal.core.laws import Drive
+from pkmcal.core.laws import Drive, Laws
 from pkmcal.display import Table, fixed
 from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.geometry import Geometry
@@ -182,6 +182,12 @@ class Model:
             )
             for i, limb in enumerate(self.limbs, 1)
         )  # fmt: skip
+
+    def doubts(self) -> dict[int, str]:
+        """Drives whose law has no inverse over their stroke, counted from 0, and why."""
+        if not self.driven:
+            return {}
+        return Laws(self.drives, self.geometry.slots.size).doubts(self.geometry.slots)
 
     def limb_of_drive(self, d: int) -> int:
         """The limb, counted from 0, that a drive is in."""

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from typing import Any
 
 from pkmcal.arrays import Unit
-from pkmcal.core.laws import Laws
 from pkmcal.files.toml_table import Table, shown
 from pkmcal.geometry.laws import Law
 from pkmcal.geometry.model import Model
@@ -100,11 +99,7 @@ def law_table(law: Law, unit: Unit, written: Callable[[str], Any]) -> dict[str, 
 
 def refuse_turning(model: Model, tables: list[Table]) -> None:
     """Refuse laws whose inverse is not known over the stroke, with the line of their limb."""
-    if not model.driven:
-        return
-    geometry = model.geometry
-    doubts = Laws(model.drives, geometry.slots.size).doubts(geometry.slots)
-    for d, why in doubts.items():
+    for d, why in model.doubts().items():
         limb = model.limb_of_drive(d)
         tables[min(limb, len(tables) - 1)].fail(
             "drive" if model.chains is None else "joints", f"limb {limb + 1}: {why}"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import ChainMachine
 from pkmcal.geometry.chains import PARTS, Chains, Joint, towards
-from pkmcal.kinematics.limits import ROUNDING, Feasibility
+from pkmcal.kinematics.limits import Feasibility, kept, margin_of
 from pkmcal.screw import from_pose
 
 
@@ -31,7 +31,7 @@ def feasibility(
     drive = machine.drives(slots, q)
     shape = (len(own), len(chains.limbs))
     stroke, before, last = (np.full(shape, np.inf) for _ in range(3))
-    room = np.zeros((3, shape[1]))
+    in_stroke = np.ones(shape, dtype=bool)
     turned, platform = _turned(machine, frames), _platform(machine, own)
     for i, limb in enumerate(chains.limbs):
         at = 0
@@ -39,35 +39,24 @@ def feasibility(
             count = 0 if joint.ball and joint is limb[-1] else joint.parts
             if joint.stroke is not None:
                 value = _value(chains, machine, i, k, passive, drive)
-                low, high = joint.stroke
-                stroke[:, i] = np.fmin(stroke[:, i], np.minimum(value - low, high - value))
-                room[0, i] = max(room[0, i], abs(low) + abs(high))
+                margin = margin_of(joint.stroke, value)
+                stroke[:, i] = np.fmin(stroke[:, i], margin)
+                in_stroke[:, i] &= kept(margin, joint.unit, chains.size) | np.isnan(margin)
             if joint.cone is not None:
                 start = machine.layout.first[i] + i + at
                 behind = turned[:, start + count] if count else platform
                 bend = _bend(limb, k, turned[:, start], behind)
-                where, row = (last, 2) if joint is limb[-1] else (before, 1)
+                where = last if joint is limb[-1] else before
                 where[:, i] = np.fmin(where[:, i], joint.cone - bend)
-                room[row, i] = max(room[row, i], joint.cone)
             at += count
-    margins = (stroke, before, last)
-    kept = [
-        np.asarray(margin >= -ROUNDING * size) for margin, size in zip(margins, room, strict=True)
-    ]
     reach = np.asarray(np.isfinite(q).all(axis=1) & np.isfinite(frames).all(axis=(1, 2)))
     first = np.array([_first_actuator(limb) for limb in chains.limbs])
     shown = np.where(first >= 0, drive[:, np.maximum(first, 0)], 0.0)
     return Feasibility(
-        np.broadcast_to(reach[:, None], shape).copy(), kept[0], kept[1], kept[2],
+        np.broadcast_to(reach[:, None], shape).copy(), in_stroke,
+        kept(before, "rad", chains.size), kept(last, "rad", chains.size),
         np.where(reach[:, None], shown, np.nan), stroke, before, last,
     )  # fmt: skip
-
-
-def in_strokes(chains: Chains, drive: FloatArray) -> BoolArray:
-    """Which actuators (n,) keep the strokes of their joints with drives at q̃ (n,)."""
-    limits = [joint.stroke or (-np.inf, np.inf) for _, joint in chains.actuated]
-    low, high = np.array(limits).T
-    return np.asarray((low <= drive) & (drive <= high))
 
 
 def _first_actuator(limb: tuple[Joint, ...]) -> int:
@@ -80,20 +69,29 @@ def _value(
     joint = chains.limbs[i][k]
     if joint.actuator is not None:
         return drive[:, joint.actuator]
-    name = joint.share or f"limb{i + 1}.joint{k + 1}"
-    index = list(chains.parts).index(name + PARTS[0])
-    return passive[:, machine.layout.coordinate[index]]
+    return passive[:, passive_coordinate(chains, i, k)]
+
+
+def passive_coordinate(chains: Chains, i: int, k: int) -> int:
+    """Which of the passive coordinates joint k of limb i has, its first part's."""
+    name = chains.limbs[i][k].share or f"limb{i + 1}.joint{k + 1}"
+    return int(chains.layout.coordinate[list(chains.parts).index(name + PARTS[0])])
+
+
+def home_axes(machine: ChainMachine) -> FloatArray:
+    """Axes at home of each frame that `ChainMachine.frames` gives, (frames, 3, 3)."""
+    layout = machine.layout
+    home = np.empty((len(layout.member) + len(layout.ball), 3, 3))
+    for i, (first, end) in enumerate(zip(layout.first[:-1], layout.first[1:], strict=True)):
+        home[first + i : end + i] = layout.axes[layout.member[first:end]]
+        home[end + i] = np.eye(3) if layout.ball[i] else layout.home[:3, :3]
+    return home
 
 
 def _turned(machine: ChainMachine, frames: FloatArray) -> FloatArray:
     """What the bodies have turned by since home: before each joint, and of each end."""
-    layout = machine.layout
-    home = np.empty((frames.shape[1], 3, 3))
-    for i, (first, end) in enumerate(zip(layout.first[:-1], layout.first[1:], strict=True)):
-        home[first + i : end + i] = layout.axes[layout.member[first:end]]
-        home[end + i] = np.eye(3) if layout.ball[i] else layout.home[:3, :3]
     R = frames[..., :9].reshape(*frames.shape[:2], 3, 3)
-    found: FloatArray = R @ home.swapaxes(1, 2)
+    found: FloatArray = R @ home_axes(machine).swapaxes(1, 2)
     return found
 
 
@@ -103,14 +101,19 @@ def _platform(machine: ChainMachine, own: FloatArray) -> FloatArray:
     return found
 
 
-def _bend(limb: tuple[Joint, ...], k: int, before: FloatArray, after: FloatArray) -> FloatArray:
-    """How far a joint bends from home, rad: a U its normal, an S the limb."""
+def bend_direction(limb: tuple[Joint, ...], k: int) -> FloatArray:
+    """What a cone of joint k limits, at home: of a U its normal, of an S the limb."""
     joint = limb[k]
     if joint.kind == "U":
         direction = np.cross(joint.axes[0], joint.axes[1])
-        direction /= np.linalg.norm(direction)
-    else:
-        way = towards(limb, k)
-        direction = np.array([0.0, 0.0, 1.0]) if way is None else way
+        normal: FloatArray = direction / np.linalg.norm(direction)
+        return normal
+    way = towards(limb, k)
+    return np.array([0.0, 0.0, 1.0]) if way is None else way
+
+
+def _bend(limb: tuple[Joint, ...], k: int, before: FloatArray, after: FloatArray) -> FloatArray:
+    """How far a joint bends from home, rad."""
+    direction = bend_direction(limb, k)
     a, b = before @ direction, after @ direction
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))

@@ -101,7 +101,7 @@ def dexterity(robot: Robot, poses: ArrayLike) -> Dexterity:
 
 def _measures(robot: Robot, poses: FloatArray) -> FloatArray:
     """The five measures, one per row (5, N)."""
-    own, _ = robot.own_rows(poses)
+    own = robot.on_map(robot.own_rows(poses)[0])
     slots = robot.slots
     q = robot.machine.inverse(slots, own)
     closure = robot.machine.closure(slots, own, q)

@@ -9,7 +9,8 @@ from pkmcal.kinematics.robot import Robot
 
 INDEPENDENT = 1e-7  # least part of a number's effect that the others cannot have
 _ALIKE = 1e-6  # share by which effects differ that are not equal
-POSES = 40
+POSES = 40  # at least
+_HALVINGS = 8
 _KNOWN = ("gain", "drive")  # better than what an arm of a machine is
 SHARE = 0.2  # of the characteristic length, and rad: how far from home the actuators go
 ERRORS = {"mm": 0.1, "rad": 1e-3}  # sizes at which effects are compared
@@ -72,15 +73,25 @@ def near_home(robot: Robot) -> FloatArray:
     """Effects (N, 6, p) of every number at random coordinates near home, as twists (v, ω).
 
     By the linear model, also where there are more closures than coordinates: which effects are
-    independent does not hang on what is missed.
+    independent does not hang on what is missed. The coordinates are so near that the machine can be
+    solved at half of them, and so many that the poses do not limit what is independent.
     """
-    random = np.random.default_rng(0)
     home = robot.inverse(robot.home)
     way = np.array([SHARE * (robot.length if u == "mm" else 1.0) for u in robot.actuator_units])
-    q = home + random.uniform(-way, way, (POSES, robot.n_actuators))
-    solved = robot.forward(q)
-    good = np.asarray(solved.ok)
-    own, _ = robot.own_rows(solved.pose[good])
     columns = robot.geometry.slot_index.astype(np.int32)
-    given = (robot.slots, own, np.ascontiguousarray(q[good]), columns, True)
-    return robot.machine.error_jacobian(*given)[:, [3, 4, 5, 0, 1, 2]]
+    poses = max(POSES, len(columns) // 2)
+    found = np.empty((0, 6, len(columns)))
+    for _ in range(_HALVINGS):
+        q = home + np.random.default_rng(0).uniform(-way, way, (poses, robot.n_actuators))
+        solved = robot.forward(q)
+        good = np.asarray(solved.ok)
+        own, _ = robot.own_rows(solved.pose[good])
+        given = (robot.slots, own, np.ascontiguousarray(q[good]), columns, True)
+        effects = robot.machine.error_jacobian(*given)[:, [3, 4, 5, 0, 1, 2]]
+        effects = effects[np.isfinite(effects).all(axis=(1, 2))]
+        if len(effects) > len(found):
+            found = effects
+        if 2 * len(found) >= poses:
+            break
+        way = way / 2
+    return found

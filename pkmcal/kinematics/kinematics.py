@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
-from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows
+from pkmcal.arrays import BoolArray, FloatArray, Unit, as_numbers, as_rows
 from pkmcal.core.chains import ChainMachine
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import MAPS, POSE
@@ -17,11 +17,10 @@ from pkmcal.core.machine import Machine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import CHAIN, Model
-from pkmcal.kinematics.chain_limits import in_strokes
 from pkmcal.kinematics.complete import Completed, complete, matched_coordinates
 from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
-from pkmcal.kinematics.limits import stroke_margin
+from pkmcal.kinematics.limits import kept, margin_of
 from pkmcal.kinematics.machines import machine_of
 from pkmcal.modes.find import AssemblyProblem
 
@@ -56,8 +55,8 @@ class Kinematics:
         self.model = instance("model", model, Model, " (see pkmcal.load)")
         self.slots = np.ascontiguousarray(model.geometry.slots)
         self.frames = Frames(model.base_frame, model.tool_frame)
-        self.own_home = np.ascontiguousarray(model.home, dtype=np.float64)
         self.machine = machine_of(model, self.slots, self.length)
+        self.own_home = self.on_map(np.array(model.home, dtype=np.float64)[None])[0].copy()
 
     @property
     def limb_machine(self) -> Machine | DrivenMachine:
@@ -406,11 +405,17 @@ class Kinematics:
         By default q is the inverse of the poses as the pose map has them.
         """
         if q is None:
-            on_map = own.copy()
-            if self.model.map in ("translation", "planar", "xy"):  # what these do not move is 0
-                on_map[:, [i for i, name in enumerate(POSE) if name not in self.coordinates]] = 0.0
-            q = self.machine.inverse(self.slots, on_map)
+            q = self.machine.inverse(self.slots, self.on_map(own))
         return self.machine.closure(self.slots, own, q).by_step
+
+    def on_map(self, own: FloatArray) -> FloatArray:
+        """Own poses (N, 6) as the pose map has them: what it does not move is not looked at."""
+        if self.model.map == "2tpr2tps":  # has x follow z and β
+            q = np.zeros((len(own), self.n_actuators))
+            return np.asarray(self.machine.closure(self.slots, own, q).pose)
+        found: FloatArray = own.copy()
+        found[:, [i for i, name in enumerate(POSE) if name not in self.coordinates]] = 0.0
+        return found
 
     def drives(self, q: FloatArray) -> FloatArray:
         """q̃ of each limb (N, limbs) at actuator coordinates (N, n).
@@ -431,12 +436,19 @@ class Kinematics:
 
     def _in_strokes(self, q: FloatArray) -> BoolArray:
         """Which actuators (n,) keep the strokes of all their limbs at coordinates (n,)."""
+        inside = np.ones(self.n_actuators, dtype=bool)
+        drives = self.machine.drives(self.slots, q[None])[0]
+        for (actuator, stroke, unit), drive in zip(self._strokes(), drives, strict=True):
+            margin = margin_of(stroke, drive)
+            inside[actuator] &= bool(kept(margin, unit, self.machine.struct.size))
+        return inside
+
+    def _strokes(self) -> list[tuple[int, tuple[float, float] | None, Unit]]:
+        """Actuator, stroke and unit of each drive: of limbs, of chains those of the actuators."""
         if self.model.chains is not None:
-            return in_strokes(self.model.chains, self.machine.drives(self.slots, q[None])[0])
-        kept = np.ones(self.n_actuators, dtype=bool)
-        for limb, drive in zip(self.model.limbs, self.drives(q[None])[0], strict=True):
-            kept[limb.actuator] &= bool(stroke_margin(limb, drive) >= 0.0)
-        return kept
+            return [(a, j.stroke, j.unit) for a, (_, j) in enumerate(self.model.chains.actuated)]
+        limbs = self.model.limbs
+        return [(limb.actuator, limb.stroke, KINDS[limb.kind].actuator_unit) for limb in limbs]
 
 
 def _for_each(

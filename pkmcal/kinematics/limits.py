@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import BoolArray, FloatArray, Unit
 from pkmcal.display import Table, first_rows
+from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Cone, Limb
 from pkmcal.result import Result
 
-ROUNDING = 1e-12  # relative: a pose at a limit keeps it
+AT_LIMIT = 1e-10  # of the machine's size, or rad: so near a limit it is kept
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,7 +70,11 @@ class Feasibility(Result):
 
 
 def feasibility(
-    limbs: tuple[Limb, ...], drive: FloatArray, on_base: FloatArray, on_platform: FloatArray
+    limbs: tuple[Limb, ...],
+    drive: FloatArray,
+    on_base: FloatArray,
+    on_platform: FloatArray,
+    size: float,
 ) -> Feasibility:
     """Compare limbs at N poses with their limits.
 
@@ -81,31 +86,49 @@ def feasibility(
         q̃, NaN out of reach.
     on_base, on_platform : ndarray (N, limbs, 3)
         Unit vectors from anchor to platform joint, in base and platform axes.
+    size : float
+        Of the machine, mm: what rounding is measured against.
     """
     stroke, base_cone, platform_cone = (np.full(drive.shape, np.inf) for _ in range(3))
-    room = np.zeros((3, drive.shape[1]))
+    in_stroke = np.ones(drive.shape, dtype=bool)
     for i, limb in enumerate(limbs):
         if limb.stroke is not None:
-            room[0, i] = abs(limb.stroke[0]) + abs(limb.stroke[1])
-            stroke[:, i] = stroke_margin(limb, drive[:, i])
-        for k, cone, margin, direction in (
-            (1, limb.base_cone, base_cone, on_base),
-            (2, limb.platform_cone, platform_cone, on_platform),
+            unit = KINDS[limb.kind].actuator_unit
+            stroke[:, i] = margin_of(limb.stroke, drive[:, i])
+            in_stroke[:, i] = kept(stroke[:, i], unit, size)
+        for cone, margin, direction in (
+            (limb.base_cone, base_cone, on_base),
+            (limb.platform_cone, platform_cone, on_platform),
         ):
             if cone is not None:
-                room[k, i] = cone.angle
                 margin[:, i] = _inside(cone, direction[:, i])
-    margins = (stroke, base_cone, platform_cone)
-    kept = [margin >= -ROUNDING * size for margin, size in zip(margins, room, strict=True)]
     return Feasibility(
-        np.isfinite(drive), kept[0], kept[1], kept[2], drive, stroke, base_cone, platform_cone
+        np.isfinite(drive),
+        in_stroke,
+        kept(base_cone, "rad", size),
+        kept(platform_cone, "rad", size),
+        drive,
+        stroke,
+        base_cone,
+        platform_cone,
     )
 
 
-def stroke_margin(limb: Limb, drive: FloatArray) -> FloatArray:
-    """How far inside its limb's stroke each q̃ (N,) is; infinite where the limb states none."""
-    low, high = limb.stroke or (-np.inf, np.inf)
+def margin_of(stroke: tuple[float, float] | None, drive: FloatArray) -> FloatArray:
+    """How far inside a stroke each q̃ (N,) is; infinite where none is stated."""
+    low, high = stroke or (-np.inf, np.inf)
     return np.minimum(drive - low, high - drive)
+
+
+def kept(margin: FloatArray, unit: Unit, size: float) -> BoolArray:
+    """Whether limits are kept with these margins, rounding apart: a pose at a limit keeps it.
+
+    Examples
+    --------
+    >>> kept(np.array([1.0, -1e-9, -1e-6]), "mm", 1000.0)
+    array([ True,  True, False])
+    """
+    return np.asarray(margin >= -AT_LIMIT * (size if unit == "mm" else 1.0))
 
 
 def _inside(cone: Cone, direction: FloatArray) -> FloatArray:

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.core.driven import CompiledMachine
+from pkmcal.core.driven import CompiledMachine, DrivenMachine
 from pkmcal.screw import from_pose, log
 
 # Of the size, to each side. The step's square is what differences of third order leave out, the
@@ -47,15 +47,22 @@ def error_jacobian(
         Of the twist (ω, v) of the platform in place of the pose.
     """
     size = machine.struct.size
-    steps = {"mm": _STEP * size, "rad": _STEP, "1": _STEP, "1/rad": _STEP}
-    steps |= {"1/mm": _STEP / size, "1/mm2": _STEP / size**2}
+    steps = {"mm": _STEP * size, "rad": _STEP, "1": _STEP}
     out = np.empty((len(pose), 6, len(columns)))
-    for k, (column, unit) in enumerate(zip(columns.tolist(), units, strict=True)):
+    unit_of = dict(zip(columns.tolist(), units, strict=True))
+    factor = np.ones((len(pose), len(columns)))
+    if isinstance(machine, DrivenMachine):  # a law moves its drive, however large its numbers are
+        columns, factor = machine.as_offsets(slots, q, columns)
+        unit_of |= {d.offset: "rad" if d.angle else "mm" for d in machine.laws.drives}
+    for column in np.unique(columns).tolist():
+        step = steps[unit_of[column]]
         start, end = (
             machine.forward(_changed(slots, column, change), q, pose, threads=None)[0]
-            for change in (-steps[unit], steps[unit])
+            for change in (-step, step)
         )
-        out[:, :, k] = _between(start, end, twists) / (2.0 * steps[unit])
+        alike = columns == column
+        out[:, :, alike] = (_between(start, end, twists) / (2.0 * step))[:, :, None]
+    out *= factor[:, None]
     return out
 
 

@@ -123,8 +123,10 @@ def readings_by_numbers(
     columns = robot.geometry.slot_index[moving].astype(np.int32)
     by_number = _of_limbs(robot).readings(robot.slots, own, q, columns)[2]
     assert by_number is not None
-    by_places: FloatArray = by_number @ chain[moving]
-    return by_places
+    if np.array_equal(chain[moving], np.eye(len(places))):
+        return by_number
+    by_places: FloatArray = by_number.reshape(-1, len(moving)) @ chain[moving]
+    return by_places.reshape(*by_number.shape[:2], len(places))
 
 
 def sphere_actuators(robot: Robot) -> list[int]:

@@ -7,6 +7,8 @@ from copy import copy
 from dataclasses import fields, replace
 from functools import cached_property
 from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,7 +17,7 @@ from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
 from pkmcal.core.chains import ChainMachine
-from pkmcal.core.driven import CompiledMachine
+from pkmcal.core.driven import CompiledMachine, DrivenMachine
 from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
@@ -31,6 +33,9 @@ from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
 from pkmcal.modes.find import assemblies, continue_path, find_modes, nearest_first, pose_distance
 from pkmcal.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 class Robot(Kinematics, Result):
@@ -141,7 +146,8 @@ class Robot(Kinematics, Result):
         Returns
         -------
         Feasibility
-            ``.ok`` for each pose; reach, stroke and joint cones for each limb.
+            ``.ok`` for each pose; reach, stroke and joint cones for each limb. What exceeds a
+            limit by rounding, 1e-10 of the machine's size or rad, keeps it.
         """
         rows, shape = self.own_rows(pose)
         chains = self.model.chains
@@ -160,7 +166,8 @@ class Robot(Kinematics, Result):
             there = self.drives(self._batch(actuators, shape))
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
             drive = np.where(angle, there + wrapped(drive - there), drive)
-        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform), shape)
+        size = self.machine.struct.size
+        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform, size), shape)
 
     def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
         """Every assembly mode at given actuator coordinates, with proof.
@@ -223,7 +230,7 @@ class Robot(Kinematics, Result):
             order,
             poses=poses,
             distance=lambda pose: pose_distance(own, self.frames.inward(pose), self.length),
-            feasible=lambda: self.feasible(poses).ok,
+            feasible=lambda: self.feasible(poses, np.tile(rows, (len(poses), 1))).ok,
             continued=continued,
         )
 
@@ -347,6 +354,66 @@ class Robot(Kinematics, Result):
         named = errors @ self.geometry.chain[:, -count:]
         return np.concatenate([errors, named], axis=-1)
 
+    def show(
+        self, path: str | PathLike[str] | None = None, *, poses: ArrayLike | None = None
+    ) -> Path:
+        """Write the machine as a page that moves it, as `pkmcal.show` does.
+
+        Parameters
+        ----------
+        path : str or path, optional
+            Where to write; an existing file is replaced. By default a temporary file, which is
+            opened in the browser.
+        poses : array_like (N, 6), optional
+            To be shown and gone to one by one, mm and rad.
+        """
+        from pkmcal.view.show import show
+
+        return show(self, path, poses=poses)
+
+    def plot(
+        self,
+        axes: Axes | None = None,
+        pose: ArrayLike | None = None,
+        *,
+        numbers: bool = True,
+        color: str | None = None,
+    ) -> Axes:
+        """Draw the machine as lines with matplotlib, for papers.
+
+        Parameters
+        ----------
+        axes : matplotlib.axes.Axes, optional
+            Of three dimensions, or of two: then it is seen from above. By default new ones.
+        pose : array_like (6,), optional
+            Where it is drawn, mm and rad; home by default.
+        numbers : bool
+            Whether limbs have their numbers.
+        color : str, optional
+            Of all lines; by default the next of the axes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The axes, in mm, with equal scales.
+
+        Raises
+        ------
+        ValueError
+            The machine does not get to the pose.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> from matplotlib.figure import Figure
+        >>> axes = Figure().add_subplot(projection="3d")
+        >>> pk.load("hexapod").plot(axes).get_xlabel()
+        'x [mm]'
+        """
+        from pkmcal.view.plot import of_robot
+
+        return of_robot(self, axes, pose, numbers, color)
+
     # changing and saving --------------------------------------------------------------------------
 
     def replace(self, changes: Mapping[str, float] | FloatArray) -> Robot:
@@ -387,6 +454,37 @@ class Robot(Kinematics, Result):
         changed.model = replace(self.model, geometry=self.geometry.replace(values))
         changed.slots = np.ascontiguousarray(changed.model.geometry.slots)
         return changed
+
+    def approaching(self, approach: ArrayLike) -> Robot:
+        """The robot with actuators that come from a known direction, for laws with backlash.
+
+        Parameters
+        ----------
+        approach : array_like (n,) or (..., n)
+            Of each actuator +1 where its reading grew before it stopped, -1 where it fell, 0 where
+            that is not known, which is half way between. A batch goes with calls of as many rows.
+
+        Returns
+        -------
+        Robot
+            What `replace` and `load` make of it knows no directions.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")  # without backlash
+        >>> bool(robot.approaching([1] * 6).forward(robot.inverse(robot.home)).ok)
+        True
+        """
+        rows, shape = as_rows("approach", approach, self.n_actuators)
+        if not np.isin(rows, (-1.0, 0.0, 1.0)).all():
+            raise ArgumentError("approach must be 1, -1 or 0 for each actuator")
+        if not isinstance(self.machine, DrivenMachine):
+            return self
+        other = copy(self)
+        other.__dict__.pop("_of_any_misfit", None)  # of the same directions
+        other.machine = self.machine.approaching(rows[0] if shape == () else rows)
+        return other
 
     @cached_property
     def _of_any_misfit(self) -> CompiledMachine:
@@ -441,8 +539,12 @@ class Robot(Kinematics, Result):
         Raises
         ------
         ValueError
-            `like` describes another robot.
+            `like` describes another robot; a drive law has no inverse over its stroke, so that
+            the file could not be read.
         """
+        for d, why in self.model.doubts().items():
+            limb = self.model.limb_of_drive(d) + 1
+            raise ArgumentError(f"robot: limb {limb} of {self.name}: its drive law: {why}")
         if like is None or self.model.chains is not None:
             robot_file.write(self.model, path, comment)
             return

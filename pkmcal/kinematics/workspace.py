@@ -182,7 +182,7 @@ def sample_poses(robot: Robot, count: int = 30, seed: int = 0, *, share: float =
         drawn = np.repeat(robot.home[None], 2 * count, axis=0)
         drawn[:, columns] = random.uniform(low, high, (2 * count, len(columns)))
         drawn = completed(robot, drawn)
-        kept = np.concatenate([kept, drawn[_good(robot, drawn)]])
+        kept = np.concatenate([kept, drawn[good_poses(robot, drawn)]])
         if len(kept) >= count:
             return kept[:count]
     raise ArgumentError(f"{robot.name}: found {len(kept)} good poses, {count} are wanted")
@@ -202,7 +202,7 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
     ValueError
         Home is no good pose.
     """
-    if not _good(robot, robot.home[None])[0]:
+    if not good_poses(robot, robot.home[None])[0]:
         broken = robot.feasible(robot.home[None]).broken()
         why = f"home breaks a limit: {'; '.join(broken)}" if broken else "home is singular"
         raise ArgumentError(f"{robot.name}: {why.replace(' in rows 0', '')}")
@@ -218,7 +218,7 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
         for sign in (-1.0, 1.0):
             ray = np.repeat(robot.home[None], _STEPS, axis=0)
             ray[:, POSE.index(name)] += sign * step * np.arange(_STEPS)
-            good = _good(robot, completed(robot, ray))
+            good = good_poses(robot, completed(robot, ray))
             last = int(np.argmin(good)) - 1 if not good.all() else _STEPS - 1
             ends.append(float(ray[last, POSE.index(name)]))
         found[name] = (ends[0], ends[1])
@@ -253,7 +253,8 @@ def _inside(robot: Robot, feasible: Feasibility, dexterity_there: Dexterity) -> 
     return np.asarray(feasible.ok & held)
 
 
-def _good(robot: Robot, poses: FloatArray) -> BoolArray:
+def good_poses(robot: Robot, poses: FloatArray) -> BoolArray:
+    """Which poses (N, 6) keep all limits, on home's side of all singularities and not near one."""
     there = dexterity(robot, poses)
     least = _SMALLEST * float(dexterity(robot, robot.home).conditioning)
     return _inside(robot, robot.feasible(poses), there) & (there.conditioning > max(least, 1e-9))

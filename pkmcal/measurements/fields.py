@@ -74,6 +74,29 @@ def sigma_array(
     return np.array(np.broadcast_to(sigma, shape))
 
 
+def value_of_row(
+    given: ArrayLike | None, kind: Kind, k: int, q: tuple[int, ...]
+) -> FloatArray | None:
+    """What was read in one row, (k,) or a number, as that of (1,) rows."""
+    if given is None:
+        return None
+    value = numbers("values", given, blank=True)
+    if kind == "touch" and value.shape[:1] == (1,):
+        return value  # of names that are touched
+    if value.shape != ((k,) if k != 1 else ()):
+        what = f"have shape ({k},)" if k != 1 else "be a number"
+        raise ArgumentError(
+            f"values of kind {kind!r} must {what} for one row of actuators {q}, or actuators have"
+            f" shape (N, n); found {value.shape}"
+        )
+    return value[None]
+
+
+def number_of_row(given: ArrayLike | None) -> ArrayLike | None:
+    """What has one entry a row, of one row."""
+    return None if given is None else np.atleast_1d(np.asarray(given))
+
+
 def values_array(given: ArrayLike | None, kind: Kind, shape: tuple[int, int]) -> FloatArray:
     """What was read, (N, k) or (N,); NaN where nothing was, of orientations as a whole."""
     if given is None:
@@ -195,6 +218,28 @@ def names_of_targets(
         wanted = int(index.max()) + 1 if target is None else len(target)
         raise ArgumentError(f"target_names must name {wanted} targets; found {len(names)}")
     return names
+
+
+def approach_array(given: ArrayLike | None, actuators: FloatArray) -> FloatArray | None:
+    """From where each actuator came (N, n): 1, -1 or 0; "order": by the order of the rows."""
+    if given is None:
+        return None
+    if isinstance(given, str):
+        if given != "order":
+            raise ArgumentError(f"approach must be 'order' or numbers; found {given!r}")
+        moved = np.sign(np.diff(actuators, axis=0, prepend=actuators[:1]))
+        for row, before in zip(moved[1:], moved[:-1], strict=True):
+            row[row == 0.0] = before[row == 0.0]  # it stood still since
+        return np.asarray(moved)
+    found = numbers("approach", given)
+    if found.shape not in ((), actuators.shape[1:], actuators.shape):
+        raise ArgumentError(
+            f"approach must be one number or have shape {actuators.shape[1:]} or"
+            f" {actuators.shape}; found {found.shape}"
+        )
+    if not np.isin(found, (-1.0, 0.0, 1.0)).all():
+        raise ArgumentError("approach must be 1, -1 or 0 for each actuator")
+    return np.array(np.broadcast_to(found, actuators.shape))
 
 
 def sessions_array(given: str | Sequence[str] | TextArray | None, rows: int) -> TextArray | None:

@@ -19,6 +19,7 @@ columns                               meaning
 ``actuator_sigma.q1 [mm]`` …          … or of each of them
 ``group``                             a whole number, the same for repeats of one pose
 ``session``                           when the row was measured, by a name
+``approach.q1`` …                     1 or -1: the reading had grown or fallen; 0: not known
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
@@ -183,6 +184,7 @@ def read_measurements(
     if "group" in table.columns:
         fields["group"] = table.integers("group")
     fields["session"] = _read_session(table)
+    fields["approach"] = _read_approach(table, len(actuator_units))
     values: FloatArray | None
     if several:
         actuators, values, fields = read_several(table, several, actuators, fields)
@@ -292,8 +294,9 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     names = {f"q{i + 1}" for i in range(len(table.columns))}
     names |= {name for name in table.columns if ACTUATOR.fullmatch(name)}
     names |= {*components, "distance", "sigma", "group", "session", "target", "probe"}
-    names |= {"actuator_sigma"}
-    names |= {f"actuator_sigma.{name}" for name in names if ACTUATOR.fullmatch(name)}
+    names |= {"actuator_sigma", "approach"}
+    of_actuators = [name for name in names if ACTUATOR.fullmatch(name)]
+    names |= {f"{what}.{q}" for what in ("actuator_sigma", "approach") for q in of_actuators}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
     names |= {f"sigma.{name}" for name in component_names()} | names_of_kinds(table)
@@ -356,6 +359,20 @@ def _nominal(robot: Actuated | None, actuators: FloatArray) -> FloatArray | None
     some = np.unique(np.linspace(0, len(actuators) - 1, _TRIED).astype(int))
     angles[some] = machine.forward(actuators[some]).pose[:, 3:]
     return angles
+
+
+def _read_approach(table: Table, count: int) -> FloatArray | None:
+    """From where each actuator came (rows, n)."""
+    each = [f"approach.q{i + 1}" for i in range(count)]
+    given = [name for name in table.columns if name.startswith("approach")]
+    if not given:
+        return None
+    if given != ["approach"]:
+        table.require(each)
+        if len(given) > len(each):
+            raise table.header_error("column 'approach' does not go with those of actuators")
+    names = ["approach"] * count if given == ["approach"] else each
+    return np.stack([table.integers(name) for name in names], axis=1).astype(np.float64)
 
 
 def _read_session(table: Table) -> TextArray | None:

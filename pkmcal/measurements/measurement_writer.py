@@ -76,6 +76,10 @@ class Writable(OfAKind, Protocol):
         """Which rows repeat one pose."""
 
     @property
+    def approach(self) -> FloatArray | None:
+        """From where each actuator came."""
+
+    @property
     def session(self) -> TextArray | None:
         """When each row was measured."""
 
@@ -140,6 +144,9 @@ def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
         yield "group", [str(number) for number in m.group]
     if m.session is not None:
         yield "session", m.session.tolist()
+    if m.approach is not None:
+        for i, each in enumerate(m.approach.T):
+            yield f"approach.q{i + 1}", [f"{direction:.0f}" for direction in each]
 
 
 def _actuator_sigma(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:

@@ -18,17 +18,25 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.components import KINDS, Artefact, Kind, components
 from pkmcal.measurements.fields import (
     actuator_sigma_array,
+    approach_array,
     attachment_array,
     integers,
     names_of_targets,
+    number_of_row,
     numbers,
     sessions_array,
     sigma_array,
     target_array,
     units_of_actuators,
+    value_of_row,
     values_array,
 )
-from pkmcal.measurements.kind_fields import KindFields, TouchDistances, kind_fields
+from pkmcal.measurements.kind_fields import (
+    KindFields,
+    TouchDistances,
+    kind_fields,
+    kind_fields_of_row,
+)
 from pkmcal.measurements.listing import deviations, table, title
 from pkmcal.measurements.measurement_writer import write_measurements
 from pkmcal.measurements.tracker import Tracker
@@ -36,7 +44,7 @@ from pkmcal.result import Result
 
 _PER_ROW = (
     "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines", "session",
-    "other", "run", "touched",
+    "approach", "other", "run", "touched",
 )  # fmt: skip
 
 
@@ -51,6 +59,8 @@ class Measurements(Result):
     values : (N, 6), (N, 3), (N, 2) or (N,) array
         What was measured, in mm and rad, in the base frame (or the instrument's, where
         `identify` is given ``frame="unknown"``); see `kind`. NaN: not read there.
+        One row is taken as it is: actuators (n,) with values (6,), (3,) or a number, and what else
+        has one entry a row likewise.
     kind : {"position", "pose", "height", "distance", "closure"}
         "pose": x y z alpha beta gamma of the platform, (N, 6). "position": x y z of the target,
         (N, 3). "height": z of the target, (N,). "distance": from the target, which here is a
@@ -104,6 +114,10 @@ class Measurements(Result):
     session : str or (N,) sequence of str, optional
         When the rows were measured, one word for all or one a row: `identify` may find some
         numbers anew in each session. None: not stated. Kept as (N,).
+    approach : scalar, (n,) or (N, n) array, or "order", optional
+        From where each actuator came, for drives with backlash: 1 where its reading had grown, -1
+        where it had fallen, 0 where that is not known. "order": the machine was driven from row to
+        row as they stand. Kept as (N, n).
     lines : (N,) array of int, optional
         The line of each row in the file it was read from, to name it by.
     file : str
@@ -143,6 +157,7 @@ class Measurements(Result):
     touch_distances: TouchDistances = ()
     joint: str | None = None
     session: TextArray | None = None
+    approach: FloatArray | None = None
     lines: Int64Array | None = None
     file: str = ""
     notes: tuple[str, ...] = ()
@@ -169,18 +184,29 @@ class Measurements(Result):
         touch_distances: Mapping[tuple[str, str], Any] | TouchDistances = (),
         joint: str | None = None,
         session: str | Sequence[str] | TextArray | None = None,
+        approach: ArrayLike | None = None,
         lines: ArrayLike | None = None,
         file: str = "",
         notes: Sequence[str] = (),
     ) -> None:
         word("kind", kind, KINDS)
         q = numbers("actuators", actuators)
-        if q.ndim != 2 or 0 in q.shape:
-            raise ArgumentError(f"actuators must have shape (N, n), not empty; found {q.shape}")
-        own, values = kind_fields(
-            kind, q.shape, values, KindFields(other, run, touched, artefact, touch_distances, joint)
-        )
-        shape = (len(q), len(components(kind, own["artefact"])))
+        if q.ndim not in (1, 2) or 0 in q.shape:
+            raise ArgumentError(
+                f"actuators must have shape (N, n), or (n,) for one row, not empty; found {q.shape}"
+            )
+        alone, q = q.ndim == 1, np.atleast_2d(q)
+        given = KindFields(other, run, touched, artefact, touch_distances, joint)
+        if alone:
+            values, given = kind_fields_of_row(kind, values, given)
+        own, values = kind_fields(kind, q.shape, values, given)
+        k = len(components(kind, own["artefact"]))
+        if alone:
+            values = value_of_row(values, kind, k, q.shape[1:])
+            group, target_index, lines = map(number_of_row, (group, target_index, lines))
+            if k > 1 and not isinstance(sigma, Tracker) and np.asarray(sigma).shape == (k, k):
+                sigma = np.asarray(sigma)[None]
+        shape = (len(q), k)
         v = values_array(values, kind, shape)
         index = None if target_index is None else integers("target_index", target_index, len(q))
         place = target_array(target, kind, index, len(q))
@@ -199,6 +225,7 @@ class Measurements(Result):
             "actuator_sigma": actuator_sigma_array(actuator_sigma, q.shape),
             **own,
             "session": sessions_array(session, len(q)),
+            "approach": approach_array(approach, q),
             "lines": None if lines is None else integers("lines", lines, len(q)),
             "file": file,
             "notes": words("notes", notes),
@@ -254,7 +281,11 @@ class Measurements(Result):
     @property
     def pose_index(self) -> Int64Array:
         """Which pose each row belongs to, (N,), counted from 0: by `group`, else by actuators."""
-        rows = self.actuators if self.group is None else self.group[:, None]
+        rows: FloatArray | Int64Array = self.actuators
+        if self.group is not None:
+            rows = self.group[:, None]
+        elif self.approach is not None:  # backlash is between them
+            rows = np.hstack([self.actuators, self.approach])
         return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
 
     @property
@@ -360,6 +391,8 @@ class Measurements(Result):
             columns["group"] = self.group
         if self.session is not None:
             columns["session"] = self.session
+        if self.approach is not None:
+            columns |= {f"approach.q{i + 1}": each for i, each in enumerate(self.approach.T)}
         return columns
 
     def _parts(self) -> Iterator[str | Table]:

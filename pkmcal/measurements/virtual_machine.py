@@ -14,6 +14,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import ArmMachine, Solvable
 from pkmcal.measurements.components import KINDS, Artefact, Kind, components
 from pkmcal.measurements.fields import numbers
@@ -89,6 +90,7 @@ class VirtualMachine:
         artefact: Artefact = "point",
         touches: Sequence[str] | None = None,
         joint: str | None = None,
+        approach: ArrayLike | None = None,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.
 
@@ -119,6 +121,8 @@ class VirtualMachine:
             What it is.
         joint : str, optional
             Of kind "angle": the passive joint, a name of ``robot.passive_names``.
+        approach : scalar, (n,) or (N, n) array, or "order", optional
+            From where the actuators come; see `Measurements`.
 
         Returns
         -------
@@ -149,6 +153,7 @@ class VirtualMachine:
             touched=touches,
             artefact=artefact if touching else None,
             joint=joint,
+            approach=approach,
         )
         exact = self._exact(blank, mounting, touched)
         if blank.run is not None:
@@ -162,31 +167,24 @@ class VirtualMachine:
         self, blank: Measurements, mounting: ArrayLike, touched: Mapping[str, ArrayLike] | None
     ) -> FloatArray:
         """What would be read without noise, (N, k)."""
-        pose = self._poses(blank.actuators, "q")
+        machine = self._machine
+        if blank.approach is not None and isinstance(machine, Robot):
+            machine = machine.approaching(blank.approach)
+        pose = _poses(machine, blank.actuators, "q")
         if blank.joint is not None:
             names = getattr(self._machine, "passive_names", ())
             if blank.joint not in names:
                 known = did_you_mean(blank.joint, names)
                 raise ArgumentError(f"joint: no passive joint is called {blank.joint!r}{known}")
-            solved: Any = self._machine.forward(blank.actuators)
+            solved: Any = machine.forward(blank.actuators)
             return np.array(solved.passive[:, [names.index(blank.joint)]])
         return predict(
             blank.kind,
             pose,
-            other=None if blank.other is None else self._poses(blank.other, "other"),
+            other=None if blank.other is None else _poses(machine, blank.other, "other"),
             touching=(blank.artefact, np.full(len(blank), 2)),
             **self._arguments(blank, mounting, touched),
         ).values
-
-    def _poses(self, actuators: FloatArray, argument: str) -> FloatArray:
-        solved = self._machine.forward(actuators)
-        failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
-        if len(failed):
-            raise ArgumentError(
-                f"{argument}: {len(failed)} of {len(actuators)} rows have no pose on the true"
-                f" machine (rows {first_rows(failed, 10)})"
-            )
-        return np.asarray(solved.pose)
 
     def _arguments(
         self, blank: Measurements, mounting: ArrayLike, touched: Mapping[str, ArrayLike] | None
@@ -223,3 +221,14 @@ class VirtualMachine:
         deviations = {"mm": self.noise, "rad": self.angle_noise}
         sigma = np.array([deviations[unit] for unit in blank.units])
         return sigma * drawn, sigma if (sigma > 0).all() else None
+
+
+def _poses(machine: Solvable, actuators: FloatArray, argument: str) -> FloatArray:
+    solved = machine.forward(actuators)
+    failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
+    if len(failed):
+        raise ArgumentError(
+            f"{argument}: {len(failed)} of {len(actuators)} rows have no pose on the true machine"
+            f" (rows {first_rows(failed, 10)})"
+        )
+    return np.asarray(solved.pose)

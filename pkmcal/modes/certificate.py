@@ -173,6 +173,10 @@ class Closures:
             fixed = [_linear(u, {k: 1.0}, float(k == 8)) for k in (2, 5, 6, 7, 8, 11)]
             fixed += [_linear(u, {1: 1.0, 3: 1.0}, 0.0), _linear(u, {0: 1.0, 4: -1.0}, 0.0)]
             return [*fixed, _product(u, (0, 3), (0, 3), 1.0)]
+        if self.map == "spherical":  # p = 0
+            return [*_orthonormal(u), *(_linear(u, {k: 1.0}, 0.0) for k in (9, 10, 11))]
+        if self.map != "2tpr2tps":
+            raise ValueError(f"no certificate has the pose map {self.map!r}")
         # R = Ry Rx has no entry (2, 1), and p lies along (-R31, 0, R11)
         return [*_orthonormal(u), _linear(u, {3: 1.0}, 0.0), _product(u, (0, 6), (9, 11), 0.0)]
 

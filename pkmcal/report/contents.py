@@ -11,6 +11,7 @@ from pkmcal import display
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, largest_first, propagate, rms
 from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
 from pkmcal.display import printable
@@ -179,13 +180,19 @@ def correlation(found: Identification) -> FloatArray:
 
 
 def iso9283(found: Identification) -> list[dict[str, Any]]:
-    """Compute AP, RP and AD of every set of positions or poses, before and after."""
+    """Compute AP, RP and AD of every set of positions or poses, before and after.
+
+    Without outliers, which are errors of the measurement.
+    """
     equations = found.fit.equations
     scores = []
     for i, measured in enumerate(equations.sets):
         if measured.kind not in ("position", "pose"):
             continue
         read = np.isfinite(measured.values).all(axis=1)
+        odd = np.isin(equations.rows[equations.set_of == i], found.outliers)
+        left_out = int((read & odd).sum())
+        read &= ~odd
         if not read.any():
             continue
         group = np.unique(groups(measured)[read], return_inverse=True)[1]
@@ -194,6 +201,7 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
         last = performance(values, values - found.residuals[i][read, :3], group)
         scores.append({
             "set": i + 1,
+            "outliers": left_out,
             "poses": len(first.repeats),
             "repeats": [int(first.repeats.min()), int(first.repeats.max())],
             "accuracy_before": first.accuracy.tolist(),
@@ -221,11 +229,14 @@ def expected(found: Identification, places: FloatArray) -> FloatArray:
 
 
 def as_seen(found: Identification, places: FloatArray) -> FloatArray:
-    """Predict that of the first row's target in the instrument's frame, as `expected` does."""
+    """Predict that of the first row's target in the instrument's frame, as `expected` does.
+
+    Of sessions that of the last.
+    """
     known = found.fit.equations
     at, q, _ = as_machine(found.robot).commanded(places)
-    like = known.datasets[0]
-    rows = np.zeros(len(q), dtype=np.intp)
+    like, first = _first_of_last(found)
+    rows = np.full(len(q), first)
     measured = replace(like.measured.select(rows), actuators=q, group=np.arange(len(q)))
     equations = Equations([replace(like, measured=measured, rows=rows)], known.parameters)
     equations = equations.commanded()
@@ -238,6 +249,30 @@ def as_seen(found: Identification, places: FloatArray) -> FloatArray:
     distance = np.abs(point.pose[equations.pose_of[0]] - at)[:, :3].max(axis=1)
     sure &= (distance < _ELSEWHERE) & found.fit.uncertainty.known
     return np.where(sure, np.sqrt(variance), np.inf)
+
+
+def _first_of_last(found: Identification) -> tuple[FitData, int]:
+    """A set and the number of its first row that is of the last session, whose is the robot."""
+    for data in found.fit.equations.datasets:
+        session = data.measured.session
+        if not found.sessions:
+            return data, 0
+        if session is not None and (session == found.sessions[-1]).any():
+            return data, int(np.argmax(session == found.sessions[-1]))
+    raise AssertionError("a session without rows")
+
+
+def held_out_numbers(found: Identification) -> list[dict[str, Any]]:
+    """List numbers that were found of sessions held out."""
+    return [
+        {
+            "name": printable(name),
+            "unit": found.holdout.units[name],
+            "value": value,
+            "stderr": stderr,
+        }
+        for name, (value, stderr) in found.holdout.own.items()
+    ]
 
 
 def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice | None] | str:

@@ -20,7 +20,8 @@ from pkmcal.report.drawing import (
     in_context,
     sample,
 )
-from pkmcal.report.skeleton import Skeleton, exaggerated
+from pkmcal.report.exaggerated import middle_exaggerated
+from pkmcal.view.plot import lines
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -65,11 +66,7 @@ def machine(found: Identification) -> Figure | None:
 
     Both at the same commands; None where one has no pose.
     """
-    equations = found.fit.equations
-    middle = len(equations.actuators) // 2
-    q, pose = equations.actuators[middle], found.fit.end.pose[middle]
-    before, after = found.fit.start.theta, found.fit.end.theta
-    drawn = exaggerated(equations.parameters, before, after, q, pose)
+    drawn = middle_exaggerated(found)
     if drawn is None:
         return None
     figure = empty_figure(_WIDTH, 4.8)
@@ -78,8 +75,8 @@ def machine(found: Identification) -> Figure | None:
     for panel, (elevation, turn), title in zip(
         panels, ((22, -60), (90, -90)), ("side view", "top view"), strict=True
     ):
-        _lines(panel, assumed, FAINT, "nominal")
-        _lines(panel, calibrated, BLUE, f"calibrated, change × {times}")
+        lines(panel, assumed, FAINT, "nominal")
+        lines(panel, calibrated, BLUE, f"calibrated, change × {times}")
         panel.set_title(title, fontsize="medium")
         panel.view_init(elevation, turn)
         panel.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="" if elevation == 90 else "z [mm]")
@@ -93,14 +90,6 @@ def machine(found: Identification) -> Figure | None:
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
     return figure
-
-
-def _lines(panel: Any, drawn: Skeleton, colour: str, label: str) -> None:
-    for outline in (drawn.base, drawn.platform):
-        panel.plot(*outline.T, color=colour, lw=1, ls=":" if outline is drawn.base else "-")
-    for k, limb in enumerate(drawn.limbs):
-        once = label if k == 0 else None
-        panel.plot(*limb.T, color=colour, lw=2, marker="o", ms=3.5, label=once)
 
 
 @in_context

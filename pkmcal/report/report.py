@@ -15,8 +15,9 @@ from pkmcal.calibration.row_names import row_names
 from pkmcal.display import printable
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import checksums, comment, version
-from pkmcal.report import contents
+from pkmcal.report import contents, machine_view
 from pkmcal.report.as_json import as_json
+from pkmcal.view import page
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,6 +67,7 @@ def gather(found: Identification, files: Mapping[str, bytes]) -> dict[str, Any]:
         "moved": contents.moved(points),
         "directions": contents.directions(found),
         "parameters": contents.parameters(found),
+        "held_out_numbers": contents.held_out_numbers(found),
         "correlation": contents.correlation(found),
         "iso9283": contents.iso9283(found),
         "accuracy": None if isinstance(predicted, str) else predicted[0],
@@ -103,7 +105,10 @@ def html(facts: Mapping[str, Any]) -> str:
         name: Markup(svg)  # matplotlib escapes the texts in it
         for name, svg in _figures(facts).items()
     }
-    return environment.get_template(_TEMPLATE).render(**facts, figures=figures)
+    view, digest = machine_view.element(facts["found"])
+    parts = {"figures": figures, "view": Markup(view), "view_digest": digest}
+    style = Markup(page.style())
+    return environment.get_template(_TEMPLATE).render(**facts, **parts, view_style=style)
 
 
 def _as_data(facts: Mapping[str, Any]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ import pkmcal as pk
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identify import identify
-from pkmcal.calibration.parameters import parameters
+from pkmcal.calibration.parameters import Asked, parameters
 from pkmcal.measurements.calibratable import ArmMachine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
@@ -225,7 +225,7 @@ def test_derivatives_of_what_is_read_are_those_of_differences(kind: str, framed:
         attachment=[50.0, 60.0, 70.0] if kind == "distance" else None,
     )  # fmt: skip
     share = FitData(measured, np.arange(7), framed, False)
-    equations = Equations([share], parameters(ArmMachine(erring(ARM)), [share], None, None, None))
+    equations = Equations([share], parameters(ArmMachine(erring(ARM)), [share], Asked()))
     at = equations.parameters.start.copy()
     if framed:
         at[-6:] = [10.0, -20.0, 30.0, 0.3, -0.2, 0.9]

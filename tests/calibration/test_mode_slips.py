@@ -11,7 +11,7 @@ import pkmcal as pk
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
-from pkmcal.calibration.parameters import parameters
+from pkmcal.calibration.parameters import Asked, parameters
 
 from ..workspaces import WORKSPACE
 
@@ -41,7 +41,7 @@ def test_no_row_is_fitted_in_another_mode_than_it_was_measured_in(name: str, sha
     for seed in range(6):
         robot, true, readings = measured(name, share, seed)
         data = FitData(readings, np.arange(len(readings)), False, False)
-        equations = Equations([data], parameters(robot, [data], "offset*", None, None))
+        equations = Equations([data], parameters(robot, [data], Asked("offset*")))
         start = equations.start()
         moved += in_their_modes(equations, start) is not start
         found = pk.identify(robot, readings, "offset*")
@@ -61,7 +61,7 @@ def test_wrong_readings_are_not_taken_for_other_modes(name: str, wrong: float) -
     values[[3, 11, 20]] += wrong * np.random.default_rng(2).normal(size=(3, 3)) * flat
     readings = pk.Measurements(readings.actuators, values, target=TARGET, sigma=NOISE)
     data = FitData(readings, np.arange(len(readings)), False, False)
-    equations = Equations([data], parameters(robot, [data], "offset*", None, None))
+    equations = Equations([data], parameters(robot, [data], Asked("offset*")))
     start = in_their_modes(equations, equations.start())
     again = in_their_modes(equations, start)
     assert again is start
@@ -71,7 +71,7 @@ def test_wrong_readings_are_not_taken_for_other_modes(name: str, wrong: float) -
 def test_rows_that_stay_in_another_mode_are_named() -> None:
     robot, _, readings = measured("hexapod", 0.5, 3)
     data = FitData(readings, np.arange(len(readings)), False, False)
-    equations = Equations([data], parameters(robot, [data], "offset*", None, None))
+    equations = Equations([data], parameters(robot, [data], Asked("offset*")))
     start = equations.start()
     assert in_other_modes(equations, start) == []
     others = robot.forward_all(equations.actuators[5]).poses

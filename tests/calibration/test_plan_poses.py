@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
 from pkmcal.calibration.plan_poses import Plan
@@ -269,3 +271,65 @@ def test_odd_wishes_say_what_was_found(
 ) -> None:
     with pytest.raises(ValueError, match=message):
         pk.plan_poses(hexapod, candidates, **odd)
+
+
+BELTS = Path(__file__).parents[2] / "examples" / "belts" / "robot.toml"
+ANCHORS = ("base*.x", "base*.y")
+
+
+@pytest.fixture(scope="module")
+def places() -> np.ndarray:
+    rng = np.random.default_rng(0)
+    at = np.zeros((150, 6))
+    at[:, :2] = rng.uniform([400, 300], [2600, 1800], (150, 2))
+    return at
+
+
+@pytest.mark.parametrize("free", [None, ANCHORS])
+def test_a_machine_that_calibrates_itself_is_as_accurate_as_planned(
+    places: np.ndarray, free: tuple[str, ...] | None
+) -> None:
+    """With all anchors free nothing says where it stands: its error is that in its own frame."""
+    robot = pk.load(BELTS)
+    plan = pk.plan_poses(robot, places, 12, kind="closure", actuator_noise=0.3, free=free)
+    assert plan.own_frame == (free is not None) == ("own frame" in str(plan))
+    assert plan.all_candidates < plan.predicted < plan.at_random
+    names = robot.geometry.match(free or robot.model.free)
+    there, squares = robot.inverse(places), []
+    for seed in range(80):
+        rng = np.random.default_rng(seed)
+        true = robot.replace({n: robot.geometry[n] + rng.normal(0, 3) for n in names})
+        read = true.inverse(plan.poses) + rng.normal(0, 0.3, plan.actuators.shape)
+        measured = pk.Measurements(read, None, "closure", actuator_sigma=0.3)
+        found = pk.identify(robot, measured, free).robot
+        ends = [machine.forward(there).pose[:, :2] for machine in (found, true)]
+        if plan.own_frame:
+            ends = [np.column_stack([end - end.mean(axis=0), np.zeros(len(end))]) for end in ends]
+            ends[0] = Rotation.align_vectors(ends[1], ends[0])[0].apply(ends[0])
+        squares.append(np.mean(((ends[0] - ends[1]) ** 2).sum(axis=1)))
+    assert np.sqrt(np.mean(squares)) == pytest.approx(plan.predicted, rel=0.15)
+
+
+def test_what_belts_cannot_say_is_refused_or_needs_their_noise(places: np.ndarray) -> None:
+    robot = pk.load(BELTS)
+    with pytest.raises(ValueError, match=r"not even all of them identify base1\.x"):
+        pk.plan_poses(
+            robot, places, 12, kind="closure", actuator_noise=0.3, free=[*ANCHORS, "gain*"]
+        )
+    with pytest.raises(ValueError, match=r"actuator_noise: .* more actuators than ways to move"):
+        pk.plan_poses(robot, places, 12)
+    delta = pk.load("linear-delta")
+    with pytest.raises(ValueError, match="alone say nothing of its geometry"):
+        pk.plan_poses(delta, pk.sample_poses(delta, 30), 12, kind="closure", actuator_noise=0.1)
+
+
+def test_noise_of_actuators_is_planned_with(hexapod: Robot, candidates: np.ndarray) -> None:
+    """The same candidate twice is one; less is known where actuators are noisy, too."""
+    twice = np.vstack([candidates[:40], candidates[:40]])
+    exact, noisy = (
+        pk.plan_poses(hexapod, twice, 25, kind="pose", noise=0.02, actuator_noise=sigma).predicted
+        for sigma in (1e-9, 0.02)
+    )
+    none = pk.plan_poses(hexapod, twice, 25, kind="pose", noise=0.02).predicted
+    assert exact == pytest.approx(none, rel=1e-6)
+    assert noisy > 1.3 * none

@@ -39,22 +39,25 @@ def test_error_falls_from_a_millimetre_to_what_the_noise_allows(result: Demonstr
     assert result.after.max() < 0.1 * result.before.min()
 
 
-def test_machine_has_28_errors_of_half_a_millimetre_of_which_positions_tell_25(
+def test_machine_has_28_errors_of_half_a_millimetre_of_which_two_reflectors_tell_26(
     result: Demonstration,
 ) -> None:
     nominal = pk.load("2tpr2tps")
     off = result.true_robot.geometry.values - nominal.geometry.values
     assert np.count_nonzero(off) == len(result.identification.free) == 28
     assert 0.5 * SIGMA < rms(off[off != 0]) < 1.5 * SIGMA
-    assert result.identification.rank == 25
+    assert result.identification.rank == 26
 
 
-def test_errors_found_are_as_far_off_as_their_standard_deviations_say(
-    result: Demonstration,
-) -> None:
-    found = result.identification
-    truth = np.array([result.true_robot.geometry[name] for name in found.free])
-    assert rms((found.values - truth) / found.stderr) == pytest.approx(1.0, abs=0.5)
+def test_errors_found_are_as_far_off_as_their_standard_deviations_say() -> None:
+    """Over eight machines: errors of one are correlated, and all large or all small together."""
+    squares = []
+    for seed in range(1, 9):
+        other = demonstrate(seed)
+        found = other.identification
+        truth = np.array([other.true_robot.geometry[name] for name in found.free])
+        squares.append(np.mean(((found.values - truth) / found.stderr) ** 2))
+    assert np.sqrt(np.mean(squares)) == pytest.approx(1.0, abs=0.3)
 
 
 def test_poses_are_tilted_and_within_the_strokes(result: Demonstration) -> None:
@@ -66,7 +69,7 @@ def test_poses_are_tilted_and_within_the_strokes(result: Demonstration) -> None:
 
 
 def test_no_pose_that_is_checked_was_measured(result: Demonstration) -> None:
-    assert (len(result.measured), len(result.poses)) == (30, 100)
+    assert (len(result.measured), len(result.poses)) == (2 * 30, 100)
     measured = {tuple(row) for row in result.measured.actuators.tolist()}
     assert not measured & {tuple(row) for row in result.ideal.tolist()}
 
@@ -94,13 +97,13 @@ def test_other_machines_are_calibrated_as_well(seed: int) -> None:
 
 
 def test_two_reflectors_tell_the_tilt_that_one_does_not(result: Demonstration) -> None:
-    machine = pk.VirtualMachine(result.true_robot, noise=NOISE)
-    q = result.measured.actuators
-    seen = [machine.measure(q, target=[0, y, 0]) for y in (100.0, -100.0)]
-    found = identify(pk.load("2tpr2tps"), seen, prior=SIGMA)
+    assert rms(result.tilt_after) < 0.1 * rms(result.tilt_before)
+    one = result.measured.select(slice(0, None, 2))
+    assert len(np.unique(one.target, axis=0)) == 1
+    found = identify(pk.load("2tpr2tps"), one, prior=SIGMA)
     reached = result.true_robot.forward(found.robot.inverse(result.poses)).pose
     tilt = np.linalg.norm((reached - result.poses)[:, 3:], axis=1)
-    assert rms(tilt) < 0.1 * min(rms(result.tilt_before), rms(result.tilt_after))
+    assert rms(tilt) > 5 * rms(result.tilt_after)
 
 
 # --- files ---------------------------------------------------------------------------------------

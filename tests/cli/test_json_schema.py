@@ -33,6 +33,7 @@ COMMANDS = {
     "export": ("export", "hexapod", "--as", "c", "--out", "robot.h"),
     "import": ("import", DELTA / "printer.cfg", "--out", "imported"),
     "new": ("new", "hexapod", "mine.toml"),
+    "show": ("show", "hexapod"),
 }
 
 

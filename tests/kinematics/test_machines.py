@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Model
@@ -269,3 +270,21 @@ def test_rbt_6t03p_as_printed_is_singular_in_every_pose() -> None:
     found = robot.forward(robot.inverse(spread), guess=spread)
     assert (found.status == 2).all() and np.isnan(found.pose).all()
     assert robot.model.free == ()
+
+
+@pytest.mark.parametrize("name", [*MACHINES, *CHAINS])
+def test_home_is_on_the_pose_map(name: str) -> None:
+    robot = pk.load(name)
+    np.testing.assert_allclose(robot.on_map(robot.own_home[None])[0], robot.own_home, atol=1e-12)
+
+
+@pytest.mark.parametrize("beta", [-0.3, 0.2])
+def test_home_of_a_2tpr2tps_follows_its_beta(beta: float) -> None:
+    """x may not be stated: x = z tan(beta)."""
+    text = robot_file.located("2tpr2tps")[0].decode()
+    turned = text.replace("z = 400.0 }", f"z = 400.0, beta = {np.degrees(beta)} }}")
+    assert turned != text
+    robot = pk.Robot(robot_file.parse(Source(turned.encode(), "made.toml"), "made.toml"))
+    assert robot.home[0] == pytest.approx(400.0 * np.tan(beta))
+    assert robot.violation(robot.home) < 1e-9
+    assert robot.forward(robot.inverse(robot.home)).ok

@@ -67,6 +67,34 @@ def test_measurements_pickle_and_stay_read_only(kind: str) -> None:
         again.actuators[0] = 0.0
 
 
+@pytest.mark.parametrize("kind", PUBLIC)
+def test_one_row_is_taken_as_it_is(kind: str) -> None:
+    """Actuators (n,) with the value that goes with them, and all else that has one entry a row."""
+    several = make(kind, sigma=0.1 if width(kind) else None, group=[4, 1, 2, 3, 4])
+    for row in range(5):
+        value = several.values[row] if width(kind) else None
+        fields: dict[str, Any] = {} if several.sigma is None else {"sigma": several.sigma[row]}
+        of_rows = needed(kind, 5, 4)
+        if kind in ("between", "relative-distance", "touch"):
+            name = {"between": "other", "relative-distance": "run"}.get(kind, "touched")
+            of_rows |= {name: of_rows[name][row]}
+        fields |= of_rows
+        one = Measurements(
+            several.actuators[row], value, kind, group=several.group[row], lines=7, **fields
+        )
+        expected = several.select([row])
+        assert str(one) == str(expected) and one.values.shape == expected.values.shape
+        assert one.actuators.shape == (1, 4) and one.lines.tolist() == [7]
+        assert one.group.tolist() == [several.group[row]]
+
+
+def test_one_row_may_have_a_covariance_and_one_of_several_targets() -> None:
+    covariance = np.diag([1.0, 4.0, 9.0])
+    one = Measurements([1, 2, 3, 4], [5, 6, 7], sigma=covariance, target=np.eye(3), target_index=2)
+    np.testing.assert_array_equal(one.sigma, [covariance])
+    np.testing.assert_array_equal(one.targets, [[0, 0, 1]])
+
+
 def test_sigma_of_heights_may_be_one_per_row() -> None:
     sigma = make("height", sigma=[1, 2, 3, 4, 5]).sigma
     np.testing.assert_array_equal(sigma, [[1], [2], [3], [4], [5]])
@@ -111,7 +139,17 @@ def test_targets_without_places_are_an_error_only_when_places_are_asked_for() ->
 
 BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"kind": "points"}, ValueError, "kind must be one of pose, position.*'points'"),
-    ({"actuators": [1, 2]}, ValueError, r"actuators must have shape \(N, n\).*\(2,\)"),
+    ({"actuators": 1}, ValueError, r"actuators must have shape \(N, n\), or \(n,\).*\(\)"),
+    (
+        {"actuators": [1, 2]},
+        ValueError,
+        r"'position' must have shape \(3,\) for one row of actuators \(2,\), or .*\(2, 3\)",
+    ),
+    (
+        {"actuators": [1, 2], "values": [1.0, 2.0], "kind": "height"},
+        ValueError,
+        r"'height' must be a number for one row of actuators \(2,\).*found \(2,\)",
+    ),
     ({"actuators": np.empty((0, 3))}, ValueError, r"actuators must .*\(0, 3\)"),
     ({"actuators": [[1, 2], [3]]}, ValueError, "actuators must have shape .* a ragged list"),
     ({"actuators": [["1", "2"]] * 2}, TypeError, "actuators must be an array of numbers"),

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 import pkmcal as pk
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.parameters import parameters
+from pkmcal.calibration.parameters import Asked, parameters
 from pkmcal.measurements import orientation
 from pkmcal.measurements.observation import corrected, difference
 
@@ -95,7 +95,7 @@ def test_a_covariance_that_knows_a_turning_exactly_is_refused() -> None:
     )
     data = FitData(measured, np.arange(1), False, False)
     with pytest.raises(ValueError, match="row 0 says, so near to beta = 90 degrees"):
-        Equations([data], parameters(robot, [data], "offset*", None, None))
+        Equations([data], parameters(robot, [data], Asked("offset*")))
 
 
 @pytest.mark.parametrize("framed", [False, True], ids=["frame known", "frame unknown"])
@@ -105,7 +105,7 @@ def test_derivatives_of_residuals_are_their_differences(name: str, framed: bool)
     at = poses(name, 6, 5)
     values = corrected("pose", robot.complete(at), rng.normal(0, 0.4, (6, 6)))
     data = FitData(pk.Measurements(robot.inverse(at), values, "pose"), np.arange(6), framed, False)
-    chosen = parameters(robot, [data], "offset*", None, None)
+    chosen = parameters(robot, [data], Asked("offset*"))
     equations = Equations([data], chosen)
     equations.start_from(np.arange(len(at)), at)
     theta = chosen.start.copy()

@@ -84,3 +84,71 @@ def test_a_session_against_itself_is_as_expected(hexapod: pk.Robot) -> None:
         assert not found.holdout_contradicts and found.moved == ()
     actual, expected = np.mean(squares, axis=0)
     assert 0.85 < np.sqrt(actual / expected) < 1.15
+
+
+# spools that build up: a quadratic number a leg ---------------------------------------------------
+
+LEGS = [0.317, 0.283, 0.444, 0.226, 0.191, 0.293]  # mm rms, a least squares leg by leg
+FREE = ["base*", "platform*", "offset*", "gain*"]
+
+
+@pytest.fixture(scope="module")
+def wound(hexapod: pk.Robot, tmp_path_factory: pytest.TempPathFactory) -> pk.Robot:
+    """The same with a quadratic number a leg, its actuators in revolutions."""
+    path = tmp_path_factory.mktemp("wound") / "robot.toml"
+    hexapod.save(path)
+    head, *limbs = path.read_text(encoding="utf-8").split("[[limb]]")
+    for i, turns in enumerate(TURNS.tolist()):
+        limbs[i] = limbs[i].rstrip().replace("gain = 1.0", f"gain = {1.0 / turns}")
+        limbs[i] += "\ndrive = { quadratic = 0.0 }\n\n"
+    path.write_text("[[limb]]".join([head, *limbs]), encoding="utf-8")
+    return pk.load(path)
+
+
+def in_revolutions(number: int, exact: bool = False) -> Measurements:
+    """A session; `exact`: what was read of the pose has no error, and the actuators have it all."""
+    measured = session(number)
+    deviations = {"sigma": [1e-4] * 3 + [1e-6] * 3, "actuator_sigma": 0.3 * 0.014} if exact else {}
+    return Measurements(
+        measured.actuators * TURNS, measured.values, "pose", session=f"day{number}", **deviations
+    )
+
+
+def off(robot: pk.Robot, measured: Measurements) -> FloatArray:
+    """What each leg misses the poses by, mm."""
+    return robot.drives(robot.inverse(measured.values)) - robot.drives(measured.actuators)
+
+
+def test_a_quadratic_number_a_leg_leaves_what_a_least_squares_leg_by_leg_does(
+    wound: pk.Robot,
+) -> None:
+    measured = in_revolutions(1, exact=True)
+    found = pk.identify(wound, measured, free=[*FREE, "drive*"])
+    legs = np.sqrt((off(found.robot, measured) ** 2).mean(axis=0))
+    assert abs(legs - LEGS).max() < 1e-3  # which are rounded
+    quadratic = [found.robot.geometry[f"drive{i}.quadratic"] for i in range(1, 7)]
+    assert min(quadratic) > 0.2 and max(quadratic) < 0.5  # mm/rev²
+    (test,) = found.law_tests
+    assert test.needed and len(test.names) == 6
+
+
+def test_the_quadratic_numbers_help_poses_that_were_held_out_too(wound: pk.Robot) -> None:
+    """Every second pose; without them 1.06 mm rms, and an F test says that they are needed."""
+    measured = in_revolutions(1)
+    fitted, held = (measured.select(slice(start, None, 2)) for start in (0, 1))
+    plain = pk.identify(wound, fitted, free=FREE, holdout=held)
+    found = pk.identify(wound, fitted, free=[*FREE, "drive*"], holdout=held)
+    assert plain.law_tests == () and found.law_tests[0].needed
+    assert plain.holdout_rms > 1.0 and found.holdout_rms < 0.75
+
+
+def test_both_sessions_with_zeros_of_their_own_are_left_by_a_third_of_a_millimetre(
+    wound: pk.Robot,
+) -> None:
+    sessions = [in_revolutions(1, exact=True), in_revolutions(2, exact=True)]
+    found = pk.identify(wound, sessions, free=[*FREE, "drive*"], per_session=["offset*"])
+    left = np.concatenate([
+        off(found.robot_of(f"day{k}"), measured) for k, measured in enumerate(sessions, 1)
+    ])  # fmt: skip
+    print(f"both sessions: {np.sqrt((left**2).mean()):.4f} mm rms over all legs")
+    assert np.sqrt((left**2).mean()) <= 0.34

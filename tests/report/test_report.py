@@ -257,7 +257,7 @@ def test_console_is_silent_and_the_document_whole(folder: Path) -> None:
     assert seen.console == []
     for name in FIGURES:
         assert f'id="{name}-figure_1"' in seen.dom
-    assert "<script" not in seen.dom
+    assert seen.dom.count("<script") == 1  # what moves the machine, named by its hash
 
 
 def test_console_of_a_faulty_page_is_not_silent(tmp_path: Path) -> None:

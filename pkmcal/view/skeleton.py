@@ -1,4 +1,4 @@
-"""A machine as lines in space, and the same machine with its errors made large enough to see."""
+"""A machine as lines in space."""
 
 from __future__ import annotations
 
@@ -9,15 +9,9 @@ import numpy as np
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.calibration.parameters import Parameters
 from pkmcal.core.instruments import seen_points
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import as_given
-
-_SEEN = 0.06  # of the machine's size: how far the most displaced joint is drawn off
-_MOST = 0.2
-_STEPS = tuple(a * 10**b for b in range(6) for a in (1, 2, 5))
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,48 +88,6 @@ def _placed(
         _in_frame(outward, base[_around(base)]),
         _in_frame(outward, ends[_around(ends) if order is None else order]),
     )
-
-
-def exaggerated(
-    parameters: Parameters, before: FloatArray, after: FloatArray, q: FloatArray, guess: FloatArray
-) -> tuple[Skeleton, Skeleton, int] | None:
-    """A machine twice at the same commands, the second time with its change made large.
-
-    Parameters
-    ----------
-    parameters : Parameters
-        Of the calibration.
-    before, after : ndarray (p,)
-        Two values of them, mm and rad.
-    q : ndarray (n,)
-        The commands, mm and rad.
-    guess : ndarray (6,)
-        Near the pose.
-
-    Returns
-    -------
-    (Skeleton, Skeleton, int) or None
-        Before, after, and by how much the change is multiplied; None where there is no pose.
-    """
-
-    def drawn(theta: FloatArray) -> Skeleton | None:
-        machine = parameters.robot.replace(parameters.values_at(theta))
-        return skeleton(as_given(machine), q, guess)
-
-    one = drawn(before)
-    if one is None:
-        return None
-    size = float(np.ptp(one.joints, axis=0).max())
-    best = None
-    for times in _STEPS:
-        other = drawn(before + times * (after - before))
-        off = np.inf if other is None else np.linalg.norm(other.joints - one.joints, axis=1).max()
-        if other is None or off > _MOST * size:
-            break
-        best = (one, other, times)
-        if off > _SEEN * size:
-            break
-    return best
 
 
 def _chain(arm: SerialArm, q: FloatArray) -> FloatArray:

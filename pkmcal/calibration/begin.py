@@ -1,0 +1,44 @@
+"""Where a calibration begins: its equations at the nominal machine, frames laid on the readings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.estimator import Estimator
+from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.loss import LossName
+from pkmcal.calibration.mode_slips import in_their_modes
+from pkmcal.calibration.parameters import Parameters
+from pkmcal.exceptions import ArgumentError
+
+
+def begun(
+    datasets: Sequence[FitData], chosen: Parameters, unread: int
+) -> tuple[Equations, Equations, Evaluation]:
+    """The equations, the same with commanded poses, and where these start."""
+    equations = Equations(datasets, chosen, unread)
+    commanded = equations.commanded()
+    start = commanded.start()
+    if in_their_modes(commanded, start) is not start:
+        start = commanded.start()  # an unknown frame was laid with rows of other modes
+    return equations, commanded, start
+
+
+def estimator_at(
+    equations: Equations, commanded: Equations, start: Evaluation, loss: LossName
+) -> Estimator:
+    """The estimator at its start.
+
+    Raises
+    ------
+    ValueError
+        Rows that were not reached.
+    """
+    if not start.ok and commanded is equations:
+        raise ArgumentError(commanded.failures(start))
+    own = equations.begin(commanded, start)
+    if not own.ok:
+        raise ArgumentError(equations.failures(own))
+    return Estimator(equations, own, loss)

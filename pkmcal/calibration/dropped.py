@@ -1,0 +1,90 @@
+"""Rows that are left out of a calibration: named by the user, or outliers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from pkmcal.arguments import shown
+from pkmcal.arrays import BoolArray
+from pkmcal.calibration.begin import estimator_at
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.outliers import outliers
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+
+Drop = Literal["outliers"] | Sequence[int] | None
+OUTLIERS = "outliers"
+
+
+def named_rows(drop: Drop, count: int) -> tuple[int, ...]:
+    """Row numbers that the user names, in order; none for "outliers".
+
+    Raises
+    ------
+    ValueError, TypeError
+        No row of the measurements.
+    """
+    if drop is None or drop == OUTLIERS:
+        return ()
+    if isinstance(drop, str) or not isinstance(drop, Iterable):
+        raise ArgumentTypeError(f"drop: 'outliers' or numbers of rows, found {shown(drop)}")
+    rows = set[int]()
+    for row in drop:
+        if isinstance(row, bool) or not isinstance(row, int | np.integer):
+            raise ArgumentTypeError(f"drop: rows are whole numbers, found {shown(row)}")
+        if not 0 <= row < count:
+            raise ArgumentError(f"drop: the measurements have rows 0 to {count - 1}, found {row}")
+        rows.add(int(row))
+    return tuple(sorted(rows))
+
+
+def without(datasets: Sequence[FitData], rows: Sequence[int]) -> list[FitData]:
+    """The sets without some rows.
+
+    Raises
+    ------
+    ValueError
+        A set of which nothing is left.
+    """
+    found = []
+    for data in datasets:
+        kept = np.flatnonzero(~np.isin(data.rows, rows))
+        if not len(kept):
+            raise ArgumentError("drop: no row of a set is left")
+        found.append(replace(data, measured=data.measured.select(kept), rows=data.rows[kept]))
+    return found
+
+
+def held_without(
+    held: Sequence[tuple[FitData, int]], rows: Sequence[int]
+) -> list[tuple[FitData, int]]:
+    """The sets that are held out, each with the fitted set it is like, without some rows."""
+    some = [(data, like) for data, like in held if not np.isin(data.rows, rows).all()]
+    return [(without([data], rows)[0], like) for data, like in some]
+
+
+def outlying(estimator: Estimator, estimate: Estimate) -> BoolArray:
+    """Which rows (N,) of the equations the others contradict."""
+    equations, fitted = estimator.equations, estimate.state.fitted.identifiable
+    odd = outliers(
+        estimate.residual,
+        estimate.jacobian @ fitted,
+        equations.components,
+        estimate.weights,
+        estimator.prior @ fitted,
+    )
+    return np.isin(equations.unit_of_row, odd)
+
+
+def robust_outliers(
+    equations: Equations, commanded: Equations, start: Evaluation
+) -> tuple[int, ...]:
+    """Numbers of the rows that a robust fit from this start finds outlying."""
+    estimator = estimator_at(equations, commanded, start, "cauchy")
+    return tuple(equations.rows[outlying(estimator, estimator.solve())].tolist())

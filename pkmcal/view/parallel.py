@@ -1,0 +1,130 @@
+"""A parallel machine as data for the page: what moves it, what it looks like, what stops it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.core.driven import DrivenMachine
+from pkmcal.core.library import MAPS, POSE, SLOTS
+from pkmcal.core.machine import Machine
+from pkmcal.core.poses import invert
+from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.model import Cone
+from pkmcal.kinematics.dexterity import dexterity
+from pkmcal.kinematics.frames import NOWHERE
+from pkmcal.kinematics.robot import Robot
+from pkmcal.screw import from_pose
+from pkmcal.view import chains, memory, ranges, words
+
+_OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
+_TRACK = 25  # points of the path of a crank's end
+
+
+def data(robot: Robot) -> dict[str, Any]:
+    """All that the page needs of a robot, as JSON has it; mm and rad."""
+    model, machine = robot.model, robot.machine
+    if isinstance(machine, DrivenMachine):
+        raise ArgumentError(f"robot: {model.name} has drive laws, which the page cannot hold")
+    size = float(machine.struct.size)
+    spans = ranges.poses(robot, size)
+    if isinstance(machine, Machine):
+        blob, numbers, strokes = memory.limbs(machine, robot.slots), 0, _strokes(robot)
+    else:
+        assert model.chains is not None
+        blob, numbers = memory.chains(machine, robot.slots)
+        strokes = chains.strokes(model.chains, robot.slots)
+    moves = ranges.actuators(robot, strokes, spans)
+    at_home = dexterity(robot, robot.home)
+    found = {
+        "kind": "limbs" if model.chains is None else "chains",
+        "name": robot.name,
+        "what": words.of_robot(robot),
+        "numbers": numbers,
+        "geometry": numbers or len(blob) - robot.slots.nbytes,
+        "map": model.map,
+        "free": [POSE.index(name) for name in MAPS[model.map]],
+        "moved": [POSE.index(name) for name in spans],
+        "rows": machine.rows + (0 if model.chains is None else machine.struct.shared),
+        "shared": 0 if model.chains is None else machine.struct.shared,
+        "size": size,
+        "length": robot.length,
+        "home": robot.home.tolist(),
+        "conditioning": _number(float(at_home.conditioning)),
+        "poses": [ranges.beyond(ends) for ends in spans.values()],
+        "reach": [list(ends) for ends in spans.values()],
+        "actuators": [
+            {"unit": unit, "range": ends, "stroke": stroke}
+            for unit, ends, stroke in zip(robot.actuator_units, moves, strokes, strict=True)
+        ],
+        "turns": [_number(turn) for turn in robot.turns.tolist()],
+        "near": machine.reference(robot.slots).tolist(),
+        "frames": _frames(robot),
+        "modes": ranges.modes(robot),
+        "cloud": ranges.cloud(robot, spans),
+        "machine": blob,
+    }
+    if model.chains is None:
+        return found | {"limbs": _limbs(robot, np.array(moves))}
+    return found | chains.looks(robot, moves)
+
+
+def _strokes(robot: Robot) -> list[tuple[float, float] | None]:
+    """What the strokes of all limbs of each actuator leave of its coordinate."""
+    found: list[tuple[float, float] | None] = [None] * robot.n_actuators
+    for limb, numbers in zip(robot.model.limbs, robot.slots, strict=True):
+        if limb.stroke is None:
+            continue
+        low, high = sorted((end - numbers[_OFFSET]) / numbers[_GAIN] for end in limb.stroke)
+        before = found[limb.actuator] or (-np.inf, np.inf)
+        found[limb.actuator] = (max(float(low), before[0]), min(float(high), before[1]))
+    return found
+
+
+def _limbs(robot: Robot, moves: FloatArray) -> list[dict[str, Any]]:
+    share = np.linspace(0.0, 1.0, _TRACK)[:, None]
+    way = robot.limb_machine.spheres(robot.slots, moves[:, 0] + share * (moves[:, 1] - moves[:, 0]))
+    made = []
+    for i, limb in enumerate(robot.model.limbs):
+        driver = KINDS[limb.kind].driver
+        along = {"length": slice(0), "slider": slice(None, None, _TRACK - 1), "crank": slice(None)}
+        made.append(
+            {
+                "kind": limb.kind,
+                "driver": driver,
+                "actuator": limb.actuator,
+                "base": robot.slots[i, :3].tolist(),
+                "axis": limb.frame[:, 2].tolist() if driver == "crank" else None,
+                "track": way[along[driver], i, 3:6].round(3).tolist(),
+                "stroke": limb.stroke,
+                "base_cone": _cone(limb.base_cone),
+                "platform_cone": _cone(limb.platform_cone),
+            }
+        )
+    return made
+
+
+def _cone(cone: Cone | None) -> dict[str, Any] | None:
+    return None if cone is None else {"axis": cone.axis.tolist(), "angle": cone.angle}
+
+
+def _frames(robot: Robot) -> dict[str, Any] | None:
+    """Base and tool frames as poses with their inverses, and the base's as a matrix."""
+    model = robot.model
+    if model.base_frame is None and model.tool_frame is None:
+        return None
+    base, tool = (
+        NOWHERE if frame is None else np.ascontiguousarray(frame, dtype=np.float64)
+        for frame in (model.base_frame, model.tool_frame)
+    )
+    poses = {"base": base, "tool": tool, "base_inverse": invert(base), "tool_inverse": invert(tool)}
+    named = {name: np.ravel(pose).tolist() for name, pose in poses.items()}
+    return named | {"matrix": from_pose(base)[:3].ravel().tolist()}
+
+
+def _number(value: float) -> float | None:
+    """None for what JSON has no number for."""
+    return value if np.isfinite(value) else None

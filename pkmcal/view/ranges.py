@@ -1,0 +1,93 @@
+"""How far the sliders of a page go, where a machine's positions are, and its assembly modes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.core.library import POSE
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.perturbed import completed
+from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.workspace import good_poses, reach
+
+BEYOND = 0.15  # of a range: sliders go beyond it, so that one sees what stops there
+_CLOUD = 500  # points, at most
+_DRAWS = 2500
+_ANGLE, _LENGTH = np.radians(30.0), 0.2  # where the machine says nothing: rad, and of its size
+
+
+def poses(robot: Robot, size: float) -> dict[str, tuple[float, float]]:
+    """From where to where each coordinate of the pose alone goes from home, mm and rad."""
+    try:
+        return reach(robot)
+    except ArgumentError:  # home is singular or breaks a limit: it can be looked at all the same
+        home = dict(zip(POSE, robot.home.tolist(), strict=True))
+        by = {name: _ANGLE if name in POSE[3:] else _LENGTH * size for name in robot.moved}
+        return {name: (home[name] - by[name], home[name] + by[name]) for name in robot.moved}
+
+
+def beyond(ends: tuple[float, float]) -> list[float]:
+    """A range with a margin at both ends."""
+    more = BEYOND * (ends[1] - ends[0])
+    return [ends[0] - more, ends[1] + more]
+
+
+def actuators(
+    robot: Robot,
+    strokes: list[tuple[float, float] | None],
+    ranges: dict[str, tuple[float, float]],
+) -> list[list[float]]:
+    """From where to where each actuator goes: its stroke, or what the poses ask for."""
+    at = robot.inverse(robot.home)
+    corners = np.repeat(robot.home[None], 2 * len(ranges), axis=0)
+    for k, (name, ends) in enumerate(ranges.items()):
+        corners[2 * k : 2 * k + 2, POSE.index(name)] = ends
+    q = robot.inverse(completed(robot, corners))
+    found = []
+    for a, stroke in enumerate(strokes):
+        least = _ANGLE if robot.actuator_units[a] == "rad" else 1e-2 * robot.length
+        seen = np.append(q[np.isfinite(q[:, a]), a], [at[a] - least, at[a] + least])
+        ends = (float(seen.min()), float(seen.max())) if stroke is None else stroke
+        found.append(beyond((min(ends[0], float(at[a])), max(ends[1], float(at[a])))))
+    return found
+
+
+def modes(robot: Robot) -> dict[str, Any]:
+    """Every pose at the actuator coordinates of home; none where home is not reached."""
+    q = robot.inverse(robot.home)
+    if not np.isfinite(q).all():
+        return {"poses": [], "complete": False}
+    found = robot.forward_all(q)
+    return {"poses": found.poses.tolist(), "complete": bool(found.complete)}
+
+
+def cloud(robot: Robot, ranges: dict[str, tuple[float, float]]) -> FloatArray:
+    """Positions of good poses (N, 3), mm: within all limits, not near a singularity.
+
+    Of machines that only turn, where a point in front of the platform goes.
+    """
+    moved = [name for name in ranges if name in POSE[:3]]
+    turned = [name for name in ranges if name in POSE[3:]]
+    names = moved or turned
+    if len(moved) == 1:  # a line is no cloud: what turns shows more
+        names = moved + turned
+    random = np.random.default_rng(0)
+    drawn = np.repeat(robot.home[None], _DRAWS, axis=0)
+    for name in names:
+        low, high = beyond(ranges[name])
+        drawn[:, POSE.index(name)] = random.uniform(low, high, _DRAWS)
+    drawn = completed(robot, drawn)
+    kept = drawn[good_poses(robot, drawn)][:_CLOUD]
+    if len(moved) > 1:
+        return kept[:, :3]
+    a, b, c = kept[:, 3:].T  # the third column of Rz(γ) Ry(β) Rx(α): where the platform's z points
+    up = np.stack([
+        np.cos(a) * np.sin(b) * np.cos(c) + np.sin(a) * np.sin(c),
+        np.cos(a) * np.sin(b) * np.sin(c) - np.sin(a) * np.cos(c),
+        np.cos(a) * np.cos(b),
+    ], axis=1)  # fmt: skip
+    shown: FloatArray = kept[:, :3] + robot.length * up
+    return shown

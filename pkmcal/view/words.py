@@ -1,0 +1,84 @@
+"""What a page says of a machine: what its limbs are, and in which way it moves."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from pkmcal.arms.arm import SerialArm
+from pkmcal.core.library import POSE
+from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.robot import Robot
+
+SYMBOLS = {"alpha": "α", "beta": "β", "gamma": "γ"}
+_COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
+_PLURALS = {
+    "a leg": "legs", "a carriage and a rod": "carriages, each with a rod",
+    "a crank and a rod": "cranks, each with a rod", "a cable or belt": "cables or belts",
+}  # fmt: skip
+
+
+def of_robot(robot: Robot) -> str:
+    """Sentences about a parallel machine.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> of_robot(pk.load("hexapod"))[:62]
+    'A platform on six legs of variable length (UPS). Six actuators'
+    """
+    chains = robot.model.chains
+    if chains is None:
+        kinds = [(_some(KINDS[kind].what, n), kind) for kind, n in _counted(robot)]
+    else:
+        letters = ["".join(_letter(j.kind, j.actuator) for j in limb) for limb in chains.limbs]
+        kinds = [(f"{_count(n)} chain{'s' * (n > 1)} of joints", kind)
+                 for kind, n in Counter(letters).items()]  # fmt: skip
+    limbs = " and ".join(f"{some} ({kind})" for some, kind in kinds)
+    if chains is not None:
+        limbs += ", underlined the joints that are driven"
+    n = robot.n_actuators
+    return f"A platform on {limbs}. {_count(n).capitalize()} actuators {_ways(robot.moved)}."
+
+
+def of_arm(arm: SerialArm) -> str:
+    """A sentence about a serial arm."""
+    kinds = Counter(arm.kinds)
+    joints = " and ".join(f"{_count(n)} {kind}" for kind, n in kinds.items())
+    return f"An arm of {joints} joint{'s' * (arm.n_joints > 1)}, one after the other."
+
+
+def _counted(robot: Robot) -> list[tuple[str, int]]:
+    return list(Counter(limb.kind for limb in robot.model.limbs).items())
+
+
+def _letter(kind: str, actuator: int | None) -> str:
+    """An actuated joint is underlined."""
+    return kind if actuator is None else kind + "\N{COMBINING LOW LINE}"
+
+
+def _count(n: int) -> str:
+    return _COUNTS[n] if n < len(_COUNTS) else str(n)
+
+
+def _some(what: str, n: int) -> str:
+    if n == 1:
+        return what
+    start = next(start for start in sorted(_PLURALS, key=len)[::-1] if what.startswith(start))
+    rest = what[len(start) :]
+    if "each" not in _PLURALS[start]:
+        rest = rest.replace("keeps", "keep")
+    return f"{_count(n)} {_PLURALS[start]}{rest}"
+
+
+def _ways(moved: Sequence[str]) -> str:
+    lengths = [name for name in moved if name in POSE[:3]]
+    angles = [name for name in moved if name in POSE[3:]]
+    ways = []
+    if lengths:
+        ways.append(f"move it along {', '.join(lengths)}")
+    if angles:
+        about = ", ".join(POSE[POSE.index(name) - 3] for name in angles)
+        letters = ", ".join(SYMBOLS[name] for name in angles)
+        ways.append(f"turn it about {about} ({letters})")
+    return " and ".join(ways)

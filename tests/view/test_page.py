@@ -1,0 +1,213 @@
+"""The page of a machine: one file that needs nothing else, is safe, and says what it shows."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.files.seal import is_sealed
+from pkmcal.view import page
+
+from .. import browser
+from . import pages
+
+ROOT = Path(__file__).resolve().parents[2]
+HOSTILE = "</script><img src=x onerror=alert(1)>\x1b[31m\u2028&\"'`${1}"
+
+
+def renamed(name: str, machine: str = "hexapod") -> pk.Robot:
+    robot = pk.load(machine)
+    return pk.Robot(dataclasses.replace(robot.model, name=name))
+
+
+@pytest.mark.parametrize("name", pk.machines())
+def test_a_page_is_one_file_of_less_than_60_kb_that_asks_for_no_other(
+    name: str, tmp_path: Path
+) -> None:
+    text = pk.show(pk.load(name), tmp_path / "page.html").read_text(encoding="utf-8")
+    assert len(text.encode()) < 60_000
+    sources = text + page.scripts() + page.style()
+    assert not re.search(r"https?:|\bfetch\(|XMLHttp|@import|\bsrc=|\bhref=|url\(", sources)
+
+
+def test_names_are_shown_and_nothing_more(tmp_path: Path) -> None:
+    ((state,),) = pages.said(tmp_path, [renamed(HOSTILE)], [[]])
+    assert state["text"].startswith("</script><img src=x onerror=alert(1)>�[31m�&\"'`${1}\n")
+    made = pk.show(renamed(HOSTILE), tmp_path / "page.html").read_text(encoding="utf-8")
+    assert "<img" not in made and made.count("</script>") == made.count("<script") == 1
+
+
+@pytest.mark.parametrize("name", ["hexapod", "3r", "exechon"])
+def test_the_page_starts_without_a_word_on_the_console(name: str, tmp_path: Path) -> None:
+    seen = browser.dump(pk.show(pk.load(name), tmp_path / "page.html"), width=390)
+    assert not seen.console
+    assert "Home</button>" in seen.dom and "conditioning" in seen.dom
+
+
+def test_data_end_no_script_and_begin_no_comment() -> None:
+    data = {"a": "</script><!--\u2028&", "b": [1e-300, 0.1]}
+    text = page.as_script(data)
+    assert json.loads(text) == data
+    assert not set("<>&\u2028") & set(text)
+
+
+def test_what_is_written_has_a_seal_and_is_the_same_twice(tmp_path: Path) -> None:
+    robot = pk.load("3rps")
+    one, other = (robot.show(tmp_path / name).read_bytes() for name in ("one.html", "other.html"))
+    assert one == other and is_sealed(one, ".html")
+
+
+def test_only_machines_are_shown() -> None:
+    with pytest.raises(TypeError, match="robot must be a Robot or a SerialArm, found str"):
+        pk.show("hexapod")  # type: ignore[arg-type]
+
+
+def test_without_a_path_the_page_is_opened(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    made = pk.load("3r").show()
+    try:
+        assert opened == [made.as_uri()] and made.stat().st_size > 10_000
+    finally:
+        made.unlink()
+
+
+def test_strokes_that_are_exceeded_are_named(tmp_path: Path) -> None:
+    """A hexapod above all its legs' strokes, and one leg alone beyond its own."""
+    moves = [["movePose", 2, 1150.0], ["movePose", 2, 1050.0], ["moveActuator", 3, 1101.0]]
+    (states,) = pages.said(tmp_path, [pk.load("hexapod")], [moves])
+    assert "within all limits" in states[0]["text"]
+    for i in range(1, 5):
+        assert f"limb {i}: stroke exceeded" in states[1]["text"]
+    assert "within all limits" in states[2]["text"]
+    assert re.findall(r"limb \d: stroke", states[3]["text"]) == ["limb 4: stroke"]
+
+
+def test_cones_that_are_exceeded_are_named(tmp_path: Path) -> None:
+    robot = pk.load("tricept")  # its central joint bends by at most 45 degrees
+    (states,) = pages.said(tmp_path, [robot], [[["movePose", 0, 640.0], ["movePose", 2, 600.0]]])
+    kept = robot.feasible(states[-1]["pose"], states[-1]["q"])
+    assert not kept.base_cone[3]
+    assert "limb 4: cone of the base joint exceeded" in states[-1]["text"]
+
+
+def test_a_singularity_is_named(tmp_path: Path) -> None:
+    """Level delta arms and rods in one plane: the platform falls (a type-2 singularity)."""
+    ((state,),) = pages.said(tmp_path, [pk.load("rbt-6t03p-printed")], [[]])
+    assert "near a singularity" in state["text"]
+    assert (
+        "near a singularity" not in pages.said(tmp_path, [pk.load("hexapod")], [[]])[0][0]["text"]
+    )
+
+
+def test_where_it_does_not_get_it_stays_and_says_so(tmp_path: Path) -> None:
+    robot = pk.load("linear-delta")
+    (states,) = pages.said(tmp_path, [robot], [[["movePose", 0, 900.0]]])
+    assert states[1]["pose"] == states[0]["pose"]
+    assert "does not get there: limb" in states[1]["text"]
+
+
+@pytest.mark.parametrize("name", ["2tpr2tps", "3rps", "tricept"])
+def test_every_assembly_mode_can_be_stepped_through(name: str, tmp_path: Path) -> None:
+    robot = pk.load(name)
+    found = robot.forward_all(robot.inverse(robot.home))
+    count = len(found.poses)
+    (states,) = pages.said(tmp_path, [robot], [[["takeMode", k] for k in range(count)]])
+    np.testing.assert_array_equal([state["pose"] for state in states[1:]], found.poses)
+    assert {tuple(state["q"]) for state in states} == {tuple(states[0]["q"])}
+    assert f"{count} of {count}" in states[-1]["text"]
+
+
+def framed() -> pk.Robot:
+    """A 3-RPS that stands upright on a stand, with a tool."""
+    base, tool = np.array([100.0, 0, 50, np.pi / 2, 0, 0]), np.array([0.0, 0, 120, 0, 0.25, 0])
+    model = dataclasses.replace(pk.load("3rps").model, base_frame=base, tool_frame=tool)
+    return pk.Robot(dataclasses.replace(model, match=("y", "alpha", "gamma")))
+
+
+def test_poses_are_in_the_users_frames(tmp_path: Path) -> None:
+    robot = framed()
+    target = pk.sample_poses(robot, 1, seed=2, share=0.3)[0]
+    from pkmcal.core.library import POSE
+
+    moves = [["movePose", j, float(target[POSE.index(n)])] for j, n in enumerate(robot.moved)]
+    (states,) = pages.said(tmp_path, [robot], [moves])
+    np.testing.assert_allclose(states[-1]["pose"], target, atol=1e-7)
+    np.testing.assert_allclose(states[-1]["q"], robot.inverse(states[-1]["pose"]), atol=1e-9)
+    np.testing.assert_allclose(states[0]["pose"], robot.home, rtol=0, atol=1e-12)
+
+
+def test_of_an_arm_forward_is_pythons_to_the_bit_and_inverse_leads_back(tmp_path: Path) -> None:
+    arms = [pk.load("3r"), six_joints()]
+    moves = []
+    for arm, theta in zip(arms, ([0.3, 0.9, -1.2], [0.7, -0.4, 0.6, -0.8, 0.9, 0.3]), strict=True):
+        tool = pk.screw.to_pose(arm.forward(theta))
+        ends = [[0, tool[0] + 9.0], [2, tool[2] - 12.0], [4, tool[4] + 0.1]][
+            : arm.n_joints // 2 + 1
+        ]
+        turns = [["moveActuator", a, x] for a, x in enumerate(theta)]
+        moves.append(turns + [["movePose", k, float(x)] for k, x in ends])
+    for arm, asked, states in zip(arms, moves, pages.said(tmp_path, arms, moves), strict=True):
+        for (verb, k, value), state in zip(asked, states[1:], strict=True):
+            assert not state["stopped"]
+            tool = pk.screw.to_pose(arm.forward(state["q"]))
+            np.testing.assert_array_equal(state["pose"], tool)
+            there = state["pose"][k] if verb == "movePose" else state["q"][k]
+            assert there == pytest.approx(value, abs=1e-8)
+        jacobian = arm.jacobian(states[-1]["q"], frame="tip")
+        jacobian[:3] *= arm.length
+        rows = jacobian if arm.n_joints == 6 else jacobian[3:]
+        sigma = np.linalg.svd(rows / arm.length, compute_uv=False)
+        assert states[-1]["conditioning"] == pytest.approx(sigma[-1] / sigma[0], rel=1e-8)
+
+
+def six_joints() -> pk.SerialArm:
+    """An elbow arm with a spherical wrist, and joint errors."""
+    arm = pk.SerialArm.from_dh(
+        a=[50, 300, 30, 0, 0, 0],
+        alpha=np.radians([-90, 0, -90, 90, -90, 0]),
+        d=[400, 0, 0, 310, 0, 80],
+        name="six joints",
+    )
+    return arm.replace(np.random.default_rng(0).normal(0, [1, 1, 1, 0.01, 0.01, 0.01], (6, 6)))
+
+
+# --- the command ---------------------------------------------------------------------------------
+
+
+def test_show_writes_beside_and_replaces_its_own(
+    run: Any, refused: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run("show", "hexapod")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout == "hexapod.html: hexapod; open it in a browser\n"
+    made = (tmp_path / "hexapod.html").read_bytes()
+    run("show", "hexapod")
+    assert (tmp_path / "hexapod.html").read_bytes() == made
+    (tmp_path / "hexapod.html").write_bytes(made + b"mine")
+    assert "would be replaced" in refused("show", "hexapod")
+    assert (tmp_path / "hexapod.html").read_bytes() == made + b"mine"
+    assert run("show", "3r", "--out", tmp_path / "a" / "arm.html").exit_code == 0
+    assert (tmp_path / "a" / "arm.html").exists()
+
+
+# --- the WebAssembly -----------------------------------------------------------------------------
+
+
+def test_the_webassembly_is_what_the_sources_give() -> None:
+    done = subprocess.run(
+        [sys.executable, ROOT / "csrc/view/build.py", "--check"], capture_output=True, text=True
+    )
+    if "is needed" in done.stderr:
+        pytest.skip(done.stderr.strip())
+    assert done.returncode == 0, done.stderr
