@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import word, words
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identifiability import as_sum, sparse_basis
 from pkmcal.calibration.optimal_design import Criterion, Design
-from pkmcal.calibration.parameters import Asked, FitData, Parameters, Prior, parameters
+from pkmcal.calibration.parameters import Asked, Parameters, Prior, parameters
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
@@ -27,6 +28,7 @@ from pkmcal.statistics.linear_fit import column_basis
 
 Unknown = Literal["frame", "target"]
 UNKNOWN: tuple[Unknown, ...] = ("frame", "target")
+PLANNED: tuple[Kind, ...] = (*("position", "pose", "height", "distance", "orientation", "closure"),)
 
 _UNIDENTIFIABLE = 1e-3  # mm a target moves per mm along an unidentifiable combination
 
