@@ -100,8 +100,7 @@ class Readings:
         directions = [m.approach for m in self.sets]
         if any(each is not None for each in directions):  # backlash is between their poses
             known = [np.zeros(m.actuators.shape) if m.approach is None else m.approach
-                     for m in self.sets]  # fmt: skip
-            known += [np.zeros(self.sets[i].actuators.shape) for i in double]
+                     for m in (*self.sets, *(self.sets[i] for i in double))]  # fmt: skip
             commands = np.hstack([commands, np.concatenate(known)])
         self.machine_columns, machine_of = self.spread.machines(len(parameters.places))
         machine = np.concatenate([*machine_of, *(machine_of[i] for i in double)])
@@ -166,8 +165,6 @@ class Readings:
 
     def columns_of(self, i: int, name: str) -> IntArray | None:
         """Parameters (N, w) of what rows of set `i` depend on; `NONE` where a number is held.
-
-        None where all of it is given.
 
         None where all of it is given. `name` is what `predict` calls it.
         """
