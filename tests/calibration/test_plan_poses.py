@@ -339,5 +339,5 @@ def test_noise_of_actuators_is_planned_with(hexapod: Robot, candidates: np.ndarr
 def test_measurements_that_no_parameter_moves_are_refused(name: str) -> None:
     """Heights of a machine that moves in a plane."""
     robot = pk.load(name)
-    with pytest.raises(ValueError, match="candidates: .* depends on no parameter"):
+    with pytest.raises(ValueError, match=r"candidates: .* depends on no parameter"):
         pk.plan_poses(robot, pk.sample_poses(robot, 20), 10, kind="height", free="offset*")
