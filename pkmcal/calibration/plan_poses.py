@@ -25,6 +25,8 @@ from pkmcal.measurements.components import Kind
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.result import Result
 
+PLANNED: tuple[Kind, ...] = ("position", "pose", "height", "distance", "orientation", "closure")
+
 _DRAWS = 25  # of poses at random, to compare a plan with
 _ERROR = 0.5  # mm; what numbers may be off by that have no prior
 _TIMES, _MACHINES = 2.0, 16  # so many machines with so many times these errors must get there
@@ -151,7 +153,7 @@ def plan_poses(
         What is made least: the predicted error at the targets, the volume of the parameters'
         confidence region (largest det of the information), or the sum of their variances, scaled
         to mm at the machine.
-    kind : {"position", "pose", "height", "distance", "closure"}
+    kind : {"position", "pose", "height", "distance", "orientation", "closure"}
         What will be measured; see `Measurements`. "closure" is nothing but the actuators, of a
         machine that has more of them than ways to move.
     target : array_like (3,) or (k, 3), optional
@@ -192,6 +194,7 @@ def plan_poses(
     (20, True)
     """
     word("criterion", criterion, CRITERIA)
+    word("kind", kind, PLANNED)
     if (count is None) == (accuracy is None):
         raise ArgumentError(
             "give either count, how many poses, or accuracy, the error wanted in mm"

@@ -13,7 +13,7 @@ from pkmcal.arguments import did_you_mean, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.optimal_design import CRITERIA
-from pkmcal.calibration.plan_poses import Plan, plan_poses
+from pkmcal.calibration.plan_poses import PLANNED, Plan, plan_poses
 from pkmcal.calibration.planned import UNKNOWN
 from pkmcal.cli.geometry_options import free_names, read_deviations
 from pkmcal.cli.inputs import Inputs
@@ -28,7 +28,6 @@ from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.command_csv import read_commands, write_commands
-from pkmcal.measurements.components import COMPONENTS
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
 
@@ -119,7 +118,7 @@ def plan(
             accuracy=accuracy,
             targets=used,
             criterion=word("--criterion", criterion, CRITERIA),
-            kind=word("--kind", kind, COMPONENTS),
+            kind=word("--kind", kind, PLANNED),
             noise=noise,
             actuator_noise=actuator_noise,
             free=chosen or None,
