@@ -156,10 +156,24 @@ def calls() -> list[Call]:
         formula("seen_points", "points of the base in a frame, with their derivatives by the frame"
                 " and by the point", measured.seen,
                 "frame point seen by_frame by_point", ((3,), (3, 6), (3, 3)), {"frame": "shared"}),
-        formula("distances", "distances from anchors of the base to targets of the platform, with"
-                " their derivatives by the twist, the target and the anchor", measured.distance,
-                "pose target anchor distance by_twist by_target by_anchor",
-                ((), (6,), (3,), (3,)), {"target": "either", "anchor": "either"}),
+        formula("distances", "distances from anchors of the base to targets of the platform less a"
+                " zero, with their derivatives by the twist, the target and the anchor",
+                measured.distance,
+                "pose target anchor zero distance by_twist by_target by_anchor",
+                ((), (6,), (3,), (3,)),
+                {"target": "either", "anchor": "either", "zero": "either"}),
+        formula("between", "distances between two places of a target of the platform, with their"
+                " derivatives by both twists and by the target", measured.between,
+                "pose other target distance by_twist by_other by_target",
+                ((), (6,), (6,), (3,)), {"target": "either"}),
+        formula("touched_points", "points of the base in the axes of artefacts, with their"
+                " derivatives by the artefact and by the point", measured.touched,
+                "artefact point inside by_artefact by_point", ((3,), (3, 6), (3, 3)),
+                {"artefact": "either"}),
+        formula("tilts", "how far the axes of sensors point up, with the derivatives by the"
+                " turning, the mounting and the vertical", measured.tilt,
+                "pose mounting up tilt by_turn by_mounting by_up",
+                ((2,), (2, 3), (2, 3), (2, 3)), {"mounting": "either", "up": "either"}),
         formula("law_drive", "the way of drives without corrections, with its derivatives by"
                 " q, gain, quadratic, spool, buildup, and twice by q", laws.drive,
                 "x way by_x bend", ((), (5,), ())),

@@ -34,7 +34,10 @@ enum { MAP_SPATIAL, MAP_TRANSLATION, MAP_PLANAR, MAP_2TPR2TPS, MAP_SPHERICAL, MA
     "compose_twists a:6! pose:6 c:6! -> twists:6,6\n" \
     "points pose:6 target:3* -> point:3 by_twist:3,6 by_target:3,3\n" \
     "seen_points frame:6! point:3 -> seen:3 by_frame:3,6 by_point:3,3\n" \
-    "distances pose:6 target:3* anchor:3* -> distance: by_twist:6 by_target:3 by_anchor:3\n" \
+    "distances pose:6 target:3* anchor:3* zero:1* -> distance: by_twist:6 by_target:3 by_anchor:3\n" \
+    "between pose:6 other:6 target:3* -> distance: by_twist:6 by_other:6 by_target:3\n" \
+    "touched_points artefact:6* point:3 -> inside:3 by_artefact:3,6 by_point:3,3\n" \
+    "tilts pose:6 mounting:3* up:3* -> tilt:2 by_turn:2,3 by_mounting:2,3 by_up:2,3\n" \
     "law_drive x:5 -> way: by_x:5 bend:\n" \
     "law_drive_inverse x:5 -> q:\n" \
     "law_harmonic x:4 -> error: by_x:3 bend:\n" \

@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 28f59fb76b20a451
+ * derivation 77b432096792458a
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* a (n, 6) or (6), b (n, 6) or (6) -> out (n, 6): A followed by B. */
@@ -29,12 +29,34 @@ int CALL(points)(ptrdiff_t n, const double *pose, const double *target, ptrdiff_
 int CALL(seen_points)(ptrdiff_t n, const double *frame, const double *point, double *seen,
                       double *by_frame, double *by_point);
 
-/* pose (n, 6), target (n, 3) or (3), anchor (n, 3) or (3) -> distance (n), by_twist (n, 6),
- * by_target (n, 3), by_anchor (n, 3): distances from anchors of the base to targets of the
- * platform, with their derivatives by the twist, the target and the anchor. */
+/* pose (n, 6), target (n, 3) or (3), anchor (n, 3) or (3), zero (n, 1) or (1) -> distance (n),
+ * by_twist (n, 6), by_target (n, 3), by_anchor (n, 3): distances from anchors of the base to
+ * targets of the platform less a zero, with their derivatives by the twist, the target and the
+ * anchor. */
 int CALL(distances)(ptrdiff_t n, const double *pose, const double *target, ptrdiff_t target_stride,
-                    const double *anchor, ptrdiff_t anchor_stride, double *distance,
-                    double *by_twist, double *by_target, double *by_anchor);
+                    const double *anchor, ptrdiff_t anchor_stride, const double *zero,
+                    ptrdiff_t zero_stride, double *distance, double *by_twist, double *by_target,
+                    double *by_anchor);
+
+/* pose (n, 6), other (n, 6), target (n, 3) or (3) -> distance (n), by_twist (n, 6), by_other
+ * (n, 6), by_target (n, 3): distances between two places of a target of the platform, with
+ * their derivatives by both twists and by the target. */
+int CALL(between)(ptrdiff_t n, const double *pose, const double *other, const double *target,
+                  ptrdiff_t target_stride, double *distance, double *by_twist, double *by_other,
+                  double *by_target);
+
+/* artefact (n, 6) or (6), point (n, 3) -> inside (n, 3), by_artefact (n, 3, 6), by_point (n, 3,
+ * 3): points of the base in the axes of artefacts, with their derivatives by the artefact and
+ * by the point. */
+int CALL(touched_points)(ptrdiff_t n, const double *artefact, ptrdiff_t artefact_stride,
+                         const double *point, double *inside, double *by_artefact, double *by_point);
+
+/* pose (n, 6), mounting (n, 3) or (3), up (n, 3) or (3) -> tilt (n, 2), by_turn (n, 2, 3),
+ * by_mounting (n, 2, 3), by_up (n, 2, 3): how far the axes of sensors point up, with the
+ * derivatives by the turning, the mounting and the vertical. */
+int CALL(tilts)(ptrdiff_t n, const double *pose, const double *mounting, ptrdiff_t mounting_stride,
+                const double *up, ptrdiff_t up_stride, double *tilt, double *by_turn,
+                double *by_mounting, double *by_up);
 
 /* x (n, 5) -> way (n), by_x (n, 5), bend (n): the way of drives without corrections, with its
  * derivatives by q, gain, quadratic, spool, buildup, and twice by q. */

@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 28f59fb76b20a451
+ * derivation 77b432096792458a
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
@@ -102,23 +102,87 @@ int CALL(seen_points)(ptrdiff_t n, const double *frame, const double *point, dou
 }
 
 int CALL(distances)(ptrdiff_t n, const double *pose, const double *target, ptrdiff_t target_stride,
-                    const double *anchor, ptrdiff_t anchor_stride, double *distance,
-                    double *by_twist, double *by_target, double *by_anchor)
+                    const double *anchor, ptrdiff_t anchor_stride, const double *zero,
+                    ptrdiff_t zero_stride, double *distance, double *by_twist, double *by_target,
+                    double *by_anchor)
 {
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
-        real lane_pose[6], lane_target[3], lane_anchor[3], lane_distance[1], lane_by_twist[6],
-             lane_by_target[3], lane_by_anchor[3];
+        real lane_pose[6], lane_target[3], lane_anchor[3], lane_zero[1], lane_distance[1],
+             lane_by_twist[6], lane_by_target[3], lane_by_anchor[3];
         const int count = block_rows(first, n, row);
         gather_row(pose, 6, 6, row, lane_pose);
         gather_row(target, target_stride, 3, row, lane_target);
         gather_row(anchor, anchor_stride, 3, row, lane_anchor);
-        FN(measured_distance)(lane_pose, lane_target, lane_anchor, lane_distance, lane_by_twist,
-                              lane_by_target, lane_by_anchor);
+        gather_row(zero, zero_stride, 1, row, lane_zero);
+        FN(measured_distance)(lane_pose, lane_target, lane_anchor, lane_zero, lane_distance,
+                              lane_by_twist, lane_by_target, lane_by_anchor);
         scatter_row(lane_distance, 1, distance, 1, row, count);
         scatter_row(lane_by_twist, 6, by_twist, 6, row, count);
         scatter_row(lane_by_target, 3, by_target, 3, row, count);
         scatter_row(lane_by_anchor, 3, by_anchor, 3, row, count);
+    }
+    return 0;
+}
+
+int CALL(between)(ptrdiff_t n, const double *pose, const double *other, const double *target,
+                  ptrdiff_t target_stride, double *distance, double *by_twist, double *by_other,
+                  double *by_target)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], lane_other[6], lane_target[3], lane_distance[1], lane_by_twist[6],
+             lane_by_other[6], lane_by_target[3];
+        const int count = block_rows(first, n, row);
+        gather_row(pose, 6, 6, row, lane_pose);
+        gather_row(other, 6, 6, row, lane_other);
+        gather_row(target, target_stride, 3, row, lane_target);
+        FN(measured_between)(lane_pose, lane_other, lane_target, lane_distance, lane_by_twist,
+                             lane_by_other, lane_by_target);
+        scatter_row(lane_distance, 1, distance, 1, row, count);
+        scatter_row(lane_by_twist, 6, by_twist, 6, row, count);
+        scatter_row(lane_by_other, 6, by_other, 6, row, count);
+        scatter_row(lane_by_target, 3, by_target, 3, row, count);
+    }
+    return 0;
+}
+
+int CALL(touched_points)(ptrdiff_t n, const double *artefact, ptrdiff_t artefact_stride,
+                         const double *point, double *inside, double *by_artefact, double *by_point)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_artefact[6], lane_point[3], lane_inside[3], lane_by_artefact[18],
+             lane_by_point[9];
+        const int count = block_rows(first, n, row);
+        gather_row(artefact, artefact_stride, 6, row, lane_artefact);
+        gather_row(point, 3, 3, row, lane_point);
+        FN(touched_point)(lane_artefact, lane_point, lane_inside, lane_by_artefact, lane_by_point);
+        scatter_row(lane_inside, 3, inside, 3, row, count);
+        scatter_row(lane_by_artefact, 18, by_artefact, 18, row, count);
+        scatter_row(lane_by_point, 9, by_point, 9, row, count);
+    }
+    return 0;
+}
+
+int CALL(tilts)(ptrdiff_t n, const double *pose, const double *mounting, ptrdiff_t mounting_stride,
+                const double *up, ptrdiff_t up_stride, double *tilt, double *by_turn,
+                double *by_mounting, double *by_up)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_pose[6], lane_mounting[3], lane_up[3], lane_tilt[2], lane_by_turn[6],
+             lane_by_mounting[6], lane_by_up[6];
+        const int count = block_rows(first, n, row);
+        gather_row(pose, 6, 6, row, lane_pose);
+        gather_row(mounting, mounting_stride, 3, row, lane_mounting);
+        gather_row(up, up_stride, 3, row, lane_up);
+        FN(measured_tilt)(lane_pose, lane_mounting, lane_up, lane_tilt, lane_by_turn,
+                          lane_by_mounting, lane_by_up);
+        scatter_row(lane_tilt, 2, tilt, 2, row, count);
+        scatter_row(lane_by_turn, 6, by_turn, 6, row, count);
+        scatter_row(lane_by_mounting, 6, by_mounting, 6, row, count);
+        scatter_row(lane_by_up, 6, by_up, 6, row, count);
     }
     return 0;
 }

@@ -25,6 +25,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.calibration.distances import Distances as Distances
     from pkmcal.calibration.identification import Identification as Identification
     from pkmcal.calibration.identify import identify as identify
+    from pkmcal.calibration.law_tests import LawTest as LawTest
     from pkmcal.calibration.moved import Moved as Moved
     from pkmcal.calibration.plan_poses import Plan as Plan
     from pkmcal.calibration.plan_poses import plan_poses as plan_poses
@@ -40,6 +41,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.compensation.program import compensate_program as compensate_program
     from pkmcal.compensation.pso import SwarmResult as SwarmResult
     from pkmcal.compensation.pso import pso as pso
+    from pkmcal.controllers.comp_file import ScrewTable as ScrewTable
+    from pkmcal.controllers.comp_file import import_comp_file as import_comp_file
     from pkmcal.controllers.import_printer import import_printer as import_printer
     from pkmcal.core.swarm import CONSTRICTION as CONSTRICTION
     from pkmcal.core.swarm import SwarmSettings as SwarmSettings
@@ -89,6 +92,7 @@ _HOMES = {
     "calibration.distances": ("Distances",),
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),
+    "calibration.law_tests": ("LawTest",),
     "calibration.moved": ("Moved",),
     "calibration.plan_poses": ("Plan", "plan_poses"),
     "calibration.verdict": ("Verdict",),
@@ -109,6 +113,7 @@ _HOMES = {
         "Error",
         "FileError",
     ),
+    "controllers.comp_file": ("ScrewTable", "import_comp_file"),
     "controllers.import_printer": ("import_printer",),
     "geometry.geometry": ("Geometry",),
     "kinematics.dexterity": ("Dexterity", "dexterity"),

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimator
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.loss import LossName
 from pkmcal.calibration.mode_slips import in_their_modes
-from pkmcal.calibration.parameters import FitData, Parameters
+from pkmcal.calibration.parameters import Parameters
 from pkmcal.exceptions import ArgumentError
 
 

@@ -10,10 +10,13 @@ import numpy as np
 
 from pkmcal.arguments import instance, word
 from pkmcal.calibration.closures import has_equations
-from pkmcal.calibration.parameters import KNOWN, FitData, Known
+from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.parameters import KNOWN, Known
 from pkmcal.calibration.sessions import in_sessions, set_names
+from pkmcal.calibration.starts import with_starts
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
 
 Said = Mapping[str, Known | Sequence[Known]]  # of "frame", "target" and "attachment"
@@ -57,10 +60,10 @@ def as_fit_data(
         raise ArgumentError("measurements: state actuator_sigma of all sets, or of none")
     if any(data.unknown_frame for data in datasets) and not any(data.framed for data in datasets):
         raise ArgumentError("frame: distances do not depend on it, it cannot be unknown")
-    distances = any(data.measured.kind == "distance" for data in datasets)
+    distances = any(KINDS[data.measured.kind].point == "base" for data in datasets)
     if any(data.unknown_attachment for data in datasets) and not distances:
         raise ArgumentError("attachment: distances alone have one, it cannot be unknown")
-    return datasets
+    return with_starts(robot, datasets)
 
 
 def informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[FitData], int]:
@@ -108,7 +111,8 @@ def as_fitted(
     of_actuators = datasets[i].measured.actuator_sigma
     if holdout.actuator_sigma is None and of_actuators is not None:
         holdout = replace(holdout, actuator_sigma=np.sqrt(np.mean(of_actuators**2, axis=0)))
-    return replace(datasets[i], measured=holdout, rows=np.arange(len(holdout))), i
+    data = replace(datasets[i], measured=holdout, rows=np.arange(len(holdout)))
+    return with_starts(robot, [data])[0], i
 
 
 def by_set(said: Said) -> frozenset[str]:
@@ -119,7 +123,8 @@ def by_set(said: Said) -> frozenset[str]:
         for name, given in each.items()
         if isinstance(given, Iterable) and list(given).count("unknown") > 1
     }
-    return frozenset(found | ({"anchor"} if "target" in found else set()))
+    of_target = {"anchor", "tool", "mounting"} if "target" in found else set()
+    return frozenset(found | of_target)
 
 
 def _check(robot: Calibratable, measured: Measurements, argument: str) -> None:

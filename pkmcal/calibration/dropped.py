@@ -14,8 +14,8 @@ from pkmcal.calibration.begin import estimator_at
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.outliers import outliers
-from pkmcal.calibration.parameters import FitData
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 
 Drop = Literal["outliers"] | Sequence[int] | None

@@ -19,7 +19,8 @@ from pkmcal.calibration.closures import RowStates
 from pkmcal.calibration.elimination import Blocks, Shares
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.first_frames import aligned
-from pkmcal.calibration.parameters import FitData, Parameters
+from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.parameters import Parameters
 from pkmcal.calibration.readings import ROUNDING, Readings, of_read
 from pkmcal.calibration.session_machines import (
     Machines,
@@ -27,7 +28,9 @@ from pkmcal.calibration.session_machines import (
     closures_of_sessions,
     commanded_closures,
 )
+from pkmcal.calibration.sessions import NONE
 from pkmcal.core.library import STATUS
+from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements import orientation
 from pkmcal.measurements.observation import by_difference, corrected, distance_per_point
 from pkmcal.result import failed_rows
@@ -69,8 +72,9 @@ class Equations(Readings):
         super().__init__(datasets, parameters)
         self.datasets, self._unread = tuple(datasets), unread
         guess = np.tile(parameters.robot.home, (len(self.actuators), 1))
-        for measured, framed, place in zip(self.sets, self._framed, self.pose_of, strict=True):
-            if measured.kind in ("pose", "position") and not framed:
+        for i, (measured, place) in enumerate(zip(self.sets, self.pose_of, strict=True)):
+            elsewhere = self._framed[i] or self.columns_of(i, "tool") is not None
+            if measured.kind in ("pose", "position") and not elsewhere:
                 read = np.isfinite(measured.values).all(axis=1)
                 guess[place[read], :3] = measured.values[read, :3]
                 if measured.kind == "pose":
@@ -89,6 +93,13 @@ class Equations(Readings):
     def _take(self, closures: SessionClosures, estimated: bool) -> None:
         """Build the units for these closures; `estimated`: their deviations are not known."""
         self.closures = closures
+        if closures.unknowns:
+            for m in self.sets:
+                if m.kind in ("between", "angle"):
+                    raise ArgumentError(
+                        f"measurements: readings of kind {m.kind!r} need poses that follow from the"
+                        " actuators: no actuator_sigma, and no surplus actuators"
+                    )
         of_row, pose_of_row = self.count, np.concatenate(self.pose_of)
         if not closures.unknowns:
             self.unstated: BoolArray = self._no_sigma
@@ -292,7 +303,7 @@ class Equations(Readings):
         if not evaluation.ok:
             self.start_from(np.flatnonzero(evaluation.status), self.parameters.robot.home)
             evaluation = self.at(theta)
-        if not self.parameters.frames or not evaluation.ok:
+        if not self.parameters.motions or not evaluation.ok:
             return evaluation
         self.parameters, theta = aligned(self, evaluation, own)
         return self.at(theta)
@@ -316,12 +327,17 @@ class Equations(Readings):
             part = np.zeros((rows, k, numbers))
             if by_geometry is not None:
                 part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
+                if seen.by_other is not None:
+                    there = by_geometry[self.other_of[i]]
+                    part[:, :, : len(p.places)] += seen.by_other @ there
+            direct = self.by_numbers(i, evaluation.pose, evaluation.theta)
+            if direct is not None:
+                part[:, :, : len(p.places)] += direct
             if seen.by_frame is not None and p.frame is not None:
                 part[:, :, p.frame : p.frame + 6] = seen.by_frame
             for name, mine in self._numbers[i].items():
-                by_point = seen.by_target if name == "target" else seen.by_anchor
-                assert by_point is not None
-                np.put_along_axis(part, np.repeat(mine[:, None, :], k, axis=1), by_point, axis=2)
+                row, slot = np.nonzero(mine != NONE)
+                part[row, :, mine[row, slot]] += seen.by[name][row, :, slot]
             wide = self.spread.of_rows(part, i)
             parts.append(by_difference(self.sets[i].kind, wide, evaluation.residuals[i]))
         return parts
@@ -374,7 +390,7 @@ class Equations(Readings):
     def distances(self, evaluation: Evaluation) -> FloatArray:
         """How far off each measured point is, mm, in the order of the sets."""
         return np.concatenate([
-            distance_per_point(of_read(m, r))
+            distance_per_point(of_read(m, r), m.units, self.parameters.robot.length)
             for m, r in zip(self.sets, evaluation.residuals, strict=True)
         ])  # fmt: skip
 

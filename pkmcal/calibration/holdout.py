@@ -15,9 +15,9 @@ from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.labels import Labels, labels
 from pkmcal.calibration.later import Later, OwnNumbers, compared, later
-from pkmcal.calibration.parameters import FitData
 from pkmcal.calibration.uncertainty import Uncertainty, stated_variances
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements

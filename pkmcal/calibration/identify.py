@@ -26,6 +26,7 @@ from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit import Fit
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.fit_statistics import (
     SearchRecord,
     identifiability,
@@ -38,7 +39,7 @@ from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.mode_slips import in_other_modes
-from pkmcal.calibration.parameters import Asked, Bounds, FitData, Known, Prior, parameters
+from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior, parameters
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
     contradicted_prior,
@@ -46,9 +47,11 @@ from pkmcal.calibration.plausibility import (
     implausible_changes,
     insufficient_data,
     likely_unit_errors,
+    shrunk,
 )
 from pkmcal.calibration.row_errors import likely_row_errors
 from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.starts import known_distances
 from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.kinematics.robot import Robot
@@ -107,7 +110,9 @@ def identify(
     target : {"known", "unknown"} or a sequence of them
         Whether the measured points of the platform are known or to be found, from where
         `Measurements.target` puts them: ``target1.x`` …; for distances the fixed point,
-        ``anchor1.x`` …. One word, or one each, as for frames.
+        ``anchor1.x`` …; for orientations how the sensor is mounted, ``mounting.alpha`` …; for poses
+        where on the platform what was measured is, ``tool.x`` … ``tool.gamma``, without a start.
+        One word, or one each, as for frames.
     holdout : float or Measurements, optional
         A fraction of the poses of each set, drawn at random with repeats kept together, or other
         measurements: they are not fitted, only compared.
@@ -185,6 +190,7 @@ def identify(
         pairs = [draw(data, holdout) for data in datasets]
         datasets, held = [kept for kept, _ in pairs], [(out, i) for i, (_, out) in enumerate(pairs)]
     datasets = without(datasets, dropped)
+    datasets += known_distances(datasets)
     chosen = parameters(machine, datasets, asked)
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
@@ -255,6 +261,7 @@ def _warnings(
     notes += in_other_modes(equations, fit.end)
     notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
+    notes += shrunk(equations, fit.start, fit.end)
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():

@@ -15,10 +15,11 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.least_squares import Search
 from pkmcal.calibration.loss import Loss
 from pkmcal.calibration.mode_slips import in_their_modes
-from pkmcal.calibration.parameters import FitData, Parameters, parameters
+from pkmcal.calibration.parameters import Parameters, parameters
 from pkmcal.calibration.sessions import NONE
 from pkmcal.calibration.uncertainty import Uncertainty
 from pkmcal.statistics.linear_fit import ROUNDING
@@ -78,7 +79,7 @@ def later(fitted: Parameters, held: Sequence[tuple[FitData, int]]) -> Later:
     mine = parameters(fitted.robot, data, fitted.asked, like=fitted)
     place = {name: column for column, name in enumerate(fitted.names)}
     columns = np.array([place.get(name, NONE) for name in mine.names], dtype=np.intp)
-    known = {first: columns[first] for first in mine.frames if columns[first] != NONE}
+    known = {first: columns[first] for first in mine.motions if columns[first] != NONE}
     origin = dict(mine.origin) | {first: fitted.origin[there] for first, there in known.items()}
     return Later(data, tuple(like for _, like in held), replace(mine, origin=origin), columns)
 

@@ -15,12 +15,12 @@ import numpy as np
 
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
+from pkmcal.calibration.fit_data import Dependence, FitData, Numbers
 from pkmcal.calibration.sessions import NONE, Scope, Spread, label, matches, scopes
 from pkmcal.calibration.smoothness import smoothness_rows
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import Calibratable
-from pkmcal.measurements.components import Kind
 from pkmcal.measurements.measurements import Measurements
 
 Prior = float | Mapping[str, float] | None
@@ -28,56 +28,9 @@ Known = Literal["known", "unknown"]
 KNOWN: tuple[Known, ...] = ("known", "unknown")
 Bounds = Mapping[str, tuple[float, float]] | None
 
-_POINT = (("x", "mm"), ("y", "mm"), ("z", "mm"))
-_FRAME = (*_POINT, ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
-
-# The points that measurements of a kind depend on: what `predict` calls them, and users.
-POINTS: dict[Kind, dict[str, str]] = {
-    "pose": {},
-    "position": {"target": "target"},
-    "height": {"target": "target"},
-    "distance": {"target": "attachment", "anchor": "anchor"},
-    "closure": {},
-}
-
-
-@dataclass(frozen=True, eq=False)
-class FitData:
-    """Rows of one set of measurements, to be fitted or held out.
-
-    Attributes
-    ----------
-    measured : Measurements
-        These rows alone.
-    rows : ndarray of int (N,)
-        Their numbers in what the user gave, counted through all sets.
-    unknown_frame, unknown_target, unknown_attachment : bool
-        Which of them `identify` was asked to find along.
-    set_name : str
-        Of the set, where it has a frame or points of its own.
-    """
-
-    measured: Measurements
-    rows: IntArray
-    unknown_frame: bool
-    unknown_target: bool
-    unknown_attachment: bool = False
-    set_name: str = ""
-
-    @property
-    def framed(self) -> bool:
-        """Whether these readings depend on the unknown frame."""
-        return self.unknown_frame and self.measured.kind != "distance"
-
-    @property
-    def sought(self) -> tuple[str, ...]:
-        """Which of its points are estimated: "target", or "attachment" and "anchor"."""
-        unknown = {
-            "target": self.unknown_target,
-            "anchor": self.unknown_target,
-            "attachment": self.unknown_attachment,
-        }
-        return tuple(role for role in POINTS[self.measured.kind].values() if unknown[role])
+_FRAME = (
+    ("x", "mm"), ("y", "mm"), ("z", "mm"), ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -109,7 +62,7 @@ class Asked:
 
 @dataclass(frozen=True, eq=False)
 class Parameters:
-    """The parameter vector: numbers of the geometry first, then frames and points.
+    """The parameter vector: numbers of the geometry first, then frames and what readings depend on.
 
     Attributes
     ----------
@@ -135,12 +88,13 @@ class Parameters:
         Places in the geometry's values of the first numbers.
     frame : int or None
         Number of frame.x; None where the frame is known.
-    points : mapping
-        Number of the x of each unknown point, by "target", "attachment" or "anchor" and its name.
+    found_along : mapping
+        First number of each point, zero or artefact that is found along, by role
+        (`Dependence.role`) and name.
     origin : mapping
-        Where the six parameters of a frame count from, by the first: the base in the instrument's
-        frame is at this pose (6,) followed by them. Near it they are small, and their angles
-        regular.
+        Where the six parameters of a frame or tool count from, by the first: the base in the
+        instrument's frame, or the tool on the platform, is at this pose (6,) followed by them. Near
+        it they are small, and their angles regular.
     robot : Calibratable
         The machine they belong to.
     asked : Asked
@@ -162,7 +116,7 @@ class Parameters:
     sessions: tuple[str, ...]
     places: IntArray
     frame: int | None
-    points: Mapping[tuple[str, str], int]
+    found_along: Mapping[tuple[str, str], int]
     origin: Mapping[int, FloatArray]
     robot: Calibratable
     asked: Asked
@@ -207,9 +161,10 @@ class Parameters:
         return slice(0, int(np.count_nonzero(self.number_of < len(self.places))))
 
     @property
-    def frames(self) -> tuple[int, ...]:
-        """The first parameter of each frame."""
-        return tuple(np.flatnonzero(self.number_of == self.frame).tolist())
+    def motions(self) -> tuple[int, ...]:
+        """The first parameter of each frame and each tool."""
+        numbers = [n for n in (self.frame, self.found_along.get(("tool", ""))) if n is not None]
+        return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
 
     def spread(self, datasets: Sequence[FitData]) -> Spread:
         """Which parameters hold in the rows of these sets."""
@@ -217,13 +172,12 @@ class Parameters:
         part_of = []
         for data in datasets:
             session = data.measured.session if "session" in self.scope else None
-            names = [""] * len(data.measured) if session is None else session.tolist()
-            one = data.set_name if "set" in self.scope else ""
-            part_of.append(
-                np.array(
-                    [place.setdefault((name, one), len(place)) for name in names], dtype=np.intp
-                )
-            )
+            behind = data.set_name if "set" in self.scope else ""
+            names, mine = [""], np.zeros(len(data.measured), dtype=np.intp)
+            if session is not None:
+                names, mine = (each.tolist() for each in np.unique(session, return_inverse=True))
+            parts = [place.setdefault((name, behind), len(place)) for name in names]
+            part_of.append(np.array(parts, dtype=np.intp)[mine])
         columns = np.array([
             [
                 self.column.get((number, label(scope, *part)), NONE)
@@ -254,9 +208,9 @@ class Parameters:
     def aligned(
         self, theta: FloatArray, first: int, frame: FloatArray
     ) -> tuple[Parameters, FloatArray]:
-        """Put the base at `frame` (6,) and count from there, unless a prior or bound is stated.
+        """Put a frame or tool at `frame` (6,) and count from there.
 
-        `first` is the first parameter of that frame.
+        Unless a prior or bound is stated. `first` is its first parameter.
         """
         mine, theta = slice(first, first + 6), theta.copy()
         stated = np.isfinite([self.prior[mine], self.lower[mine], self.upper[mine]]).any()
@@ -265,9 +219,9 @@ class Parameters:
         return replace(self, origin=origin), theta
 
     def reported(self, theta: FloatArray) -> FloatArray:
-        """The parameters (n,) with the frames' numbers counted from zero."""
+        """The parameters (n,) with the numbers of frames and tools counted from zero."""
         out: FloatArray = theta.copy()
-        for first in self.frames:
+        for first in self.motions:
             mine = slice(first, first + 6)
             out[mine] = compose(self.origin[first], np.ascontiguousarray(theta[None, mine]))[0]
         return out
@@ -275,22 +229,20 @@ class Parameters:
     def reported_rates(self, theta: FloatArray) -> FloatArray:
         """Derivative (n, n) of `reported` to the parameters (n,)."""
         rates = np.eye(len(self))
-        for first in self.frames:
+        for first in self.motions:
             mine, nowhere = slice(first, first + 6), np.zeros(6)
             at, origin = np.ascontiguousarray(theta[None, mine]), self.origin[first]
             whole = compose(origin, at)
             rates[mine, mine] = compose_rates(origin, at, nowhere, whole)[0]
         return rates
 
-    def numbers_of(self, role: str, measured: Measurements) -> IntArray:
-        """Numbers of the unknown point of each row, (N, 3)."""
-        places, index = _points_of(role, measured)
-        for name in places:
-            if (role, name) not in self.points:
-                known = did_you_mean(name, (other for _, other in self.points))
-                raise ArgumentError(f"holdout: its {role} {name!r} was not fitted{known}")
-        first = np.array([self.points[role, name] for name in places])
-        numbers: IntArray = first[index][:, None] + np.arange(3)
+    def numbers_of(self, dependence: Dependence) -> IntArray:
+        """Numbers of an argument in each row, (N, w); `NONE` where one of it is given."""
+        numbers = np.full(dependence.given.shape, NONE, dtype=np.intp)
+        for i, (name, mine) in enumerate(dependence.sought.items()):
+            rows = np.flatnonzero(dependence.index == i)
+            first = self.found_along[dependence.role, name]
+            numbers[rows[:, None], mine.slots] = first + np.arange(len(mine.slots))
         return numbers
 
 
@@ -317,7 +269,10 @@ def parameters(
     """
     row = _numbers_of_a_row(robot, datasets, asked)
     blocks = [("frame", slice(row.frame, row.frame + 6))] if row.frame is not None else []
-    blocks += [(role, slice(first, first + 3)) for (role, _), first in row.points.items()]
+    blocks += [
+        (role, slice(first, first + row.width[role, name]))
+        for (role, name), first in row.found_along.items()
+    ]
     scope = scopes(row.names, blocks, asked.per_session, asked.by_set)
     entries = _entries(row, scope, blocks, datasets, asked.held_points)
     number_of = np.array([number for number, _ in entries], dtype=np.intp)
@@ -348,12 +303,12 @@ def parameters(
         sessions=_sessions(datasets) if "session" in scope else (),
         places=row.places,
         frame=row.frame,
-        points=row.points,
+        found_along=row.found_along,
         origin={},
         robot=robot,
         asked=asked,
     )
-    return replace(made, origin={first: np.zeros(6) for first in made.frames})
+    return replace(made, origin={first: np.zeros(6) for first in made.motions})
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,7 +320,8 @@ class _Row:
     start: list[float]
     places: IntArray
     frame: int | None
-    points: dict[tuple[str, str], int]
+    found_along: dict[tuple[str, str], int]
+    width: dict[tuple[str, str], int]
 
 
 def _numbers_of_a_row(robot: Calibratable, datasets: Sequence[FitData], asked: Asked) -> _Row:
@@ -391,22 +347,24 @@ def _numbers_of_a_row(robot: Calibratable, datasets: Sequence[FitData], asked: A
         names += [f"frame.{axis}" for axis, _ in _FRAME]
         units += [unit for _, unit in _FRAME]
         start += [0.0] * 6
-    points: dict[tuple[str, str], int] = {}
-    known: dict[tuple[str, str], FloatArray] = {}
-    for role, measured in ((role, data.measured) for data in datasets for role in data.sought):
-        for name, place in _points_of(role, measured)[0].items():
-            if (role, name) in points:
-                if (known[role, name] != place).any():
+    found_along: dict[tuple[str, str], int] = {}
+    known: dict[tuple[str, str], Numbers] = {}
+    for dependence in (each for data in datasets for each in data.dependences()):
+        role = dependence.role
+        for name, mine in dependence.sought.items():
+            if (role, name) in found_along:
+                if not np.array_equal(known[role, name].start, mine.start):
                     raise ArgumentError(
                         f"{role}: {role} {name} starts at different places in different"
                         " measurements; give different targets different target_names"
                     )
                 continue
-            points[role, name], known[role, name] = len(names), place
-            names += [f"{role}{name}.{axis}" for axis, _ in _POINT]
-            units += [unit for _, unit in _POINT]
-            start += list(place)
-    return _Row(names, units, start, places, frame, points)
+            found_along[role, name], known[role, name] = len(names), mine
+            names += mine.names
+            units += mine.units
+            start += mine.start.tolist()
+    width = {key: len(mine.names) for key, mine in known.items()}
+    return _Row(names, units, start, places, frame, found_along, width)
 
 
 def _sessions(datasets: Sequence[FitData]) -> tuple[str, ...]:
@@ -427,7 +385,7 @@ def _entries(
     own = range(len(row.places))
     found = [(j, "") for j in own if scope[j] == "common"]
     found += [(j, name) for name in _sessions(datasets) for j in own if scope[j] == "session"]
-    of_point = {first: (role, name) for (role, name), first in row.points.items()}
+    of_point = {first: (role, name) for (role, name), first in row.found_along.items()}
     for _, block in blocks:
         kind, point = scope[block.start], of_point.get(block.start)
         if point in held:
@@ -446,46 +404,19 @@ def _where_read(data: FitData, point: tuple[str, str] | None) -> tuple[str, ...]
     if point is None:
         return (data.measured.sessions or ("",)) if data.framed else ()
     role, name = point
-    if role not in data.sought:
-        return ()
-    places, index = _points_of(role, data.measured)
-    if name not in places:
-        return ()
-    mine = index == list(places).index(name)
-    session = data.measured.session
-    if session is None:
-        return ("",) if mine.any() else ()
-    return tuple(dict.fromkeys(session[mine].tolist()))
+    for each in data.dependences():
+        if each.role == role and name in each.sought:
+            mine = each.index == list(each.sought).index(name)
+            if mine.any():
+                session = data.measured.session
+                return ("",) if session is None else tuple(dict.fromkeys(session[mine].tolist()))
+    return ()
 
 
 def _travel(robot: Calibratable, measured: Measurements) -> float:
     """Largest actuator coordinate, mm; an angle counts as its arc."""
     arcs = measured.actuators * mm_per_unit(robot.actuator_units, robot.length)
     return max(1.0, float(np.abs(arcs).max()))
-
-
-def _points_of(role: str, measured: Measurements) -> tuple[dict[str, FloatArray], IntArray]:
-    """The points of one role by name, where the user puts them, and which one each row has."""
-    given = measured.attachment if role == "attachment" else measured.target
-    names, index = measured.target_names, measured.target_index
-    one = given is None if role == "attachment" else names is None and given is None
-    if one or (given is not None and given.ndim == 1):
-        place = np.zeros(3) if given is None else given
-        return {"1": place}, np.zeros(len(measured), dtype=np.intp)
-    if names is None or index is None:
-        raise ArgumentError(
-            f"{role}: one place per row cannot be estimated; say with target_index which of a few"
-            " each row measured"
-        )
-    places = np.zeros((len(names), 3)) if given is None else given
-    return dict(zip(names, places, strict=True)), index
-
-
-def places_of(role: str, measured: Measurements) -> FloatArray:
-    """Where the user puts the unknown point of each row, (N, 3)."""
-    places, index = _points_of(role, measured)
-    of_rows: FloatArray = np.array(list(places.values()))[index]
-    return of_rows
 
 
 def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool) -> list[int]:
@@ -535,7 +466,7 @@ def _bounds(
     for pattern, pair in bounds.items():
         try:
             low, high = (float(end) for end in pair)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ArgumentError(
                 f"bounds of {pattern} must be (lower, upper); found {pair!r}"
             ) from None

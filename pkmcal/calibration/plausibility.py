@@ -12,8 +12,9 @@ from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, largest_first, mm_per_unit, rms
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identifiability import listed
-from pkmcal.calibration.parameters import FitData, Parameters
+from pkmcal.calibration.parameters import Parameters
 from pkmcal.display import chance_text, first_rows, printable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -24,6 +25,7 @@ FAR = 0.25  # share of the machine's size by which errors of manufacture do not 
 _BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
 _LEAST_FREEDOM = 0.5  # degrees of freedom from which residuals show how good a fit is
 MISFIT_RATIO = 0.2  # of the misfit that another reading may leave to be named as what was meant
+_SHRUNK = 0.02  # share of its size by which errors of manufacture do not shrink a machine
 _REMOTE = 3.0  # times a machine's reach within which a point of its platform is
 _PULLED = 2.0  # times what is expected, from which a pull on a prior is worth a word
 _ALIKE = 1e-6  # share by which misfits, or pulls, differ that are not equal
@@ -191,12 +193,14 @@ def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
     lengths = np.abs(geometry.values[np.array(geometry.units) == "mm"]).max(initial=0.0)
     size = _REMOTE * max(reach, parameters.robot.length, float(lengths))
     found = []
-    for (role, point), number in parameters.points.items():
+    for (role, point), number in parameters.found_along.items():
+        if role not in ("target", "attachment"):
+            continue
         for first in np.flatnonzero(parameters.number_of == number).tolist():
             place = end.theta[first : first + 3]
             moved = float(np.linalg.norm(place - parameters.start[first : first + 3]))
             far = float(np.linalg.norm(place))
-            if role == "anchor" or min(moved, far) <= size:
+            if min(moved, far) <= size:
                 continue
             behind = parameters.names[first].partition("@")[2]
             name = f"{point} of {printable(behind)}" if behind else point
@@ -208,6 +212,32 @@ def distant_points(end: Evaluation, parameters: Parameters) -> list[str]:
     return found
 
 
+def shrunk(equations: Equations, start: Evaluation, end: Evaluation) -> list[str]:
+    """Say where a machine that touches has become smaller, which makes all of its misfits smaller.
+
+    That a point, a line or a plane was touched again says nothing of how large the machine is.
+    """
+    kinds = {measured.kind for measured in equations.sets}
+    if not kinds <= {"touch", "orientation", "tilt", "angle", "closure"}:
+        return []  # some length was read
+    pairs = zip(equations.sets, equations.pose_of, strict=True)
+    touching = [place for measured, place in pairs if measured.kind == "touch"]
+    if not touching:
+        return []
+    rows = np.concatenate(touching)
+    spans = []
+    for evaluation in (start, end):
+        places = evaluation.pose[rows, :3]
+        spans.append(rms(np.linalg.norm(places - places.mean(axis=0), axis=1)))
+    share = 1.0 - spans[1] / spans[0]
+    if share < _SHRUNK:
+        return []
+    return [
+        f"the poses lie {100 * share:.2g} % closer together than before: touches alone do not say"
+        " how large a machine is, state touch_distances or measure a length as well"
+    ]
+
+
 def contradicted_prior(
     test: PriorTest | None, parameters: Parameters, with_outliers: bool
 ) -> list[str]:
@@ -215,9 +245,11 @@ def contradicted_prior(
     if test is None or not test.contradicted:
         return []
     pulls = np.nan_to_num(test.pulls)
-    stated = [i for i, sigma in enumerate(parameters.prior) if np.isfinite(sigma)]
+    stated = [n for n, s in zip(parameters.names, parameters.prior, strict=True) if np.isfinite(s)]
+    bends = parameters.prior_rows[len(stated) :]
+    stated += [f"the smoothness at {parameters.names[np.abs(row).argmax()]}" for row in bends]
     worst = [k for k in largest_first(np.abs(pulls), _ALIKE)[:3] if abs(pulls[k]) > _PULLED]
-    shown = ", ".join(f"{parameters.names[stated[k]]} {abs(pulls[k]):.1f}" for k in worst)
+    shown = ", ".join(f"{stated[k]} {abs(pulls[k]):.1f}" for k in worst)
     pulled = f" and pull {shown} times as far as prior and noise let expect" if worst else ""
     return [
         f"the measurements contradict the prior ({chance_text(test.chance_of_either)}){pulled}: a"
@@ -253,6 +285,7 @@ def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: b
         )
         table = np.column_stack([
             measured.actuators,
+            np.empty((len(measured), 0)) if measured.other is None else measured.other,
             measured.values.reshape(len(measured), -1),
             targets,
         ])  # fmt: skip

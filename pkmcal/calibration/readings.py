@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
-from pkmcal.calibration.parameters import POINTS, FitData, Parameters, places_of
+from pkmcal.calibration import joint_angles
+from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.parameters import Parameters
 from pkmcal.calibration.sessions import NONE
 from pkmcal.measurements import orientation
+from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import Predicted, difference, joined, predict
+from pkmcal.measurements.observation import Predicted, difference, joined, predict, read_angles
 
 ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
 
@@ -41,6 +45,8 @@ class Readings:
         From where the actuators came.
     pose_of : list of ndarray of int
         Which pose each row of each set is at.
+    other_of : list of ndarray of int or None
+        At which other pose it ends, of distances between two.
     spread : Spread
         Which parameters hold in each row.
     machine_columns : ndarray of int (S, g)
@@ -64,42 +70,41 @@ class Readings:
         self.spread = parameters.spread(datasets)
         self._framed = [data.framed for data in datasets]
         self._frames = [self._frames_of(i) for i in range(len(datasets))]
-        self._numbers = [  # of the points that are sought, by what `predict` calls them
-            {
-                name: parameters.numbers_of(role, data.measured)
-                for name, role in POINTS[data.measured.kind].items()
-                if role in data.sought
-            }
-            for data in datasets
+        depend = [list(data.dependences()) for data in datasets]
+        self._given = [{each.argument: each.given for each in mine} for mine in depend]
+        self._numbers = [  # that are found along, by what `predict` calls them
+            {each.argument: parameters.numbers_of(each) for each in mine if each.sought}
+            for mine in depend
         ]
         self._columns = [  # the parameters that these are
             {
-                name: np.take_along_axis(self.spread.columns[part], numbers, axis=1)
+                name: np.where(
+                    numbers == NONE,
+                    NONE,
+                    np.take_along_axis(self.spread.columns[part], numbers, axis=1),
+                )
                 for name, numbers in of_set.items()
             }
             for of_set, part in zip(self._numbers, self.spread.part_of, strict=True)
         ]
-        self._known = [
-            {
-                name: places_of(role, m)  # of points that are held
-                if name in columns
-                else (m.attachments if role == "attachment" else m.targets)
-                for name, role in POINTS[m.kind].items()
-            }
-            for m, columns in zip(self.sets, self._columns, strict=True)
-        ]
+        self._along = [data.along for data in datasets]
         # several targets or repeats at the same actuators are one pose
-        actuators = np.concatenate([m.actuators for m in self.sets])
-        noises = [m.actuator_sigma for m in self.sets]
+        double = [i for i, m in enumerate(self.sets) if m.other is not None]
+        actuators = np.concatenate([
+            *(m.actuators for m in self.sets),
+            *(m.other for m in self.sets if m.other is not None),
+        ])  # fmt: skip
+        noises = [m.actuator_sigma for m in (*self.sets, *(self.sets[i] for i in double))]
         stated = [sigma for sigma in noises if sigma is not None]
         commands = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
         directions = [m.approach for m in self.sets]
         if any(each is not None for each in directions):  # backlash is between their poses
             known = [np.zeros(m.actuators.shape) if m.approach is None else m.approach
                      for m in self.sets]  # fmt: skip
+            known += [np.zeros(self.sets[i].actuators.shape) for i in double]
             commands = np.hstack([commands, np.concatenate(known)])
         self.machine_columns, machine_of = self.spread.machines(len(parameters.places))
-        machine = np.concatenate(machine_of)
+        machine = np.concatenate([*machine_of, *(machine_of[i] for i in double)])
         # machines of different sessions are not at the same pose at the same actuators
         several = len(self.machine_columns) > 1
         key = np.column_stack([commands, machine]) if several else commands
@@ -115,15 +120,18 @@ class Readings:
             if several
             else np.arange(len(distinct))
         )
-        edges = np.cumsum([0, *map(len, self.sets)])
-        self.pose_of = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
+        count = [len(m) for m in self.sets]
+        edges = np.cumsum([0, *count, *(count[i] for i in double)])
+        place = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
+        self.pose_of, there = place[: len(count)], iter(place[len(count) :])
+        self.other_of = [None if m.other is None else next(there) for m in self.sets]
         self.deviations = tuple(np.ones(len(m.components)) for m in self.sets)
         self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
         self.present: BoolArray = np.concatenate([
             np.isfinite(m.values).reshape(-1) for m in self.sets
         ])  # fmt: skip
         self._whole = bool(self.present.all())
-        self.set_of = np.repeat(np.arange(len(self.sets)), np.diff(edges))
+        self.set_of = np.repeat(np.arange(len(self.sets)), count)
         self.count = np.concatenate([
             np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in self.sets
         ])  # fmt: skip
@@ -145,39 +153,95 @@ class Readings:
                 found.setdefault(first, {})[i] = rows
         return found
 
+    @property
+    def tools(self) -> dict[int, dict[int, IntArray]]:
+        """Rows of each set that have each tool, by its first parameter."""
+        found: dict[int, dict[int, IntArray]] = {}
+        for i, columns in enumerate(self._columns):
+            if "tool" in columns:
+                first = columns["tool"][:, 0]
+                for each in np.unique(first).tolist():
+                    found.setdefault(each, {})[i] = np.flatnonzero(first == each)
+        return found
+
     def columns_of(self, i: int, name: str) -> IntArray | None:
-        """Parameters (N, 3) of a point of each row of set `i`; `NONE` where it is held.
+        """Parameters (N, w) of what rows of set `i` depend on; `NONE` where a number is held.
+
+        None where all of it is given.
 
         None where it is known.
         `name` is what `predict` calls it.
         """
         return self._columns[i].get(name)
 
-    def points_of(self, i: int, name: str, theta: FloatArray) -> FloatArray:
-        """Where that point is (N, 3), mm."""
-        known, columns = self._known[i][name], self._columns[i].get(name)
-        return known if columns is None else np.where(columns == NONE, known, theta[columns])
+    def arguments_of(self, i: int, theta: FloatArray) -> dict[str, FloatArray]:
+        """What readings of set `i` depend on beside the pose, (N, w) each, for `predict`."""
+        found = dict(self._given[i])
+        for name, columns in self._columns[i].items():
+            found[name] = np.where(columns == NONE, found[name], theta[columns])
+        if "tool" in self._columns[i]:
+            first = self._columns[i]["tool"][:, 0].tolist()
+            found["tool_origin"] = np.array([self.parameters.origin[column] for column in first])
+        return found
 
     def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Readings of each set at poses (K, 6)."""
         return tuple(self._predicted_of(i, pose, theta) for i in range(len(self.sets)))
 
     def _predicted_of(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
-        places = {name: self.points_of(i, name, theta) for name in self._known[i]}
-        kind, mine = self.sets[i].kind, pose[self.pose_of[i]]
+        places, measured = self.arguments_of(i, theta), self.sets[i]
+        kind, mine, there = measured.kind, pose[self.pose_of[i]], self.other_of[i]
+        touching = (measured.artefact, self._along[i])
+        if measured.joint is not None:
+            return read_angles(self._angles(i, pose, theta), **places)
         if not self._frames[i]:
-            return predict(kind, mine, **places)
+            return predict(
+                kind,
+                mine,
+                touching=touching,
+                other=None if there is None else pose[there],
+                **places,
+            )
         parts = [
             predict(
                 kind,
                 mine[rows],
                 frame=theta[first : first + 6],
                 origin=self.parameters.origin[first],
+                touching=touching,
                 **{name: place[rows] for name, place in places.items()},
             )
             for first, rows in self._frames[i]
         ]
         return joined(parts, [rows for _, rows in self._frames[i]])
+
+    def _angles(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray:
+        """Angles (N,) of the passive joint that set `i` reads."""
+        measured, joint = self.sets[i], str(self.sets[i].joint)
+        found = np.empty(len(measured))
+        for machine, rows in self._machines(i, theta):
+            at = pose[self.pose_of[i][rows]]
+            found[rows] = joint_angles.angles(machine, measured.actuators[rows], at, joint)
+        return found
+
+    def by_numbers(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray | None:
+        """How readings of set `i` follow the geometry not by the pose alone, (N, k, g)."""
+        measured, places = self.sets[i], self.parameters.places
+        if measured.joint is None:
+            return None
+        found = np.empty((len(measured), 1, len(places)))
+        for machine, rows in self._machines(i, theta):
+            q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
+            found[rows, 0] = joint_angles.rates(machine, q, at, measured.joint, places)
+        return found
+
+    def _machines(self, i: int, theta: FloatArray) -> Iterator[tuple[Calibratable, IntArray]]:
+        """The machines of set `i`, one or one a session, and the rows of each."""
+        machine_of_row = self.machine_of_pose[self.pose_of[i]]
+        for machine in np.unique(machine_of_row):
+            values = self.parameters.values_at(theta, self.machine_columns[machine])
+            rows = np.flatnonzero(machine_of_row == machine)
+            yield self.parameters.robot.with_values(values), rows
 
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
         """Measured less predicted of each set."""
@@ -276,8 +340,9 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     sigma = measured.sigma
     if sigma is None:
         return np.tile(mm_per_unit(measured.units, length), (len(measured), 1))
-    if measured.kind == "pose" and not _same_turnings(sigma):
-        sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, 3:]))
+    first = KINDS[measured.kind].turning
+    if first is not None and not _same_turnings(sigma, first):
+        sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, first:]))
     if sigma.ndim == 2:
         return 1.0 / sigma
     missing = np.isnan(measured.values)
@@ -287,6 +352,6 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     return np.linalg.inv(np.linalg.cholesky(sigma))
 
 
-def _same_turnings(sigma: FloatArray) -> bool:
-    """Whether standard deviations (N, 6) are the same about every axis."""
-    return sigma.ndim == 2 and bool((sigma[:, 4:] == sigma[:, 3:4]).all())
+def _same_turnings(sigma: FloatArray, first: int) -> bool:
+    """Whether standard deviations (N, k) are the same about every axis."""
+    return sigma.ndim == 2 and bool((sigma[:, first + 1 :] == sigma[:, first : first + 1]).all())

@@ -11,7 +11,7 @@ from pkmcal.calibration.dropped import outlying
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimator
 from pkmcal.calibration.fit import Fit
-from pkmcal.calibration.parameters import FitData
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.statistics.robust_scale import median_ratio, robust_ratio
 
 _SUSPECT = 1.25  # ratio of the linear model's noises from which the robust fit is made

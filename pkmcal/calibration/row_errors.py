@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.parameters import FitData, Parameters
+from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.parameters import Parameters
 from pkmcal.calibration.plausibility import MISFIT_RATIO
 from pkmcal.calibration.readings import of_read
 from pkmcal.display import printable

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from pkmcal.calibration.parameters import FitData
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.display import printable
 
 _MOST = 6  # places that are listed

@@ -52,6 +52,7 @@ _KEYS = {
     "rod": "length from carriage or crank to the platform joint",
     "offset, gain": "the drive is at gain · q + offset; 0 and 1 if left out",
     "branch": "which of the two places that a rod can lead to: 1 or -1",
+    "drive": "law of a drive with a shape: quadratic, spool, harmonics, table, backlash",
     "stroke": "least and most of gain · q + offset",
     "base_cone": "{{ axis = …, angle = … }}: how far its joint on the base swings",
     "platform_cone": "the same of its joint on the platform",
@@ -62,7 +63,7 @@ _CHAINS = """\
 #                  kind R, P, U, S, C · at: a point; left out, that of the joint before
 #                  axis or axes: left out, across the line to the next point (U) or along it (P)
 #                  actuator: which q moves it; passive without · home_value: what q reads at home
-#                  offset, gain: of its q · stroke, cone: its limits · soft: how it yields
+#                  offset, gain, drive: of its q · stroke, cone: its limits · soft: how it yields
 #                  share: a name, of a joint that several limbs have
 #   copies, about  so many of this limb, turned about z or { axis = …, at = … }
 #   group          limbs that are copied together

@@ -13,6 +13,7 @@ from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import linuxcnc_modules
 from pkmcal.controllers.c_header import text_of as header_of
+from pkmcal.controllers.comp_file import comp_texts, without_laws
 from pkmcal.controllers.laws import require_no_laws
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.rendering import rendered
@@ -32,7 +33,8 @@ def linuxcnc(robot: Robot, folder: str | PathLike[str]) -> Loss | None:
     """Write a robot for LinuxCNC: its kinematics, and a headless simulation that runs them.
 
     Of a folder ``mill``: ``pkm_mill.c``, a component for halcompile with the numbers of this robot
-    folded in, ``mill.ini`` and ``mill.hal``; and, where a module that LinuxCNC ships holds the
+    folded in, ``mill.ini`` and ``mill.hal``; of joints with a table or backlash in their drive law
+    ``joint0.comp`` …, which the ini file names; and, where a module that LinuxCNC ships holds the
     robot's numbers, its `setp` lines, such as ``genhexkins.hal``.
 
     Parameters
@@ -51,7 +53,8 @@ def linuxcnc(robot: Robot, folder: str | PathLike[str]) -> Loss | None:
     Raises
     ------
     ValueError
-        A machine that the component cannot hold; nothing is written.
+        A machine that the component cannot hold, or a drive law that is neither a table nor
+        backlash; nothing is written.
     OSError
         The folder cannot be written.
 
@@ -81,10 +84,16 @@ def contents(robot: Robot, folder: str) -> tuple[dict[str, str], Loss | None]:
             f"folder must have a name of 1 to {_LONGEST} letters, for LinuxCNC's own are short,"
             f" found {folder!r}"
         )
-    require_no_laws(robot, "a kinematics module")
+    tabled = robot
+    if robot.model.driven and robot.model.chains is None:  # the module is of the joints
+        robot = without_laws(robot)
     module = linuxcnc_modules.of_robot(robot)
     says = _contents(robot, name)
-    files = {
+    tables = _tables(tabled, robot)
+    for i, joint in enumerate(says["joint_list"]):
+        joint["table"] = f"joint{i}.comp" if i in tables else ""
+    files = {f"joint{i}.comp": text for i, text in tables.items()}
+    files |= {
         f"{_MODULE}{name}.c": rendered("kins.c.jinja", says),
         f"{name}.ini": rendered("machine.ini.jinja", says),
         f"{name}.hal": rendered("machine.hal.jinja", says),
@@ -94,6 +103,16 @@ def contents(robot: Robot, folder: str) -> tuple[dict[str, str], Loss | None]:
     if module.loss.exact:
         files[f"{module.name}.hal"] = module.lines
     return files, module.loss
+
+
+def _tables(robot: Robot, plain: Robot) -> dict[int, str]:
+    """The COMP_FILE of each joint that needs one; `plain` is the robot without laws."""
+    if not robot.model.driven:
+        return {}
+    if robot.model.chains is not None:
+        require_no_laws(robot, "a kinematics module")
+    at_home = plain.inverse(plain.home, match=True)
+    return comp_texts(robot, *_limits(plain, at_home, plain.machine.struct.size))
 
 
 def _contents(robot: Robot, name: str) -> dict[str, Any]:

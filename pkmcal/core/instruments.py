@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import rows
+
+_NONE = np.zeros(1)
 
 
 def points(
@@ -30,12 +34,54 @@ def seen_points(
 
 
 def distances(
-    pose: FloatArray, target: FloatArray, anchor: FloatArray, isa: int | None = None
+    pose: FloatArray,
+    target: FloatArray,
+    anchor: FloatArray,
+    zero: FloatArray = _NONE,
+    isa: int | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """How far targets of the platform are from anchors of the base, at poses (N, 6).
+    """How far targets of the platform are from anchors of the base less zeros, at poses (N, 6).
 
-    `target` and `anchor` are (3,) or (N, 3). Returns the distances (N,) and their derivatives by
-    the platform's twist (ω, v) (N, 6), by the target (N, 3) and by the anchor (N, 3).
+    `target` and `anchor` are (3,) or (N, 3), `zero` is (1,) or (N, 1). Returns the distances (N,)
+    and their derivatives by the platform's twist (ω, v) (N, 6), by the target (N, 3) and by the
+    anchor (N, 3).
     """
-    distance, by_twist, by_target, by_anchor = rows("distances", pose, target, anchor, isa=isa)
+    distance, *by = rows("distances", pose, target, anchor, zero, isa=isa)
+    by_twist, by_target, by_anchor = by
     return distance, by_twist, by_target, by_anchor
+
+
+def between(
+    pose: FloatArray, other: FloatArray, target: FloatArray, isa: int | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """How far targets (3,) or (N, 3) at poses (N, 6) are from where they are at other ones.
+
+    Returns the distances (N,) and their derivatives by both twists (ω, v) (N, 6) and by the target
+    (N, 3).
+    """
+    distance, by_twist, by_other, by_target = rows("between", pose, other, target, isa=isa)
+    return distance, by_twist, by_other, by_target
+
+
+def touched_points(
+    artefact: FloatArray, point: FloatArray, isa: int | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Points (N, 3) of the base in the axes of artefacts, which are poses (6,) or (N, 6) there.
+
+    Returns them (N, 3) with their derivatives by the artefact (N, 3, 6) and by the point (N, 3, 3).
+    """
+    inside, by_artefact, by_point = rows("touched_points", artefact, point, isa=isa)
+    return inside, by_artefact, by_point
+
+
+def tilts(
+    pose: FloatArray, mounting: FloatArray, up: FloatArray, isa: int | None = None
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """How far x and y of sensors point up, at poses (N, 6) of the platform that carries them.
+
+    `mounting` are α β γ of the sensor on the platform, `up` the vertical in base axes, (3,) or
+    (N, 3). Returns the angles (N, 2) and their derivatives by the turning of the platform, by the
+    mounting and by the vertical, (N, 2, 3) each.
+    """
+    tilt, by_turn, by_mounting, by_up = rows("tilts", pose, mounting, up, isa=isa)
+    return tilt, by_turn, by_mounting, by_up

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pkmcal.core.library import POSE
 
 BESIDE = ("index", "time", "date", "comment", "name", "collection")  # not looked at by themselves
-RESERVED = ("sigma", "cov", "target", "attachment", "actuator_sigma", "approach")
+RESERVED = ("sigma", "cov", "target", "attachment", "actuator_sigma", "approach", "to", "touch")
 EULER = (("rx", "ry", "rz"), ("a", "b", "c"), ("w", "p", "r"))  # in the order of their letters
 VECTOR = ("rvx", "rvy", "rvz")
 QUATERNION = ("qw", "qx", "qy", "qz")
@@ -37,6 +37,10 @@ _SYNONYMS: dict[str, str] = {
     "distance": "dist|length measured|measured length|measured distance|ball bar length",
     "sigma": "std|stdev|stddev|std dev|standard deviation|sigma xyz",
     "group": "pose|pose id|pose no|pose nr|pose number|pose name|configuration|config",
+    "run": "run id|run no|run number|run name",
+    "tilt1": "tilt 1|inclination 1|inclinometer 1",
+    "tilt2": "tilt 2|inclination 2|inclinometer 2",
+    "touch": "touched|socket",
     "session": "session id|session name|session no|session number|sitting",
     "target": "reflector|smr|target name|reflector name|marker|prism",
     "name": "point id|point|point name|pointname|point no|pt|pt id|pt name|id|label|object name"
@@ -82,6 +86,7 @@ _DRIVEN = re.compile(
 )
 _QUATERNION = re.compile(r"(?:q|quat|quaternion) ?([0-4])")
 _OF_A_TARGET = re.compile(r"(?P<target>.*[^\s_\-.:/])[\s_\-.:/]+(?P<axis>[xyz])", re.IGNORECASE)
+_OF_A_KIND = re.compile(r"(?:angle|touch):.+", re.IGNORECASE)
 _SIGMA = re.compile(
     r"(?:sigma|std|stdev|stddev|std dev|s) (?P<one>x|y|z|alpha|beta|gamma)"
     r"|(?P<other>x|y|z) (?:sigma|std|stdev|stddev|std dev)"
@@ -93,7 +98,11 @@ def is_known(name: str) -> bool:
     plain = _plain(name)
     return (
         bool(
-            plain in _NAMES or _DRIVEN.fullmatch(plain) or _SIGMA.fullmatch(plain) or _dotted(name)
+            plain in _NAMES
+            or _DRIVEN.fullmatch(plain)
+            or _SIGMA.fullmatch(plain)
+            or _OF_A_KIND.fullmatch(name)
+            or _dotted(name)
         )
         or known_as(name).partition(".")[0] in RESERVED
     )

@@ -11,7 +11,7 @@ from pkmcal.arguments import shown, words
 from pkmcal.arrays import FloatArray, Int64Array, TextArray, as_numbers
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import LONGEST_NAME
-from pkmcal.measurements.components import COMPONENTS, Kind
+from pkmcal.measurements.components import KINDS, Kind, components
 from pkmcal.measurements.tracker import Tracker
 
 _ROUNDED = 1e-9  # share by which a covariance may miss symmetry, as what was computed or typed does
@@ -79,7 +79,7 @@ def value_of_row(given: ArrayLike | None, kind: Kind, q: tuple[int, ...]) -> Flo
     if given is None:
         return None
     value = numbers("values", given, blank=True)
-    k = len(COMPONENTS[kind])
+    k = len(components(kind))
     if value.shape != ((k,) if k != 1 else ()):
         what = f"have shape ({k},)" if k != 1 else "be a number"
         raise ArgumentError(
@@ -94,7 +94,7 @@ def number_of_row(given: ArrayLike | None) -> ArrayLike | None:
     return None if given is None else np.atleast_1d(np.asarray(given))
 
 
-def values_array(given: ArrayLike | None, kind: str, shape: tuple[int, int]) -> FloatArray:
+def values_array(given: ArrayLike | None, kind: Kind, shape: tuple[int, int]) -> FloatArray:
     """What was read, (N, k) or (N,); NaN where nothing was, of orientations as a whole."""
     if given is None:
         if shape[1]:
@@ -109,8 +109,9 @@ def values_array(given: ArrayLike | None, kind: str, shape: tuple[int, int]) -> 
             f"values of kind {kind!r} must have shape {expected} for {shape[0]} rows of"
             f" actuators; found {values.shape}"
         )
-    if kind == "pose":
-        angles = np.isnan(values[:, 3:])
+    first = KINDS[kind].turning
+    if first is not None:
+        angles = np.isnan(values[:, first:])
         part = angles.any(axis=1) & ~angles.all(axis=1)
         if part.any():
             raise ArgumentError(
@@ -140,16 +141,16 @@ def actuator_sigma_array(given: ArrayLike | None, shape: tuple[int, ...]) -> Flo
 
 
 def target_array(
-    given: ArrayLike | None, kind: str, index: Int64Array | None, rows: int
+    given: ArrayLike | None, kind: Kind, index: Int64Array | None, rows: int
 ) -> FloatArray | None:
     """One target, one per row, or several that an index chooses from; None where none is given."""
-    if kind in ("pose", "closure") and (given is not None or index is not None):
-        own = "a pose is the platform's own" if kind == "pose" else "a closure reads no point"
+    if not KINDS[kind].point and (given is not None or index is not None):
+        own = "a pose is the platform's own" if kind == "pose" else f"a {kind} reads no point"
         raise ArgumentError(f"target: {own} and takes no target")
     if index is not None and index.min() < 0:
         raise ArgumentError(f"target_index counts from 0; found {index.min()}")
     if given is None:
-        if kind == "distance":
+        if KINDS[kind].point == "base":
             raise ArgumentError(
                 "target: a distance needs the fixed point it is measured to, (x, y, z) in mm in"
                 " the base frame"
@@ -175,12 +176,12 @@ def target_array(
 
 
 def attachment_array(
-    given: ArrayLike | None, kind: str, targets: int | None, rows: int
+    given: ArrayLike | None, kind: Kind, targets: int | None, rows: int
 ) -> FloatArray | None:
     """One attachment, one per row, or one for each of the several targets; None without."""
     if given is None:
         return None
-    if kind != "distance":
+    if KINDS[kind].point != "base":
         raise ArgumentError(
             f"attachment: distances alone have one, values of kind {kind!r} a target"
         )

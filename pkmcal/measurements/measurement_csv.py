@@ -8,6 +8,9 @@ columns                               meaning
 ``z [mm]`` alone                      a height
 ``x [mm], y [mm], probe [mm]``        where a printer's probe triggered; or ``q1`` … and ``probe``
 ``distance [mm]``                     from the fixed point ``target`` to the ``attachment``
+``alpha``, ``beta``, ``gamma [deg]``  an orientation, where there is no position
+``to.q1``, ``run``, ``tilt1``,        distances between two places and relative ones, tilts, angles
+``angle:…``, ``touch`` …              of joints, touches: `pkmcal.measurements.kind_columns`
 ``A.x [mm], A.y [mm], A.z [mm]`` …    positions of several targets A, B, … in one row
 ``sigma [mm]``                        standard deviation of the row, of every component
 ``sigma.x [mm]``, ``sigma.alpha``…    … or of each component
@@ -54,9 +57,16 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements import orientation_columns
 from pkmcal.measurements.actuator_columns import ACTUATOR, Actuated, compare, read_actuators
 from pkmcal.measurements.calibratable import as_machine
-from pkmcal.measurements.components import COMPONENTS, Kind
+from pkmcal.measurements.components import KINDS, Kind
 from pkmcal.measurements.join import JOINS, Join
 from pkmcal.measurements.join import join as joined
+from pkmcal.measurements.kind_columns import (
+    component_names,
+    kinds_in,
+    names_of_kinds,
+    read_kind_fields,
+    value_columns,
+)
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.orientation_columns import checked, names_in
 from pkmcal.measurements.probe import (
@@ -66,6 +76,7 @@ from pkmcal.measurements.probe import (
     is_of_trigger,
     probed,
 )
+from pkmcal.measurements.sigma_columns import read_actuator_sigma, read_sigma
 from pkmcal.measurements.table_layout import (
     Layout,
     layout,
@@ -167,8 +178,9 @@ def read_measurements(
     actuators, actuator_units = read_actuators(table, robot)
     compare(table, actuator_units, robot)
     kind = _kind(table, several)
-    fields: dict[str, Any] = {"sigma": _read_sigma(table, kind), "lines": np.array(table.lines)}
-    fields["actuator_sigma"] = _read_actuator_sigma(table, actuator_units)
+    fields: dict[str, Any] = {"sigma": read_sigma(table, kind), "lines": np.array(table.lines)}
+    fields["actuator_sigma"] = read_actuator_sigma(table, actuator_units)
+    fields |= read_kind_fields(table, kind, actuator_units)
     if "group" in table.columns:
         fields["group"] = table.integers("group")
     fields["session"] = _read_session(table)
@@ -215,7 +227,7 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
             " it probed"
         )
     z = _read(table, "probe", "mm")[0]
-    sigma = _read_sigma(table, "height")
+    sigma = read_sigma(table, "height")
     if any(ACTUATOR.fullmatch(name) for name in table.columns):
         actuators, units = read_actuators(table, robot)
         compare(table, units, robot)
@@ -287,8 +299,8 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     names |= {f"{what}.{q}" for what in ("actuator_sigma", "approach") for q in of_actuators}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
-    names |= {f"sigma.{name}" for name in components}
-    pairs = itertools.combinations_with_replacement(components, 2)
+    names |= {f"sigma.{name}" for name in component_names()} | names_of_kinds(table)
+    pairs = itertools.product(component_names(), repeat=2)
     return names | {f"cov.{a}.{b}" for a, b in pairs} | set(names_in(table))
 
 
@@ -296,8 +308,9 @@ def _kind(table: Table, several: tuple[str, ...]) -> Kind:
     """What was measured, by the columns that are there."""
     names = table.columns.keys()
     turned = set(names_in(table)) | (set(_ANGLES) & names)
+    own = kinds_in(table)
     groups = {
-        "distance": {"distance"} & names,
+        **{title: {title} for title in own},
         "x, y, z": ({*_AXES} & names) | turned,
         f"several targets ({', '.join(several)})": set(several),
     }
@@ -306,10 +319,12 @@ def _kind(table: Table, several: tuple[str, ...]) -> Kind:
         raise table.header_error(f"more than one thing measured: {' and '.join(there)}")
     if not there:
         return "closure"
-    if "distance" in names:
-        return "distance"
+    if own:
+        return next(iter(own.values()))
     if several:
         return "position"
+    if turned and names.isdisjoint(_AXES):
+        return "orientation"
     if names.isdisjoint(("x", "y", *turned)):
         return "height"
     return "pose" if turned else "position"
@@ -323,11 +338,11 @@ def _read_values(
     robot: Actuated | None,
 ) -> FloatArray | None:
     """What was measured, (N, k) or (N,); None without columns of it."""
-    if kind == "pose" and names_in(table) not in ((), _ANGLES):
-        places = [_read(table, axis, "mm")[0] for axis in _AXES]
+    if KINDS[kind].turning is not None and names_in(table) not in ((), _ANGLES):
+        places = [_read(table, axis, "mm")[0] for axis in _AXES] if kind == "pose" else []
         nominal = _nominal(robot, actuators)
         return np.column_stack([*places, orientation_columns.read(table, rotation, nominal)])
-    columns = [_read(table, *component, blank=True)[0] for component in COMPONENTS[kind]]
+    columns = [_read(table, *component, blank=True)[0] for component in value_columns(table, kind)]
     if not columns:
         return None
     return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
@@ -344,65 +359,6 @@ def _nominal(robot: Actuated | None, actuators: FloatArray) -> FloatArray | None
     some = np.unique(np.linspace(0, len(actuators) - 1, _TRIED).astype(int))
     angles[some] = machine.forward(actuators[some]).pose[:, 3:]
     return angles
-
-
-def _read_sigma(table: Table, kind: Kind) -> FloatArray | None:
-    """Deviations (rows, 1) or (rows, k), or covariances (rows, k, k)."""
-    given = [name for name in table.columns if name.partition(".")[0] in ("sigma", "cov")]
-    if not given:
-        return None
-    names, units = zip(*COMPONENTS[kind], strict=True)
-    pairs = list(itertools.combinations_with_replacement(range(len(names)), 2))
-    forms = {
-        "one": ["sigma"],
-        "each": [f"sigma.{name}" for name in names],
-        "covariance": [f"cov.{names[i]}.{names[j]}" for i, j in pairs],
-    }
-    form = "covariance" if given[0].startswith("cov") else "each" if "." in given[0] else "one"
-    if form == "one" and kind == "pose":
-        raise table.header_error(
-            f"column 'sigma' for poses: expected {forms['each'][0]!r} to {forms['each'][-1]!r}"
-        )
-    table.require(forms[form])
-    for name in given:
-        if name not in forms[form]:
-            raise table.header_error(f"column {name!r} does not go with {given[0]!r} and {kind}s")
-    if form == "covariance":
-        sigma = np.empty((len(table), len(names), len(names)))
-        for name, (i, j) in zip(forms[form], pairs, strict=True):
-            sigma[:, i, j] = sigma[:, j, i] = table.numbers(name, f"{units[i]}*{units[j]}")[0]
-        return sigma
-    of = units if form == "each" else units[:1]
-    columns = [
-        table.numbers(sigma, unit, like=names[0] if form == "one" else name)[0]
-        for sigma, unit, name in zip(forms[form], of, names, strict=False)
-    ]
-    for name, column in zip(forms[form], columns, strict=True):
-        if not (column > 0).all():
-            row = int(np.argmin(column > 0))
-            raise table.cell_error(name, row, f"must be positive, found {column[row]:g}")
-    return np.stack(columns, axis=1)
-
-
-def _read_actuator_sigma(table: Table, units: tuple[str, ...]) -> FloatArray | None:
-    """Deviations (rows, n) of what the actuators read."""
-    each = [f"actuator_sigma.q{i + 1}" for i in range(len(units))]
-    given = [name for name in table.columns if name.startswith("actuator_sigma")]
-    if not given:
-        return None
-    if given == ["actuator_sigma"]:
-        if len(set(units)) > 1:
-            raise table.header_error(
-                "column 'actuator_sigma' for lengths and angles: expected"
-                f" {each[0]!r} to {each[-1]!r}"
-            )
-        columns = [table.numbers("actuator_sigma", units[0])[0]] * len(units)
-    else:
-        table.require(each)
-        if len(given) > len(each):
-            raise table.header_error("column 'actuator_sigma' does not go with those of actuators")
-        columns = [table.numbers(name, unit)[0] for name, unit in zip(each, units, strict=True)]
-    return np.stack(columns, axis=1)
 
 
 def _read_approach(table: Table, count: int) -> FloatArray | None:

@@ -8,12 +8,15 @@ from collections.abc import Iterator, Sequence
 from os import PathLike
 from typing import Protocol
 
+import numpy as np
+
 from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.files.csv_writer import write_csv
-from pkmcal.measurements.components import COMPONENTS, Kind
+from pkmcal.measurements.components import Kind, components
+from pkmcal.measurements.kind_columns import OfAKind, kind_cells
 
 
-class Writable(Protocol):
+class Writable(OfAKind, Protocol):
     """The fields of `Measurements` that are written, each as it describes them."""
 
     @property
@@ -30,7 +33,11 @@ class Writable(Protocol):
 
     @property
     def kind(self) -> Kind:
-        """Which key of `COMPONENTS` they are."""
+        """Which key of `KINDS` they are."""
+
+    @property
+    def joint(self) -> str | None:
+        """Of an angle, the joint."""
 
     @property
     def sigma(self) -> FloatArray | None:
@@ -105,20 +112,25 @@ def write_measurements(
 
 def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
     """Headings and cells, in the order in which they are written."""
-    for i, unit in enumerate(m.actuator_units or ("mm",) * m.actuators.shape[1]):
+    units = m.actuator_units or ("mm",) * m.actuators.shape[1]
+    for i, unit in enumerate(units):
         yield f"q{i + 1} [{unit}]", _exact(m.actuators[:, i])
-    components = COMPONENTS[m.kind]
-    for i, (name, unit) in enumerate(components):
-        yield f"{name} [{unit}]", _exact(m.values.reshape(len(m.values), -1)[:, i])
+    yield from kind_cells(m, units)
+    read = components(m.kind, m.artefact)
+    for i, (name, unit) in enumerate(read):
+        if m.touched is not None and not m.values.any() and not np.signbit(m.values).any():
+            break  # where it touched, nothing was read
+        heading = name if m.joint is None else f"angle:{m.joint}"
+        yield f"{heading} [{unit}]", _exact(m.values.reshape(len(m.values), -1)[:, i])
     yield from _actuator_sigma(m)
     if m.sigma is not None and m.sigma.ndim == 3:
-        for i, j in itertools.combinations_with_replacement(range(len(components)), 2):
-            (a, of_a), (b, of_b) = components[i], components[j]
+        for i, j in itertools.combinations_with_replacement(range(len(read)), 2):
+            (a, of_a), (b, of_b) = read[i], read[j]
             yield f"cov.{a}.{b} [{of_a}*{of_b}]", _exact(m.sigma[:, i, j])
     elif m.sigma is not None and m.kind != "pose" and (m.sigma == m.sigma[:, :1]).all():
-        yield "sigma [mm]", _exact(m.sigma[:, 0])
+        yield f"sigma [{read[0][1]}]", _exact(m.sigma[:, 0])
     elif m.sigma is not None:
-        for i, (name, unit) in enumerate(components):
+        for i, (name, unit) in enumerate(read):
             yield f"sigma.{name} [{unit}]", _exact(m.sigma[:, i])
     if m.target_index is not None and m.target_names is not None:
         yield "target", [m.target_names[i] for i in m.target_index]

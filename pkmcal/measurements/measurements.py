@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal import display
 from pkmcal.arguments import checked_seed, shown, word, words
 from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.components import COMPONENTS, Kind
+from pkmcal.measurements.components import KINDS, Artefact, Kind, components
 from pkmcal.measurements.fields import (
     actuator_sigma_array,
     approach_array,
@@ -32,15 +31,20 @@ from pkmcal.measurements.fields import (
     value_of_row,
     values_array,
 )
+from pkmcal.measurements.kind_fields import (
+    SEVERAL_ROWS,
+    KindFields,
+    TouchDistances,
+    kind_fields,
+)
+from pkmcal.measurements.listing import deviations, table, title
 from pkmcal.measurements.measurement_writer import write_measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.result import Result
 
-_LISTED_ROWS = 12  # a longer list of measurements is printed with its middle left out
-
 _PER_ROW = (
     "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines", "session",
-    "approach",
+    "approach", "other", "run", "touched",
 )  # fmt: skip
 
 
@@ -52,7 +56,7 @@ class Measurements(Result):
     ----------
     actuators : (N, n) array
         Actuator coordinates as commanded or read, mm or rad as the limbs say.
-    values : (N, 6), (N, 3) or (N,) array
+    values : (N, 6), (N, 3), (N, 2) or (N,) array
         What was measured, in mm and rad, in the base frame (or the instrument's, where
         `identify` is given ``frame="unknown"``); see `kind`. NaN: not read there.
         One row is taken as it is: actuators (n,) with values (6,), (3,) or a number, and what else
@@ -62,6 +66,11 @@ class Measurements(Result):
         (N, 3). "height": z of the target, (N,). "distance": from the target, which here is a
         fixed point of the base frame, to the attachment, a point of the platform, (N,).
         "closure": nothing, `values` is None; what the actuators read is all that is known.
+        "between": from where the target is in one row to where it is at `other`, (N,).
+        "relative-distance": a distance less the zero of its `run`, (N,). "orientation": alpha beta
+        gamma of the platform, (N, 3). "tilt": how far the x and y axes of a sensor on the platform,
+        whose mounting is not known, point up, (N, 2). "touch": names of what the target touches,
+        (N,), the same where it touches the same; kept as how far off it is, which is 0.
     sigma : scalar, (k,), (N, 1), (N, k) or (N, k, k) array, or Tracker, optional
         Standard deviation of the values in their own units; k is the number of components of the
         kind. (N, k, k) are covariance matrices. One number for poses counts as mm and as rad.
@@ -91,6 +100,17 @@ class Measurements(Result):
         Standard deviation of what the actuators read, mm or rad. None: they are where they read on
         a machine with as many closures as free coordinates; on one with more, and with rows that
         contradict each other, it is estimated from them. Kept as (N, n).
+    other : (N, n) array, optional
+        Of kind "between": the actuators at the second place.
+    run : (N,) sequence of str, optional
+        Of kind "relative-distance": in which run each was read, by a name. A run has one zero.
+    artefact : {"point", "line", "plane", "sphere"}, optional
+        Of kind "touch": what is touched; "point" by default: a socket, a cone, a hole.
+    touch_distances : mapping of (str, str) to float or (float, float), optional
+        Known distances between touched points, or centres of spheres, mm, or each with its
+        standard deviation, which is 1 µm by default: ``{("A", "B"): 50.0}``.
+    joint : str, optional
+        Of kind "angle": the passive joint that is read.
     session : str or (N,) sequence of str, optional
         When the rows were measured, one word for all or one a row: `identify` may find some
         numbers anew in each session. None: not stated. Kept as (N,).
@@ -130,6 +150,12 @@ class Measurements(Result):
     actuator_units: tuple[str, ...] | None = None
     attachment: FloatArray | None = None
     actuator_sigma: FloatArray | None = None
+    other: FloatArray | None = None
+    run: TextArray | None = None
+    touched: TextArray | None = None
+    artefact: Artefact | None = None
+    touch_distances: TouchDistances = ()
+    joint: str | None = None
     session: TextArray | None = None
     approach: FloatArray | None = None
     lines: Int64Array | None = None
@@ -151,25 +177,36 @@ class Measurements(Result):
         actuator_units: str | Sequence[str] | None = None,
         attachment: ArrayLike | None = None,
         actuator_sigma: ArrayLike | None = None,
+        other: ArrayLike | None = None,
+        run: Sequence[str] | TextArray | None = None,
+        touched: Sequence[str] | TextArray | None = None,
+        artefact: Artefact | None = None,
+        touch_distances: Mapping[tuple[str, str], Any] | TouchDistances = (),
+        joint: str | None = None,
         session: str | Sequence[str] | TextArray | None = None,
         approach: ArrayLike | None = None,
         lines: ArrayLike | None = None,
         file: str = "",
         notes: Sequence[str] = (),
     ) -> None:
-        word("kind", kind, COMPONENTS)
+        word("kind", kind, KINDS)
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:
             raise ArgumentError(
                 f"actuators must have shape (N, n), or (n,) for one row, not empty; found {q.shape}"
             )
-        k = len(COMPONENTS[kind])
+        k = len(components(kind, artefact))
+        if q.ndim == 1 and kind in SEVERAL_ROWS:
+            raise ArgumentError(f"actuators must have shape (N, n) for {kind!r}; found {q.shape}")
         if q.ndim == 1:
             q, values = q[None], value_of_row(values, kind, q.shape)
             group, target_index, lines = map(number_of_row, (group, target_index, lines))
-            if k > 1 and np.shape(sigma) == (k, k):
+            if k > 1 and sigma is not None and np.asarray(sigma).shape == (k, k):
                 sigma = np.asarray(sigma)[None]
-        shape = (len(q), k)
+        own, values = kind_fields(
+            kind, q.shape, values, KindFields(other, run, touched, artefact, touch_distances, joint)
+        )
+        shape = (len(q), len(components(kind, own["artefact"])))
         v = values_array(values, kind, shape)
         index = None if target_index is None else integers("target_index", target_index, len(q))
         place = target_array(target, kind, index, len(q))
@@ -186,6 +223,7 @@ class Measurements(Result):
             "actuator_units": units_of_actuators(actuator_units, q.shape[1]),
             "attachment": attachment_array(attachment, kind, targets, len(q)),
             "actuator_sigma": actuator_sigma_array(actuator_sigma, q.shape),
+            **own,
             "session": sessions_array(session, len(q)),
             "approach": approach_array(approach, q),
             "lines": None if lines is None else integers("lines", lines, len(q)),
@@ -206,12 +244,12 @@ class Measurements(Result):
     @property
     def components(self) -> tuple[str, ...]:
         """Names of the components of one value: ("x", "y", "z") for a position."""
-        return tuple(name for name, _ in COMPONENTS[self.kind])
+        return tuple(name for name, _ in components(self.kind, self.artefact))
 
     @property
     def units(self) -> tuple[str, ...]:
         """Units of the components, "mm" or "rad"."""
-        return tuple(unit for _, unit in COMPONENTS[self.kind])
+        return tuple(unit for _, unit in components(self.kind, self.artefact))
 
     @property
     def targets(self) -> FloatArray:
@@ -339,10 +377,14 @@ class Measurements(Result):
         columns: dict[str, Any] = {f"q{i + 1}": q for i, q in enumerate(self.actuators.T)}
         values = self.values.reshape(len(self), -1)
         columns |= dict(zip(self.components, values.T, strict=True))
-        deviations = self._deviations()
-        if deviations is not None:
+        sigma = deviations(self)
+        if sigma is not None:
             names = (f"sigma.{name}" for name in self.components)
-            columns |= dict(zip(names, deviations.T, strict=True))
+            columns |= dict(zip(names, sigma.T, strict=True))
+        if self.other is not None:
+            columns |= {f"to.q{i + 1}": q for i, q in enumerate(self.other.T)}
+        columns |= {} if self.run is None else {"run": self.run}
+        columns |= {} if self.touched is None else {"touch": self.touched}
         if self.target_index is not None and self.target_names is not None:
             columns["target"] = [self.target_names[i] for i in self.target_index]
         if self.group is not None:
@@ -354,94 +396,5 @@ class Measurements(Result):
         return columns
 
     def _parts(self) -> Iterator[str | Table]:
-        yield self._title()
-        yield self._table()
-
-    def _table(self) -> Table:
-        units = self.actuator_units or ("",) * self.actuators.shape[1]
-        heads, columns = ["row"], [[str(row) for row in range(len(self))]]
-        for i, unit in enumerate(units):
-            heads.append(_heading(f"q{i + 1}", unit))
-            columns.append(_column(self.actuators[:, i], unit, None))
-        deviations = self._deviations()
-        for i, (name, unit) in enumerate(COMPONENTS[self.kind]):
-            heads.append(_heading(name, unit))
-            sigma = None if deviations is None else deviations[:, i]
-            columns.append(_column(self.values.reshape(len(self), -1)[:, i], unit, sigma))
-        if self.target_index is not None and self.target_names is not None:
-            heads.append("target")
-            columns.append([self.target_names[i] for i in self.target_index])
-        if self.group is not None:
-            heads.append("group")
-            columns.append([str(number) for number in self.group])
-        if self.session is not None and len(self.sessions) > 1:
-            heads.append("session")
-            columns.append([display.printable(name) for name in self.session])
-        rows = list(zip(*columns, strict=True))
-        if len(rows) > _LISTED_ROWS:
-            rows[_LISTED_ROWS - 4 : -3] = [("⋮",) * len(heads)]
-        return Table(heads, rows)
-
-    def _deviations(self) -> FloatArray | None:
-        """Standard deviations (N, k), also where covariance matrices were given."""
-        if self.sigma is None or self.sigma.ndim == 2:
-            return self.sigma
-        variances: FloatArray = np.diagonal(self.sigma, axis1=1, axis2=2)
-        return np.sqrt(variances)
-
-    def _title(self) -> str:
-        many = "" if len(self) == 1 else "s"
-        n = self.actuators.shape[1]
-        what = f"{len(self)} measured {self.kind}{many}"
-        if self.kind == "closure":
-            what = f"{len(self)} row{many} of actuators alone"
-        elif missing := int(np.isnan(self.values.reshape(len(self), -1)).all(axis=1).sum()):
-            what += f" ({missing} not read)"
-        parts = [what, f"{n} actuator{'' if n == 1 else 's'}"]
-        if self.kind != "closure":
-            parts.append("sigma " + self._sigma_text())
-        if self.actuator_sigma is not None:
-            parts.append("actuator_sigma stated")
-        if self.approach is not None:
-            parts.append("approach stated")
-        if self.sessions:
-            many = "s" if len(self.sessions) > 1 else ""
-            parts.append(f"session{many} {', '.join(map(display.printable, self.sessions))}")
-        if self.target_names is not None:
-            known = "" if self.target is not None else " (places not known)"
-            parts.append(f"targets {' '.join(self.target_names)}{known}")
-        elif self.target is not None and self.target.ndim == 1:
-            parts.append("target ({:g}, {:g}, {:g}) mm".format(*self.target))
-        return ", ".join(parts)
-
-    def _sigma_text(self) -> str:
-        deviations = self._deviations()
-        if deviations is None:
-            return "not known"
-        texts = []
-        for unit in dict.fromkeys(self.units):
-            of_unit = deviations[:, [u == unit for u in self.units]]
-            ends = dict.fromkeys(_sigma_number(s, unit) for s in (of_unit.min(), of_unit.max()))
-            texts.append(" to ".join(ends) + " " + display.displayed(0.0, unit)[1])
-        return " and ".join(texts)
-
-
-def _sigma_number(sigma: float, unit: str) -> str:
-    shown, _ = display.displayed(float(sigma), unit)
-    return display.fixed(shown, display.decimals(shown))
-
-
-def _heading(name: str, unit: str) -> str:
-    shown = display.displayed(0.0, unit)[1]
-    return f"{name} [{shown}]" if shown else name
-
-
-def _column(values: FloatArray, unit: str, sigma: FloatArray | None) -> list[str]:
-    """Numbers to the digits their sigma supports, else to 0.1 µm and 0.0001 degrees."""
-    places = 4
-    if sigma is not None:
-        places = display.decimals(display.displayed(float(sigma.min()), unit)[0])
-    return [
-        "" if np.isnan(value) else display.fixed(display.displayed(float(value), unit)[0], places)
-        for value in values
-    ]
+        yield title(self)
+        yield table(self)

@@ -63,16 +63,16 @@ def axes_of_angles(angles: FloatArray) -> FloatArray:
 
 
 def covariance(sigma: FloatArray, angles: FloatArray) -> FloatArray:
-    """Covariance (N, 6, 6) of place and rotation vector, from that of x y z α β γ.
+    """Covariance (N, k, k) of place and rotation vector, from that of x y z α β γ, or of α β γ.
 
     Parameters
     ----------
-    sigma : ndarray (N, 6) or (N, 6, 6)
-        As stated. Covariances are those of the numbers x y z α β γ and are transformed. Three
-        deviations are those of turnings about the three axes at right angles that are nearest to
-        the axes of α, β and γ: with equal ones the instrument is as sure about every axis. The
-        axes themselves meet at β = ±90°, where deviations of the numbers would say that one
-        turning is known exactly.
+    sigma : ndarray (N, k) or (N, k, k)
+        As stated; k is 6, or 3 of orientations alone. Covariances are those of the numbers x y z
+        α β γ and are transformed. Three deviations are those of turnings about the three axes at
+        right angles that are nearest to the axes of α, β and γ: with equal ones the instrument is
+        as sure about every axis. The axes themselves meet at β = ±90°, where deviations of the
+        numbers would say that one turning is known exactly.
     angles : ndarray (N, 3)
         As measured.
 
@@ -84,13 +84,12 @@ def covariance(sigma: FloatArray, angles: FloatArray) -> FloatArray:
     axes = axes_of_angles(angles)
     if sigma.ndim == 2:
         left, _, right = np.linalg.svd(axes)
-        axes, sigma = left @ right, sigma[:, :, None] ** 2 * np.eye(6)
-    rates = np.zeros((len(angles), 6, 6))
-    rates[:, [0, 1, 2], [0, 1, 2]] = 1.0
-    rates[:, 3:, 3:] = axes
+        axes, sigma = left @ right, sigma[:, :, None] ** 2 * np.eye(sigma.shape[1])
+    rates = np.tile(np.eye(sigma.shape[1]), (len(angles), 1, 1))
+    rates[:, -3:, -3:] = axes
     carried: FloatArray = rates @ sigma @ rates.transpose(0, 2, 1)
     scale = np.sqrt(np.diagonal(sigma, axis1=1, axis2=2))
-    scale[:, 3:] = scale[:, 3:].max(axis=1, keepdims=True)
+    scale[:, -3:] = scale[:, -3:].max(axis=1, keepdims=True)
     least = np.linalg.eigvalsh(carried / (scale[:, :, None] * scale[:, None, :]))[:, 0]
     if (least <= _NONE).any():
         row = int(np.argmax(least <= _NONE))

@@ -11,7 +11,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.files.column_names import RESERVED
 from pkmcal.files.csv_table import Table
 from pkmcal.files.reading import LONGEST_NAME
-from pkmcal.measurements.components import Kind
+from pkmcal.measurements.components import KINDS, Kind
 
 _AXES = ("x", "y", "z")
 _OF_A_TARGET = re.compile(r"(?P<target>.+)\.[xyz]")
@@ -53,11 +53,12 @@ def read_targets(table: Table, kind: Kind) -> dict[str, Any]:
     points = {name: _read_point(table, name) for name in ("target", "attachment")}
     fields: dict[str, Any] = {name: place for name, place in points.items() if place is not None}
     named = "target" in table.columns
-    if kind == "pose" and (named or "target" in fields):
-        raise table.header_error("columns of a target do not go with poses")
-    if kind == "distance" and "target" not in fields:
+    point = KINDS[kind].point
+    if not point and (named or "target" in fields):
+        raise table.header_error(f"columns of a target do not go with {kind}s")
+    if point == "base" and "target" not in fields:
         raise table.header_error("missing column 'target.x': a distance is measured to a point")
-    if kind != "distance" and "attachment" in fields:
+    if point != "base" and "attachment" in fields:
         raise table.header_error(f"column 'attachment.x' goes with distances, not with {kind}s")
     if not named:
         return {name: _one(place) for name, place in fields.items()}

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import checked_seed, number, shown, word
+from pkmcal.arguments import checked_seed, did_you_mean, number, shown, word
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import ArmMachine, Solvable
-from pkmcal.measurements.components import COMPONENTS, Kind
+from pkmcal.measurements.components import KINDS, Artefact, Kind, components
 from pkmcal.measurements.fields import numbers
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import corrected, predict
@@ -83,6 +84,13 @@ class VirtualMachine:
         *,
         attachment: ArrayLike | None = None,
         approach: ArrayLike | None = None,
+        other: ArrayLike | None = None,
+        run: Sequence[str] | None = None,
+        mounting: ArrayLike = (0.0, 0.0, 0.0),
+        touched: Mapping[str, ArrayLike] | None = None,
+        artefact: Artefact = "point",
+        touches: Sequence[str] | None = None,
+        joint: str | None = None,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.
 
@@ -90,7 +98,7 @@ class VirtualMachine:
         ----------
         q : (N, n) or (n,) array
             Actuator coordinates, mm or rad.
-        kind : {"position", "pose", "height", "distance"}
+        kind : str
             What the instrument reads; see `Measurements`.
         target : (3,) or (N, 3) array, optional
             The measured point in the platform frame, mm; by default the platform's origin. For
@@ -99,6 +107,22 @@ class VirtualMachine:
             The point in the platform frame, mm, from which distances are measured.
         approach : scalar, (n,) or (N, n) array, or "order", optional
             From where the actuators come; see `Measurements`.
+        other : (N, n) array, optional
+            Of kind "between": the actuators at the second place.
+        run : (N,) sequence of str, optional
+            Of kind "relative-distance": the run of each row. The first row of a run reads 0.
+        mounting : (3,) array
+            Of kinds "tilt" and "orientation": α β γ of the sensor on the platform, rad.
+        touches : (N,) sequence of str, optional
+            Of kind "touch": the name of what each row touches. The values are how far off it the
+            machine stands, as the deflection of a probe reads it.
+        touched : mapping of str to array, optional
+            Where that is in the base frame: of a point or sphere (3,) or (4,) with the radius, of a
+            line or plane a pose (6,), whose z it is along or normal to.
+        artefact : {"point", "line", "plane", "sphere"}
+            What it is.
+        joint : str, optional
+            Of kind "angle": the passive joint, a name of ``robot.passive_names``.
 
         Returns
         -------
@@ -114,7 +138,9 @@ class VirtualMachine:
         n = getattr(self._machine, "n_actuators", actuators.shape[-1])
         if actuators.ndim != 2 or actuators.shape[1] != n or not actuators.size:
             raise ArgumentError(f"q must have shape (N, {n}) or ({n},); found {np.shape(q)}")
-        width = len(COMPONENTS[word("kind", kind, COMPONENTS)])
+        word("kind", kind, KINDS)
+        touching = kind == "touch"
+        width = len(components(kind, artefact if touching else None))
         blank = Measurements(
             actuators,
             np.zeros((len(actuators), width) if width > 1 else len(actuators)),
@@ -123,23 +149,79 @@ class VirtualMachine:
             actuator_units=getattr(self._machine, "actuator_units", None),
             attachment=attachment,
             approach=approach,
+            other=other,
+            run=run,
+            touched=touches,
+            artefact=artefact if touching else None,
+            joint=joint,
         )
-        machine = self._machine
-        if blank.approach is not None and isinstance(machine, Robot):
-            machine = machine.approaching(blank.approach)
+        exact = self._exact(blank, mounting, touched)
+        if blank.run is not None:
+            first = np.unique(blank.run, return_index=True, return_inverse=True)[1:]
+            exact -= exact[first[0]][first[1].reshape(-1)]
+        noise, sigma = self._drawn(blank, exact)
+        values = corrected(kind, exact, noise).reshape(blank.values.shape)
+        return dataclasses.replace(blank, values=values, sigma=sigma)
+
+    def _exact(
+        self, blank: Measurements, mounting: ArrayLike, touched: Mapping[str, ArrayLike] | None
+    ) -> FloatArray:
+        """What would be read without noise, (N, k)."""
+        pose = self._poses(self._machine_of(blank), blank.actuators, "q")
+        if blank.joint is not None:
+            names = getattr(self._machine, "passive_names", ())
+            if blank.joint not in names:
+                known = did_you_mean(blank.joint, names)
+                raise ArgumentError(f"joint: no passive joint is called {blank.joint!r}{known}")
+            solved: Any = self._machine_of(blank).forward(blank.actuators)
+            return np.array(solved.passive[:, [names.index(blank.joint)]])
+        return predict(
+            blank.kind,
+            pose,
+            other=None if blank.other is None else self._poses(self._machine, blank.other, "other"),
+            touching=(blank.artefact, np.full(len(blank), 2)),
+            **self._arguments(blank, mounting, touched),
+        ).values
+
+    def _machine_of(self, blank: Measurements) -> Solvable:
+        """The machine, its actuators coming from where it is said."""
+        if blank.approach is not None and isinstance(self._machine, Robot):
+            return self._machine.approaching(blank.approach)
+        return self._machine
+
+    def _poses(self, machine: Solvable, actuators: FloatArray, argument: str) -> FloatArray:
         solved = machine.forward(actuators)
         failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
         if len(failed):
             raise ArgumentError(
-                f"q: {len(failed)} of {len(actuators)} rows have no pose on the true machine"
-                f" (rows {first_rows(failed, 10)})"
+                f"{argument}: {len(failed)} of {len(actuators)} rows have no pose on the true"
+                f" machine (rows {first_rows(failed, 10)})"
             )
-        places = (blank.targets, blank.attachments)
-        point, fixed = places[::-1] if kind == "distance" else places
-        exact = predict(kind, np.asarray(solved.pose), point, fixed).values
-        noise, sigma = self._drawn(blank, exact)
-        values = corrected(kind, exact, noise).reshape(blank.values.shape)
-        return dataclasses.replace(blank, values=values, sigma=sigma)
+        return np.asarray(solved.pose)
+
+    def _arguments(
+        self, blank: Measurements, mounting: ArrayLike, touched: Mapping[str, ArrayLike] | None
+    ) -> dict[str, FloatArray]:
+        """What the readings depend on beside the pose, as `predict` takes it."""
+        if blank.kind in ("tilt", "orientation"):
+            return {"mounting": as_rows("mounting", mounting, 3)[0][0]}
+        if KINDS[blank.kind].point == "base":
+            return {"target": blank.attachments, "anchor": blank.targets}
+        found = {"target": blank.targets}
+        if blank.touched is None:
+            return found
+        wide = {"point": 3, "sphere": 4}.get(blank.artefact or "", 6)
+        places = {
+            name: as_rows(f"touched[{name!r}]", place, wide)[0][0]
+            for name, place in (touched or {}).items()
+        }
+        missing = [name for name in np.unique(blank.touched).tolist() if name not in places]
+        if missing:
+            raise ArgumentError(f"touched: where {missing[0]!r} is has to be given")
+        rows = np.array([places[name] for name in blank.touched.tolist()])
+        if wide == 4:
+            return found | {"anchor": rows[:, :3], "zero": rows[:, 3:]}
+        return found | {"place": np.hstack([rows, np.zeros((len(rows), 6 - wide))])}
 
     def _drawn(self, blank: Measurements, exact: FloatArray) -> tuple[FloatArray, Any]:
         """Noise (N, k), and the sigma to state."""

@@ -11,8 +11,8 @@ from pkmcal import display
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, largest_first, propagate, rms
 from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.parameters import FitData
 from pkmcal.core.library import POSE
 from pkmcal.display import printable
 from pkmcal.kinematics.workspace import reach, sample_poses, workspace

@@ -14,8 +14,9 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identify import identify
-from pkmcal.calibration.parameters import Asked, FitData, parameters
+from pkmcal.calibration.parameters import Asked, parameters
 from pkmcal.measurements.calibratable import ArmMachine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine

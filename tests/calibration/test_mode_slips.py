@@ -9,8 +9,9 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
-from pkmcal.calibration.parameters import Asked, FitData, parameters
+from pkmcal.calibration.parameters import Asked, parameters
 
 from ..workspaces import WORKSPACE
 

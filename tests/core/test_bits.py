@@ -35,6 +35,7 @@ ELSEWHERE = {
 
 rng = np.random.default_rng(20)
 POSES = rng.uniform(-1, 1, (ROWS, 6)) * [300, 300, 300, 3, 1.5, 3]
+OTHERS = POSES[::-1].copy()
 TWISTS = np.hstack([rng.normal(0, 1, (ROWS, 3)), rng.normal(0, 300, (ROWS, 3))])
 TWISTS[:9, :3] *= np.array([0, 1e-300, 1e-200, 1e-160, 1e-9, 1e-4, 1e-2, 30, 1e4])[:, None]
 TWISTS[9, :3] = [np.pi, 0, 0]
@@ -70,8 +71,25 @@ def points(isa: int, part: slice) -> list[np.ndarray]:
 
 def distances(isa: int, part: slice) -> list[np.ndarray]:
     ends = POINTS[::-1][part].copy()
-    own = instruments.distances(POSES[part], POINTS[part], ends, isa)
-    return [*own, *instruments.distances(POSES[part], POINTS[0], POINTS[1], isa)]
+    zero = POINTS[part, :1].copy()
+    own = instruments.distances(POSES[part], POINTS[part], ends, zero, isa)
+    return [*own, *instruments.distances(POSES[part], POINTS[0], POINTS[1], isa=isa)]
+
+
+def between(isa: int, part: slice) -> list[np.ndarray]:
+    own = instruments.between(POSES[part], OTHERS[part], POINTS[part], isa)
+    return [*own, *instruments.between(POSES[part], OTHERS[part], POINTS[0], isa)]
+
+
+def touched_points(isa: int, part: slice) -> list[np.ndarray]:
+    own = instruments.touched_points(POSES[part], POINTS[part], isa)
+    return [*own, *instruments.touched_points(POSES[0], POINTS[part], isa)]
+
+
+def tilts(isa: int, part: slice) -> list[np.ndarray]:
+    up = POINTS / np.linalg.norm(POINTS, axis=1, keepdims=True)
+    own = instruments.tilts(POSES[part], OTHERS[part, 3:].copy(), up[part], isa)
+    return [*own, *instruments.tilts(POSES[part], OTHERS[0, 3:].copy(), up[0], isa)]
 
 
 def closure_cost(isa: int, part: slice) -> list[np.ndarray]:
@@ -132,10 +150,24 @@ def by_rows(call: Callable[..., np.ndarray], *given: np.ndarray) -> Case:
     return lambda isa, part: [call(*(rows[part] for rows in given), isa=isa)]
 
 
+def law(call: str) -> Case:
+    """Formulas of drive laws; the way's inverse has no number in some rows."""
+    width = library.ROW_CALLS[call][0][0][0]
+    given = 3.0 * np.random.default_rng(31).normal(size=(ROWS, width))
+    return lambda isa, part: [*library.rows(call, given[part], isa=isa)]
+
+
 CASES: dict[str, Case] = {
+    "law_drive": law("law_drive"),
+    "law_drive_inverse": law("law_drive_inverse"),
+    "law_harmonic": law("law_harmonic"),
+    "law_segment": law("law_segment"),
     "points": points,
     "seen_points": lambda isa, part: [*instruments.seen_points(POSES[0], POINTS[part], isa)],
     "distances": distances,
+    "between": between,
+    "touched_points": touched_points,
+    "tilts": tilts,
     "tpr2tps_lengths": lambda isa, part: closed_forms(isa, part, tpr2tps_lengths, (4,)),
     "tpr2tps_jacobian": lambda isa, part: closed_forms(isa, part, tpr2tps_jacobian, (4, 4)),
     "closure_cost": closure_cost,

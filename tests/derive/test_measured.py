@@ -34,14 +34,20 @@ def vector(name: str) -> tuple[sp.Matrix, Places]:
 def pose(name: str) -> tuple[sp.Matrix, sp.Matrix, Places]:
     """R, p and the places of a random pose whose sines and cosines are rational."""
     symbols, p = entries(name, 6), sp.Matrix([rational() for _ in range(3)])
-    places: Places = dict(zip(symbols[:3], p, strict=True))
+    R, places = turned(symbols[3:])
+    return R, p, dict(zip(symbols[:3], p, strict=True)) | places
+
+
+def turned(angles: list[sp.Symbol]) -> tuple[sp.Matrix, Places]:
+    """R of random angles α β γ whose sines and cosines are rational."""
+    places: Places = {}
     turns = []
-    for symbol in symbols[3:]:
+    for symbol in angles:
         h = sp.Rational(random_numbers.randint(1, 9), random_numbers.randint(1, 9))
         c, s = (1 - h**2) / (1 + h**2), 2 * h / (1 + h**2)
         places |= {sp.cos(symbol): c, sp.sin(symbol): s}
         turns.append((c, s))
-    return rot_z(*turns[2]) * rot_y(*turns[1]) * rot_x(*turns[0]), p, places
+    return rot_z(*turns[2]) * rot_y(*turns[1]) * rot_x(*turns[0]), places
 
 
 def value(name: str, output: str, places: Places) -> sp.Matrix:
@@ -65,14 +71,70 @@ def test_a_distance_changes_by_what_its_end_moves_along_it() -> None:
     R, p, places = pose("pose")
     t, of_target = vector("target")
     a, of_anchor = vector("anchor")
-    places |= of_target | of_anchor
+    z = rational()
+    places |= of_target | of_anchor | {sp.Symbol("zero[0]", real=True): z}
     d = p + R * t - a
-    (rho,) = value("measured_distance", "distance", places)
+    rho = value("measured_distance", "distance", places)[0] + z
     assert rho**2 == d.dot(d)
     moved = value("measured_distance", "by_twist", places).dot(TWIST)
     assert sp.simplify(rho * moved - d.dot(V + skew(W) * R * t)) == 0
     for name, direction in (("by_target", R.T * d), ("by_anchor", -d)):
         assert (rho * value("measured_distance", name, places) - direction).is_zero_matrix
+
+
+def test_a_distance_between_two_places_changes_by_what_either_end_moves_along_it() -> None:
+    R1, p1, places = pose("pose")
+    R2, p2, of_other = pose("other")
+    t, of_target = vector("target")
+    places |= of_other | of_target
+    d = p2 + R2 * t - p1 - R1 * t
+    (rho,) = value("measured_between", "distance", places)
+    assert rho**2 == d.dot(d)
+    for name, R, sign in (("by_twist", R1, -1), ("by_other", R2, 1)):
+        moved = value("measured_between", name, places).dot(TWIST)
+        assert sp.simplify(rho * moved - sign * d.dot(V + skew(W) * R * t)) == 0
+    by_target = value("measured_between", "by_target", places)
+    assert (rho * by_target - (R2 - R1).T * d).is_zero_matrix
+
+
+def test_a_touched_point_is_in_the_axes_of_the_artefact() -> None:
+    R, p, places = pose("artefact")
+    x, of_point = vector("x")
+    places |= of_point
+    assert R * value("touched_point", "inside", places) + p == x
+    assert value("touched_point", "by_point", places).reshape(3, 3) == R.T
+    symbols = entries("artefact", 6)
+    inside = rpy(*symbols[3:]).T * (x - sp.Matrix(symbols[:3]))
+    by_artefact = value("touched_point", "by_artefact", places).reshape(3, 6)
+    assert by_artefact == inside.jacobian(symbols).subs(places)
+
+
+def test_a_tilt_is_how_far_an_axis_of_the_sensor_points_up() -> None:
+    R, _, places = pose("pose")
+    symbols = entries("mounting", 3)
+    Rm, of_mounting = turned(symbols)
+    up = (lambda A: A[:, 2])(turned(entries("unused", 3))[0])  # of length one, and rational
+    places |= of_mounting | dict(zip(entries("up", 3), up, strict=True))
+    s = (R * Rm).T * up
+    tilts = value("measured_tilt", "tilt", places)
+    whole = (R * rpy(*symbols)).T * up
+    for i in range(2):
+        assert sp.simplify(sp.tan(tilts[i]) ** 2 - s[i] ** 2 / (1 - s[i] ** 2)) == 0
+        assert sp.sign(tilts[i]) == sp.sign(s[i])
+        cosine = sp.sqrt(1 - s[i] ** 2)
+        rates = {
+            "by_turn": (skew(W) * R * Rm)[:, i].dot(up)
+            - cosine * _row("by_turn", i, places).dot(W),
+            "by_up": (R * Rm)[:, i].T - cosine * _row("by_up", i, places),
+            "by_mounting": sp.Matrix([whole[i]]).jacobian(symbols).subs(places)
+            - cosine * _row("by_mounting", i, places),
+        }
+        for name, off in rates.items():
+            assert all(sp.simplify(entry) == 0 for entry in sp.Matrix([off])), name
+
+
+def _row(output: str, i: int, places: Places) -> sp.Matrix:
+    return value("measured_tilt", output, places).reshape(2, 3)[i, :]
 
 
 def test_a_point_seen_from_a_frame_follows_point_and_frame() -> None:

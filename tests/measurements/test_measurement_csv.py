@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from pkmcal.files import atomic as whole_file
-from pkmcal.measurements.components import COMPONENTS
 from pkmcal.measurements.measurement_csv import read_measurements
 from pkmcal.measurements.measurements import Measurements
+
+from .kinds import ARTEFACTS, OF_ORIENTATIONS, PUBLIC, needed, takes_target, width
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 POSITIVE = st.floats(1e-300, 1e300)
@@ -141,8 +142,23 @@ def test_the_robot_says_how_many_actuators_and_in_which_unit(tmp_path: Path) -> 
 
 def same(one: Measurements, other: Measurements) -> None:
     assert one.kind == other.kind
-    assert one.target_names == other.target_names
-    for name in ("actuators", "values", "sigma", "group", "target_index", "actuator_sigma"):
+    for name in ("target_names", "artefact", "joint"):
+        assert getattr(one, name) == getattr(other, name), name
+    stated = [
+        {(frozenset(each[:2]), *each[2:]) for each in m.touch_distances} for m in (one, other)
+    ]
+    assert stated[0] == stated[1]
+    for name in ("run", "touched"):
+        assert np.array_equal(getattr(one, name), getattr(other, name)), name
+    for name in (
+        "actuators",
+        "values",
+        "sigma",
+        "group",
+        "target_index",
+        "actuator_sigma",
+        "other",
+    ):
         a, b = getattr(one, name), getattr(other, name)
         assert (a is None) == (b is None), name
         if a is not None:
@@ -157,9 +173,12 @@ def same(one: Measurements, other: Measurements) -> None:
 
 @st.composite
 def measurements(draw: st.DrawFn) -> Measurements:
-    kind = draw(st.sampled_from(list(COMPONENTS)))
-    rows, n, k = draw(st.integers(1, 4)), draw(st.integers(1, 3)), len(COMPONENTS[kind])
-    fields: dict[str, Any] = {}
+    kind, artefact = draw(st.sampled_from(PUBLIC)), draw(st.sampled_from(ARTEFACTS))
+    artefact = artefact if kind == "touch" else None
+    rows, n, k = draw(st.integers(1, 4)), draw(st.integers(1, 3)), width(kind, artefact)
+    fields: dict[str, Any] = needed(kind, rows, n, artefact or "point")
+    if artefact in ("point", "sphere") and rows > 1 and draw(st.booleans()):
+        fields["touch_distances"] = {("no 1", "no 2"): draw(POSITIVE), ("no 2", "a third"): 5.0}
     if k and draw(st.booleans()):
         shape = draw(st.sampled_from([(), (rows, 1), (rows, k)]))
         fields["sigma"] = draw(arrays(float, shape, elements=POSITIVE))
@@ -168,14 +187,15 @@ def measurements(draw: st.DrawFn) -> Measurements:
     if draw(st.booleans()):
         shape = draw(st.sampled_from([(), (n,), (rows, n)]))
         fields["actuator_sigma"] = draw(arrays(float, shape, elements=POSITIVE))
-    if kind == "distance" or (kind not in ("pose", "closure") and draw(st.booleans())):
+    of_base = kind in ("distance", "relative-distance")
+    if of_base or (takes_target(kind) and draw(st.booleans())):
         shape = draw(st.sampled_from([(3,), (rows, 3)]))
         fields["target"] = draw(arrays(float, shape, elements=NUMBERS))
-    if kind == "distance" and draw(st.booleans()):
+    if of_base and draw(st.booleans()):
         shape = draw(st.sampled_from([(3,), (rows, 3)]))
         fields["attachment"] = draw(arrays(float, shape, elements=NUMBERS))
     values = draw(arrays(float, (rows, k) if k != 1 else (rows,), elements=NUMBERS))
-    if kind != "pose" and draw(st.booleans()):
+    if kind not in OF_ORIENTATIONS and draw(st.booleans()):
         values[0] = np.nan  # not read
     units = draw(st.lists(st.sampled_from(["mm", "rad"]), min_size=n, max_size=n))
     return Measurements(
@@ -201,7 +221,7 @@ def test_what_is_written_is_read_back_to_the_last_bit(
 
 @pytest.mark.parametrize("kind", ["position", "pose"])
 def test_covariances_are_read_back_to_the_last_bit(tmp_path: Path, kind: str) -> None:
-    k = len(COMPONENTS[kind])
+    k = width(kind)
     half = np.random.default_rng(0).normal(size=(3, k, k)) / 7
     covariance = half @ half.transpose(0, 2, 1) + np.eye(k)
     covariance = (covariance + covariance.transpose(0, 2, 1)) / 2
@@ -329,3 +349,18 @@ def test_text_of_windows_is_read_and_that_is_said(tmp_path: Path) -> None:
     m = read_measurements(path)
     assert m.values.tolist() == [0.002]
     assert m.notes == (f"{path}: not UTF-8, read as Windows-1252",)
+
+
+def test_a_column_of_sessions_is_read_and_written(tmp_path: Path) -> None:
+    names = ["mon", "thu, evening", "mon"]
+    m = Measurements([[1, 2], [3, 4], [5, 6]], [7.0, 8.0, 9.0], "height", session=names)
+    m.write(tmp_path / "log.csv")
+    again = read_measurements(tmp_path / "log.csv")
+    assert again.session is not None and again.session.tolist() == names
+    text = "q1 [mm],q2 [mm],A.x [mm],A.y [mm],A.z [mm],B.x [mm],B.y [mm],B.z [mm],Session ID\n"
+    (tmp_path / "two.csv").write_text(text + "1,2,3,4,5,6,7,8,mon\n1,2,3,4,5,,,,thu\n")
+    seen = read_measurements(tmp_path / "two.csv")
+    assert seen.session is not None and seen.session.tolist() == ["mon", "mon", "thu"]
+    (tmp_path / "blank.csv").write_text("q1 [mm],z [mm],session\n1,2,mon\n3,4,\n")
+    with pytest.raises(ValueError, match=r"blank\.csv, line 3, column 'session': found an empty"):
+        read_measurements(tmp_path / "blank.csv")

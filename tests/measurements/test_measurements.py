@@ -12,23 +12,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pkmcal.measurements.components import COMPONENTS
+from pkmcal.measurements.kind_fields import SEVERAL_ROWS
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
-KINDS = tuple(COMPONENTS)
-SHAPES = {"pose": (5, 6), "position": (5, 3), "height": (5,), "distance": (5,), "closure": (5, 0)}
+from .kinds import PUBLIC, needed, width
+
+SHAPES = {
+    "pose": (5, 6), "position": (5, 3), "height": (5,), "distance": (5,), "closure": (5, 0),
+    "between": (5,), "relative-distance": (5,), "orientation": (5, 3), "tilt": (5, 2),
+    "angle": (5,), "touch": (5, 3),
+}  # fmt: skip
 
 
 def make(kind: str = "position", **fields: Any) -> Measurements:
     random = np.random.default_rng(0)
-    if kind == "distance":
-        fields = {"target": [0, 0, 100]} | fields
+    fields = needed(kind, 5, 4) | fields
     q = random.uniform(300, 500, (5, 4))
     return Measurements(q, random.normal(size=SHAPES[kind]), kind, **fields)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", PUBLIC)
 def test_every_kind_has_its_shape_components_and_units(kind: str) -> None:
     m = make(kind)
     assert len(m) == 5
@@ -54,9 +58,9 @@ def test_sigma_of_any_stated_shape_is_one_per_component_and_row(shape: tuple[int
     np.testing.assert_array_equal(sigma, np.broadcast_to(given_sigma, (5, 3)))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", PUBLIC)
 def test_measurements_pickle_and_stay_read_only(kind: str) -> None:
-    m = make(kind, sigma=0.1 if COMPONENTS[kind] else None, group=[1, 1, 2, 3, 4])
+    m = make(kind, sigma=0.1 if width(kind) else None, group=[1, 1, 2, 3, 4])
     again = pickle.loads(pickle.dumps(m))
     assert str(again) == str(m)
     assert (again.actuators == m.actuators).all() and (again.group == m.group).all()
@@ -64,12 +68,15 @@ def test_measurements_pickle_and_stay_read_only(kind: str) -> None:
         again.actuators[0] = 0.0
 
 
-@pytest.mark.parametrize("kind", KINDS)
+ONE_ROW = [kind for kind in PUBLIC if kind not in SEVERAL_ROWS]
+
+
+@pytest.mark.parametrize("kind", ONE_ROW)
 def test_one_row_is_taken_as_it_is(kind: str) -> None:
     """Actuators (n,) with the value that goes with them, and all else that has one entry a row."""
-    several = make(kind, sigma=0.1 if COMPONENTS[kind] else None, group=[4, 1, 2, 3, 4])
+    several = make(kind, sigma=0.1 if width(kind) else None, group=[4, 1, 2, 3, 4])
     for row in range(5):
-        value = several.values[row] if COMPONENTS[kind] else None
+        value = several.values[row] if width(kind) else None
         fields: dict[str, Any] = {} if several.sigma is None else {"sigma": several.sigma[row]}
         if kind == "distance":
             fields["target"] = [0, 0, 100]
@@ -366,3 +373,31 @@ def test_a_covariance_that_is_symmetric_to_rounding_is_accepted() -> None:
     skew = np.eye(3) + 1e-6 * np.eye(3, k=1)
     with pytest.raises(ValueError, match="row 0 is not a covariance"):
         Measurements(np.ones((1, 6)), np.zeros((1, 3)), sigma=skew[None])
+
+
+def test_sessions_stay_with_their_rows() -> None:
+    m = make(session=["mon", "mon", "thu", "mon", "thu"])
+    assert m.sessions == ("mon", "thu")
+    assert m.select([4, 0]).session.tolist() == ["thu", "mon"]
+    fit, held = m.split(0.4)
+    assert sorted([*fit.session.tolist(), *held.session.tolist()]) == sorted(m.session.tolist())
+    assert "sessions mon, thu" in str(m) and str(m).count("thu") == 3
+    one = make(session="mon")
+    assert one.session.tolist() == ["mon"] * 5 and "session mon" in str(one)
+    assert make().session is None and make().sessions == ()
+    assert pickle.loads(pickle.dumps(m)).session.tolist() == m.session.tolist()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["mon"] * 4, "session must be one name, or one for each of 5 rows; found 4"),
+        ("a@b", "session must be a name on one line"),
+        ("", "session must be a name on one line"),
+        (["a\nb"] * 5, "session must be a name on one line"),
+        (5, "session must be a name or several, found 5"),
+    ],
+)
+def test_what_is_no_session_is_refused(given: Any, message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=message):
+        make(session=given)

@@ -7,7 +7,9 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.parameters import Asked, FitData, parameters
+from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.parameters import Asked, parameters
+from pkmcal.calibration.starts import with_starts
 from pkmcal.core import instruments
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -15,22 +17,34 @@ from pkmcal.measurements.observation import difference, predict
 
 from .. import twin
 from ..simulated import hexapod_poses
+from .kinds import ARTEFACTS, needed, shape
 
-KINDS = ("pose", "position", "height", "distance")
-SHAPES = {"position": (12, 3), "height": (12,), "distance": (12,)}
+KINDS = (
+    *("pose", "position", "height", "distance", "between", "relative-distance", "orientation"),
+    *("tilt", *(f"touch {artefact}" for artefact in ARTEFACTS)),
+)
 
 
 def measured(robot: Robot, kind: str, rng: np.random.Generator) -> Measurements:
     """Readings that the machine does not explain, of two targets in turn."""
+    kind, _, artefact = kind.partition(" ")
     poses = hexapod_poses(robot, 12, rng)
     q = robot.inverse(poses)
     if kind == "pose":
         return Measurements(q, poses + rng.normal(0, 0.01, poses.shape), kind)
-    values = rng.normal(0, 3, SHAPES[kind])
+    if kind == "orientation":
+        return Measurements(q, poses[:, 3:] + rng.normal(0, 0.01, (12, 3)), kind)
+    if kind == "tilt":  # of a sensor on its side
+        seen = predict("tilt", poses, mounting=np.array([1.4, 0.1, -0.3])).values
+        return Measurements(q, seen + rng.normal(0, 0.01, (12, 2)), kind)
+    fields = needed(kind, 12, 6, artefact or "point")
     two = np.array([[60.0, -20.0, 35.0], [300.0, 200.0, -50.0]])
-    ends = two[:, ::-1] if kind == "distance" else None
-    index = np.arange(12) % 2
-    return Measurements(q, values, kind, target=two, target_index=index, attachment=ends)
+    fields |= {"target": two, "target_index": np.arange(12) % 2}
+    if "distance" in kind:
+        fields["attachment"] = two[:, ::-1]
+    if kind == "between":
+        fields["other"] = robot.inverse(hexapod_poses(robot, 12, rng))
+    return Measurements(q, rng.normal(0, 3, shape(kind, 12, artefact or None)), kind, **fields)
 
 
 def differences(equations: Equations, theta: np.ndarray, scale: np.ndarray) -> np.ndarray:
@@ -49,7 +63,7 @@ def test_analytic_jacobian_equals_differences(kind: str, unknown: bool) -> None:
     rng = np.random.default_rng(7)
     robot = pk.load("hexapod")
     readings = measured(robot, kind, rng)
-    share = FitData(readings, np.arange(12), unknown and kind != "distance", unknown, unknown)
+    (share,) = with_starts(robot, [FitData(readings, np.arange(12), unknown, unknown, unknown)])
     chosen = parameters(robot, [share], Asked(["base*", "offset*", "gain*"]))
     equations = Equations([share], chosen)
     theta = chosen.start.copy()
@@ -118,3 +132,33 @@ def test_angles_differ_the_short_way_round() -> None:
     one = np.array([[0, 0, 0, np.pi - 0.01, 0, 0]])
     other = np.array([[0, 0, 0, -np.pi + 0.01, 0, 0]])
     np.testing.assert_allclose(difference("pose", one, other)[0, 3], -0.02, atol=1e-12)
+
+
+def test_a_distance_between_touched_points_is_theirs_whatever_the_machine_does() -> None:
+    rng = np.random.default_rng(4)
+    place, anchor = rng.normal(0, 90, (4, 6)), rng.normal(0, 90, (4, 3))
+    pose = rng.normal(0, 1, (4, 6))
+    seen = predict("touch-distance", pose, place=place, anchor=anchor)
+    expected = np.linalg.norm(place[:, :3] - anchor, axis=1)
+    np.testing.assert_allclose(seen.values[:, 0], expected, rtol=1e-15)
+    assert (seen.by_twist == 0).all()
+    unit = (place[:, :3] - anchor) / expected[:, None]
+    np.testing.assert_allclose(seen.by["place"][:, 0, :3], unit, atol=1e-15)
+    np.testing.assert_allclose(seen.by["anchor"][:, 0], -unit, atol=1e-15)
+
+
+def test_a_level_sensor_reads_pitch_and_roll() -> None:
+    """x points up where the platform pitches back, y where it rolls to the left."""
+    pose = np.array([[5.0, 6, 7, 0, -0.3, 2.0], [0, 0, 0, 0.2, 0, -1.0]])
+    np.testing.assert_allclose(predict("tilt", pose).values, [[0.3, 0], [0, 0.2]], atol=1e-15)
+
+
+def test_a_frame_turns_orientations_and_tilts_as_it_turns_the_platform() -> None:
+    rng = np.random.default_rng(6)
+    pose, frame = rng.normal(0, 0.4, (5, 6)), rng.normal(0, 0.4, 6)
+    composed = predict("pose", pose, frame=frame).values
+    mounting = rng.normal(0, 0.4, 3)
+    for kind in ("orientation", "tilt"):
+        seen = predict(kind, pose, frame=frame, mounting=mounting).values
+        there = predict(kind, composed, mounting=mounting).values
+        np.testing.assert_allclose(seen, there, atol=1e-14)

@@ -72,3 +72,47 @@ def test_two_logs_of_one_printer_agree_and_a_moved_height_is_named(tmp_path: Pat
     assert str(found.moved[0]) == "offset1 … offset3 alike"
     assert found.moved[0].shift[0] == pytest.approx(-1.0, abs=0.2)
     assert "offset1 … offset3 alike by -" in found.verdict.reasons[0]
+
+
+# distances between printed points ---------------------------------------------------------------
+
+ARMS = ["radius", "angle1", "angle2", "offset*", "rod*"]
+HEIGHT = 0.02  # mm; the firmware weighs a distance half as much as a height
+
+
+def printed(log: dict[str, Any], sigma: float | None) -> Measurements:
+    """Distances between two points of a print, which were measured with a caliper."""
+    distances, first, then = zip(*log["distance"], strict=True)
+    first, then = (-np.array(pos) * np.array(log["stepdist"]) for pos in (first, then))
+    return Measurements(first, distances, "between", other=then, sigma=sigma)
+
+
+def with_distances() -> list[dict[str, Any]]:
+    return [log for log in logs() if log["distance"]]
+
+
+def test_seven_heights_cannot_tell_the_arms_at_all(tmp_path: Path) -> None:
+    for log in with_distances():
+        with pytest.warns(pk.CalibrationWarning, match="7 equations for 9 parameters"):
+            found = pk.identify(printer(log, tmp_path / "robot.toml"), probed(log), ARMS)
+        assert found.rank == 7
+        assert np.isinf(found.stderr).all()
+
+
+@pytest.mark.filterwarnings("ignore:residuals are")  # of the first, 4 times what is said here
+def test_twelve_distances_tell_the_arms_as_the_firmwares_own_least_squares_does(
+    tmp_path: Path,
+) -> None:
+    """It minimises the same squares of heights and of distances, these at half the weight."""
+    for log, sure in zip(with_distances(), (2.1, 1.3), strict=True):
+        assert len(log["distance"]) == 12
+        heights = probed(log)
+        heights = Measurements(heights.actuators, heights.values, "height", sigma=HEIGHT)
+        both = [heights, printed(log, 2 * HEIGHT)]
+        found = pk.identify(printer(log, tmp_path / "robot.toml"), both, ARMS)
+        arms = [found.free.index(f"rod{i}") for i in (1, 2, 3)]
+        off = found.values[arms] - log["arm_length"]
+        print(log["printer"], found.values[arms], found.stderr[arms], off)
+        assert found.rank == 9
+        assert (found.stderr[arms] < sure).all()
+        np.testing.assert_allclose(off, 0.0, atol=0.15)
