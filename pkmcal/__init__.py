@@ -70,6 +70,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.kinematics.workspace import workspace as workspace
     from pkmcal.loading import load as load
     from pkmcal.loading import machines as machines
+    from pkmcal.measurements.circular_test import CircularTest as CircularTest
+    from pkmcal.measurements.circular_test import circular_test as circular_test
     from pkmcal.measurements.measurement_csv import read_measurements as read_measurements
     from pkmcal.measurements.measurements import Measurements as Measurements
     from pkmcal.measurements.probe import probed as probed
@@ -123,6 +125,7 @@ _HOMES = {
     "kinematics.robot": ("Robot",),
     "kinematics.workspace": ("Workspace", "sample_poses", "workspace"),
     "loading": ("load", "machines"),
+    "measurements.circular_test": ("CircularTest", "circular_test"),
     "measurements.measurement_csv": ("read_measurements",),
     "measurements.measurements": ("Measurements",),
     "measurements.probe": ("probed",),

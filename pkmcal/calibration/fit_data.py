@@ -169,7 +169,8 @@ class FitData:
             )
             for name, place in places.items()
         }
-        return Dependence(argument, role, np.zeros((len(m), 3)), sought, index)
+        given = np.array(list(places.values()))[index]  # which counts where they are held
+        return Dependence(argument, role, given, sought, index)
 
     def _always(
         self,

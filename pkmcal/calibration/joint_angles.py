@@ -36,15 +36,31 @@ def place_of(machine: Calibratable, joint: str) -> int:
     return names.index(joint)
 
 
-def angles(machine: Calibratable, q: FloatArray, pose: FloatArray, joint: str) -> FloatArray:
-    """Angles (N,) from home at coordinates (N, n), near poses (N, 6); NaN where there is none."""
-    place = place_of(machine, joint)
-    found: FloatArray = cast(Robot, machine).forward(q, pose).passive[:, place]
+def angles(
+    machine: Calibratable,
+    q: FloatArray,
+    pose: FloatArray,
+    joint: str,
+    approach: FloatArray | None = None,
+) -> FloatArray:
+    """Angles (N,) from home at coordinates (N, n), near poses (N, 6); NaN where there is none.
+
+    `approach` (N, n) says from where the actuators came.
+    """
+    place, robot = place_of(machine, joint), cast(Robot, machine)
+    if approach is not None:
+        robot = robot.approaching(approach)
+    found: FloatArray = robot.forward(q, pose).passive[:, place]
     return found
 
 
 def rates(
-    machine: Calibratable, q: FloatArray, pose: FloatArray, joint: str, places: IntArray
+    machine: Calibratable,
+    q: FloatArray,
+    pose: FloatArray,
+    joint: str,
+    places: IntArray,
+    approach: FloatArray | None = None,
 ) -> FloatArray:
     """How they follow numbers of the geometry at some places, (N, p), the actuators held."""
     values, units = machine.geometry.values, machine.geometry.units
@@ -57,6 +73,6 @@ def rates(
         for side in (1, -1):
             changed = values.copy()
             changed[number] += side * step
-            ends.append(angles(machine.with_values(changed), q, pose, joint))
+            ends.append(angles(machine.with_values(changed), q, pose, joint, approach))
         found[:, column] = wrapped(ends[0] - ends[1]) / (2 * step)
     return found

@@ -169,8 +169,7 @@ class Readings:
 
         None where all of it is given.
 
-        None where it is known.
-        `name` is what `predict` calls it.
+        None where all of it is given. `name` is what `predict` calls it.
         """
         return self._columns[i].get(name)
 
@@ -220,8 +219,9 @@ class Readings:
         measured, joint = self.sets[i], str(self.sets[i].joint)
         found = np.empty(len(measured))
         for machine, rows in self._machines(i, theta):
-            at = pose[self.pose_of[i][rows]]
-            found[rows] = joint_angles.angles(machine, measured.actuators[rows], at, joint)
+            q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
+            approach = None if measured.approach is None else measured.approach[rows]
+            found[rows] = joint_angles.angles(machine, q, at, joint, approach)
         return found
 
     def by_numbers(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray | None:
@@ -232,7 +232,8 @@ class Readings:
         found = np.empty((len(measured), 1, len(places)))
         for machine, rows in self._machines(i, theta):
             q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
-            found[rows, 0] = joint_angles.rates(machine, q, at, measured.joint, places)
+            approach = None if measured.approach is None else measured.approach[rows]
+            found[rows, 0] = joint_angles.rates(machine, q, at, measured.joint, places, approach)
         return found
 
     def _machines(self, i: int, theta: FloatArray) -> Iterator[tuple[Calibratable, IntArray]]:

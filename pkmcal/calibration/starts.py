@@ -102,7 +102,9 @@ def _joints(
     off: dict[str, list[FloatArray]] = {}
     for m, pose in sets:
         joint = str(m.joint)
-        off.setdefault(joint, []).append(angles(machine, m.actuators, pose, joint) - m.values)
+        off.setdefault(joint, []).append(
+            angles(machine, m.actuators, pose, joint, m.approach) - m.values
+        )
     for joint, parts in off.items():
         turns = np.exp(1j * np.concatenate(parts))
         found["angle", joint] = Start((0,), np.array([np.angle(np.nansum(turns))]))

@@ -74,6 +74,17 @@ def kind_fields(
     return fields, values
 
 
+def kind_fields_of_row(
+    kind: Kind, values: ArrayLike | None, given: KindFields
+) -> tuple[ArrayLike | None, KindFields]:
+    """What is given of one row, a name where there are names, as that of (1,) rows."""
+    if kind == "touch" and isinstance(values, str):
+        values = [values]
+    run, touched = ([n] if isinstance(n, str) else n for n in (given.run, given.touched))
+    other = None if given.other is None else np.atleast_2d(np.asarray(given.other))
+    return values, given._replace(other=other, run=run, touched=touched)
+
+
 def _names_touched(values: ArrayLike | None) -> Sequence[str] | TextArray:
     named = np.asarray(values) if isinstance(values, list | tuple | np.ndarray) else None
     if named is None or named.ndim != 1 or named.dtype.kind != "U":

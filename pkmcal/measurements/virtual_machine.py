@@ -154,6 +154,7 @@ class VirtualMachine:
             touched=touches,
             artefact=artefact if touching else None,
             joint=joint,
+            approach=approach,
         )
         exact = self._exact(blank, mounting, touched)
         if blank.run is not None:
@@ -234,3 +235,14 @@ class VirtualMachine:
         deviations = {"mm": self.noise, "rad": self.angle_noise}
         sigma = np.array([deviations[unit] for unit in blank.units])
         return sigma * drawn, sigma if (sigma > 0).all() else None
+
+
+def _poses(machine: Solvable, actuators: FloatArray, argument: str) -> FloatArray:
+    solved = machine.forward(actuators)
+    failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
+    if len(failed):
+        raise ArgumentError(
+            f"{argument}: {len(failed)} of {len(actuators)} rows have no pose on the true machine"
+            f" (rows {first_rows(failed, 10)})"
+        )
+    return np.asarray(solved.pose)

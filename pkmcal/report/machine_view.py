@@ -60,8 +60,9 @@ def measured_places(found: Identification) -> FloatArray:
     """Where the measured points of all rows are in the robot's base frame, mm (N, 3)."""
     equations, end = found.fit.equations, found.fit.end
     parts = []
-    for i, measured in enumerate(equations.sets):
-        if measured.kind in ("pose", "closure"):
+    for i in range(len(equations.sets)):
+        target = equations.arguments_of(i, end.theta).get("target")
+        if target is None:
             parts.append(end.pose[equations.pose_of[i], :3])
         else:
             target = np.ascontiguousarray(equations.arguments_of(i, end.theta)["target"])

@@ -78,8 +78,11 @@ def test_one_row_is_taken_as_it_is(kind: str) -> None:
     for row in range(5):
         value = several.values[row] if width(kind) else None
         fields: dict[str, Any] = {} if several.sigma is None else {"sigma": several.sigma[row]}
-        if kind == "distance":
-            fields["target"] = [0, 0, 100]
+        of_rows = needed(kind, 5, 4)
+        if kind in ("between", "relative-distance", "touch"):
+            name = {"between": "other", "relative-distance": "run"}.get(kind, "touched")
+            of_rows |= {name: of_rows[name][row]}
+        fields |= of_rows
         one = Measurements(
             several.actuators[row], value, kind, group=several.group[row], lines=7, **fields
         )
