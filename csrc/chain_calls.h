@@ -40,7 +40,7 @@ INLINE void chain_prepare(const chain_geometry *of, ptrdiff_t first, const ptrdi
 }
 
 #define AT_HOME 0.1  /* rad, of the length: passive joints so near those of home are of its posture */
-#define POSTURE 1e-2 /* of the size: actuators that are farther from those of a posture may be another's */
+#define POSTURE 2e-4 /* of the size: actuators that are farther from those of a posture may be another's */
 #define LIKELY 1e-2  /* of that way: what the other then misses at most */
 
 /* A guess: the pose, its passive joints, and the drives that lead there. Of chains that have several
@@ -152,6 +152,11 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
         if (first == 0 || geometry_stride || guess_stride || own) {
             own = any(chain_guess(machine, &numbers, begin, drive, &start, from));
             chain_predict(machine, &numbers, &start, from, &predicted);
+        }
+        for (int j = 0; j < machine->joints; j++) { /* whole turns are no way to go */
+            const int a = machine->actuator[j];
+            if (a >= 0 && !machine->prismatic[j])
+                drive[a] = nearest_turn(drive[a], from[a], fill(TWO_PI));
         }
         for (int a = 0; a < machine->actuators; a++) valid &= finite(drive[a]) & finite(lane_q[a]);
         for (int k = 0; k < 6; k++) valid &= finite(begin[k]);

@@ -6,7 +6,7 @@
 #include "chain_system.h"
 #include "newton.h"
 
-enum { MAX_ASSEMBLY = 40, FEW_ASSEMBLY = 14, FEW_POSTURES = 6, MOST_POSTURES = 24, PATH_PARTS = 8, PATH_STEPS = 5 };
+enum { MAX_ASSEMBLY = 40, FEW_ASSEMBLY = 14, FEW_POSTURES = 12, MOST_POSTURES = 24, PATH_PARTS = 8, PATH_STEPS = 5 };
 #define CHAIN_CLOSED 2e-13 /* residual at which chains close, relative to the machine's size */
 #define LEAST_COLUMN 1e-6  /* of a passive joint beside the others: below, they do not say where it is */
 

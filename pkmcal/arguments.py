@@ -31,6 +31,8 @@ def number(name: str, value: object, least: float = -math.inf, above: float = -m
     """
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise ArgumentTypeError(f"{name} must be a number, found {shown(value)}")
+    if isinstance(value, np.floating):  # limits are not numbers of lower precision
+        value = float(value)
     if not abs(value) <= sys.float_info.max:
         raise ArgumentError(f"{name} must be finite, found {shown(value)}")
     if not value >= least:
@@ -49,6 +51,8 @@ def whole(name: str, value: object, least: int, most: float = math.inf, note: st
         Anything else.
     """
     counted = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if counted and cast(int, value) > sys.maxsize:
+        most = min(most, sys.maxsize)
     if not counted or not least <= cast(int, value) <= most:
         span = f"from {least}" + (f" to {most}" if most < math.inf else "") + note
         raise ArgumentError(f"{name} must be a whole number {span}, found {shown(value)}")

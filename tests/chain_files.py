@@ -135,3 +135,54 @@ def same_errors(robot: Robot, limb_errors: dict[str, float]) -> dict[str, float]
         for c, part in zip("xyz", rod, strict=True):
             add(f"{n}.joint3.d{c}", part * limb_errors.get(f"rod{i + 1}", 0.0))
     return found
+
+
+DRAWN = {  # kinds of joints from the base on, the actuated one with a star
+    "spatial": ("UP*S", "P*US", "R*US", "R*RRRRR", "P*RUU", "R*RRS", "UP*UR", "P*CUR", "R*PCU"),
+    "planar": ("R*RR", "RP*R", "P*RR"),
+    "spherical": ("R*RR",),
+}
+_SIZE = 500.0  # mm
+
+
+def drawn(map: str, rng: np.random.Generator) -> str:
+    """The robot file of a machine of random chains, one actuator each."""
+    way = {"spatial": np.ones(3), "planar": np.array([1.0, 1.0, 0.0]), "spherical": np.zeros(3)}[
+        map
+    ]
+    home = way * _SIZE * rng.uniform(-1, 1, 3)
+    place = ", ".join(f"{c} = {h!r}" for c, h in zip("xyz", home.tolist(), strict=True) if h)
+    lines = [f'name = "drawn"\nunits = {{ length = "mm", angle = "rad" }}\n[pose]\nmap = "{map}"']
+    lines += [f"home = {{ {place} }}"] * bool(place)
+    limbs = {"spatial": 6, "planar": 3, "spherical": 3}[map]
+    for limb in range(limbs):
+        word = str(rng.choice(DRAWN[map]))
+        kinds = [word[i] for i in range(len(word)) if word[i] != "*"]
+        actuated = word.index("*") - 1
+        end = home + way * rng.uniform(-0.4, 0.4, 3) * _SIZE
+        start = end - _direction(rng, way) * rng.uniform(0.8, 1.5) * _SIZE
+        lines += ["[[limb]]", 'kind = "chain"', "joints = ["]
+        for k, kind in enumerate(kinds):
+            at = start + (end - start) * k / (len(kinds) - 1)
+            if 0 < k < len(kinds) - 1:
+                at = at + _direction(rng, way) * 0.3 * _SIZE
+            said = [f'kind = "{kind}"', f"at = {at.tolist()}"]
+            across = way if map == "planar" else np.ones(3)
+            if kind in "RPC":
+                planar = map == "planar" and kind == "R"
+                axis = np.array([0.0, 0.0, 1.0]) if planar else _direction(rng, across)
+                said.append(f"axis = {axis.tolist()}")
+            if kind == "U":
+                one = _direction(rng, across)
+                other = np.cross(one, _direction(rng, across))
+                said.append(f"axes = [{one.tolist()}, {(other / np.linalg.norm(other)).tolist()}]")
+            if k == actuated:
+                said.append(f"actuator = {limb + 1}")
+            lines.append("  { " + ", ".join(said) + " },")
+        lines.append("]")
+    return "\n".join(lines) + "\n"
+
+
+def _direction(rng: np.random.Generator, way: FloatArray) -> FloatArray:
+    found = rng.normal(size=3) * (way if way.any() else np.ones(3))
+    return np.asarray(found / np.linalg.norm(found))

@@ -560,3 +560,36 @@ def test_a_time_that_is_no_number_has_no_place() -> None:
     ):
         found = np.array(law.sample([0.0, np.nan, 1.0]))
         assert np.isnan(found[:, 1]).all() and np.isfinite(found[:, [0, 2]]).all()
+
+
+@pytest.mark.parametrize(
+    ("call", "named"),
+    [
+        (lambda r: pk.workspace(r, {"x": ([1, 2], 10, 3)}), r"axes: x must be \(low, high"),
+        (lambda r: pk.workspace(r, {"x": (-10, 10, 1e308)}), "axes: x must have at most"),
+        (lambda r: pk.workspace(r, {"x": (-10, 10, 3)}, np.zeros((0, 6))), "at must have shape"),
+        (lambda r: r.forward_all(r.inverse(r.home), starts=10**59), "starts must be a whole"),
+        (lambda r: pk.correction_grid(r, r, {"x": [[1, 2], [3]]}), r"axes\['x'\] must have"),
+        (lambda r: pk.VirtualMachine(r, noise=10**400), "noise must be finite"),
+    ],
+)
+def test_numbers_beyond_reason_and_ragged_lists_are_refused_by_name(call, named) -> None:
+    with pytest.raises(pk.Error, match=named):
+        call(pk.load("hexapod"))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_scalar_of_single_precision_is_the_number_it_is() -> None:
+    robot, given = pk.load("hexapod"), np.float32(0.1)
+    one, other = (pk.sensitivity(robot, robot.home, step).linear for step in (given, float(given)))
+    np.testing.assert_array_equal(one, other)
+    assert (
+        pk.VirtualMachine(robot, noise=given).measure(robot.inverse(robot.home)).sigma is not None
+    )
+
+
+def test_a_move_may_be_sampled_at_no_time() -> None:
+    robot = pk.load("hexapod")
+    end = robot.home + np.eye(6)[0]
+    sampled = pk.trajectory.move(robot, robot.home, end, duration=1.0).sample([])
+    assert sampled.pose.shape == (0, 6) and sampled.actuators.shape == (0, 6)

@@ -321,6 +321,17 @@ class SerialArm(SerialChain, Result):
             raise FileError(f"source: {source} holds another arm than this one")
         urdf.write(path, read, self.error_motions(), tip, base)
 
+    def limits(self) -> FloatArray:
+        """Least and largest coordinate of each joint (n, 2), mm and rad, of its URDF file.
+
+        Infinite where it states none, or where the arm is not from such a file.
+        """
+        if self.source is None:
+            return np.tile([-np.inf, np.inf], (self.n_joints, 1))
+        from pkmcal.arms import urdf
+
+        return urdf.limits(*self.source)
+
     def _is_alike(self, other: SerialArm) -> bool:
         """Whether it is the same arm without the joint errors, up to rounding."""
         if self.kinds != other.kinds:

@@ -33,6 +33,7 @@ class Joint:
     parent: FloatArray  # (4, 4) of the parent link in the base, mm
     origin: FloatArray  # (4, 4) of the joint in the base, mm
     axis: FloatArray  # (3,) in the joint's frame
+    limits: tuple[float, float]  # mm or rad; infinite where there are none
 
 
 def read(path: str | os.PathLike[str], tip: str | None, base: str | None) -> ArmArguments:
@@ -48,6 +49,11 @@ def read(path: str | os.PathLike[str], tip: str | None, base: str | None) -> Arm
         "joint_names": tuple(joint.name for joint in joints),
         "source": Source(str(path), tip, base),
     }
+
+
+def limits(path: str | os.PathLike[str], tip: str | None, base: str | None) -> FloatArray:
+    """Least and largest coordinate of each joint (n, 2), mm and rad; infinite where not stated."""
+    return np.array([joint.limits for joint in _chain(path, tip, base)[1]])
 
 
 def write(
@@ -116,7 +122,9 @@ def _chain(
         if not any(joint.axis):
             raise FileError(f"{path}: joint {joint.name!r}: axis must be a direction, found 0 0 0")
         axis = np.array(joint.axis)
-        joints.append(Joint(joint.name, _KINDS[joint.type], parent, place, axis))
+        kind = _KINDS[joint.type]
+        low, high = (end * (_METRE if kind == "prismatic" else 1.0) for end in joint.limits)
+        joints.append(Joint(joint.name, kind, parent, place, axis, (low, high)))
     if not joints:
         raise FileError(f"{path}: no moving joint above the link {tip!r}")
     return robot.name, joints, place

@@ -15,7 +15,7 @@ from pkmcal.core import screws
 
 _ROUNDS = 60  # of turning and shifting in turn
 _ALIKE = 1e-12  # share of squares by which turnings differ that are not equally good
-_TILT = 1e-3  # rad; with tilts below it the poses do not determine where a target is
+TILT = 1e-3  # rad; with tilts below it the poses do not determine where a target is
 _FLAT = 0.05  # share of the largest spread of points below which they lie in a plane, or a line
 
 
@@ -51,13 +51,13 @@ def of_points(seen: PointPairs) -> tuple[FloatArray, FloatArray]:
     from scipy.spatial.transform import Rotation
 
     count = int(seen.target.max(initial=-1)) + 1
-    values, point = _centred(seen.values), _centred(seen.point)
+    values, point = centred(seen.values), centred(seen.point)
     shifted = np.zeros((len(values), 3, count, 3))
     for k in range(count):
         mine = seen.target == k
         shifted[mine, :, k] = seen.turn[mine]
-    lever = _centred(shifted).reshape(3 * len(values), 3 * count)  # of all points, by the shifts
-    inverse = _inverse(lever, _TILT * np.sqrt(len(values)))
+    lever = centred(shifted).reshape(3 * len(values), 3 * count)  # of all points, by the shifts
+    inverse = inverse_above(lever, TILT * np.sqrt(len(values)))
     # shifts = gain · vec(turn) - still, and turn = Kabsch of `straight` + `by_shift` · shifts
     seen_by = np.einsum("ni,jk->njik", values, np.eye(3)).reshape(-1, 9)  # of Rᵀ v, by vec(R)
     gain, still = inverse @ seen_by, inverse @ point.reshape(-1)
@@ -75,7 +75,7 @@ def of_points(seen: PointPairs) -> tuple[FloatArray, FloatArray]:
     shift = inverse @ off[best]
     point = seen.point + (shifted.reshape(lever.shape) @ shift).reshape(-1, 3)
     place = seen.values.mean(axis=0) - turns[best] @ point.mean(axis=0)
-    return _frame(turns[best], place), shift.reshape(count, 3)
+    return frame_of(turns[best], place), shift.reshape(count, 3)
 
 
 def of_poses(values: FloatArray, pose: FloatArray) -> FloatArray:
@@ -85,7 +85,7 @@ def of_poses(values: FloatArray, pose: FloatArray) -> FloatArray:
     measured = Rotation.from_euler("xyz", values[:, 3:])
     turn = (measured * Rotation.from_euler("xyz", pose[:, 3:]).inv()).mean()
     place = (values[:, :3] - turn.apply(pose[:, :3])).mean(axis=0)
-    return _frame(turn.as_matrix(), place)
+    return frame_of(turn.as_matrix(), place)
 
 
 def of_heights(values: FloatArray, point: FloatArray) -> FloatArray:
@@ -93,9 +93,9 @@ def of_heights(values: FloatArray, point: FloatArray) -> FloatArray:
 
     Heights say which way is up, but for what lies in a plane: there it is up as in the robot file.
     """
-    spread, axes = np.linalg.svd(_centred(point), full_matrices=False)[1:]
+    spread, axes = np.linalg.svd(centred(point), full_matrices=False)[1:]
     seen = axes[spread > _FLAT * spread[0]]
-    up = np.linalg.lstsq(_centred(point) @ seen.T, _centred(values), rcond=None)[0] @ seen
+    up = np.linalg.lstsq(centred(point) @ seen.T, centred(values), rcond=None)[0] @ seen
     rest = np.array([0.0, 0.0, 1.0]) - seen.T @ seen[:, 2]
     if np.linalg.norm(rest) > _FLAT:
         rest *= np.sqrt(max(0.0, 1.0 - up @ up)) / np.linalg.norm(rest)
@@ -120,10 +120,10 @@ def of_directions(values: FloatArray, directions: FloatArray) -> FloatArray:
 
 def angles_of(turn: FloatArray) -> FloatArray:
     """α β γ (3,) of a turning (3, 3)."""
-    return _frame(turn, np.zeros(3))[3:]
+    return frame_of(turn, np.zeros(3))[3:]
 
 
-def _inverse(lever: FloatArray, floor: float) -> FloatArray:
+def inverse_above(lever: FloatArray, floor: float) -> FloatArray:
     """Pseudo-inverse of mm per mm; what poses determine less than `floor` stays where it is stated.
 
     The floor is absolute: with poses of one orientation the lever is rounding alone, and a floor
@@ -135,12 +135,13 @@ def _inverse(lever: FloatArray, floor: float) -> FloatArray:
     return inverse
 
 
-def _centred(rows: FloatArray) -> FloatArray:
-    centred: FloatArray = rows - rows.mean(axis=0)
-    return centred
+def centred(rows: FloatArray) -> FloatArray:
+    """Rows less their mean."""
+    about: FloatArray = rows - rows.mean(axis=0)
+    return about
 
 
-def _frame(turn: FloatArray, place: FloatArray) -> FloatArray:
+def frame_of(turn: FloatArray, place: FloatArray) -> FloatArray:
     """The pose (6,) of a turning (3, 3) and a place (3,)."""
     motion = np.eye(4)
     motion[:3, :3], motion[:3, 3] = turn, place

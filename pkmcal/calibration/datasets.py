@@ -123,7 +123,8 @@ def by_set(said: Said) -> frozenset[str]:
         for name, given in each.items()
         if isinstance(given, Iterable) and list(given).count("unknown") > 1
     }
-    return frozenset(found | ({"anchor"} if "target" in found else set()))
+    of_target = {"anchor", "tool", "mounting"} if "target" in found else set()
+    return frozenset(found | of_target)
 
 
 def _check(robot: Calibratable, measured: Measurements, argument: str) -> None:

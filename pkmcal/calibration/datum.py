@@ -30,6 +30,7 @@ DatumRule = Literal["none", "auto"]
 DATUMS: tuple[DatumRule, ...] = ("none", "auto")
 
 _POSES, _SHARE = 60, 0.7  # at which twists are compared, and how far out
+_POINTS = ("target", "attachment", "anchor")  # what a reading depends on and a frame moves
 _OUTSIDE = 1e-6  # share of a combination outside some others that does not count
 _ALIKE = 1e-3  # share by which numbers differ that are as good to hold
 _FAMILIAR = 0.1  # of the best number's: a coordinate is held that has as much
@@ -125,7 +126,7 @@ def _held_points(
     rest: FloatArray = open_ones @ rows[rank:].T  # without any number of the geometry
     held = []
     for point, first in chosen.found_along.items():
-        if point[0] not in ("target", "attachment", "anchor"):
+        if point[0] not in _POINTS:
             continue
         mine = np.flatnonzero(np.isin(chosen.number_of, np.arange(first, first + 3)))
         if len(mine) != 3 or stated[mine].any():  # or there is one in each session

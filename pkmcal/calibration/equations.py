@@ -72,8 +72,9 @@ class Equations(Readings):
         super().__init__(datasets, parameters)
         self.datasets, self._unread = tuple(datasets), unread
         guess = np.tile(parameters.robot.home, (len(self.actuators), 1))
-        for measured, framed, place in zip(self.sets, self._framed, self.pose_of, strict=True):
-            if measured.kind in ("pose", "position") and not framed:
+        for i, (measured, place) in enumerate(zip(self.sets, self.pose_of, strict=True)):
+            elsewhere = self._framed[i] or self.columns_of(i, "tool") is not None
+            if measured.kind in ("pose", "position") and not elsewhere:
                 read = np.isfinite(measured.values).all(axis=1)
                 guess[place[read], :3] = measured.values[read, :3]
                 if measured.kind == "pose":
@@ -302,7 +303,7 @@ class Equations(Readings):
         if not evaluation.ok:
             self.start_from(np.flatnonzero(evaluation.status), self.parameters.robot.home)
             evaluation = self.at(theta)
-        if not self.parameters.frames or not evaluation.ok:
+        if not self.parameters.motions or not evaluation.ok:
             return evaluation
         self.parameters, theta = aligned(self, evaluation, own)
         return self.at(theta)

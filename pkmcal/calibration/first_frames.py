@@ -1,6 +1,7 @@
-"""Where the search for unknown frames and targets starts: see `alignment`.
+"""Where the search for unknown frames, targets and tools starts: see `alignment` and `hand_eye`.
 
-Frame by frame; targets that several frames have in common are placed with the first of them.
+Frame by frame; what several frames have in common is placed with the first of them. Frames in which
+points were read come first, then tools, with their frame where it is not laid yet.
 """
 
 from __future__ import annotations
@@ -12,8 +13,10 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.calibration.alignment import PointPairs, of_heights, of_points, of_poses
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.hand_eye import of_frame_and_tool, of_tool
 from pkmcal.calibration.parameters import Parameters
 from pkmcal.core import instruments
+from pkmcal.core.poses import compose, invert
 
 if TYPE_CHECKING:
     from pkmcal.calibration.readings import Readings
@@ -37,15 +40,88 @@ def aligned(
     """
     parameters, theta = readings.parameters, evaluation.theta.copy()
     free = np.ones(len(parameters), dtype=bool) if own is None else own.copy()
-    for first, rows in readings.frames.items():
-        if free[first]:
-            frame = _aligned(readings, evaluation, rows, theta, free)
-            parameters, theta = parameters.aligned(theta, first, frame)
+    frames, tools = readings.frames, readings.tools
+    by_points = [
+        first
+        for first, rows in frames.items()
+        if any(readings.sets[i].kind == "position" for i in rows)
+    ]
+    for first in dict.fromkeys([*by_points, *tools, *frames]):
+        if not free[first]:
+            continue
+        if first in tools:
+            laid = _with_tool(readings, evaluation, first, parameters, theta, free)
+        else:
+            laid = {first: _aligned(readings, evaluation, frames[first], parameters, theta, free)}
+        for each, motion in laid.items():
+            parameters, theta = parameters.aligned(theta, each, motion)
+            free[each : each + 6] = False
     return parameters, theta
 
 
+def _with_tool(
+    readings: Readings,
+    evaluation: Evaluation,
+    tool: int,
+    parameters: Parameters,
+    theta: FloatArray,
+    free: BoolArray,
+) -> dict[int, FloatArray]:
+    """A tool (6,) by its first parameter, with the frame it was measured in where that is free."""
+    groups: dict[int | None, list[tuple[int, IntArray]]] = {}
+    for i, rows in readings.tools[tool].items():
+        framed = {f: own[i] for f, own in readings.frames.items() if i in own}
+        if not framed:
+            groups.setdefault(None, []).append((i, rows))
+        for f, own in framed.items():
+            if len(some := np.intersect1d(rows, own)):
+                groups.setdefault(f, []).append((i, some))
+    known = [each for each in groups if each is None or not free[each]]
+    frame = (known or list(groups))[0]
+    values = np.concatenate([readings.sets[i].values[rows] for i, rows in groups[frame]])
+    pose = np.concatenate([evaluation.pose[readings.pose_of[i][rows]] for i, rows in groups[frame]])
+    if frame is None:
+        return {tool: of_tool(values, pose)}
+    if free[frame]:
+        base, carried = of_frame_and_tool(values, pose)
+        return {frame: base, tool: carried}
+    base = _motion(parameters, theta, frame)
+    return {tool: of_tool(compose(invert(base), np.ascontiguousarray(values)), pose)}
+
+
+def _motion(parameters: Parameters, theta: FloatArray, first: int) -> FloatArray:
+    """A frame or tool (6,) by its first parameter."""
+    near = np.ascontiguousarray(theta[None, first : first + 6])
+    motion: FloatArray = compose(parameters.origin[first], near)[0]
+    return motion
+
+
+def _seen(
+    readings: Readings,
+    evaluation: Evaluation,
+    i: int,
+    rows: IntArray,
+    parameters: Parameters,
+    theta: FloatArray,
+) -> FloatArray:
+    """What rows of set `i` read in the base frame, (N, k), tools where they are laid."""
+    columns = readings.columns_of(i, "tool")
+    if columns is None:
+        return evaluation.predicted[i].values[rows]
+    pose = evaluation.pose[readings.pose_of[i][rows]]
+    for first in np.unique(columns[rows, 0]).tolist():
+        mine = columns[rows, 0] == first
+        pose[mine] = compose(pose[mine], _motion(parameters, theta, first))
+    return pose
+
+
 def _aligned(
-    readings: Readings, evaluation: Evaluation, rows: Rows, theta: FloatArray, free: BoolArray
+    readings: Readings,
+    evaluation: Evaluation,
+    rows: Rows,
+    parameters: Parameters,
+    theta: FloatArray,
+    free: BoolArray,
 ) -> FloatArray:
     """The frame (6,) nearest to the readings; targets that are free are moved and then not free."""
     kinds = {
@@ -60,7 +136,7 @@ def _aligned(
         if kind == "tilt":  # as level as the robot file says
             return np.zeros(6)
         if kind != "height":
-            seen = [evaluation.predicted[i].values[rows[i]] for i in kinds[kind]]
+            seen = [_seen(readings, evaluation, i, rows[i], parameters, theta) for i in kinds[kind]]
             whole = np.zeros((2, len(values), 6))
             whole[:, :, 6 - values.shape[1] :] = values, np.concatenate(seen)
             read, predicted = whole[:, np.isfinite(values).all(axis=1)]

@@ -50,7 +50,7 @@ class Dependence:
     argument : str
         Its name there.
     role : str
-        What it is to users: "target", "anchor", "attachment", "run", "angle", "touch", "mounting".
+        What it is to users: "target", "anchor", "attachment", "tool", "run", "angle" …
     given : ndarray (N, w)
         Its numbers, as far as they are known.
     sought : mapping of str to Numbers
@@ -129,6 +129,8 @@ class FitData:
         m = self.measured
         if KINDS[m.kind].point == "platform":
             yield self._point("target", "target", self.unknown_target)
+        if m.kind == "pose" and self.unknown_target:
+            yield self._always("tool", "tool", _PLACE, [""] * len(m))
         if KINDS[m.kind].point == "base":
             yield self._point("target", "attachment", self.unknown_attachment)
             yield self._point("anchor", "anchor", self.unknown_target)

@@ -216,21 +216,22 @@ def tested_prior(estimator: Estimator, estimate: Estimate) -> PriorTest | None:
     A robust fit's prior is not tested.
     """
     chosen = estimator.equations.parameters
-    stated = np.isfinite(chosen.prior)
-    if not stated.any() or estimator.loss != "linear":
+    rows = estimator.prior
+    if not len(rows) or np.linalg.matrix_rank(rows) < len(rows) or estimator.loss != "linear":
         return None
-    moved = (estimate.evaluation.theta - chosen.start) / chosen.scale
-    data = estimate.residual + estimate.jacobian @ moved
+    # parameters as what the prior says of them, in its deviations, and the rest
+    known = np.linalg.pinv(rows)
+    rest = np.linalg.svd(rows)[2][len(rows) :].T
+    data = estimate.residual - estimate.jacobian @ known @ chosen.prior_left(
+        estimate.evaluation.theta
+    )
     variance, freedom = 1.0, np.inf
     if estimator.unstated.any():
         squares, freedom = data_alone(estimate.jacobian, data)
         if freedom < LEAST_FREEDOM:
             return None
         variance = squares / freedom
-    by_prior = estimate.jacobian * (np.where(stated, chosen.prior, 1.0) / np.where(
-        stated, chosen.scale, 1.0
-    ))  # fmt: skip
-    factor = triangle(np.column_stack([by_prior, data]))
-    return prior_test(
-        factor[:, :-1][:, stated], factor[:, :-1][:, ~stated], factor[:, -1], variance, freedom
-    )
+    columns = [estimate.jacobian @ known, estimate.jacobian @ rest, data]
+    factor = triangle(np.column_stack(columns))
+    k = len(rows)
+    return prior_test(factor[:, :k], factor[:, k:-1], factor[:, -1], variance, freedom)

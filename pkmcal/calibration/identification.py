@@ -197,7 +197,11 @@ class Identification(Parts, Result):
         drawing.write(residual_figure.residuals(self), arguments.path("path", path))
 
     def report(
-        self, folder: str | PathLike[str], files: Mapping[str, bytes] | None = None
+        self,
+        folder: str | PathLike[str],
+        files: Mapping[str, bytes] | None = None,
+        *,
+        certificate: str | PathLike[str] | None = None,
     ) -> list[Path]:
         """Write the whole calibration as ``report.html``, one file that needs nothing else.
 
@@ -209,6 +213,10 @@ class Identification(Parts, Result):
             An existing folder.
         files : mapping of str to bytes, optional
             What the calibration was made from, by name; their checksums are stated.
+        certificate : str or path, optional
+            A TOML file with machine, serial, customer, operator, date, instrument, temperature and
+            method: the report then begins with a certificate that states the expanded uncertainty
+            with its budget, and has room for signatures.
 
         Returns
         -------
@@ -220,13 +228,15 @@ class Identification(Parts, Result):
         OSError
             The folder cannot be written.
         """
+        from pkmcal.report import certificate as certificates
         from pkmcal.report import report
 
         if files is not None and not isinstance(files, Mapping):
             raise ArgumentTypeError(
                 f"files must map names to bytes, found {arguments.shown(files)}"
             )
-        return report.write(self, arguments.path("folder", folder), files or {})
+        stated = None if certificate is None else certificates.read(certificate)
+        return report.write(self, arguments.path("folder", folder), files or {}, stated)
 
     def summary(self) -> str:
         """Everything a person should know, on one screen."""

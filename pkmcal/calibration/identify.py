@@ -110,8 +110,9 @@ def identify(
     target : {"known", "unknown"} or a sequence of them
         Whether the measured points of the platform are known or to be found, from where
         `Measurements.target` puts them: ``target1.x`` …; for distances the fixed point,
-        ``anchor1.x`` …; for orientations how the sensor is mounted, ``mounting.alpha`` …. One
-        word, or one each, as for frames.
+        ``anchor1.x`` …; for orientations how the sensor is mounted, ``mounting.alpha`` …; for poses
+        where on the platform what was measured is, ``tool.x`` … ``tool.gamma``, without a start.
+        One word, or one each, as for frames.
     holdout : float or Measurements, optional
         A fraction of the poses of each set, drawn at random with repeats kept together, or other
         measurements: they are not fitted, only compared.

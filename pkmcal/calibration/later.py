@@ -79,7 +79,7 @@ def later(fitted: Parameters, held: Sequence[tuple[FitData, int]]) -> Later:
     mine = parameters(fitted.robot, data, fitted.asked, like=fitted)
     place = {name: column for column, name in enumerate(fitted.names)}
     columns = np.array([place.get(name, NONE) for name in mine.names], dtype=np.intp)
-    known = {first: columns[first] for first in mine.frames if columns[first] != NONE}
+    known = {first: columns[first] for first in mine.motions if columns[first] != NONE}
     origin = dict(mine.origin) | {first: fitted.origin[there] for first, there in known.items()}
     return Later(data, tuple(like for _, like in held), replace(mine, origin=origin), columns)
 

@@ -110,7 +110,7 @@ def _groups(geometry: Geometry, free: Sequence[str]) -> list[tuple[str, ...]]:
             kinds.setdefault(name, set()).add(_kind(number.slot))
     groups: dict[str, list[str]] = {}
     for name in free:
-        of = kinds.get(name, set())
+        of = kinds.get(name.partition("@")[0], set())  # of whatever session
         if len(of) == 1 and (kind := next(iter(of))):
             groups.setdefault(kind, []).append(name)
     return [tuple(names) for names in groups.values()]

@@ -77,34 +77,29 @@ class Search:
             self.evaluations += 1
         return self._last[2]
 
-    def jacobian(
-        self, evaluation: Evaluation, noise: FloatArray, aside: BoolArray | None = None
-    ) -> FloatArray:
-        """Derivative (M, n) of the predicted values, scaled and whitened; 0 for units set aside.
+    def jacobian(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """Derivative (M, n) of the predicted values, scaled and whitened.
+
+        The last one is kept until another is asked for.
 
         Raises
         ------
         ValueError
             It does not exist, at a singularity of the machine.
         """
-        jacobian = self._whole_jacobian(evaluation, noise)
-        if aside is not None and aside.any():
-            jacobian = np.where(np.repeat(aside, self.equations.components)[:, None], 0.0, jacobian)
-        if not np.isfinite(jacobian).all():
-            raise ArgumentError(
-                "no geometry near the present one agrees: the fit runs into poses"
-                " where the actuators do not hold the machine (type-2 singular)"
-            )
-        return jacobian
+        found = _finite(self._taken(evaluation, noise))
+        self._last_jacobian = evaluation, noise, found
+        return found
 
-    def _whole_jacobian(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
-        """The same of all units; the last is kept, for the statistics ask for it again."""
-        last = self._last_jacobian
-        if last is None or last[0] is not evaluation or not np.array_equal(last[1], noise):
-            by_parameters = self.equations.by_parameters(evaluation, noise)[:, self._found]
-            by_parameters *= self.scale
-            last = self._last_jacobian = evaluation, noise, by_parameters
-        return last[2]
+    def _taken(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """The same, finite or not, and not kept: a search holds copies of its own."""
+        last, self._last_jacobian = self._last_jacobian, None
+        if last is not None and last[0] is evaluation and np.array_equal(last[1], noise):
+            return last[2]
+        del last
+        found: FloatArray = self.equations.by_parameters(evaluation, noise)[:, self._found]
+        found *= self.scale
+        return found
 
     def best(self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray) -> FloatArray:
         """Where the cost is least, from `u` (n,).
@@ -179,8 +174,11 @@ class Search:
             evaluation = self.at(u, noise)
             equations.warm_start(evaluation)  # the step to it was taken
             self.history.append(equations.progress(evaluation))
-            by_u = self.jacobian(evaluation, noise, aside)
-            return np.vstack([loss.jacobian(data(evaluation), by_u), extra, np.zeros(len(u))])
+            by_u = self._taken(evaluation, noise)
+            if aside.any():
+                by_u = np.where(without[:, None], 0.0, by_u)
+            by_u = loss.jacobian(data(evaluation), _finite(by_u))
+            return np.vstack([by_u, extra, np.zeros(len(u))])
 
         found = least_squares(
             residual,
@@ -196,3 +194,12 @@ class Search:
         )
         self.converged = bool(found.status > 0)
         return found.x, float(found.cost)
+
+
+def _finite(jacobian: FloatArray) -> FloatArray:
+    if not np.isfinite(jacobian).all():
+        raise ArgumentError(
+            "no geometry near the present one agrees: the fit runs into poses"
+            " where the actuators do not hold the machine (type-2 singular)"
+        )
+    return jacobian

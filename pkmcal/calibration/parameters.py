@@ -92,9 +92,9 @@ class Parameters:
         First number of each point, zero or artefact that is found along, by role
         (`Dependence.role`) and name.
     origin : mapping
-        Where the six parameters of a frame count from, by the first: the base in the instrument's
-        frame is at this pose (6,) followed by them. Near it they are small, and their angles
-        regular.
+        Where the six parameters of a frame or tool count from, by the first: the base in the
+        instrument's frame, or the tool on the platform, is at this pose (6,) followed by them. Near
+        it they are small, and their angles regular.
     robot : Calibratable
         The machine they belong to.
     asked : Asked
@@ -161,9 +161,10 @@ class Parameters:
         return slice(0, int(np.count_nonzero(self.number_of < len(self.places))))
 
     @property
-    def frames(self) -> tuple[int, ...]:
-        """The first parameter of each frame."""
-        return tuple(np.flatnonzero(self.number_of == self.frame).tolist())
+    def motions(self) -> tuple[int, ...]:
+        """The first parameter of each frame and each tool."""
+        numbers = [n for n in (self.frame, self.found_along.get(("tool", ""))) if n is not None]
+        return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
 
     def spread(self, datasets: Sequence[FitData]) -> Spread:
         """Which parameters hold in the rows of these sets."""
@@ -171,13 +172,12 @@ class Parameters:
         part_of = []
         for data in datasets:
             session = data.measured.session if "session" in self.scope else None
-            names = [""] * len(data.measured) if session is None else session.tolist()
-            one = data.set_name if "set" in self.scope else ""
-            part_of.append(
-                np.array(
-                    [place.setdefault((name, one), len(place)) for name in names], dtype=np.intp
-                )
-            )
+            behind = data.set_name if "set" in self.scope else ""
+            names, mine = [""], np.zeros(len(data.measured), dtype=np.intp)
+            if session is not None:
+                names, mine = (each.tolist() for each in np.unique(session, return_inverse=True))
+            parts = [place.setdefault((name, behind), len(place)) for name in names]
+            part_of.append(np.array(parts, dtype=np.intp)[mine])
         columns = np.array([
             [
                 self.column.get((number, label(scope, *part)), NONE)
@@ -208,9 +208,9 @@ class Parameters:
     def aligned(
         self, theta: FloatArray, first: int, frame: FloatArray
     ) -> tuple[Parameters, FloatArray]:
-        """Put the base at `frame` (6,) and count from there, unless a prior or bound is stated.
+        """Put a frame or tool at `frame` (6,) and count from there.
 
-        `first` is the first parameter of that frame.
+        Unless a prior or bound is stated. `first` is its first parameter.
         """
         mine, theta = slice(first, first + 6), theta.copy()
         stated = np.isfinite([self.prior[mine], self.lower[mine], self.upper[mine]]).any()
@@ -219,9 +219,9 @@ class Parameters:
         return replace(self, origin=origin), theta
 
     def reported(self, theta: FloatArray) -> FloatArray:
-        """The parameters (n,) with the frames' numbers counted from zero."""
+        """The parameters (n,) with the numbers of frames and tools counted from zero."""
         out: FloatArray = theta.copy()
-        for first in self.frames:
+        for first in self.motions:
             mine = slice(first, first + 6)
             out[mine] = compose(self.origin[first], np.ascontiguousarray(theta[None, mine]))[0]
         return out
@@ -229,7 +229,7 @@ class Parameters:
     def reported_rates(self, theta: FloatArray) -> FloatArray:
         """Derivative (n, n) of `reported` to the parameters (n,)."""
         rates = np.eye(len(self))
-        for first in self.frames:
+        for first in self.motions:
             mine, nowhere = slice(first, first + 6), np.zeros(6)
             at, origin = np.ascontiguousarray(theta[None, mine]), self.origin[first]
             whole = compose(origin, at)
@@ -308,7 +308,7 @@ def parameters(
         robot=robot,
         asked=asked,
     )
-    return replace(made, origin={first: np.zeros(6) for first in made.frames})
+    return replace(made, origin={first: np.zeros(6) for first in made.motions})
 
 
 @dataclass(frozen=True, eq=False)
@@ -466,7 +466,7 @@ def _bounds(
     for pattern, pair in bounds.items():
         try:
             low, high = (float(end) for end in pair)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise ArgumentError(
                 f"bounds of {pattern} must be (lower, upper); found {pair!r}"
             ) from None

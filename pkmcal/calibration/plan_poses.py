@@ -10,17 +10,11 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arguments import number, whole, word
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows, mm_per_unit
 from pkmcal.calibration.optimal_design import CRITERIA, Criterion
 from pkmcal.calibration.parameters import Parameters, Prior
-from pkmcal.calibration.planned import (
-    PLANNED,
-    Unknown,
-    design_of,
-    equations_of,
-    information,
-    planned,
-)
+from pkmcal.calibration.planned import Unknown, design_of, equations_of, information, planned
+from pkmcal.calibration.tour import short_tour
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
 from pkmcal.exceptions import ArgumentError
@@ -30,6 +24,8 @@ from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.components import Kind
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.result import Result
+
+PLANNED: tuple[Kind, ...] = ("position", "pose", "height", "distance", "orientation", "closure")
 
 _DRAWS = 25  # of poses at random, to compare a plan with
 _ERROR = 0.5  # mm; what numbers may be off by that have no prior
@@ -46,7 +42,7 @@ class Plan(Result):
     robot : Robot or SerialArm
         The machine they are for.
     indices : ndarray of int (count,)
-        Which of the candidates, in their order.
+        Which of the candidates, in the order of a short tour from home.
     poses : ndarray (count, 6)
         mm and rad.
     actuators : ndarray (count, n)
@@ -63,6 +59,9 @@ class Plan(Result):
         near a singularity that errors of the geometry bar the way there.
     parameters : tuple of str
         What the calibration is to find.
+    travel : float
+        Length of the tour, mm: of each move what the actuator travels that has farthest to go,
+        angles as arcs.
     own_frame : bool
         Whether predicted errors are those in the machine's own frame, because nothing that is read
         says where it stands.
@@ -77,6 +76,7 @@ class Plan(Result):
     all_candidates: float
     left_out: int
     parameters: tuple[str, ...]
+    travel: float = float("nan")
     own_frame: bool = False
 
     def __len__(self) -> int:
@@ -102,7 +102,8 @@ class Plan(Result):
         yield f"{self.robot.name}: measure {count} for {len(self.parameters)} parameters{left_out}"
         yield (
             f"predicted error {self.predicted:.3g} mm rms; {count} at random"
-            f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g}"
+            f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g};"
+            f" a tour of {self.travel:.4g} mm"
         )
         if self.own_frame:
             yield "in the machine's own frame: nothing that is read says where it stands"
@@ -213,6 +214,9 @@ def plan_poses(
         chosen = design.grown(whole("count", count, 1, len(q), ", the candidates"))
     else:
         chosen = design.reaching(_accuracy(accuracy, everything, len(q)))
+    arcs = mm_per_unit(machine.actuator_units, machine.length)
+    order, travel = short_tour(q[chosen] * arcs, _at_home(machine) * arcs)
+    chosen = chosen[order]
     return Plan(
         robot=robot,
         indices=inside[chosen],
@@ -223,8 +227,17 @@ def plan_poses(
         all_candidates=everything,
         left_out=offered - len(inside),
         parameters=equations.parameters.names,
+        travel=travel,
         own_frame=own_frame,
     )
+
+
+def _at_home(robot: Calibratable) -> FloatArray:
+    """Actuator coordinates (n,) at home; of an arm zero."""
+    if not isinstance(robot, Robot):
+        return np.zeros(robot.n_actuators)
+    q: FloatArray = robot.commanded(robot.home)[1][0]
+    return q
 
 
 def _poses(count: int) -> str:

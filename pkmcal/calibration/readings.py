@@ -102,7 +102,8 @@ class Readings:
         directions = [m.approach for m in self.sets]
         if any(each is not None for each in directions):  # backlash is between their poses
             known = [np.zeros(m.actuators.shape) if m.approach is None else m.approach
-                     for m in (*self.sets, *(self.sets[i] for i in double))]  # fmt: skip
+                     for m in self.sets]  # fmt: skip
+            known += [np.zeros(self.sets[i].actuators.shape) for i in double]
             commands = np.hstack([commands, np.concatenate(known)])
         self.machine_columns, machine_of = self.spread.machines(len(parameters.places))
         machine = np.concatenate([*machine_of, *(machine_of[i] for i in double)])
@@ -155,8 +156,21 @@ class Readings:
                 found.setdefault(first, {})[i] = rows
         return found
 
+    @property
+    def tools(self) -> dict[int, dict[int, IntArray]]:
+        """Rows of each set that have each tool, by its first parameter."""
+        found: dict[int, dict[int, IntArray]] = {}
+        for i, columns in enumerate(self._columns):
+            if "tool" in columns:
+                first = columns["tool"][:, 0]
+                for each in np.unique(first).tolist():
+                    found.setdefault(each, {})[i] = np.flatnonzero(first == each)
+        return found
+
     def columns_of(self, i: int, name: str) -> IntArray | None:
-        """Parameters (N, w) of what rows of set `i` depend on; `NONE` where it is given or held.
+        """Parameters (N, w) of what rows of set `i` depend on; `NONE` where a number is held.
+
+        None where all of it is given.
 
         None where all of it is given. `name` is what `predict` calls it.
         """
@@ -167,6 +181,9 @@ class Readings:
         found = dict(self._given[i])
         for name, columns in self._columns[i].items():
             found[name] = np.where(columns == NONE, found[name], theta[columns])
+        if "tool" in self._columns[i]:
+            first = self._columns[i]["tool"][:, 0].tolist()
+            found["tool_origin"] = np.array([self.parameters.origin[column] for column in first])
         return found
 
     def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:

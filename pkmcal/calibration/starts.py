@@ -40,6 +40,8 @@ def with_starts(machine: Calibratable, datasets: Sequence[FitData]) -> list[FitD
     _joints(
         machine, [(d.measured, pose) for d, pose in pairs if d.measured.joint is not None], found
     )
+    if any(data.measured.kind == "pose" for data in datasets):
+        found["tool", ""] = Start(tuple(range(6)), np.zeros(6))  # `first_frames` lays it
     _mountings([pair for pair in pairs if pair[0].measured.kind in ("tilt", "orientation")], found)
     return [replace(data, starts=found) for data in datasets]
 

@@ -12,6 +12,7 @@ from pkmcal.checks.chains import CHAIN_CHECKS, surplus
 from pkmcal.checks.finding import Finding
 from pkmcal.checks.function import (
     not_closed,
+    outside_workspace,
     singular,
     turning,
     unreachable,
@@ -40,6 +41,7 @@ CHECKS = (
     off_circle,
     unlike,
     not_closed,
+    outside_workspace,
     turning,
     unreachable,
     singular,
@@ -149,7 +151,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
         found = [finding for check in ARM_CHECKS for finding in check(robot)]
     else:
         instance("robot", robot, Robot, " or SerialArm")
-        checks = CHECKS if robot.model.chains is None else CHAIN_CHECKS
+        checks = CHECKS if robot.model.chains is None else (outside_workspace, *CHAIN_CHECKS)
         found = [finding for check in checks for finding in check(robot)]
     return GeometryCheck(robot, tuple(found))
 

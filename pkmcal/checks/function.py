@@ -10,6 +10,8 @@ from pkmcal.arrays import FloatArray
 from pkmcal.checks.finding import Finding, named
 from pkmcal.checks.joint_layout import ALIKE, joints, size
 from pkmcal.core.library import POSE, SLOTS
+from pkmcal.display import displayed
+from pkmcal.geometry.box import in_box
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.limits import kept, margin_of
@@ -193,6 +195,27 @@ def not_closed(robot: Robot) -> Iterator[Finding]:
             f"at home {named(open_limbs)} cannot close: {worst[open_limbs].max():.4g} mm missing",
             "check the axes of the limbs, their joints and the home pose",
         )
+
+
+def outside_workspace(robot: Robot) -> Iterator[Finding]:
+    """Home outside the box that the file states."""
+    box = robot.model.workspace
+    if in_box(box, robot.home):
+        return
+    parts = []
+    for name, ends in box.items():
+        value = robot.home[POSE.index(name)]
+        if not ends[0] <= value <= ends[1]:
+            unit = "mm" if name in "xyz" else "rad"
+            pairs = (displayed(float(each), unit) for each in (value, *ends))
+            numbers = [f"{number:.6g} {shown}" for number, shown in pairs]
+            parts.append(f"{name} is {numbers[0]}, the workspace {numbers[1]} to {numbers[2]}")
+    yield Finding(
+        "workspace",
+        (),
+        f"home is outside the workspace of the file: {'; '.join(parts)}",
+        "check [workspace] and the home pose; both are in the base frame",
+    )
 
 
 def unreachable(robot: Robot) -> Iterator[Finding]:

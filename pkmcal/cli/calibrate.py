@@ -40,6 +40,7 @@ from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.report.as_json import as_json
+from pkmcal.report.certificate import read as read_statement
 from pkmcal.report.report import FILES as REPORT
 from pkmcal.statistics.covariance import RULES
 
@@ -161,6 +162,14 @@ def calibrate(
             help="Write report.html, which any browser shows, report.json and robot.toml.",
         ),
     ] = None,
+    certificate: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Begin the report with a certificate: a TOML file states machine, serial,"
+            " customer, operator, date, instrument, temperature, method.",
+        ),
+    ] = None,
     force: Force = False,
     json: Json = False,
 ) -> int:
@@ -190,6 +199,11 @@ def calibrate(
     names = ["robot.toml", "residuals.png", *["robot.urdf"] * urdf]
     output = None if out is None else Output(out, names, read, force)
     reported = None if report is None else Output(report, REPORT, read, force)
+    if certificate is not None and report is None:
+        raise ArgumentError("--certificate: it is part of the report, --report DIR")
+    stated = None if certificate is None else read.file(certificate)
+    if stated is not None:
+        read_statement(stated)  # a mistake in it is said before the work
     if tracker is not None:
         seen = read_tracker(tracker)
         measured = [_seen_by(seen, each) for each in measured]
@@ -226,7 +240,7 @@ def calibrate(
                 found.robot.save_urdf(draft / "robot.urdf")
     if reported is not None:
         with progress("report"), reported.draft() as draft:
-            found.report(draft, read.contents())
+            found.report(draft, read.contents(), certificate=stated)
             _save(found, draft / "robot.toml", read, robot)
     if json:
         say(as_json(found, "parameters", "correlations", schema="calibrate"))

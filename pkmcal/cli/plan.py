@@ -9,18 +9,20 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from pkmcal.arguments import word
+from pkmcal.arguments import did_you_mean, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.optimal_design import CRITERIA
-from pkmcal.calibration.plan_poses import Plan, plan_poses
-from pkmcal.calibration.planned import PLANNED, UNKNOWN
+from pkmcal.calibration.plan_poses import PLANNED, Plan, plan_poses
+from pkmcal.calibration.planned import UNKNOWN
 from pkmcal.cli.geometry_options import free_names, read_deviations
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
+from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.box import Box
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
@@ -73,6 +75,15 @@ def plan(
         list[str] | None,
         typer.Option(metavar="WORD", help="frame or target: identified too, as for calibrate."),
     ] = None,
+    within: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=LO:HI",
+            help="Where to stay, in mm and deg: 'z=0:300', of an arm 'q1=-90:90'; beside the"
+            " \\[workspace] of the robot file and the limits of a URDF file. Repeat it, or"
+            " separate with commas.",
+        ),
+    ] = None,
     seed: Seed = 0,
     out: Annotated[
         Path | None,
@@ -90,9 +101,12 @@ def plan(
     """
     read = Inputs()
     machine: Robot | SerialArm = load(read.robot(robot))
+    box = _box(machine, within or [])
+    if isinstance(machine, Robot):
+        machine = machine.within(box)
     seen = as_machine(machine)
     chosen = free_names(seen, free)
-    candidates = _drawn(machine, seed) if poses is None else _places(machine, read.file(poses))
+    candidates = _drawn(machine, box, seed) if poses is None else _places(machine, read.file(poses))
     used = None if targets is None else _places(machine, read.file(targets))
     names = ["poses.csv", "commands.csv"]
     output = None if out is None else Output(out, names, read, force)
@@ -123,13 +137,51 @@ def plan(
     return 0 if np.isfinite(made.predicted) else 1
 
 
-def _drawn(machine: Robot | SerialArm, seed: int) -> FloatArray:
+def _box(machine: Robot | SerialArm, given: list[str]) -> Box:
+    """Ends of coordinates, mm and rad, as ``--within`` states them.
+
+    Raises
+    ------
+    ValueError
+        No such coordinate, no numbers.
+    """
     if isinstance(machine, SerialArm):
+        units = {f"q{i + 1}": unit for i, unit in enumerate(machine.actuator_units)}
+    else:
+        units = {name: "mm" if name in "xyz" else "rad" for name in POSE}
+    box = {}
+    for text in (part.strip() for each in given for part in each.split(",")):
+        name, _, ends = text.partition("=")
+        low, _, high = ends.partition(":")
+        if name.strip() not in units:
+            known = did_you_mean(name.strip(), units)
+            raise ArgumentError(f"--within {text}: {name.strip()!r} is no coordinate{known}")
+        try:
+            numbers = float(low), float(high)
+        except ValueError:
+            raise ArgumentError(f"--within {text}: expected NAME=LO:HI, such as z=0:300") from None
+        if not numbers[0] < numbers[1]:
+            raise ArgumentError(f"--within {text}: from {low.strip()} to {high.strip()} is nothing")
+        factor = np.radians(1.0) if units[name.strip()] == "rad" else 1.0
+        box[name.strip()] = (numbers[0] * factor, numbers[1] * factor)
+    return box
+
+
+def _drawn(machine: Robot | SerialArm, box: Box, seed: int) -> FloatArray:
+    if not isinstance(machine, SerialArm):
+        return sample_poses(machine, _DRAWN, seed, share=_SHARE)
+    ends = machine.limits()
+    for name, (low, high) in box.items():
+        i = int(name[1:]) - 1
+        ends[i] = max(low, ends[i, 0]), min(high, ends[i, 1])
+    unknown = [f"q{i + 1}" for i in np.flatnonzero(~np.isfinite(ends).all(axis=1))]
+    if unknown:
         raise ArgumentError(
-            f"--poses: {machine.name} is a serial arm, whose limits are not known: a file of joint"
-            " coordinates to choose from is needed, with columns such as 'q1 [deg]'"
+            f"--poses: {machine.name} is a serial arm, and the limits of {', '.join(unknown)} are"
+            f" not known: state them ('--within {unknown[0]}=-90:90'), or give a file of joint"
+            " coordinates to choose from, with columns such as 'q1 [deg]'"
         )
-    return sample_poses(machine, _DRAWN, seed, share=_SHARE)
+    return np.random.default_rng(seed).uniform(ends[:, 0], ends[:, 1], (_DRAWN, len(ends)))
 
 
 def _places(machine: Robot | SerialArm, path: PathLike[str]) -> FloatArray:

@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from pkmcal import display
 from pkmcal.arguments import word
-from pkmcal.arrays import BoolArray, FloatArray, as_rows, rms
+from pkmcal.arrays import BoolArray, FloatArray, as_numbers, as_rows, rms
 from pkmcal.core.library import POSE
-from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.kinematics.kinematics import Match
 from pkmcal.kinematics.perturbed import ideal
@@ -275,9 +275,7 @@ def _poses(names: tuple[str, ...], axes: tuple[FloatArray, ...], origin: FloatAr
 
 
 def _nodes(name: str, given: ArrayLike, least: int) -> FloatArray:
-    nodes = np.asarray(given)
-    if nodes.dtype.kind not in "iuf":
-        raise ArgumentTypeError(f"axes[{name!r}] must be numbers, found dtype {nodes.dtype}")
+    nodes = as_numbers(f"axes[{name!r}]", given, "nodes")
     if nodes.ndim != 1 or len(nodes) < least:
         raise ArgumentError(
             f"axes[{name!r}] needs at least {least} nodes, found shape {nodes.shape}"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.laws import Drive, Laws
 from pkmcal.display import Table, fixed
+from pkmcal.geometry.box import Box
 from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.laws import Law, drive
@@ -124,6 +125,9 @@ class Model:
         Where the model was read; a built-in machine has none.
     chains : Chains or None
         The joints, of a machine whose limbs are chains.
+    workspace : mapping of str to (float, float)
+        Least and largest value of coordinates of the pose, mm and rad: where the machine may go,
+        a bed or a frame being in the way. Empty where the file states none.
     """
 
     name: str
@@ -139,6 +143,7 @@ class Model:
     closure_tolerance: float | None = None
     file: str | None = None
     chains: Chains | None = None
+    workspace: Box = field(default_factory=dict)
 
     @property
     def n_actuators(self) -> int:

@@ -19,6 +19,7 @@ from pkmcal.files import reading
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import ANGLE_UNITS, LENGTH_UNITS, Table, Units, shown
+from pkmcal.geometry.box import read_box
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import CHAIN, Limb, Model
@@ -32,8 +33,8 @@ from pkmcal.geometry.robot_file_writer import text_of
 STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_diameter", "length")
 INDEPENDENT = "independent"  # the default free set of a file that names none: found when loaded
 TOP = (
-    "name", "units", "closure_tolerance", "frames", "pose", "parameters", "calibration", "stated",
-    "limb",
+    "name", "units", "closure_tolerance", "frames", "pose", "workspace", "parameters",
+    "calibration", "stated", "limb",
 )  # fmt: skip
 
 
@@ -171,6 +172,7 @@ def parse(source: Source, file: str | None) -> Model:
         base_frame=_read_pose(frames, "base", POSE) if "base" in frames else None,
         tool_frame=_read_pose(frames, "tool", POSE) if "tool" in frames else None,
         closure_tolerance=_read_tolerance(top),
+        workspace=read_box(_section(top, "workspace")),
         file=file,
     )
     refuse_turning(model, described)

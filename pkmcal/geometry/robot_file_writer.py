@@ -66,6 +66,7 @@ def _sections(model: Model) -> dict[str, Mapping[str, Any]]:
     return {
         "pose": pose,
         "frames": {k: _pose(v, POSE) for k, v in frames.items() if v is not None},
+        "workspace": {name: list(ends) for name, ends in model.workspace.items()},
         "parameters": {name: geometry[name] for name in geometry.parameters},
         "calibration": {"free": list(model.free)} if model.free else {},
         "stated": model.stated,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -18,7 +18,7 @@ AT_LIMIT = 1e-10  # of the machine's size, or rad: so near a limit it is kept
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Feasibility(Result):
-    """Limits kept, for each pose and limb; every array is (..., limbs).
+    """Limits kept, for each pose and limb; every array but the last is (..., limbs).
 
     Attributes
     ----------
@@ -33,6 +33,8 @@ class Feasibility(Result):
     stroke_margin, base_cone_margin, platform_cone_margin : ndarray
         How far inside its limit each is, mm or rad; below 0 where it is broken, infinite where the
         limb states none.
+    workspace : ndarray of bool (...)
+        The pose is in the box of the robot file, ``[workspace]``; True where it states none.
     """
 
     reach: BoolArray
@@ -43,6 +45,7 @@ class Feasibility(Result):
     stroke_margin: FloatArray
     base_cone_margin: FloatArray
     platform_cone_margin: FloatArray
+    workspace: BoolArray = field(default_factory=lambda: np.array(True))
 
     LIMITS = ("reach", "stroke", "base_cone", "platform_cone")
 
@@ -50,11 +53,14 @@ class Feasibility(Result):
     def ok(self) -> BoolArray:
         """Whether every limb keeps every limit, (...)."""
         kept = self.reach & self.stroke & self.base_cone & self.platform_cone
-        return np.asarray(kept.all(axis=-1))
+        return np.asarray(kept.all(axis=-1) & self.workspace)
 
     def broken(self) -> list[str]:
         """What is broken, one line per limit and limb, over all poses."""
         lines = []
+        outside = np.flatnonzero(~self.workspace.reshape(-1))
+        if outside.size:
+            lines.append(f"outside the workspace of the file in rows {first_rows(outside)}")
         for limit in self.LIMITS:
             kept = getattr(self, limit).reshape(-1, self.reach.shape[-1])
             for limb in range(kept.shape[1]):

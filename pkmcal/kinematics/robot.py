@@ -23,7 +23,7 @@ from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
-from pkmcal.geometry import robot_file
+from pkmcal.geometry import box, robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Model
@@ -160,14 +160,49 @@ class Robot(Kinematics, Result):
             machine, slots, at = self.machine.bare(self.slots, q)
             assert isinstance(machine, ChainMachine)
             found = chain_limits.feasibility(chains, machine, slots, rows, at)
-            return _shaped(found, shape)
+            return self._shaped(found, pose, shape)
         drive, on_base, on_platform = self.limb_machine.limbs(self.slots, rows)
         if actuators is not None:
             there = self.drives(self._batch(actuators, shape))
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
             drive = np.where(angle, there + wrapped(drive - there), drive)
         size = self.machine.struct.size
-        return _shaped(feasibility(self.model.limbs, drive, on_base, on_platform, size), shape)
+        found = feasibility(self.model.limbs, drive, on_base, on_platform, size)
+        return self._shaped(found, pose, shape)
+
+    def _shaped(self, found: Feasibility, pose: ArrayLike, shape: tuple[int, ...]) -> Feasibility:
+        """Limits of N rows as those of a batch, and whether its poses are in the workspace."""
+        each = {
+            f.name: getattr(found, f.name) for f in fields(Feasibility) if f.name != "workspace"
+        }
+        at = as_rows("pose", pose, 6)[0].reshape(*shape, 6)
+        return Feasibility(
+            **{name: array.reshape(*shape, array.shape[-1]) for name, array in each.items()},
+            workspace=box.in_box(self.model.workspace, at),
+        )
+
+    def within(self, ends: box.Box) -> Robot:
+        """The robot with a smaller workspace: coordinates with their ends, mm and rad.
+
+        Parameters
+        ----------
+        ends : mapping of str to (float, float)
+            Such as ``{"z": (0, 300)}``; where the robot states ends too, the nearer ones count.
+
+        Raises
+        ------
+        ValueError
+            No coordinate of a pose, or ends between which nothing is left.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> printer = pk.load("linear-delta").within({"z": (0, 300)})
+        >>> poses = pk.sample_poses(printer, 20, share=1.0)
+        >>> bool((poses[:, 2] >= 0).all() and (poses[:, 2] <= 300).all())
+        True
+        """
+        return Robot(replace(self.model, workspace=box.both(self.model.workspace, ends)))
 
     def forward_all(self, q: ArrayLike, starts: int | None = None) -> Assemblies:
         """Every assembly mode at given actuator coordinates, with proof.
@@ -554,12 +589,6 @@ class Robot(Kinematics, Result):
         source = Source(content, place)
         head = arguments.comment(comment)
         write_whole(path, text_like(source, self.model, deviations, head))
-
-
-def _shaped(found: Feasibility, shape: tuple[int, ...]) -> Feasibility:
-    """Limits of N rows as those of a batch."""
-    each = (getattr(found, field.name) for field in fields(Feasibility))
-    return Feasibility(*(array.reshape(*shape, array.shape[-1]) for array in each))
 
 
 def determines_others(robot: Robot) -> bool:

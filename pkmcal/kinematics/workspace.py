@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import checked_seed, did_you_mean, number, whole
+from pkmcal.arguments import checked_seed, did_you_mean, number, shown, whole
 from pkmcal.arrays import BoolArray, FloatArray, as_rows
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, displayed
@@ -21,6 +21,7 @@ from pkmcal.result import Result
 
 _STEPS = 200  # along each coordinate, in search of the end of the workspace
 _SMALLEST = 0.1  # of the conditioning at home: poses nearer to a singularity are not drawn
+_MOST_CELLS = 1_000_000  # along an axis
 _PATIENCE = 100  # times as many draws as poses are wanted
 _POWER = {1: "", 2: "²", 3: "³"}
 
@@ -123,9 +124,11 @@ def workspace(
     require_parallel(robot)
     require_moved(robot, axes)
     values = tuple(_middles(name, ends) for name, ends in axes.items())
-    start, _ = as_rows("at", robot.home if at is None else at, 6)
+    start, given = as_rows("at", robot.home if at is None else at, 6)
+    if given:
+        raise ArgumentError(f"at must have shape (6,), found {(*given, 6)}")
     shape = tuple(len(axis) for axis in values)
-    rows = np.repeat(start[:1], int(np.prod(shape)), axis=0)
+    rows = np.repeat(start, int(np.prod(shape)), axis=0)
     for name, column in zip(axes, np.meshgrid(*values, indexing="ij"), strict=True):
         rows[:, POSE.index(name)] = column.ravel()
     blocks = [completed(robot, rows[i : i + BLOCK]) for i in range(0, len(rows), BLOCK)]
@@ -261,15 +264,20 @@ def good_poses(robot: Robot, poses: FloatArray) -> BoolArray:
 
 
 def _middles(name: str, ends: tuple[float, float, int]) -> FloatArray:
-    given = np.asarray(ends)
+    try:
+        given = np.asarray(ends)
+    except ValueError:  # ragged
+        given = np.empty(0)
     if given.dtype.kind not in "iuf" or given.shape != (3,):
-        raise ArgumentError(f"axes: {name} must be (low, high, cells), found {ends!r}")
+        raise ArgumentError(f"axes: {name} must be (low, high, cells), found {shown(ends)}")
     low, high, cells = given.tolist()
     count = int(cells) if np.isfinite(cells) else 0
     if count != cells:
         raise ArgumentError(f"axes: {name} must have a whole number of cells, found {cells}")
     if not -np.inf < low < high < np.inf:
         raise ArgumentError(f"axes: {name} must run from low to high, found {low} to {high}")
+    if count > _MOST_CELLS:
+        raise ArgumentError(f"axes: {name} must have at most {_MOST_CELLS} cells, found {cells:g}")
     if count < 2:
         raise ArgumentError(f"axes: {name} must have two cells at least, found {count}")
     middles: FloatArray = low + (high - low) * (np.arange(count) + 0.5) / count

@@ -25,6 +25,7 @@ _KIND_OF = {
     "artefact": "touch",
     "joint": "angle",
 }
+SEVERAL_ROWS = {*_KIND_OF.values(), "touch-distance"}  # kinds that say nothing in one row
 
 
 class KindFields(NamedTuple):

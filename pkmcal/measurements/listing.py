@@ -100,6 +100,8 @@ def title(m: Listed) -> str:
         parts.append("sigma " + _sigma_text(m))
     if m.actuator_sigma is not None:
         parts.append("actuator_sigma stated")
+    if m.approach is not None:
+        parts.append("approach stated")
     if m.sessions:
         many = "s" if len(m.sessions) > 1 else ""
         parts.append(f"session{many} {', '.join(map(display.printable, m.sessions))}")

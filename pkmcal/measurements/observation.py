@@ -55,6 +55,8 @@ def predict(
     *,
     zero: FloatArray = _ZERO,
     mounting: FloatArray = _ORIGIN,
+    tool: FloatArray | None = None,
+    tool_origin: FloatArray = _NOWHERE,
     place: FloatArray = _NOWHERE,
     touching: tuple[Artefact | None, IntArray | None] = (None, None),
     other: FloatArray | None = None,
@@ -80,6 +82,8 @@ def predict(
         What is taken off a distance: the zero of a relative one, the radius of a touched sphere.
     mounting : ndarray (3,) or (N, 3)
         α β γ of a sensor on the platform.
+    tool : ndarray (N, 6), optional
+        Pose of what is measured on the platform, counted from another, `tool_origin` (N, 6).
     place : ndarray (6,) or (N, 6)
         Pose of the touched point, line or plane in the base frame.
     touching : (str, ndarray of int (N,)), optional
@@ -105,7 +109,7 @@ def predict(
         case "tilt", _:
             return _tilts(pose, mounting, frame, origin)
         case "pose", _:
-            return _poses(pose, frame, origin)
+            return _poses(pose, tool, tool_origin, frame, origin)
         case "closure", _:
             return Predicted(np.empty((len(pose), 0)), np.empty((len(pose), 0, 6)))
     seen = _points(pose, target, frame, origin)
@@ -204,15 +208,30 @@ def _touched(
     return _rows(found, across % 3)
 
 
-def _poses(pose: FloatArray, frame: FloatArray | None, origin: FloatArray) -> Predicted:
-    place = _points(pose, _ORIGIN, frame, origin)
-    turned = _orientations(pose, None, frame, origin)
-    by_frame = None
+def _poses(
+    pose: FloatArray,
+    tool: FloatArray | None,
+    tool_origin: FloatArray,
+    frame: FloatArray | None,
+    origin: FloatArray,
+) -> Predicted:
+    """Poses of the platform, or of a tool that is mounted on it."""
+    whole = np.zeros_like(pose) if tool is None else compose(tool_origin, tool)
+    place = _points(pose, np.ascontiguousarray(whole[:, :3]), frame, origin)
+    turned = _orientations(pose, None if tool is None else whole[:, 3:], frame, origin)
+    by, by_frame = {}, None
+    if tool is not None:  # its six numbers move and turn it in the axes of its origin
+        outer = orientation.rotations(tool_origin[:, 3:])
+        seen = place.by["target"] @ outer
+        by["tool"] = np.zeros((len(pose), 6, 6))
+        by["tool"][:, :3, :3] = seen
+        by["tool"][:, 3:, 3:] = seen @ orientation.axes_of_angles(tool[:, 3:])
     if place.by_frame is not None and turned.by_frame is not None:
         by_frame = np.concatenate([place.by_frame, turned.by_frame], axis=1)
     return Predicted(
         np.hstack([place.values, turned.values]),
         np.concatenate([place.by_twist, turned.by_twist], axis=1),
+        by,
         by_frame=by_frame,
     )
 

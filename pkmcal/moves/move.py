@@ -117,7 +117,7 @@ class Move(Result):
         motion, actuators = made[self.space](times.reshape(-1))
         twist, twist_rate = derivatives.twists(motion)
         found = (to_pose(motion[:, 0]), twist, twist_rate, *actuators)
-        return MoveSample(times, *(each.reshape(*times.shape, -1) for each in found))
+        return MoveSample(times, *(each.reshape(*times.shape, each.shape[-1]) for each in found))
 
     def events(self) -> list[Event]:
         """Limits that are broken and singularities that are met, in order of time (`events`)."""

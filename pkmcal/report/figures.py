@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 _WIDTH = 9.0  # inches
 _LEAST = 1e-6  # mm; what a logarithmic axis begins with
 _FEW = 50  # largest over least below which numbers between the powers of ten are named
-_NAMED = 40  # parameters up to which a correlation picture names each
+_NAMED = 80  # parameters up to which a correlation picture names each
+_SLENDER = 0.4  # of the longest side: a shorter one gets room, so that its ticks do not collide
 
 
 @in_context
@@ -56,7 +57,8 @@ def before_after(groups: dict[str, tuple[FloatArray, FloatArray]]) -> Figure:
         panel.set(title=title, xlabel="cumulative share of points [%]", xlim=(0, 100), yscale="log")
         _grid(panel)
     panels[0].set_ylabel("distance, measured from predicted [mm]")
-    panels[0].legend()
+    handles, labels = panels[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=2)
     return figure
 
 
@@ -80,6 +82,7 @@ def machine(found: Identification) -> Figure | None:
         panel.set_title(title, fontsize="medium")
         panel.view_init(elevation, turn)
         panel.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="" if elevation == 90 else "z [mm]")
+        _widen(panel)
         panel.set_aspect("equal")
         panel.tick_params(labelsize="small")
         for axis in (panel.xaxis, panel.yaxis, panel.zaxis):
@@ -87,9 +90,19 @@ def machine(found: Identification) -> Figure | None:
             axis.get_major_locator().set_params(nbins=4)
         if elevation == 90:
             panel.set_zticks([])
+            panel.yaxis.labelpad = 14  # beside its ticks, which stand inside from above
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
     return figure
+
+
+def _widen(panel: Any) -> None:
+    """Room for the ticks of a side that is much shorter than the others."""
+    ends = [getattr(panel, f"get_{name}lim")() for name in "xyz"]
+    least = _SLENDER * max(high - low for low, high in ends)
+    for name, (low, high) in zip("xyz", ends, strict=True):
+        more = max(least - (high - low), 0.0) / 2
+        getattr(panel, f"set_{name}lim")(low - more, high + more)
 
 
 @in_context
@@ -104,7 +117,7 @@ def correlation(matrix: FloatArray, names: tuple[str, ...]) -> Figure:
         Of the parameters.
     """
     n = len(names)
-    side = min(max(0.17 * n, 2.0), 6.0)
+    side = min(max(0.17 * n, 2.0), 0.15 * _NAMED)
     figure = empty_figure(side + 2.2, side + 1.0)  # room for names, and for the bar beside
     panel = figure.subplots()
     shown = panel.imshow(matrix, cmap="RdBu_r", vmin=-1, vmax=1)

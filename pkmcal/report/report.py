@@ -15,8 +15,10 @@ from pkmcal.calibration.row_names import row_names
 from pkmcal.display import printable
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import checksums, comment, version
-from pkmcal.report import contents, machine_view
+from pkmcal.report import certificate, contents, machine_view
 from pkmcal.report.as_json import as_json
+from pkmcal.report.axes import axes
+from pkmcal.report.certificate import Statement
 from pkmcal.view import page
 
 if TYPE_CHECKING:
@@ -27,7 +29,12 @@ _TEMPLATE = "report.html.jinja"
 FILES = ("report.html", "report.json", "robot.toml")
 
 
-def write(found: Identification, folder: Path, files: Mapping[str, bytes]) -> list[Path]:
+def write(
+    found: Identification,
+    folder: Path,
+    files: Mapping[str, bytes],
+    stated: Statement | None = None,
+) -> list[Path]:
     """Write ``report.html``, ``report.json`` and ``robot.toml``, the same for the same inputs.
 
     Parameters
@@ -38,13 +45,15 @@ def write(found: Identification, folder: Path, files: Mapping[str, bytes]) -> li
         An existing folder.
     files : mapping of str to bytes
         What was read, by name: the report states the checksums.
+    stated : Statement, optional
+        Of a certificate, which the report then begins with.
 
     Raises
     ------
     OSError
         The folder cannot be written.
     """
-    facts = gather(found, files)
+    facts = gather(found, files, stated)
     page, numbers, robot = (folder / name for name in FILES)
     found.robot.save(robot, comment(files))
     write_whole(numbers, as_json(_as_data(facts), schema="report") + "\n")
@@ -52,11 +61,18 @@ def write(found: Identification, folder: Path, files: Mapping[str, bytes]) -> li
     return [page, numbers, robot]
 
 
-def gather(found: Identification, files: Mapping[str, bytes]) -> dict[str, Any]:
+def gather(
+    found: Identification, files: Mapping[str, bytes], stated: Statement | None = None
+) -> dict[str, Any]:
     """Collect everything that the report says; the calibration itself is ``found``."""
     state, sentence = contents.verdict(found)
     points = contents.points(found)
     predicted = contents.over_the_workspace(found)
+    accuracy = None if isinstance(predicted, str) else predicted[0]
+    signed = None
+    if stated is not None:
+        sure = np.empty(0) if accuracy is None else accuracy.predicted
+        signed = certificate.as_data(stated, certificate.budget(found, stated, sure))
     return {
         "state": state,
         "verdict": sentence,
@@ -70,7 +86,9 @@ def gather(found: Identification, files: Mapping[str, bytes]) -> dict[str, Any]:
         "held_out_numbers": contents.held_out_numbers(found),
         "correlation": contents.correlation(found),
         "iso9283": contents.iso9283(found),
-        "accuracy": None if isinstance(predicted, str) else predicted[0],
+        "axes": axes(found),
+        "certificate": signed,
+        "accuracy": accuracy,
         "slice": None if isinstance(predicted, str) else predicted[1],
         "no_accuracy": predicted if isinstance(predicted, str) else "",
         "inputs": checksums(files),

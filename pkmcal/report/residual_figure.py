@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from pkmcal.calibration.identification import Identification
 
 
+_ARROW, _LONGEST_ARROW = 0.1, 0.25  # of the panel's width
 _LOOKS = {
     "x": (BLUE, "o"),
     "y": (ORANGE, "s"),
@@ -54,6 +55,8 @@ def residuals(found: Identification) -> Figure:
 
 def _by_row(panel: Axes, found: Identification, drawn: IntArray, unit: str) -> None:
     """Draw one mark per row and component, rows that are outliers ringed."""
+    from matplotlib.ticker import MaxNLocator
+
     equations, seen = found.fit.equations, set()
     shown = displayed(0.0, unit)[1]
     for i, (measured, residual) in enumerate(zip(equations.sets, found.residuals, strict=True)):
@@ -72,6 +75,7 @@ def _by_row(panel: Axes, found: Identification, drawn: IntArray, unit: str) -> N
             seen.add(name)
     panel.axhline(0.0, color="0.6", lw=0.8)
     panel.grid(axis="y")
+    panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     panel.set(xlabel="row", ylabel=f"measured − predicted [{shown}]")
     panel.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(seen))
 
@@ -93,13 +97,18 @@ def _over_the_workspace(panel: Axes, found: Identification, drawn: IntArray) -> 
     x, y, dx, dy, colour = x[read], y[read], dx[read], dy[read], colour[read]
     most = max(float(np.abs(colour).max(initial=0.0)), 1e-12)
     marks = panel.scatter(x, y, c=colour, cmap="coolwarm", vmin=-most, vmax=most, s=26, zorder=3)
-    long = float(np.quantile(np.hypot(dx, dy), 0.9)) if len(dx) else 0.0
+    lengths = np.hypot(dx, dy)
+    long = float(np.quantile(lengths, 0.9)) if len(dx) else 0.0
+    margin = 0.15
     if long > 0:
+        scale = max(long / _ARROW, float(lengths.max()) / _LONGEST_ARROW)  # mm by width
+        share = 1.1 * float(lengths.max()) / scale  # of the panel; its height is a little less
+        margin = max(margin, share / (1.0 - 2.0 * share))  # of the data: tips stay inside
         arrows = panel.quiver(
             *(x, y, dx, dy),
             angles="xy",
             scale_units="width",
-            scale=long / 0.1,
+            scale=scale,
             width=0.004,
             color="0.25",
             zorder=2,
@@ -107,7 +116,7 @@ def _over_the_workspace(panel: Axes, found: Identification, drawn: IntArray) -> 
         panel.quiverkey(arrows, 0.12, 0.96, long, f"{long:.2g} mm", labelpos="E")
     panel.figure.colorbar(marks, ax=panel, label="z, height or distance [mm]")
     panel.set(xlabel="x [mm]", ylabel="y [mm]")
-    panel.margins(0.15)
+    panel.margins(margin)
 
 
 def _quantiles(panel: Axes, found: Identification) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -218,13 +219,11 @@ def test_a_table_that_is_less_smooth_than_was_said_contradicts_that() -> None:
     places = np.linspace(700.0, 980.0, 15)
     law = {"table": np.column_stack([places, 0.0 * places]).tolist(), "smoothness": 0.001}
     robot = hexapod(*[{"drive": law, "stroke": [600.0, 1100.0]}] * 6)
-    true = robot.replace(
-        {f"drive{i}.table{j}": 0.3 * (j % 2) for i in range(1, 7) for j in range(1, 16)}
-    )
+    true = robot.replace({f"drive3.table{j}": 0.03 * (j % 2) for j in range(1, 16)})
     measured = pk.VirtualMachine(true, noise=0.005, angle_noise=5e-6).measure(
         rows(true, 90), kind="pose"
     )
     with pytest.warns(
-        pk.CalibrationWarning, match=r"contradict the prior .* smoothness of a table"
+        pk.CalibrationWarning, match=r"contradict the prior .* pull the smoothness at drive3\.table"
     ):
-        pk.identify(robot, measured, free=["drive*"])
+        pk.identify(robot, replace(measured, sigma=None), free=["drive*"])

@@ -29,6 +29,42 @@ def test_plan_prints_and_writes_what_plan_poses_finds(run: Any, tmp_path: Path) 
     np.testing.assert_array_equal(commands, expected.actuators)
 
 
+def test_a_plan_stays_within_what_is_stated(run: Any, refused: Any) -> None:
+    command = ("plan", "linear-delta", "--kind", "height", "--free", "offset*", "--count", "8")
+    result = run(*command, "--within", "z=0:120,x=-40:40", "--within", "y=-10:90", "--json")
+    poses = np.array(json.loads(result.stdout)["poses"])
+    for k, (low, high) in enumerate([(-40, 40), (-10, 90), (0, 120)]):
+        assert (low <= poses[:, k]).all() and (poses[:, k] <= high).all()
+    assert "expected NAME=LO:HI" in refused(*command, "--within", "z=5")
+    assert "'w' is no coordinate" in refused(*command, "--within", "w=5:6")
+    assert "from 9 to 2 is nothing" in refused(*command, "--within", "z=9:2")
+    assert "nothing is left" not in refused(*command, "--within", "z=5000:6000")
+
+
+def test_an_arm_stays_within_the_limits_of_its_urdf_file(
+    run: Any, refused: Any, tmp_path: Path
+) -> None:
+    joint = (
+        '<joint name="{0}" type="revolute"><parent link="l{1}"/><child link="l{2}"/>'
+        '<origin xyz="0 0 0.3" rpy="0 0 0"/><axis xyz="{3}"/>{4}</joint>'
+    )
+    limit = '<limit lower="-0.5" upper="0.25" effort="1" velocity="1"/>'
+    joints = [
+        joint.format("a", 0, 1, "0 0 1", limit),
+        joint.format("b", 1, 2, "0 1 0", limit),
+        joint.format("c", 2, 3, "0 1 0", ""),
+        '<joint name="tip" type="fixed"><parent link="l3"/><child link="l4"/>'
+        '<origin xyz="0 0.1 0.3" rpy="0 0 0"/></joint>',
+    ]
+    links = "".join(f'<link name="l{i}"/>' for i in range(5))
+    (tmp_path / "arm.urdf").write_text(f'<robot name="arm">{links}{"".join(joints)}</robot>')
+    command = ("plan", "arm.urdf", "--free", "joint2.dx", "--free", "joint3.dx", "--count", "4")
+    assert "the limits of q3 are not known" in refused(*command)
+    q = np.array(json.loads(run(*command, "--within", "q3=-20:10", "--json").stdout)["actuators"])
+    low, high = [-0.5, -0.5, np.radians(-20)], [0.25, 0.25, np.radians(10)]
+    assert (low <= q).all() and (q <= high).all()
+
+
 def test_commands_with_what_was_measured_beside_them_can_be_calibrated(
     run: Any, tmp_path: Path
 ) -> None:

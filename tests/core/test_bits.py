@@ -150,7 +150,18 @@ def by_rows(call: Callable[..., np.ndarray], *given: np.ndarray) -> Case:
     return lambda isa, part: [call(*(rows[part] for rows in given), isa=isa)]
 
 
+def law(call: str) -> Case:
+    """Formulas of drive laws; the way's inverse has no number in some rows."""
+    width = library.ROW_CALLS[call][0][0][0]
+    given = 3.0 * np.random.default_rng(31).normal(size=(ROWS, width))
+    return lambda isa, part: [*library.rows(call, given[part], isa=isa)]
+
+
 CASES: dict[str, Case] = {
+    "law_drive": law("law_drive"),
+    "law_drive_inverse": law("law_drive_inverse"),
+    "law_harmonic": law("law_harmonic"),
+    "law_segment": law("law_segment"),
     "points": points,
     "seen_points": lambda isa, part: [*instruments.seen_points(POSES[0], POINTS[part], isa)],
     "distances": distances,

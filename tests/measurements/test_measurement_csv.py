@@ -349,3 +349,18 @@ def test_text_of_windows_is_read_and_that_is_said(tmp_path: Path) -> None:
     m = read_measurements(path)
     assert m.values.tolist() == [0.002]
     assert m.notes == (f"{path}: not UTF-8, read as Windows-1252",)
+
+
+def test_a_column_of_sessions_is_read_and_written(tmp_path: Path) -> None:
+    names = ["mon", "thu, evening", "mon"]
+    m = Measurements([[1, 2], [3, 4], [5, 6]], [7.0, 8.0, 9.0], "height", session=names)
+    m.write(tmp_path / "log.csv")
+    again = read_measurements(tmp_path / "log.csv")
+    assert again.session is not None and again.session.tolist() == names
+    text = "q1 [mm],q2 [mm],A.x [mm],A.y [mm],A.z [mm],B.x [mm],B.y [mm],B.z [mm],Session ID\n"
+    (tmp_path / "two.csv").write_text(text + "1,2,3,4,5,6,7,8,mon\n1,2,3,4,5,,,,thu\n")
+    seen = read_measurements(tmp_path / "two.csv")
+    assert seen.session is not None and seen.session.tolist() == ["mon", "mon", "thu"]
+    (tmp_path / "blank.csv").write_text("q1 [mm],z [mm],session\n1,2,mon\n3,4,\n")
+    with pytest.raises(ValueError, match=r"blank\.csv, line 3, column 'session': found an empty"):
+        read_measurements(tmp_path / "blank.csv")

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pkmcal.measurements.kind_fields import SEVERAL_ROWS
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
@@ -67,7 +68,10 @@ def test_measurements_pickle_and_stay_read_only(kind: str) -> None:
         again.actuators[0] = 0.0
 
 
-@pytest.mark.parametrize("kind", PUBLIC)
+ONE_ROW = [kind for kind in PUBLIC if kind not in SEVERAL_ROWS]
+
+
+@pytest.mark.parametrize("kind", ONE_ROW)
 def test_one_row_is_taken_as_it_is(kind: str) -> None:
     """Actuators (n,) with the value that goes with them, and all else that has one entry a row."""
     several = make(kind, sigma=0.1 if width(kind) else None, group=[4, 1, 2, 3, 4])
@@ -372,3 +376,31 @@ def test_a_covariance_that_is_symmetric_to_rounding_is_accepted() -> None:
     skew = np.eye(3) + 1e-6 * np.eye(3, k=1)
     with pytest.raises(ValueError, match="row 0 is not a covariance"):
         Measurements(np.ones((1, 6)), np.zeros((1, 3)), sigma=skew[None])
+
+
+def test_sessions_stay_with_their_rows() -> None:
+    m = make(session=["mon", "mon", "thu", "mon", "thu"])
+    assert m.sessions == ("mon", "thu")
+    assert m.select([4, 0]).session.tolist() == ["thu", "mon"]
+    fit, held = m.split(0.4)
+    assert sorted([*fit.session.tolist(), *held.session.tolist()]) == sorted(m.session.tolist())
+    assert "sessions mon, thu" in str(m) and str(m).count("thu") == 3
+    one = make(session="mon")
+    assert one.session.tolist() == ["mon"] * 5 and "session mon" in str(one)
+    assert make().session is None and make().sessions == ()
+    assert pickle.loads(pickle.dumps(m)).session.tolist() == m.session.tolist()
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["mon"] * 4, "session must be one name, or one for each of 5 rows; found 4"),
+        ("a@b", "session must be a name on one line"),
+        ("", "session must be a name on one line"),
+        (["a\nb"] * 5, "session must be a name on one line"),
+        (5, "session must be a name or several, found 5"),
+    ],
+)
+def test_what_is_no_session_is_refused(given: Any, message: str) -> None:
+    with pytest.raises((ValueError, TypeError), match=message):
+        make(session=given)

@@ -53,7 +53,8 @@ def session(number: int) -> Measurements:
     motion = np.tile(np.eye(4), (len(log), 1, 1))
     motion[:, :3, :3] = Rotation.from_quat(log[:, 9:13]).as_matrix()  # x, y, z, w
     motion[:, :3, 3] = log[:, 6:9]
-    return Measurements(log[:, :6] / TURNS, pk.screw.to_pose(motion), "pose")
+    poses = pk.screw.to_pose(motion)
+    return Measurements(log[:, :6] / TURNS, poses, "pose", session=f"session {number}")
 
 
 def compared(hexapod: pk.Robot, first: int, later: int) -> Identification:
@@ -72,6 +73,57 @@ def test_offsets_5_and_3_moved_and_nothing_else(
     assert found.holdout_contradicts and found.verdict.state == "doubtful"
     assert str(found).startswith("Doubtful: the held-out points contradict the fit")
     assert "moved, or the model is wrong there: offset5 by" in found.verdict.reasons[1]
+    assert found.verdict.reasons[1].endswith(
+        "per_session='offset*' finds such numbers anew in each session"
+    )
+
+
+def test_the_second_session_is_as_expected_after_its_own_zeros(hexapod: pk.Robot) -> None:
+    """A least squares of each leg for itself leaves 0.842 mm."""
+    first, second = session(1), session(2)
+    found = pk.identify(hexapod, first, holdout=second, per_session="offset*")
+    assert found.holdout_rms < 0.87 and not found.holdout_contradicts and found.moved == ()
+    assert found.verdict.state == "calibrated"
+    zeros = {name: own["value"] for name, own in found.holdout_parameters.items()}
+    shifts = [
+        zeros[f"offset{i}@session 2"] - found.parameters[f"offset{i}@session 1"]["value"]
+        for i in range(1, 7)
+    ]
+    assert np.argsort(shifts)[-2:].tolist() == [2, 4]
+    robust = pk.identify(hexapod, first, holdout=second, per_session="offset*", loss="huber")
+    assert robust.holdout_rms < 0.86  # without the pull of the outliers that the first one names
+    assert found.outliers
+
+
+def test_both_sessions_fitted_together_with_zeros_of_their_own(hexapod: pk.Robot) -> None:
+    sets = [session(1), session(2)]
+    found = pk.identify(hexapod, sets, per_session="offset*")
+    second = np.linalg.norm(found.residuals[1][:, :3], axis=1)
+    assert np.sqrt(np.mean(second**2)) < 0.86
+    assert found.verdict.state == "calibrated" and len(found.free) == 54
+
+
+def test_one_quadratic_number_a_leg_and_zeros_by_session_leave_a_third_of_a_millimetre(
+    hexapod: pk.Robot, tmp_path: Path
+) -> None:
+    """Over all legs, poses and both sessions; and the second session held out is nearer too."""
+    hexapod.save(tmp_path / "plain.toml")
+    text = (tmp_path / "plain.toml").read_text(encoding="utf-8")
+    bent = text.replace('kind = "UPS"\n', 'kind = "UPS"\ndrive = { quadratic = 0.0 }\n')
+    (tmp_path / "bent.toml").write_text(bent, encoding="utf-8")
+    robot, sets = pk.load(tmp_path / "bent.toml"), [session(1), session(2)]
+    free = ["base*", "platform*", "offset*", "gain*", "drive*.quadratic"]
+    found = pk.identify(robot, sets, free, per_session="offset*")
+    legs = np.concatenate(
+        [
+            found.robot_of(name).inverse(measured.values) - measured.actuators
+            for name, measured in zip(found.sessions, sets, strict=True)
+        ]
+    )
+    assert np.sqrt(np.mean(legs**2)) < 0.34
+    held = pk.identify(robot, sets[0], free, holdout=sets[1], per_session="offset*")
+    plain = pk.identify(hexapod, sets[0], holdout=sets[1], per_session="offset*")
+    assert held.holdout_rms < 0.9 * plain.holdout_rms
 
 
 def test_a_session_against_itself_is_as_expected(hexapod: pk.Robot) -> None:

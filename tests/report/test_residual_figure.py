@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.quiver import Quiver
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
@@ -53,6 +54,41 @@ def test_outliers_are_ringed(found: Identification) -> None:
     assert found.outliers == (3,)
     rings = [line for line in residuals(found).axes[0].get_lines() if line.get_markersize() > 10]
     assert {tuple(ring.get_xdata()) for ring in rings} == {(3,), ()}
+
+
+def test_rows_are_marked_at_whole_numbers() -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(hexapod_poses(robot, 18, np.random.default_rng(3)))
+    few = pk.identify(robot, pk.VirtualMachine(robot).measure(q), free="offset*")
+    panel = residuals(few).axes[0]
+    ticks = panel.get_xticks()
+    assert len(ticks) > 2 and (ticks == np.round(ticks)).all()
+
+
+def test_arrows_end_inside_their_panel_even_of_an_outlier() -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(hexapod_poses(robot, 30, np.random.default_rng(0)))
+    measured = pk.VirtualMachine(robot).measure(q)
+    wrong = measured.values.copy()
+    edge = int(np.argmax(wrong[:, 0]))
+    wrong[edge, 0] += 3.0  # away from the middle
+    figure = residuals(
+        pk.identify(
+            robot, dataclasses.replace(measured, values=wrong), free="offset*", loss="cauchy"
+        )
+    )
+    figure.draw_without_rendering()
+    (panel,) = (axes for axes in figure.axes if axes.get_ylabel() == "y [mm]")
+    arrows = next(each for each in panel.collections if isinstance(each, Quiver))
+    begin = panel.transData.transform(arrows.XY)
+    way = np.stack([arrows.U, arrows.V], axis=1)
+    ahead = panel.transData.transform(arrows.XY + way) - begin
+    ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-30)
+    box = panel.get_window_extent()
+    tips = begin + ahead * np.linalg.norm(way, axis=1, keepdims=True) / arrows.scale * box.width
+    assert np.linalg.norm(tips - begin, axis=1).max() > 0.2 * box.width
+    out = [tips.min(axis=0) - box.min, box.max - tips.max(axis=0)]
+    assert np.min(out) > -1.0, out
 
 
 def test_good_residuals_lie_on_the_line_of_normal_quantiles() -> None:

@@ -1,0 +1,59 @@
+"""A box that poses have to stay in: the workspace that a robot file states."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from pkmcal.arguments import did_you_mean
+from pkmcal.arrays import BoolArray, FloatArray, Unit
+from pkmcal.core.library import POSE
+from pkmcal.exceptions import ArgumentError
+from pkmcal.files.toml_table import Table, shown
+
+Box = Mapping[str, tuple[float, float]]  # least and largest value of coordinates, mm and rad
+
+_ROUNDING = 1e-12  # relative: a pose at an end is inside
+
+
+def read_box(table: Table) -> Box:
+    """The box of a table ``[workspace]``."""
+    table.only(POSE)
+    box = {}
+    for name in (name for name in POSE if name in table):
+        unit: Unit = "mm" if name in "xyz" else "rad"
+        ends = table.list_of(name, 2, "the least and the largest value")
+        low, high = (table.as_number(name, end, unit) for end in ends)
+        if not low < high:
+            table.fail(name, f"the least value must be below the largest, found {shown(ends)}")
+        box[name] = (low, high)
+    return box
+
+
+def both(own: Box, other: Box) -> Box:
+    """What two boxes have in common.
+
+    Raises
+    ------
+    ValueError
+        No coordinate of a pose, or ends between which nothing is left.
+    """
+    found = dict(own)
+    for name, (low, high) in other.items():
+        if name not in POSE:
+            raise ArgumentError(f"within: {name!r} is no coordinate{did_you_mean(name, POSE)}")
+        least, most = found.get(name, (-np.inf, np.inf))
+        found[name] = (max(float(low), least), min(float(high), most))
+        if not found[name][0] < found[name][1]:
+            raise ArgumentError(f"within: nothing is left of {name} from {low:g} to {high:g}")
+    return found
+
+
+def in_box(box: Box, poses: FloatArray) -> BoolArray:
+    """Which poses (..., 6) are inside."""
+    inside = np.ones(poses.shape[:-1], dtype=bool)
+    for name, (low, high) in box.items():
+        value, room = poses[..., POSE.index(name)], _ROUNDING * (abs(low) + abs(high))
+        inside &= (value >= low - room) & (value <= high + room)
+    return inside

@@ -1,0 +1,234 @@
+"""What a certificate states beside the report: who, what, with what, and how uncertain it is."""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, rms
+from pkmcal.calibration.identifiability import listed
+from pkmcal.calibration.identification import Identification
+from pkmcal.files import reading
+from pkmcal.files.toml_lines import Source
+from pkmcal.files.toml_table import Table
+from pkmcal.statistics.budget import Budget, Contribution, standard
+from pkmcal.statistics.noise import SIGNIFICANT
+
+_TEXTS = (
+    "number", "customer", "machine", "manufacturer", "serial", "operator", "place", "method",
+    "remarks",
+)  # fmt: skip
+_INSTRUMENT = ("name", "serial", "certificate", "expanded", "factor")
+_TEMPERATURE = ("mean", "uncertainty", "expansion", "expansion_uncertainty")
+_REFERENCE = 20.0  # °C, of ISO 1
+
+
+@dataclass(frozen=True)
+class Statement:
+    """What the file of a certificate says.
+
+    Attributes
+    ----------
+    texts : dict
+        Number, customer, machine, manufacturer, serial, operator, place, date, method, remarks:
+        "" where not stated, which is then left for the pen.
+    instrument : dict
+        Name, serial and certificate of the instrument.
+    expanded, factor : float
+        Expanded uncertainty of a coordinate it reads, mm, and its coverage factor; NaN: not stated.
+    temperature : float
+        Mean of the machine during the measurement, °C; NaN: not stated.
+    temperature_uncertainty : float
+        Half width of its range, K.
+    expansion, expansion_uncertainty : float
+        Coefficient of thermal expansion and half width of its range, 1/K.
+    datum : float
+        Standard uncertainty of where the frame lies, mm.
+    """
+
+    texts: dict[str, str] = field(default_factory=dict)
+    instrument: dict[str, str] = field(default_factory=dict)
+    expanded: float = float("nan")
+    factor: float = 2.0
+    temperature: float = float("nan")
+    temperature_uncertainty: float = 0.0
+    expansion: float = float("nan")
+    expansion_uncertainty: float = 0.0
+    datum: float = 0.0
+
+
+def read(path: str | PathLike[str]) -> Statement:
+    """Read the TOML file of a certificate; all its keys may be left out.
+
+    Raises
+    ------
+    ValueError
+        An unknown key, a number where a text is needed, or below zero: one line with file and line.
+    """
+    source = Source(reading.content(path, reading.MOST_ROBOT), str(path))
+    top = Table(source.data, source)
+    top.only((*_TEXTS, "date", "instrument", "temperature", "datum"), "a certificate")
+    texts = {key: top.text(key) if key in top else "" for key in _TEXTS}
+    texts["date"] = _date(top)
+    empty = Table({}, source)
+    tool = top.table("instrument") if "instrument" in top else empty
+    tool.only(_INSTRUMENT)
+    heat = top.table("temperature") if "temperature" in top else empty
+    heat.only(_TEMPERATURE)
+    if ("mean" in heat) != ("expansion" in heat):
+        heat.fail("", "state mean and expansion, both")
+    nan = float("nan")
+    return Statement(
+        texts=texts,
+        instrument={k: tool.text(k) if k in tool else "" for k in _INSTRUMENT[:3]},
+        expanded=_positive(tool, "expanded", nan),
+        factor=_positive(tool, "factor", 2.0),
+        temperature=heat.number("mean", "1", nan),
+        temperature_uncertainty=_positive(heat, "uncertainty", 0.0),
+        expansion=heat.number("expansion", "1", nan),
+        expansion_uncertainty=_positive(heat, "expansion_uncertainty", 0.0),
+        datum=_positive(top, "datum", 0.0),
+    )
+
+
+def _date(top: Table) -> str:
+    if "date" not in top:
+        return ""
+    value = top["date"]
+    return value.isoformat() if isinstance(value, datetime.date) else top.text("date")
+
+
+def _positive(table: Table, key: str, default: float) -> float:
+    value = table.number(key, "1", default)
+    if value < 0 or (key == "factor" and value == 0):
+        table.fail(key, f"must be positive, found {value:g}")
+    return value
+
+
+def budget(found: Identification, stated: Statement, predicted: FloatArray) -> Budget:
+    """What a coordinate of the tool's position is uncertain by, anywhere in the workspace.
+
+    Parameters
+    ----------
+    found : Identification
+        The calibration.
+    stated : Statement
+        What is known beside the measurements.
+    predicted : ndarray (N,)
+        Standard deviation of the tool's position at poses of the workspace, mm.
+    """
+    lines = []
+    if np.isfinite(stated.expanded):
+        remark = f"U = {stated.expanded:g} mm, k = {stated.factor:g}"
+        lines.append(
+            Contribution("instrument", stated.expanded / stated.factor, type="B", remark=remark)
+        )
+    if predicted.size:
+        dof = found.parameter_dof[np.isfinite(found.stderr)]
+        remark = f"over {len(predicted)} poses of the workspace; frame and targets included"
+        lines.append(
+            Contribution(
+                "identified numbers",
+                rms(predicted) / np.sqrt(3.0),
+                dof=float(np.median(dof)) if dof.size else float("inf"),
+                remark=remark,
+            )
+        )
+    lines += _misfit(found)
+    if np.isfinite(stated.temperature):
+        length = float(np.linalg.norm(found.fit.start.pose[:, :3], axis=1).max())
+        mean = stated.temperature - _REFERENCE
+        half, coefficient = stated.temperature_uncertainty, stated.expansion_uncertainty
+        lines += [
+            Contribution(
+                "temperature",
+                standard(half, "rectangular"),
+                stated.expansion * length,
+                type="B",
+                remark=f"±{half:g} K rectangular, {length:.4g} mm of {stated.expansion:g}/K",
+            ),
+            Contribution(
+                "coefficient of expansion",
+                standard(coefficient, "rectangular"),
+                mean * length,
+                type="B",
+                remark=f"±{coefficient:g}/K rectangular, {mean:+.3g} K from {_REFERENCE:g} °C",
+            ),
+        ]
+    held = found.datum.names
+    remark = "as stated" if stated.datum else "none stated"
+    if held:
+        remark = f"by definition: {len(held)} numbers are held ({listed(held)})"
+    lines.append(Contribution("datum", stated.datum, type="B", remark=remark))
+    return Budget(tuple(lines))
+
+
+def _misfit(found: Identification) -> list[Contribution]:
+    """What machine and model miss: repeats tell one from the other."""
+    sure = found.fit.uncertainty
+    split = sure.repeats(plain=True)
+    if np.isfinite(found.repeatability):
+        missed = found.lack_of_fit_chance < SIGNIFICANT
+        return [
+            Contribution(
+                "repeatability",
+                found.repeatability,
+                dof=split.pure_freedom,
+                remark="scatter of repeated poses, noise of the instrument included",
+            ),
+            Contribution(
+                "lack of fit",
+                found.lack_of_fit if missed else 0.0,
+                dof=split.missed_freedom,
+                remark="what the model misses beyond that" if missed else "not significant",
+            ),
+        ]
+    total = np.array([each.total for each in sure.noises])
+    known = total[np.isfinite(total)]
+    if not known.size:
+        return []
+    return [
+        Contribution(
+            "repeatability and lack of fit",
+            float(np.sqrt(known.mean())),
+            dof=max(sure.fit.freedom, 0.0) or float("inf"),
+            remark="residuals; no pose was repeated, which would tell one from the other",
+        )
+    ]
+
+
+def _shown(stated: Statement) -> str:
+    if not np.isfinite(stated.temperature):
+        return ""
+    return f"({stated.temperature:g} ± {stated.temperature_uncertainty:g}) °C"
+
+
+def as_data(stated: Statement, made: Budget) -> dict[str, Any]:
+    """The certificate as JSON files hold it."""
+    return {
+        **stated.texts,
+        "instrument": stated.instrument,
+        "temperature": _shown(stated),
+        "instrument_stated": bool(np.isfinite(stated.expanded)),
+        "standard_uncertainty": made.combined,
+        "expanded_uncertainty": made.expanded,
+        "coverage_factor": made.factor,
+        "coverage": made.coverage,
+        "dof": made.dof,
+        "budget": [
+            {
+                "source": line.source,
+                "type": line.type,
+                "standard": line.standard,
+                "sensitivity": line.sensitivity,
+                "contribution": line.share,
+                "dof": line.dof,
+                "remark": line.remark,
+            }
+            for line in made.contributions
+        ],
+    }

@@ -1,0 +1,144 @@
+"""Uncertainty budgets after the GUM: combined and expanded uncertainty, degrees of freedom.
+
+JCGM 100:2008, Evaluation of measurement data - Guide to the expression of uncertainty in
+measurement: 5.1.2 (combination), G.4.1 (Welch and Satterthwaite), G.3 (coverage by Student's t).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pkmcal.exceptions import ArgumentError
+
+Distribution = Literal["normal", "rectangular", "triangular", "U-shaped"]
+DIVISORS: dict[Distribution, float] = {
+    "normal": 1.0,
+    "rectangular": 3.0**0.5,
+    "triangular": 6.0**0.5,
+    "U-shaped": 2.0**0.5,
+}
+_MANY = 1e9  # degrees of freedom, beyond which a distribution is its limit
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """One line of a budget: independent of the others.
+
+    Attributes
+    ----------
+    source : str
+        What it is of.
+    standard : float
+        Standard uncertainty of the source, in its own unit.
+    sensitivity : float
+        Derivative of the result by the source.
+    dof : float
+        Degrees of freedom of the standard uncertainty.
+    type : {"A", "B"}
+        From statistics of the measurements, or from other knowledge.
+    remark : str
+        Where it comes from.
+    """
+
+    source: str
+    standard: float
+    sensitivity: float = 1.0
+    dof: float = float("inf")
+    type: Literal["A", "B"] = "A"
+    remark: str = ""
+
+    @property
+    def share(self) -> float:
+        """Its part of the combined standard uncertainty, in the unit of the result."""
+        return abs(self.sensitivity) * self.standard
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What a result is uncertain by.
+
+    Attributes
+    ----------
+    contributions : tuple of Contribution
+        The lines.
+    factor : float
+        Coverage factor k.
+
+    Examples
+    --------
+    >>> budget = Budget((Contribution("scale", 3.0), Contribution("repeats", 4.0, dof=9)))
+    >>> budget.combined, budget.expanded, round(budget.dof, 1)
+    (5.0, 10.0, 22.0)
+    >>> round(budget.coverage, 3)
+    0.942
+    """
+
+    contributions: tuple[Contribution, ...]
+    factor: float = 2.0
+
+    @property
+    def combined(self) -> float:
+        """Combined standard uncertainty."""
+        return float(np.sqrt(sum(each.share**2 for each in self.contributions)))
+
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty U = k u."""
+        return self.factor * self.combined
+
+    @property
+    def dof(self) -> float:
+        """Effective degrees of freedom of the combined uncertainty."""
+        known = sum(each.share**4 / each.dof for each in self.contributions if each.share > 0)
+        return self.combined**4 / known if known > 0 else float("inf")
+
+    @property
+    def coverage(self) -> float:
+        """Probability that the interval ±U holds the value, by Student's t."""
+        from scipy.special import stdtr
+
+        return float(1.0 - 2.0 * stdtr(min(self.dof, _MANY), -self.factor))
+
+
+def coverage_factor(probability: float, dof: float) -> float:
+    """Factor k whose interval has this probability, by Student's t.
+
+    Examples
+    --------
+    >>> round(coverage_factor(0.99, 16), 2), round(coverage_factor(0.95, float("inf")), 2)
+    (2.92, 1.96)
+    """
+    from scipy.special import stdtrit
+
+    if not 0.0 < probability < 1.0:
+        raise ArgumentError(f"probability must be between 0 and 1, found {probability!r}")
+    return float(stdtrit(min(dof, _MANY), 0.5 + probability / 2.0))
+
+
+def standard(half_width: float, distribution: Distribution) -> float:
+    """Standard uncertainty of a half width with a distribution; of a normal one it is itself.
+
+    Examples
+    --------
+    >>> round(standard(1.0, "rectangular"), 4)
+    0.5774
+    """
+    return half_width / DIVISORS[distribution]
+
+
+def pooled(variances: Sequence[float], freedoms: Sequence[float]) -> tuple[float, float]:
+    """Variance and degrees of freedom of several estimates of one variance; NaN and 0 of none.
+
+    Examples
+    --------
+    >>> pooled([4.0, 1.0], [10.0, 20.0])
+    (2.0, 30.0)
+    """
+    total = float(sum(freedoms))
+    if not total > 0:
+        return float("nan"), 0.0
+    return float(np.dot(variances, freedoms)) / total, total

@@ -1,0 +1,180 @@
+"""A certificate states what its file states, and an uncertainty that comes true."""
+
+from __future__ import annotations
+
+import json
+import re
+import warnings
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.report import certificate
+
+from .. import browser, workspaces
+
+HOSTILE = "<img src=x onerror=alert(1)>"
+TEXT = f"""
+number = "C-17"
+customer = "{HOSTILE}"
+serial = "0042"
+operator = "somebody"
+date = 2026-11-20
+method = "positions by a laser tracker"
+datum = 0.002
+
+[instrument]
+name = "laser tracker"
+serial = "T-1"
+certificate = "K-4711"
+expanded = 0.015
+factor = 3
+
+[temperature]
+mean = 22.0
+uncertainty = 0.5
+expansion = 11.5e-6
+expansion_uncertainty = 1e-6
+"""
+NOISE = 0.01
+
+
+def calibrated(seed: int, repeats: int = 3) -> tuple[pk.Robot, pk.Identification]:
+    """The true hexapod, and it calibrated from poses that repeat to 0.01 mm a coordinate."""
+    robot, rng = pk.load("hexapod"), np.random.default_rng(seed)
+    true = robot.replace({f"offset{i}": rng.normal(0, 0.3) for i in range(1, 7)})
+    q = np.repeat(robot.inverse(workspaces.poses("hexapod", 12, seed)), repeats, axis=0)
+    values = true.forward(q).pose[:, :3] + rng.normal(0, NOISE, (len(q), 3))
+    return true, pk.identify(robot, pk.Measurements(q, values), free="offset*")
+
+
+@pytest.fixture(scope="module")
+def found() -> pk.Identification:
+    return calibrated(1)[1]
+
+
+@pytest.fixture(scope="module")
+def stated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("stated") / "certificate.toml"
+    path.write_text(TEXT, "utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(
+    found: pk.Identification, stated: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Path:
+    made = tmp_path_factory.mktemp("report")
+    found.report(made, certificate=stated)
+    return made
+
+
+def test_the_budget_is_what_was_stated_and_what_the_fit_shows(
+    found: pk.Identification, stated: Path
+) -> None:
+    predicted = np.array([0.03, 0.04])
+    made = certificate.budget(found, certificate.read(stated), predicted)
+    lines = {line.source: line.share for line in made.contributions}
+    reach = np.linalg.norm(found.fit.start.pose[:, :3], axis=1).max()
+    assert lines["instrument"] == pytest.approx(0.005)
+    assert lines["identified numbers"] == pytest.approx(np.sqrt((0.03**2 + 0.04**2) / 2 / 3))
+    assert lines["repeatability"] == found.repeatability == pytest.approx(NOISE, rel=0.3)
+    assert lines["temperature"] == pytest.approx(11.5e-6 * 0.5 / np.sqrt(3) * reach)
+    assert lines["coefficient of expansion"] == pytest.approx(1e-6 / np.sqrt(3) * 2.0 * reach)
+    assert lines["datum"] == 0.002 and lines["lack of fit"] == 0.0
+    assert made.combined == pytest.approx(np.sqrt(sum(u**2 for u in lines.values())))
+    assert made.expanded == 2 * made.combined
+
+
+@pytest.mark.parametrize("repeats", [1, 3])
+def test_the_expanded_uncertainty_holds_the_errors_of_new_arrivals(repeats: int) -> None:
+    """Positions of the true machine at poses that were not measured: about 95 of 100 within U."""
+    within, stated_coverage = [], []
+    poses = pk.sample_poses(pk.load("hexapod"), 60, share=0.9)
+    for seed in range(30):
+        true, found = calibrated(seed, repeats)
+        made = certificate.budget(found, certificate.Statement(), found.accuracy(poses))
+        there = true.forward(found.robot.inverse(poses)).pose[:, :3]
+        there += np.random.default_rng(seed).normal(0, NOISE, there.shape)
+        within.append(np.mean(np.abs(there - poses[:, :3]) < made.expanded))
+        stated_coverage.append(made.coverage)
+    assert np.mean(within) == pytest.approx(np.mean(stated_coverage), abs=0.04)
+
+
+def test_without_repeats_their_scatter_and_lack_of_fit_are_one_line() -> None:
+    _, found = calibrated(2, repeats=1)
+    made = certificate.budget(found, certificate.Statement(), np.empty(0))
+    assert [line.source for line in made.contributions] == [
+        "repeatability and lack of fit", "datum",
+    ]  # fmt: skip
+    assert made.combined == pytest.approx(NOISE, rel=0.4)
+
+
+def test_the_page_begins_with_what_is_stated(folder: Path, found: pk.Identification) -> None:
+    page = (folder / "report.html").read_text("utf-8")
+    assert page.index('id="certificate"') < page.index('id="before-after"')
+    for text in ("C-17", "0042", "2026-11-20", "K-4711", "somebody", "ISO 9283", "ISO 230-2"):
+        assert text in page
+    assert HOSTILE not in page
+    told = json.loads((folder / "report.json").read_text("utf-8"))["certificate"]
+    assert f"U = {told['expanded_uncertainty']:.3g}".rstrip("0") in page
+    assert told["expanded_uncertainty"] == pytest.approx(2 * told["standard_uncertainty"])
+    assert found.verdict.reasons[0].split(" falls")[0] in page
+    found.report(folder.parent)
+    plain = (folder.parent / "report.html").read_text("utf-8")
+    assert 'id="certificate"' not in plain
+
+
+def test_the_data_are_what_the_schema_says(folder: Path) -> None:
+    jsonschema = pytest.importorskip("jsonschema")
+    schema = json.loads(files("pkmcal.report").joinpath("schema.json").read_text("utf-8"))
+    part = {**schema, "anyOf": [{"$ref": "#/$defs/report"}]}
+    said = json.loads((folder / "report.json").read_text("utf-8"))
+    jsonschema.Draft202012Validator(part).validate(said)
+    said["certificate"]["coverage"] = "95 %"
+    assert list(jsonschema.Draft202012Validator(part).iter_errors(said))
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ('owner = "x"', "unknown key 'owner'"),
+        ("serial = 42", "serial"),
+        ("datum = -1.0", "datum: must be positive"),
+        ("[instrument]\nfactor = 0.0", "factor: must be positive"),
+        ("[temperature]\nmean = 20.0", "state mean and expansion"),
+    ],
+)
+def test_mistakes_in_the_file_are_named(tmp_path: Path, text: str, message: str) -> None:
+    path = tmp_path / "certificate.toml"
+    path.write_text(text, "utf-8")
+    with pytest.raises(pk.FileError, match=message) as raised:
+        certificate.read(path)
+    assert "certificate.toml, line" in str(raised.value)
+
+
+def test_it_is_part_of_a_report(run: Any, refused: Any, stated: Path, tmp_path: Path) -> None:
+    example = Path(__file__).resolve().parents[2] / "examples" / "linear-delta"
+    command = ("calibrate", example / "robot.toml", example / "probe.csv", "--certificate", stated)
+    assert "--report DIR" in refused(*command)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert run(*command, "--report", tmp_path / "out").exit_code == 0
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert 'id="certificate"' in page and "certificate.toml" in page, "its checksum is stated"
+
+
+def test_it_prints_on_a4(folder: Path, tmp_path: Path) -> None:
+    browser.look(
+        folder / "report.html", f"--print-to-pdf={tmp_path / 'page.pdf'}", "--no-pdf-header-footer"
+    )
+    boxes = re.findall(
+        rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", (tmp_path / "page.pdf").read_bytes()
+    )
+    assert len(boxes) >= 3
+    sizes = np.array(boxes, dtype=float) / 72 * 25.4
+    np.testing.assert_allclose(sizes, np.tile([210.0, 297.0], (len(boxes), 1)), atol=1.0)
