@@ -19,6 +19,7 @@ from pkmcal.report import machine_view
 
 from .. import browser
 from ..simulated import hexapod_poses
+from ..view import pages
 
 HEXAPOD = pk.load("hexapod")
 POSES = hexapod_poses(HEXAPOD, 20, np.random.default_rng(3))
@@ -96,7 +97,7 @@ def test_distances_point_away_from_their_anchor() -> None:
 _DRIVER = """<pre id="said"></pre><script>
 (async () => {
 const root = document.querySelector(".pkmcal-view")
-while (!root.machine) await new Promise(next => setTimeout(next, 20))
+while (!root.machine) await new Promise(next => setTimeout(next, 5))
 const { mover, calibration, changed, scene } = root.machine, said = {}
 const still = () => getComputedStyle(document.querySelector(".still")).display
 said.still = still()
@@ -142,7 +143,7 @@ def said(report: Path) -> dict[str, Any]:
     text = re.sub(policy, "", report.read_text(encoding="utf-8"))
     other = report.with_name("driven.html")
     other.write_text(text.replace("</body>", _DRIVER + "</body>"), encoding="utf-8")
-    seen = browser.dump(other)
+    seen = pages.dumped(other)
     match = re.search(r'<pre id="said">(.*?)</pre>', seen.dom, re.DOTALL)
     assert match and match[1] and not match[1].startswith("failed"), (match, seen.console)
     result: dict[str, Any] = json.loads(html.unescape(match[1]))
@@ -159,7 +160,7 @@ def test_the_policy_of_the_report_allows_its_script_and_no_other(report: Path) -
     assert (
         "default-src 'none'" in policy[1] and "unsafe-inline'" not in policy[1].split("script")[1]
     )
-    seen = browser.dump(report)
+    seen = pages.started(report)
     assert not seen.console and "Measured minus predicted, at the places" in seen.dom
 
 
@@ -213,5 +214,5 @@ def test_arms_and_chains_have_it_too(name: str, tmp_path: Path) -> None:
     measured = pk.VirtualMachine(true, noise=0.01).measure(q, "position")
     found = pk.identify(robot, measured, prior=1.0)
     found.report(tmp_path)
-    seen = browser.dump(tmp_path / "report.html")
+    seen = pages.started(tmp_path / "report.html")
     assert not seen.console and "the machine as assumed before" in seen.dom
