@@ -148,6 +148,7 @@ class VirtualMachine:
             target=target,
             actuator_units=getattr(self._machine, "actuator_units", None),
             attachment=attachment,
+            approach=approach,
             other=other,
             run=run,
             touched=touches,
