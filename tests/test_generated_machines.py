@@ -67,8 +67,9 @@ def judged(kind: str, seed: int, rows: int) -> Counter[str]:
         q = robot.inverse(out(own))
         known = np.isfinite(q).all(axis=1)
         if robot.violation(out(own[known])).max(initial=0.0) < CLOSED:
-            completed = robot.complete(out(own[known]))
-            found["wrong: taken but not completed"] += int(np.isnan(completed).any(axis=1).sum())
+            lost = np.isnan(robot.complete(out(own[known]))).any(axis=1)
+            lost[lost] = robot.forward(q[known][lost], out(own[known][lost])).ok  # not singular
+            found["wrong: taken but not completed"] += int(lost.sum())
     found["out of reach"] += int((~known).sum())
     own, q = own[known], q[known]
     found["wrong: inverse"] += int((missed(robot, own, q) > CLOSED).sum())
