@@ -212,9 +212,9 @@ class NoisyActuators:
 class FreePoses:
     """Poses of a machine with more actuators than ways to move, which no pose can meet at once.
 
-    The unknowns are steps of the pose that keep what passive joints hold, if they hold anything:
-    those across the gradients of the held rows, with Newton's steps of least norm back onto them
-    where a pose or the geometry has moved.
+    The unknowns are steps of the pose that keep what passive joints hold and actuators that are
+    never wrong, if there are any: those across the gradients of the held rows, with Newton's steps
+    of least norm back onto them where a pose or the geometry has moved.
 
     Parameters
     ----------
@@ -223,22 +223,31 @@ class FreePoses:
     read : ndarray (K, n)
         What the actuators read.
     sigma : ndarray (K, n)
-        Its standard deviation, mm or rad.
+        Its standard deviation, mm or rad; an actuator whose deviations are 0 is never wrong.
     """
 
     def __init__(self, robot: Robot, read: FloatArray, sigma: FloatArray) -> None:
         self.read = read
-        self._roles = pose_steps.row_roles(robot)
-        self._held = len(self._roles.held)
-        self._mixed = not np.array_equal(self._roles.read, np.eye(robot.machine.rows))
+        roles = pose_steps.row_roles(robot)
+        exact = np.flatnonzero(~sigma.any(axis=0))
+        rows = np.setdiff1d(np.arange(len(roles.read)), exact)  # the first are of the actuators
+        self._read, self._actuator = roles.read[rows], [roles.actuator[row] for row in rows]
+        self._held = np.concatenate([roles.held, roles.read[exact]])
+        self._mixed = not np.array_equal(self._read, np.eye(robot.machine.rows))
         self._arcs = 1.0 / mm_per_unit(pose_steps.step_units(robot), robot.length)
-        self.unknowns = robot.machine.m - self._held
-        self.equations = len(self._roles.read)
+        self.unknowns = robot.machine.m - len(self._held)
+        self.equations = len(rows)
+        if self.unknowns < 1 or not sigma[:, np.setdiff1d(self._actuator, -1)].all():
+            raise ArgumentError(
+                f"measurements: {robot.name} has more actuators than ways to move, which cannot"
+                " be met without noise: actuator_sigma must be positive, or None; 0 at all rows for"
+                f" at most {robot.machine.m - len(roles.held) - 1} actuators that are never wrong"
+            )
         self.sigma: FloatArray | None = sigma
-        if self._roles.actuator != tuple(range(sigma.shape[1])):
+        if self._actuator != list(range(sigma.shape[1])):
             # passive rows that give way are as sure as the file weighs them against the actuators
             common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
-            each = [sigma[:, a] if a >= 0 else common for a in self._roles.actuator]
+            each = [sigma[:, a] if a >= 0 else common for a in self._actuator]
             self.sigma = np.stack(each, axis=1)
         self._white = 1.0 / self.sigma
         self._shift: FloatArray | float = 0.0
@@ -249,7 +258,7 @@ class FreePoses:
 
     def moved(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
         """Move the poses."""
-        if self._held:
+        if len(self._held):
             step = (self._allowed(robot, states)[0] @ step[:, :, None])[:, :, 0]
         pose = pose_steps.moved(_machine(robot), states.pose, step)
         return self._kept(robot, pose, states.status)
@@ -258,8 +267,8 @@ class FreePoses:
         """What the limbs would read at the poses less what they read."""
         off, by_step = pose_steps.readings(_machine(robot), states.pose, self.read)
         if self._mixed:
-            off, by_step = off @ self._roles.read.T, self._roles.read @ by_step
-        if self._held:
+            off, by_step = off @ self._read.T, self._read @ by_step
+        if len(self._held):
             by_step = by_step @ self._allowed(robot, states)[0]
         off *= self._white
         off += self._shift
@@ -275,21 +284,21 @@ class FreePoses:
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units; the other rows are in mm."""
         of_actuators = mm_per_unit(robot.actuator_units, robot.length)
-        return np.array([of_actuators[a] if a >= 0 else 1.0 for a in self._roles.actuator])
+        return np.array([of_actuators[a] if a >= 0 else 1.0 for a in self._actuator])
 
     def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
         """Twists by steps of the pose."""
         twists = pose_steps.step_twists(_machine(robot), states.pose)
-        return twists @ self._allowed(robot, states)[0] if self._held else twists
+        return twists @ self._allowed(robot, states)[0] if len(self._held) else twists
 
     def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
         """What the limbs would read, unknowns held."""
         machine = _machine(robot)
         by_free = pose_steps.readings_by_numbers(machine, states.pose, self.read, places)
-        found = self._roles.read @ by_free if self._mixed else by_free
-        if self._held:
+        found = self._read @ by_free if self._mixed else by_free
+        if len(self._held):
             by_step = pose_steps.readings(machine, states.pose, self.read)[1]
-            found += self._roles.read @ by_step @ self._following(robot, states, by_free)
+            found += self._read @ by_step @ self._following(robot, states, by_free)
         found *= self._white[:, :, None]
         return found
 
@@ -297,7 +306,7 @@ class FreePoses:
         self, robot: Calibratable, states: RowStates, places: IntArray
     ) -> FloatArray | None:
         """Poses are held, or go with the joints that hold them."""
-        if not self._held:
+        if not len(self._held):
             return None
         machine = _machine(robot)
         by_free = pose_steps.readings_by_numbers(machine, states.pose, self.read, places)
@@ -306,7 +315,7 @@ class FreePoses:
 
     def _following(self, robot: Calibratable, states: RowStates, by_free: FloatArray) -> FloatArray:
         """Steps of the pose by numbers that keep what is held, (K, m, p)."""
-        return -self._allowed(robot, states)[1] @ (self._roles.held @ by_free)
+        return -self._allowed(robot, states)[1] @ (self._held @ by_free)
 
     def _allowed(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """Steps that keep the held rows (K, m, unknowns), and those that undo them (K, m, h)."""
@@ -314,24 +323,24 @@ class FreePoses:
         return self._split(by_step)
 
     def _split(self, by_step: FloatArray) -> tuple[FloatArray, FloatArray]:
-        across = (self._roles.held @ by_step * self._arcs).transpose(0, 2, 1)
+        across = (self._held @ by_step * self._arcs).transpose(0, 2, 1)
         known = np.isfinite(across).all(axis=(1, 2))
         across[~known] = np.eye(*across.shape[1:])
         q, r = np.linalg.qr(across, mode="complete")
-        square = r[:, : self._held].transpose(0, 2, 1)
-        undo = q[:, :, : self._held] @ np.linalg.inv(square)
+        square = r[:, : len(self._held)].transpose(0, 2, 1)
+        undo = q[:, :, : len(self._held)] @ np.linalg.inv(square)
         undo[~known] = np.nan
         arcs = self._arcs[:, None]
-        return arcs * q[:, :, self._held :], arcs * undo
+        return arcs * q[:, :, len(self._held) :], arcs * undo
 
     def _kept(self, robot: Calibratable, pose: FloatArray, status: Int32Array) -> RowStates:
         """Poses (K, 6) moved back to where joints hold them; NaN where they do not get there."""
         machine = _machine(robot)
-        if self._held:
+        if len(self._held):
             limit = _HELD * machine.machine.struct.size
             for _ in range(_STEPS):
                 off, by_step = pose_steps.readings(machine, pose, self.read)
-                missed = off @ self._roles.held.T
+                missed = off @ self._held.T
                 step = -(self._split(by_step)[1] @ missed[:, :, None])[:, :, 0]
                 pose = pose_steps.moved(machine, pose, step)
                 short = np.abs(step / self._arcs).max(axis=1) <= limit
@@ -370,11 +379,6 @@ def closures_of(
         actuators are as many as the ways to move, and 1 mm, to be estimated, where they are more.
     """
     if isinstance(robot, Robot) and pose_steps.surplus(robot) > 0:
-        if sigma is not None and not sigma.all():
-            raise ArgumentError(
-                f"measurements: {robot.name} has more actuators than ways to move, which cannot"
-                " be met without noise: actuator_sigma must be positive, or None"
-            )
         if sigma is None:
             sigma = np.tile(1.0 / mm_per_unit(robot.actuator_units, robot.length), (len(read), 1))
         return FreePoses(robot, read, sigma)

@@ -18,6 +18,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, first_largest
 from pkmcal.calibration.identifiability import decompose
+from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics.linear_fit import ROUNDING
 
 Criterion = Literal["prediction", "D", "A"]
@@ -65,6 +66,10 @@ class Design:
         n = blocks.shape[2]
         singular, basis = decompose(np.vstack([blocks.reshape(-1, n), prior]))
         rank = int(np.count_nonzero(singular > ROUNDING * singular[0]))
+        if not rank:
+            raise ArgumentError(
+                "candidates: what would be measured there depends on no parameter that is free"
+            )
         unit = basis[:, :rank] / singular[:rank]
         self.unidentifiable = basis[:, rank:]
         self._determinant = criterion == "D"

@@ -59,6 +59,8 @@ class Readings:
         How many numbers were read in each row.
     present : ndarray of bool
         Which of all numbers of all sets were read, row by row.
+    arcs : tuple of float
+        What takes the misfit of each set to mm: where angles alone were read, the machine's length.
     deviations : tuple of ndarray (k,)
         Relative deviations of the components of each set; 1 unless they were told apart.
     """
@@ -100,8 +102,7 @@ class Readings:
         directions = [m.approach for m in self.sets]
         if any(each is not None for each in directions):  # backlash is between their poses
             known = [np.zeros(m.actuators.shape) if m.approach is None else m.approach
-                     for m in self.sets]  # fmt: skip
-            known += [np.zeros(self.sets[i].actuators.shape) for i in double]
+                     for m in (*self.sets, *(self.sets[i] for i in double))]  # fmt: skip
             commands = np.hstack([commands, np.concatenate(known)])
         self.machine_columns, machine_of = self.spread.machines(len(parameters.places))
         machine = np.concatenate([*machine_of, *(machine_of[i] for i in double)])
@@ -130,6 +131,7 @@ class Readings:
         self.present: BoolArray = np.concatenate([
             np.isfinite(m.values).reshape(-1) for m in self.sets
         ])  # fmt: skip
+        self.arcs = tuple(1.0 if "mm" in m.units else parameters.robot.length for m in self.sets)
         self._whole = bool(self.present.all())
         self.set_of = np.repeat(np.arange(len(self.sets)), count)
         self.count = np.concatenate([
@@ -166,8 +168,6 @@ class Readings:
 
     def columns_of(self, i: int, name: str) -> IntArray | None:
         """Parameters (N, w) of what rows of set `i` depend on; `NONE` where a number is held.
-
-        None where all of it is given.
 
         None where all of it is given. `name` is what `predict` calls it.
         """

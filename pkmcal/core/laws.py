@@ -8,7 +8,7 @@ formulas are those of ``derive/laws.py``.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -107,6 +107,7 @@ class Laws:
         self._wave = np.array([(a, b) for _, _, a, b in waves], dtype=np.intp).reshape(-1, 2)
         self._tabled = [d for d, drive in enumerate(drives) if drive.table is not None]
         self._corrected = [d for d, drive in enumerate(drives) if drive.corrected]
+        self._of_one: dict[int, Laws] = {}
         self._spans: tuple[bytes, FloatArray] | None = None
         self._of_place: dict[int, tuple[int, str, int]] = {}
         for d, drive in enumerate(drives):
@@ -268,12 +269,12 @@ class Laws:
             inside = drive.table[(drive.table > low) & (drive.table < high)]
             places = np.union1d(places, inside)
         middle = 0.5 * (places[1:] + places[:-1])
-        found = self.ways(numbers[:, :-2], np.repeat(middle[:, None], self._width, axis=1))
+        slope = self._alone(d).ways(numbers[:, :-2], middle[:, None]).slope[:, 0]
         turn = np.abs([gain + 2.0 * quadratic * each for each in (low, high)]).max()
         wound = [radius + 0.5 * buildup * (gain + quadratic * e) * e for e in (low, high)]
         bend = 0.5 * abs(buildup) * turn**2 + 2.0 * abs(quadratic) * np.abs(wound).max()
         bend += float(k**2 @ size)
-        turns = np.flatnonzero(~(sign * found.slope[:, d] - 0.5 * bend * np.diff(places) > 0.0))
+        turns = np.flatnonzero(~(sign * slope - 0.5 * bend * np.diff(places) > 0.0))
         before, behind = turns[middle[turns] < wanted[0]], turns[middle[turns] > wanted[1]]
         if len(before) + len(behind) < len(turns):
             return np.nan, np.nan
@@ -292,9 +293,11 @@ class Laws:
 
     # ----------------------------------------------------------------------------------------------
 
-    @property
-    def _width(self) -> int:
-        return int(self.actuator.max()) + 1
+    def _alone(self, d: int) -> Laws:
+        """One drive, as if it were all."""
+        if d not in self._of_one:
+            self._of_one[d] = Laws([replace(self.drives[d], actuator=0)], self._size)
+        return self._of_one[d]
 
     def _numbers(self, slots: FloatArray) -> FloatArray:
         """Geometries flattened, (1 or N, size + 2), with a 0 and a 1 behind."""
@@ -361,13 +364,13 @@ class Laws:
         q: FloatArray = 0.5 * (low + high)
         offset, sign = numbers[0, drive.offset], 1.0 if rising else -1.0
         scale = np.abs(way) + most + abs(offset)
-        done = np.zeros(len(q), dtype=bool)
+        done, alone = np.zeros(len(q), dtype=bool), self._alone(d)
         for _ in range(_MOST_STEPS):
-            found = self.ways(numbers[:, :-2], np.repeat(q[:, None], self._width, axis=1))
-            off = found.way[:, d] - offset - way
+            found = alone.ways(numbers[:, :-2], q[:, None])
+            off = found.way[:, 0] - offset - way
             low, high = np.where(sign * off < 0.0, q, low), np.where(sign * off > 0.0, q, high)
             with np.errstate(divide="ignore", invalid="ignore"):
-                step = q - off / found.slope[:, d]
+                step = q - off / found.slope[:, 0]
             inside = (step >= low) & (step <= high)
             over = done.all()
             done = np.abs(off) <= _ROUNDING * scale

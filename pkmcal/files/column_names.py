@@ -52,7 +52,8 @@ _SYNONYMS: dict[str, str] = {
     "time": "timestamp|time stamp|datetime|date time|time seconds|time s|time utc|utc|date and time"
     "|measurement time|meas time|clock|uhrzeit|zeit|heure",
     "date": "day|measurement date|datum",
-    "temperature": "temp|air temperature|t c|temperature c|machine temperature|ambient temperature",
+    "temperature": "temp|temp c|air temperature|t c|temperature c|machine temperature"
+    "|ambient temperature",
     "probe": "probed|probed z|z probed|probe z|z probe|trigger z|z trigger|triggered|mesh|mesh z"
     "|bed mesh|bed z",
     "rx": "rot x|rotx|x rotation|euler x|angle x|actual rx",

@@ -18,6 +18,7 @@ from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Closure
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.frames import Frames
+from pkmcal.screw import from_pose
 
 ITERATIONS = 30
 SETTLED = 1e-12  # of the machine's size
@@ -111,7 +112,7 @@ def complete(
     size = machine.struct.size
     live: BoolArray = np.asarray(np.isfinite(q).all(axis=1))
     done = np.zeros(len(own), dtype=bool)
-    for _ in range(ITERATIONS):
+    for k in range(ITERATIONS):
         rows = np.flatnonzero(live & ~done)
         if not rows.size:
             break
@@ -122,12 +123,15 @@ def complete(
         missing = _off(seen, matched, wanted[rows])
         right = np.concatenate([closure.residual, missing], axis=1)
         good = np.isfinite(left).all(axis=(1, 2)) & np.isfinite(right).all(axis=1)
-        live[rows[~good]] = False
+        # the machine takes the pose as it is: near β = ±90° rates of angles would lead away
+        met = (np.abs(right).max(axis=1) <= SETTLED * size) & (k == 0)
+        good &= ~met
+        live[rows[~good & ~met]] = False
         step = np.zeros((len(rows), left.shape[-1]))
         step[good] = -(np.linalg.pinv(left[good]) @ right[good][..., None])[..., 0]
         own[rows[:, None], free] += step[:, : len(free)]
         q[rows] += step[:, len(free) :]
-        done[rows] = good & (np.abs(step).max(axis=1) <= SETTLED * size)
+        done[rows] = np.where(good, np.abs(step).max(axis=1) <= SETTLED * size, met)
     own[~done], q[~done] = np.nan, np.nan
     q = machine.nearest_turns(slots, q, near)  # a long step may have gone round
     own = machine.forward(slots, q, own, threads=None)[0]
@@ -135,7 +139,7 @@ def complete(
         own, q = _correct_actuators(machine, slots, frames, own, q, matched, wanted)
     seen = _seen(frames, own, matched, wanted)
     if map == "spatial":
-        seen = _as_wanted(seen, matched, wanted)
+        seen = _same_rotation(_as_wanted(seen, matched, wanted), matched, wanted, KEPT)
     off = np.abs(_off(seen, matched, wanted))
     kept = off <= KEPT * np.where(np.array(matched) < 3, size, 1.0)
     unsolved = ~kept.all(axis=1)  # at a stationary point that is no solution, or without a pose
@@ -201,6 +205,22 @@ def _as_wanted(pose: FloatArray, matched: Sequence[int], wanted: FloatArray) -> 
         np.abs(_off(each, angles, wanted[:, places])).sum(axis=1) for each in (pose, other)
     )
     return np.where((other_off < off)[:, None], other, pose)
+
+
+def _same_rotation(
+    pose: FloatArray, matched: Sequence[int], wanted: FloatArray, alike: float
+) -> FloatArray:
+    """Poses with the angles that are wanted, where all three are and say the same rotation.
+
+    Near β = ±90° very different angles do.
+    """
+    places = [i for i, k in enumerate(matched) if k >= 3]
+    if len(places) < 3:
+        return pose
+    asked = pose.copy()
+    asked[:, [matched[i] for i in places]] = wanted[:, places]
+    apart = np.abs(from_pose(asked) - from_pose(pose))[:, :3, :3].max(axis=(1, 2))
+    return np.where((apart <= alike)[:, None], asked, pose)
 
 
 def _system(
@@ -298,7 +318,7 @@ def _correct_actuators(
     """
     for _ in range(ITERATIONS):
         seen = _seen(frames, own, matched, wanted)
-        missing = _off(seen, matched, wanted)
+        missing = _off(_same_rotation(seen, matched, wanted, SETTLED), matched, wanted)
         live = np.flatnonzero(np.abs(missing).max(axis=1) > SETTLED * machine.struct.size)
         if not live.size:
             break

@@ -11,7 +11,7 @@ from pkmcal.arguments import shown, words
 from pkmcal.arrays import FloatArray, Int64Array, TextArray, as_numbers
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import LONGEST_NAME
-from pkmcal.measurements.components import KINDS, Kind, components
+from pkmcal.measurements.components import KINDS, Kind
 from pkmcal.measurements.tracker import Tracker
 
 _ROUNDED = 1e-9  # share by which a covariance may miss symmetry, as what was computed or typed does
@@ -74,12 +74,15 @@ def sigma_array(
     return np.array(np.broadcast_to(sigma, shape))
 
 
-def value_of_row(given: ArrayLike | None, kind: Kind, q: tuple[int, ...]) -> FloatArray | None:
+def value_of_row(
+    given: ArrayLike | None, kind: Kind, k: int, q: tuple[int, ...]
+) -> FloatArray | None:
     """What was read in one row, (k,) or a number, as that of (1,) rows."""
     if given is None:
         return None
     value = numbers("values", given, blank=True)
-    k = len(components(kind))
+    if kind == "touch" and value.shape[:1] == (1,):
+        return value  # of names that are touched
     if value.shape != ((k,) if k != 1 else ()):
         what = f"have shape ({k},)" if k != 1 else "be a number"
         raise ArgumentError(

@@ -70,7 +70,11 @@ def _put(table: Table, log: Table, actuators: Sequence[str], rows: Rows, said: s
         said += f"; {unused} of its {len(log)} rows not used"
     table.take(kept)
     chosen = [row for row in rows if row is not None]
-    beside = [name for name in ("session",) if name in log.columns and name not in table.columns]
+    beside = [
+        name
+        for name in log.columns
+        if (name == "session" or name.startswith("approach")) and name not in table.columns
+    ]
     for name in [*actuators, *beside]:
         table.put(name, log.columns[name].take(chosen))
     table.notes += [*(f"{log.path}: {note}" for note in log.notes), said]

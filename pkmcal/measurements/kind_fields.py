@@ -25,7 +25,6 @@ _KIND_OF = {
     "artefact": "touch",
     "joint": "angle",
 }
-SEVERAL_ROWS = {*_KIND_OF.values(), "touch-distance"}  # kinds that say nothing in one row
 
 
 class KindFields(NamedTuple):

@@ -257,6 +257,7 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
         lines=np.array(table.lines),
         file=table.path.name,
         session=_read_session(table),
+        approach=_read_approach(table, measured.actuators.shape[1]),
     )
 
 

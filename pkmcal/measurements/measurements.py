@@ -32,10 +32,10 @@ from pkmcal.measurements.fields import (
     values_array,
 )
 from pkmcal.measurements.kind_fields import (
-    SEVERAL_ROWS,
     KindFields,
     TouchDistances,
     kind_fields,
+    kind_fields_of_row,
 )
 from pkmcal.measurements.listing import deviations, table, title
 from pkmcal.measurements.measurement_writer import write_measurements
@@ -195,18 +195,18 @@ class Measurements(Result):
             raise ArgumentError(
                 f"actuators must have shape (N, n), or (n,) for one row, not empty; found {q.shape}"
             )
-        k = len(components(kind, artefact))
-        if q.ndim == 1 and kind in SEVERAL_ROWS:
-            raise ArgumentError(f"actuators must have shape (N, n) for {kind!r}; found {q.shape}")
-        if q.ndim == 1:
-            q, values = q[None], value_of_row(values, kind, q.shape)
+        alone, q = q.ndim == 1, np.atleast_2d(q)
+        given = KindFields(other, run, touched, artefact, touch_distances, joint)
+        if alone:
+            values, given = kind_fields_of_row(kind, values, given)
+        own, values = kind_fields(kind, q.shape, values, given)
+        k = len(components(kind, own["artefact"]))
+        if alone:
+            values = value_of_row(values, kind, k, q.shape[1:])
             group, target_index, lines = map(number_of_row, (group, target_index, lines))
-            if k > 1 and sigma is not None and np.asarray(sigma).shape == (k, k):
+            if k > 1 and not isinstance(sigma, Tracker) and np.asarray(sigma).shape == (k, k):
                 sigma = np.asarray(sigma)[None]
-        own, values = kind_fields(
-            kind, q.shape, values, KindFields(other, run, touched, artefact, touch_distances, joint)
-        )
-        shape = (len(q), len(components(kind, own["artefact"])))
+        shape = (len(q), k)
         v = values_array(values, kind, shape)
         index = None if target_index is None else integers("target_index", target_index, len(q))
         place = target_array(target, kind, index, len(q))

@@ -196,12 +196,18 @@ def leave_out_unknown(table: Table, known: Collection[str], also: Collection[str
 
 
 def _agrees(table: Table, poses: Sequence[str], names: Sequence[str]) -> bool:
-    """Whether equal actuators are of one pose, and names are of points rather than of targets."""
+    """Whether poses and actuators belong together, and names are of points rather than of targets.
+
+    Home that is measured again has another pose's name; a log that runs on has several rows a pose.
+    """
     actuators = [c.cells for n, c in table.columns.items() if re.fullmatch(r"q[0-9]+", n)]
     rows = list(zip(*actuators, strict=True)) if actuators else list(poses)
     of_row: dict[object, str] = {}
-    return len(set(names)) > len(names) / 3 and all(
-        of_row.setdefault(row, pose) == pose for row, pose in zip(rows, poses, strict=True)
+    of_pose: dict[str, object] = {}
+    pairs = list(zip(rows, poses, strict=True))
+    return len(set(names)) > len(names) / 3 and (
+        all(of_row.setdefault(row, pose) == pose for row, pose in pairs)
+        or all(of_pose.setdefault(pose, row) == row for row, pose in pairs)
     )
 
 

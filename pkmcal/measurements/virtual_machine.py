@@ -83,7 +83,6 @@ class VirtualMachine:
         target: ArrayLike | None = None,
         *,
         attachment: ArrayLike | None = None,
-        approach: ArrayLike | None = None,
         other: ArrayLike | None = None,
         run: Sequence[str] | None = None,
         mounting: ArrayLike = (0.0, 0.0, 0.0),
@@ -91,6 +90,7 @@ class VirtualMachine:
         artefact: Artefact = "point",
         touches: Sequence[str] | None = None,
         joint: str | None = None,
+        approach: ArrayLike | None = None,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.
 
@@ -105,8 +105,6 @@ class VirtualMachine:
             distances the fixed point of the base frame, and required.
         attachment : (3,) or (N, 3) array, optional
             The point in the platform frame, mm, from which distances are measured.
-        approach : scalar, (n,) or (N, n) array, or "order", optional
-            From where the actuators come; see `Measurements`.
         other : (N, n) array, optional
             Of kind "between": the actuators at the second place.
         run : (N,) sequence of str, optional
@@ -123,6 +121,8 @@ class VirtualMachine:
             What it is.
         joint : str, optional
             Of kind "angle": the passive joint, a name of ``robot.passive_names``.
+        approach : scalar, (n,) or (N, n) array, or "order", optional
+            From where the actuators come; see `Measurements`.
 
         Returns
         -------
@@ -148,7 +148,6 @@ class VirtualMachine:
             target=target,
             actuator_units=getattr(self._machine, "actuator_units", None),
             attachment=attachment,
-            approach=approach,
             other=other,
             run=run,
             touched=touches,
@@ -167,37 +166,24 @@ class VirtualMachine:
         self, blank: Measurements, mounting: ArrayLike, touched: Mapping[str, ArrayLike] | None
     ) -> FloatArray:
         """What would be read without noise, (N, k)."""
-        pose = self._poses(self._machine_of(blank), blank.actuators, "q")
+        machine = self._machine
+        if blank.approach is not None and isinstance(machine, Robot):
+            machine = machine.approaching(blank.approach)
+        pose = _poses(machine, blank.actuators, "q")
         if blank.joint is not None:
             names = getattr(self._machine, "passive_names", ())
             if blank.joint not in names:
                 known = did_you_mean(blank.joint, names)
                 raise ArgumentError(f"joint: no passive joint is called {blank.joint!r}{known}")
-            solved: Any = self._machine_of(blank).forward(blank.actuators)
+            solved: Any = machine.forward(blank.actuators)
             return np.array(solved.passive[:, [names.index(blank.joint)]])
         return predict(
             blank.kind,
             pose,
-            other=None if blank.other is None else self._poses(self._machine, blank.other, "other"),
+            other=None if blank.other is None else _poses(machine, blank.other, "other"),
             touching=(blank.artefact, np.full(len(blank), 2)),
             **self._arguments(blank, mounting, touched),
         ).values
-
-    def _machine_of(self, blank: Measurements) -> Solvable:
-        """The machine, its actuators coming from where it is said."""
-        if blank.approach is not None and isinstance(self._machine, Robot):
-            return self._machine.approaching(blank.approach)
-        return self._machine
-
-    def _poses(self, machine: Solvable, actuators: FloatArray, argument: str) -> FloatArray:
-        solved = machine.forward(actuators)
-        failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
-        if len(failed):
-            raise ArgumentError(
-                f"{argument}: {len(failed)} of {len(actuators)} rows have no pose on the true"
-                f" machine (rows {first_rows(failed, 10)})"
-            )
-        return np.asarray(solved.pose)
 
     def _arguments(
         self, blank: Measurements, mounting: ArrayLike, touched: Mapping[str, ArrayLike] | None

@@ -65,7 +65,6 @@ def measured_places(found: Identification) -> FloatArray:
         if target is None:
             parts.append(end.pose[equations.pose_of[i], :3])
         else:
-            target = np.ascontiguousarray(equations.arguments_of(i, end.theta)["target"])
             parts.append(instruments.points(end.pose[equations.pose_of[i]], target)[0])
     return np.concatenate(parts)
 

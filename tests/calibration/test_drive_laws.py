@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -227,3 +228,47 @@ def test_a_table_that_is_less_smooth_than_was_said_contradicts_that() -> None:
         pk.CalibrationWarning, match=r"contradict the prior .* pull the smoothness at drive3\.table"
     ):
         pk.identify(robot, replace(measured, sigma=None), free=["drive*"])
+
+
+# from where actuators came ------------------------------------------------------------------------
+
+
+def test_the_direction_of_approach_is_written_and_read(tmp_path: Path) -> None:
+    q = np.array([[1.0, 5.0], [2.0, 5.0], [1.5, 4.0], [1.5, 6.0]])
+    measured = pk.Measurements(q, np.zeros((4, 3)), approach="order")
+    assert measured.approach is not None
+    assert measured.approach.tolist() == [[0, 0], [1, 0], [-1, -1], [-1, 1]]
+    measured.write(tmp_path / "m.csv")
+    again = pk.read_measurements(tmp_path / "m.csv")
+    assert again.approach is not None and (again.approach == measured.approach).all()
+    assert (again.select([2, 1]).approach == measured.approach[[2, 1]]).all()
+    text = (tmp_path / "m.csv").read_text(encoding="utf-8")
+    (tmp_path / "half.csv").write_text(text.replace("approach.q2", "heat"), encoding="utf-8")
+    with pytest.raises(ValueError, match=r"approach\.q2"):
+        pk.read_measurements(tmp_path / "half.csv")
+
+
+def test_rows_from_both_sides_are_two_poses() -> None:
+    q = np.array([[1.0, 5.0]] * 3)
+    measured = pk.Measurements(q, np.zeros((3, 3)), approach=[[1, 1], [-1, 1], [1, 1]])
+    assert measured.pose_index.tolist() == [1, 0, 1]
+
+
+@pytest.mark.parametrize(("approach", "message"), [
+    (0.5, "approach must be 1, -1 or 0"),
+    ("sideways", "approach must be 'order' or numbers"),
+    ([1, 1, 1], r"approach must be one number or have shape \(2,\) or \(4, 2\)"),
+])  # fmt: skip
+def test_no_other_direction_is_taken(approach: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        pk.Measurements(np.zeros((4, 2)), np.zeros((4, 3)), approach=approach)
+
+
+def test_a_batch_of_directions_goes_with_as_many_rows() -> None:
+    robot = hexapod({"drive": {"backlash": 0.1}})
+    q = robot.inverse(robot.home)
+    from_both = robot.approaching(np.outer([1, -1], np.ones(6)))
+    ways = from_both.machine.drives(robot.slots, np.stack([q, q]))
+    assert np.allclose(ways[1] - ways[0], [0.1, 0, 0, 0, 0, 0])
+    with pytest.raises(ValueError, match="approach is of 2 rows, but 1 were asked for"):
+        from_both.forward(q)

@@ -333,3 +333,11 @@ def test_noise_of_actuators_is_planned_with(hexapod: Robot, candidates: np.ndarr
     none = pk.plan_poses(hexapod, twice, 25, kind="pose", noise=0.02).predicted
     assert exact == pytest.approx(none, rel=1e-6)
     assert noisy > 1.3 * none
+
+
+@pytest.mark.parametrize("name", ["3rrr-planar", "five-bar"])
+def test_measurements_that_no_parameter_moves_are_refused(name: str) -> None:
+    """Heights of a machine that moves in a plane."""
+    robot = pk.load(name)
+    with pytest.raises(ValueError, match=r"candidates: .* depends on no parameter"):
+        pk.plan_poses(robot, pk.sample_poses(robot, 20), 10, kind="height", free="offset*")

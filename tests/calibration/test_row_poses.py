@@ -70,7 +70,9 @@ def measured(drawn: Simulated, **changes: object) -> pk.Measurements:
     return pk.Measurements(drawn.lengths, drawn.read, "position", **given)  # type: ignore[arg-type]
 
 
-def dense(drawn: Simulated, sigma_lengths: float) -> tuple[np.ndarray, float, np.ndarray]:
+def dense(
+    drawn: Simulated, sigma_lengths: float | np.ndarray
+) -> tuple[np.ndarray, float, np.ndarray]:
     """Parameters, χ² and covariance with all positions among the unknowns of one least squares."""
     rows = len(drawn.lengths)
     has = np.isfinite(drawn.read)
@@ -322,9 +324,26 @@ def test_actuators_alone_say_nothing_of_a_machine_whose_closures_always_hold() -
         pk.identify(robot, alone, "offset*")
 
 
-def test_an_actuator_that_is_never_wrong_has_no_place_among_surplus_closures(
+def test_an_actuator_that_is_never_wrong_is_met_exactly(cables: pk.Robot) -> None:
+    drawn = simulated(5, 24, "third")
+    sigma = np.array([NOISE, NOISE, 0.0, NOISE])
+    found = pk.identify(cables, measured(drawn, actuator_sigma=sigma), ORDER)
+    heavy = np.tile(np.where(sigma > 0, sigma, 1e-5 * NOISE), len(drawn.lengths))
+    values, _, covariance = dense(drawn, heavy)
+    deviation = np.sqrt(np.diag(covariance))
+    np.testing.assert_allclose((found.values - values) / deviation, 0.0, atol=1e-3)
+    at = found.fit.estimate.evaluation
+    assert isinstance(found.robot, pk.Robot)
+    needed = found.robot.inverse(at.pose) - at.actuators
+    assert np.abs(needed[:, 2]).max() < 1e-9 < 0.1 < np.abs(needed[:, 3]).max()
+
+
+def test_actuators_that_are_never_wrong_cannot_be_as_many_as_the_ways_to_move(
     cables: pk.Robot,
 ) -> None:
+    for sigma in (0.0, np.array([0.0, 0.0, 0.0, NOISE])):
+        with pytest.raises(ValueError, match="at most 2 actuators that are never wrong"):
+            pk.identify(cables, measured(simulated(0, 12, "all"), actuator_sigma=sigma))
     with pytest.raises(ValueError, match="actuator_sigma must be positive, or None"):
         pk.identify(cables, measured(simulated(0, 12, "all"), actuator_sigma=0.0))
     stated = measured(simulated(0, 12, "all"))

@@ -303,6 +303,16 @@ def test_a_reflector_that_was_set_down_anew(hexapod: Robot) -> None:
             assert np.abs((found.values[mine] - place) / found.stderr[mine]).max() < 4.0
 
 
+def test_the_bootstrap_scatters_each_sessions_numbers(
+    hexapod: Robot, two: tuple[list[Robot], list[Measurements]]
+) -> None:
+    _, sets = two
+    found = pk.identify(hexapod, sets, FREE, per_session="offset*")
+    drawn = pk.bootstrap(found, 60)
+    assert drawn.free == found.free and not drawn.n_failed
+    assert (np.abs(drawn.stderr / found.stderr - 1.0) < 0.6).all()
+
+
 # hold-outs ---------------------------------------------------------------------------------------
 
 

@@ -129,3 +129,17 @@ def test_a_prior_may_name_the_number_of_one_session(
         "offset5@thursday=3",
     )  # fmt: skip
     assert found["rank"] == len(found["free"]) == 18
+
+
+def test_the_report_shows_them(run: Callable[..., Any], files: list[Path]) -> None:
+    first, later = files
+    done = run("calibrate", "hexapod", first, *FREE, "--holdout", later, "--per-session", "offset*",
+               "--report", "shown")  # fmt: skip
+    assert done.exit_code == 0
+    page = Path("shown/report.html").read_text(encoding="utf-8")
+    assert "Sessions: monday." in page and "offset6@thursday" in page
+    data = json.loads(Path("shown/report.json").read_text(encoding="utf-8"))
+    assert data["calibration"]["sessions"] == ["monday"]
+    assert [row["name"] for row in data["held_out_numbers"]] == [
+        f"offset{i}@thursday" for i in range(1, 7)
+    ]

@@ -367,3 +367,51 @@ def test_limbs_that_share_an_actuator_have_its_law_each() -> None:
         limb | {"actuator": i + 1} for i, limb in enumerate(limbs[::2])
     ])  # fmt: skip
     assert abs(single.inverse(at) - q).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["redundant", "six", "2tpr2tps-spatial"])
+def test_what_actuators_would_read_follows_poses_and_numbers(name: str) -> None:
+    """Readings that poses need, less those read, and their derivatives, against differences."""
+    robot, at = driven(name, 1)
+    machine, slots = robot.machine, robot.slots
+    assert not robot.geometry.tied.any()
+    own = np.ascontiguousarray(robot.own_rows(at)[0])
+    own = own[np.isfinite(machine.inverse(slots, own)).all(axis=1)]
+    rng = np.random.default_rng(0)
+    step = np.array([1.0] * 3 + [1e-2] * 3)[: machine.m] * rng.uniform(-1, 1, (len(own), machine.m))
+    read = machine.inverse(slots, own)
+    there = np.ascontiguousarray(machine.moved(own, step)[0])
+    reached = np.isfinite(machine.inverse(slots, there)).all(axis=1)
+    assert reached.sum() > 5
+    there, read, step = there[reached].copy(), read[reached].copy(), step[reached]
+    columns = robot.geometry.slot_index.astype(np.int32)
+    residual, by_step, by_number = machine.readings(slots, there, read, columns)
+    exact = [i for i, limb in enumerate(robot.model.limbs)]
+    rows = np.cumsum([0, *(int(r).bit_count() + 1 for r in machine.struct.rows[0 : len(exact)])])
+    needed = machine.inverse(slots, there, read)
+    alone = [i for i in exact if sum(o.actuator == robot.model.limbs[i].actuator
+                                     for o in robot.model.limbs) == 1]  # fmt: skip
+    for i in alone:
+        a = robot.model.limbs[i].actuator
+        assert abs(residual[:, rows[i]] - (needed - read)[:, a]).max() < 1e-9
+    small = 1e-5
+    for k in range(machine.m):
+        change = np.zeros_like(step)
+        change[:, k] = small
+        ends = [
+            machine.readings(slots, np.ascontiguousarray(machine.moved(there, e * change)[0]), read)
+            for e in (-1, 1)
+        ]
+        slope = (ends[1][0] - ends[0][0]) / (2 * small)
+        assert abs(slope - by_step[:, :, k]).max() < 1e-4 * (1 + abs(by_step).max())
+    steps = {"mm": 1e-4, "rad": 1e-6, "1": 1e-7, "1/mm": 1e-10, "1/rad": 1e-7, "1/mm2": 1e-12}
+    for j, number in enumerate(robot.geometry.numbers):
+        e = steps[number.unit]
+        ends = []
+        for sign in (-1, 1):
+            changed = slots.copy()
+            changed.flat[columns[j]] += sign * e
+            ends.append(machine.readings(changed, there, read)[0])
+        slope = (ends[1] - ends[0]) / (2 * e)
+        size = 1.0 + abs(by_number[:, :, j]).max()
+        assert abs(slope - by_number[:, :, j]).max() < 1e-4 * size, number.name

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pkmcal.measurements.kind_fields import SEVERAL_ROWS
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
 
@@ -68,10 +67,7 @@ def test_measurements_pickle_and_stay_read_only(kind: str) -> None:
         again.actuators[0] = 0.0
 
 
-ONE_ROW = [kind for kind in PUBLIC if kind not in SEVERAL_ROWS]
-
-
-@pytest.mark.parametrize("kind", ONE_ROW)
+@pytest.mark.parametrize("kind", PUBLIC)
 def test_one_row_is_taken_as_it_is(kind: str) -> None:
     """Actuators (n,) with the value that goes with them, and all else that has one entry a row."""
     several = make(kind, sigma=0.1 if width(kind) else None, group=[4, 1, 2, 3, 4])
