@@ -222,9 +222,10 @@ def _points(
         part = (
             np.zeros((count, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
         )
-        added.append(part.ravel())
+        added.append(equations.arcs[i] ** 2 * part.ravel())
     jacobian = np.concatenate([
-        part.reshape(-1, part.shape[2]) for part in equations.jacobian(after)
+        arc * part.reshape(-1, part.shape[2])
+        for arc, part in zip(equations.arcs, equations.jacobian(after), strict=True)
     ])[equations.present]  # fmt: skip
     back = uncertainty.fit.back
     by_all = (jacobian * equations.parameters.scale)[named.length]
@@ -237,12 +238,15 @@ def _points(
     if own is not None:
         by_own = by_all[:, rows.own]
         by_fitted += by_own @ own.follow
-        weighted = equations.variances(own.noise)[named.length]
+        arcs = np.array(equations.arcs)[named.set_of[named.length]]
+        weighted = arcs**2 * equations.variances(own.noise)[named.length]
         if uncertainty.mixed:
             weighted += by_sigma / uncertainty.excess.total
         taken = np.clip(((by_own @ own.half) ** 2).sum(axis=1) / weighted, 0.0, 1.0)
     return _Points(
-        residual=lengths([part.ravel() for part in after.residuals]),
+        residual=lengths(
+            [arc * part.ravel() for arc, part in zip(equations.arcs, after.residuals, strict=True)]
+        ),
         design=by_fitted @ back,
         reading=lengths(variances),
         by_actuators=by_sigma,
@@ -272,7 +276,8 @@ def _of_own(
 def _variances(measured: Measurements, uncertainty: Uncertainty, like: int) -> FloatArray:
     """Variance of a length of each row, mm² (N,): that of the fitted set, by sigma where stated."""
     total = uncertainty.noises[like].total
-    own, fitted = stated_variances(measured), uncertainty.stated_variances(like)
+    own = stated_variances(measured)
+    fitted = stated_variances(uncertainty.equations.sets[like])
     if own is None or fitted is None:
         return np.full(len(measured), total)
     return own * total / float(fitted.mean())

@@ -26,7 +26,8 @@ class Labels:
         Rows count through all sets; a pose is that of `poses_of_rows`; components of the same name
         have the same number. Of mixtures, the row is the unit, and the set the first.
     length : ndarray of bool (M,)
-        Whether it is in mm; of a pose the position. Of mixtures none is.
+        Whether it is in mm; of a pose the position. Where angles alone were read they count, as
+        arcs. Of mixtures none is.
     """
 
     set_of: IntArray
@@ -63,7 +64,8 @@ def _of_readings(equations: Equations) -> Labels:
         targets.append(np.repeat(index, len(m.components)))
         numbers = [names.setdefault(name, len(names)) for name in m.components]
         components.append(np.tile(np.array(numbers, dtype=np.intp), len(m)))
-        lengths.append(np.tile(np.array([unit == "mm" for unit in m.units], dtype=bool), len(m)))
+        counted = [unit == "mm" or "mm" not in m.units for unit in m.units]
+        lengths.append(np.tile(np.array(counted, dtype=bool), len(m)))
         rows.append(np.repeat(np.arange(first, first + len(m)), len(m.components)))
         first += len(m)
     read = equations.present

@@ -59,6 +59,8 @@ class Readings:
         How many numbers were read in each row.
     present : ndarray of bool
         Which of all numbers of all sets were read, row by row.
+    arcs : tuple of float
+        What takes the misfit of each set to mm: where angles alone were read, the machine's length.
     deviations : tuple of ndarray (k,)
         Relative deviations of the components of each set; 1 unless they were told apart.
     """
@@ -130,6 +132,7 @@ class Readings:
         self.present: BoolArray = np.concatenate([
             np.isfinite(m.values).reshape(-1) for m in self.sets
         ])  # fmt: skip
+        self.arcs = tuple(1.0 if "mm" in m.units else parameters.robot.length for m in self.sets)
         self._whole = bool(self.present.all())
         self.set_of = np.repeat(np.arange(len(self.sets)), count)
         self.count = np.concatenate([

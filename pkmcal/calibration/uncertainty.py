@@ -23,7 +23,10 @@ FEW = 5.0  # degrees of freedom below which residuals hardly show the noise
 
 
 def stated_variances(measured: Measurements) -> FloatArray | None:
-    """Mean variance of the lengths of each row (N,), mm², as sigma says; None where it does not."""
+    """Mean variance of the lengths of each row (N,), mm², as sigma says; None where it does not.
+
+    Where angles alone were read theirs, rad².
+    """
     sigma = measured.sigma
     if sigma is None:
         return None
@@ -107,9 +110,11 @@ class Uncertainty:
         return matrix
 
     def in_units(self, whitened: FloatArray) -> FloatArray:
-        """Whitened values (M,) in mm and rad."""
+        """Whitened values (M,) in mm and rad; where angles alone were read, their arcs in mm."""
         parts = self.equations.unwhiten(whitened, self.factors)
-        return np.concatenate([part.ravel() for part in parts])[self.equations.present]
+        arcs = self.equations.arcs
+        every = [arc * part.ravel() for arc, part in zip(arcs, parts, strict=True)]
+        return np.concatenate(every)[self.equations.present]
 
     @cached_property
     def adjusted(self) -> FloatArray:
@@ -147,8 +152,9 @@ class Uncertainty:
         return noise(self.adjusted[mine], retained, numbered(self.fit.key[mine]))
 
     def stated_variances(self, i: int) -> FloatArray | None:
-        """`stated_variances` of set `i`."""
-        return stated_variances(self.equations.sets[i])
+        """`stated_variances` of set `i`, of angles that were read alone as arcs."""
+        stated = stated_variances(self.equations.sets[i])
+        return None if stated is None else self.equations.arcs[i] ** 2 * stated
 
     def repeats(self, plain: bool = False) -> Split:
         """Pure error and lack of fit, whitened; `plain`: of lengths in mm.

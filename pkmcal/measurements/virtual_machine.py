@@ -154,7 +154,6 @@ class VirtualMachine:
             touched=touches,
             artefact=artefact if touching else None,
             joint=joint,
-            approach=approach,
         )
         exact = self._exact(blank, mounting, touched)
         if blank.run is not None:
