@@ -303,10 +303,10 @@ class Equations(Readings):
         if not evaluation.ok:
             self.start_from(np.flatnonzero(evaluation.status), self.parameters.robot.home)
             evaluation = self.at(theta)
-        if not self.parameters.motions or not evaluation.ok:
+        if not evaluation.ok:
             return evaluation
         self.parameters, theta = aligned(self, evaluation, own)
-        return self.at(theta)
+        return evaluation if np.array_equal(theta, evaluation.theta) else self.at(theta)
 
     def warm_start(self, evaluation: Evaluation) -> None:
         """Start the forward kinematics of later calls of `at` from its poses."""

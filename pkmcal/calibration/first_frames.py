@@ -1,7 +1,8 @@
 """Where the search for unknown frames, targets and tools starts: see `alignment` and `hand_eye`.
 
-Frame by frame; what several frames have in common is placed with the first of them. Frames in which
-points were read come first, then tools, with their frame where it is not laid yet.
+Targets in known frames follow from the poses. Then frame by frame; what several frames have in
+common is placed with the first of them. Frames in which points were read come first, then tools,
+with their frame where it is not laid yet.
 """
 
 from __future__ import annotations
@@ -41,6 +42,7 @@ def aligned(
     parameters, theta = readings.parameters, evaluation.theta.copy()
     free = np.ones(len(parameters), dtype=bool) if own is None else own.copy()
     frames, tools = readings.frames, readings.tools
+    _with_known_frame(readings, evaluation, theta, free)
     by_points = [
         first
         for first, rows in frames.items()
@@ -57,6 +59,41 @@ def aligned(
             parameters, theta = parameters.aligned(theta, each, motion)
             free[each : each + 6] = False
     return parameters, theta
+
+
+def _with_known_frame(
+    readings: Readings, evaluation: Evaluation, theta: FloatArray, free: BoolArray
+) -> None:
+    """Place targets that are free and were read in a known frame: they are then not free.
+
+    At the medians, which a few rows that are solved in another assembly mode do not move.
+    """
+    framed = {i for rows in readings.frames.values() for i in rows}
+    seen = [i for i, m in enumerate(readings.sets) if m.kind == "position" and i not in framed]
+    every = {i: np.arange(len(readings.sets[i])) for i in seen}
+    columns = {i: _sought(readings, i, rows, free)[:, 0] for i, rows in every.items()}
+    for first in np.unique(np.concatenate([np.empty(0, np.intp), *columns.values()])).tolist():
+        if first < 0:
+            continue
+        shifts = []
+        for i, rows in every.items():
+            mine = rows[columns[i] == first]
+            places, turn = _points(readings, evaluation, i, mine, theta)
+            off = readings.sets[i].values[mine] - places
+            shifts.append((turn.transpose(0, 2, 1) @ off[:, :, None])[:, :, 0])
+        read = np.concatenate(shifts)
+        read = read[np.isfinite(read).all(axis=1)]
+        if len(read):
+            _shift(readings, theta, free, first, np.median(read, axis=0))
+
+
+def _shift(
+    readings: Readings, theta: FloatArray, free: BoolArray, first: int, shift: FloatArray
+) -> None:
+    """Move a target within its bounds; it is then not free."""
+    mine, (lower, upper) = slice(first, first + 3), readings.parameters.bounds
+    theta[mine] = np.clip(theta[mine] + shift, lower[mine], upper[mine])
+    free[mine] = False
 
 
 def _with_tool(
@@ -153,11 +190,8 @@ def _aligned(
         target=target.reshape(-1) - int(sought[0] < 0),
     )
     frame, shifts = of_points(pairs)
-    lower, upper = readings.parameters.bounds
-    for first, shift in zip(sought[sought >= 0], shifts, strict=True):
-        mine = slice(first, first + 3)
-        theta[mine] = np.clip(theta[mine] + shift, lower[mine], upper[mine])
-        free[mine] = False
+    for first, shift in zip(sought[sought >= 0].tolist(), shifts, strict=True):
+        _shift(readings, theta, free, first, shift)
     return frame
 
 

@@ -12,7 +12,13 @@ from pkmcal.calibration.dropped import outlying
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.gauges import MIRROR, Gauges, gauges, mirror_fits
-from pkmcal.calibration.identifiability import as_sum, observability, sparse_basis
+from pkmcal.calibration.identifiability import (
+    as_sum,
+    decompose,
+    held_errors,
+    observability,
+    sparse_basis,
+)
 from pkmcal.calibration.uncertainty import Uncertainty
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
@@ -103,7 +109,9 @@ def parameter_table(
     along = rates @ estimate.state.determined.unidentifiable
     unknown = np.linalg.norm(along, axis=1) > _INVOLVED * chosen.scale
     unknown |= uncertainty.freedom <= 0  # nothing shows the deviation
-    shown = uncertainty.matrix.copy()
+    after = decompose(np.vstack([estimate.jacobian, estimator.prior]))
+    held = rates @ held_errors(after, estimate.state.determined.rank, chosen.robot.length)
+    shown = uncertainty.matrix + held @ held.T
     shown[unknown] = shown[:, unknown] = np.nan
     shown[unknown, unknown] = np.inf
     stderr = np.sqrt(np.maximum(np.diagonal(shown), 0.0))

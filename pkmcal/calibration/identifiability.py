@@ -95,6 +95,32 @@ def directions(
     return Directions(basis[:, :rank], basis[:, rank:], singular)
 
 
+def held_errors(after: Decomposed, rank: int, size: float) -> FloatArray:
+    """What combinations may be off by that are held though errors of the machine show them.
+
+    The machine as it was found determines a little what the nominal one does not. That is too
+    little to be estimated, but what is held there shifts the other parameters.
+
+    Parameters
+    ----------
+    after : tuple
+        `decompose` of the scaled, whitened Jacobian after the fit.
+    rank : int
+        How many combinations were identifiable.
+    size : float
+        Of the machine, mm: by more than that no combination is taken to be off.
+
+    Returns
+    -------
+    ndarray (n, e)
+        Scaled standard deviations, a column for each.
+    """
+    singular, basis = after
+    shown = _count(singular, np.inf)
+    errors: FloatArray = basis[:, rank:shown] * np.minimum(1.0 / singular[rank:shown], size)
+    return errors
+
+
 def _count(singular: FloatArray, deviation: float) -> int:
     """Number of singular values that are not zero and stand for at most this deviation."""
     floor = max(ROUNDING * float(singular[0]), 1.0 / deviation)
