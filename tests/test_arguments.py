@@ -54,11 +54,20 @@ WRONG: dict[str, list[Any]] = {
 # Each call with arguments that fit, and of which kind they are.
 Call = tuple[Callable[..., Any], dict[str, Any], dict[str, str]]
 PRINTER = Path(__file__).parents[1] / "examples" / "linear-delta" / "printer.cfg"
+SCREW = Path(__file__).parent / "data" / "screw.comp"
 BELTS = pk.load(Path(__file__).parents[1] / "examples" / "belts" / "robot.toml")
 PLACES = np.random.default_rng(0).uniform(-200, 200, (12, 6)) * [1, 1, 0, 0, 0, 0]
+ANGLES = np.linspace(0, 2 * np.pi, 60)
+CIRCLE = 100.0 * np.column_stack([np.cos(ANGLES), np.sin(ANGLES)])
 CALLS: dict[str, Call] = {
     "load": (pk.load, {"robot": "hexapod"}, {"robot": "path"}),
     "import_printer": (pk.import_printer, {"path": PRINTER}, {"path": "path"}),
+    "import_comp_file": (pk.import_comp_file, {"path": SCREW}, {"path": "path"}),
+    "circular_test": (
+        pk.circular_test,
+        {"path": CIRCLE, "radius": 100.0},
+        {"path": "numbers", "other": "numbers", "radius": "number"},
+    ),
     "Robot": (pk.Robot, {"model": ROBOT.model}, {"model": "robot"}),
     **{
         name: (getattr(ROBOT, name), {"pose": POSES}, {"pose": "numbers"})
@@ -498,6 +507,7 @@ def test_the_arguments_that_are_to_fit_do(name: str) -> None:
 def test_every_public_call_is_among_them() -> None:
     results = {  # made by calls, not by users
         *("Allocation", "ArmInverse", "Assemblies", "Bootstrap", "Certificate", "Compensation"),
+        *("CircularTest", "Datum", "LawTest", "ScrewTable"),
         *(
             "CorrectedProgram",
             "LocatedAnchors",
@@ -521,7 +531,7 @@ def test_every_public_call_is_among_them() -> None:
         ),
     }
     raised = {"ArgumentError", "ArgumentTypeError", "CalibrationWarning", "Error", "FileError"}
-    no_calls = {"machines", "CONSTRICTION", "export", "screw", "trajectory"}
+    no_calls = {"show", "machines", "CONSTRICTION", "export", "screw", "trajectory"}
     for name in set(pk.__all__) - results - raised - no_calls:
         assert name in CALLS, name
     checked = {call.__name__ for call, _, _ in CALLS.values()}

@@ -67,7 +67,7 @@ def axis_performance(deviation: ArrayLike, target: ArrayLike) -> AxisPerformance
     --------
     >>> found = axis_performance([1.0, 3.0, 0.0, 0.0], [0, 0, 1, 1])
     >>> found.systematic, round(found.repeatability, 3), round(found.accuracy, 3)
-    (2.0, 5.657, 4.828)
+    (2.0, 5.657, 5.657)
     """
     values, number = np.asarray(deviation, dtype=np.float64), np.asarray(target)
     if values.ndim != 1 or not len(values) or number.shape != values.shape:
