@@ -35,11 +35,12 @@ from pkmcal.calibration.fit_statistics import (
     repeats,
     tested_prior,
 )
+from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.mode_slips import in_other_modes
-from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior, parameters
+from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
     contradicted_prior,

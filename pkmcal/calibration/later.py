@@ -16,10 +16,11 @@ from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.least_squares import Search
 from pkmcal.calibration.loss import Loss
 from pkmcal.calibration.mode_slips import in_their_modes
-from pkmcal.calibration.parameters import Parameters, parameters
+from pkmcal.calibration.parameters import Parameters
 from pkmcal.calibration.sessions import NONE
 from pkmcal.calibration.uncertainty import Uncertainty
 from pkmcal.statistics.linear_fit import ROUNDING

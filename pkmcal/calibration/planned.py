@@ -13,9 +13,10 @@ from pkmcal.arguments import word, words
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.identifiability import as_sum, sparse_basis
 from pkmcal.calibration.optimal_design import Criterion, Design
-from pkmcal.calibration.parameters import Asked, Parameters, Prior, parameters
+from pkmcal.calibration.parameters import Asked, Parameters, Prior
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot

@@ -10,8 +10,9 @@ import pytest
 import pkmcal as pk
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.fit_data import FitData
+from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.mode_slips import in_other_modes, in_their_modes
-from pkmcal.calibration.parameters import Asked, parameters
+from pkmcal.calibration.parameters import Asked
 
 from ..workspaces import WORKSPACE
 

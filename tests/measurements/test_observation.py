@@ -8,7 +8,8 @@ import pytest
 import pkmcal as pk
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.parameters import Asked, parameters
+from pkmcal.calibration.free_parameters import parameters
+from pkmcal.calibration.parameters import Asked
 from pkmcal.calibration.starts import with_starts
 from pkmcal.core import instruments
 from pkmcal.kinematics.robot import Robot

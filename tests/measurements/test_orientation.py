@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 import pkmcal as pk
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.parameters import Asked, parameters
+from pkmcal.calibration.free_parameters import parameters
+from pkmcal.calibration.parameters import Asked
 from pkmcal.measurements import orientation
 from pkmcal.measurements.observation import corrected, difference
 

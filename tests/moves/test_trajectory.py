@@ -504,7 +504,9 @@ def test_a_stroke_broken_between_two_looks_is_found() -> None:
         (event,) = pk.trajectory.move(tight, start, end, duration=2.0).events()
         assert (event.what, event.limb) == ("stroke", i + 1)
         assert (event.time + event.until) / 2 == pytest.approx(turn, abs=1e-7)
-        assert event.until - event.time == pytest.approx(np.sqrt(8 * (1e-7 - rounding) / abs(bend)), rel=0.01)
+        assert event.until - event.time == pytest.approx(
+            np.sqrt(8 * (1e-7 - rounding) / abs(bend)), rel=0.01
+        )
         break
     else:
         pytest.fail("no slider turns back on this path")
