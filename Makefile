@@ -47,7 +47,7 @@ demo: $(PACKAGE)
 	$(BIN)/pkmcal demo
 
 test: $(TESTS)
-	$(BIN)/pytest -m "not slow"
+	$(BIN)/pytest -n auto --maxprocesses 8 --dist loadfile -m "not slow"
 
 test-all: $(TESTS)
 	$(BIN)/pytest
