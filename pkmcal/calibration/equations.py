@@ -305,8 +305,11 @@ class Equations(Readings):
             evaluation = self.at(theta)
         if not evaluation.ok:
             return evaluation
+        before = self.parameters
         self.parameters, theta = aligned(self, evaluation, own)
-        return evaluation if np.array_equal(theta, evaluation.theta) else self.at(theta)
+        if self.parameters is before and np.array_equal(theta, evaluation.theta):
+            return evaluation
+        return self.at(theta)
 
     def warm_start(self, evaluation: Evaluation) -> None:
         """Start the forward kinematics of later calls of `at` from its poses."""
