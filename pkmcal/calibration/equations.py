@@ -266,7 +266,7 @@ class Equations(Readings):
         """
         other, errors, unknowns = copy.copy(self), left, self.closures.unknowns
         if unknowns:
-            off, by_unknown = self._system(at.machines, at.states, at.theta, noise)
+            off, by_unknown = self._at(at, noise)
             errors = self._blocks.spread(by_unknown, left)
             own = len(self.actuators) * self.closures.equations
             change = -noise[-1] * (errors + off)[:own]

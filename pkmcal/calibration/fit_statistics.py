@@ -14,7 +14,6 @@ from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.gauges import MIRROR, Gauges, gauges, mirror_fits
 from pkmcal.calibration.identifiability import (
     as_sum,
-    decompose,
     held_errors,
     observability,
     sparse_basis,
@@ -109,8 +108,8 @@ def parameter_table(
     along = rates @ estimate.state.determined.unidentifiable
     unknown = np.linalg.norm(along, axis=1) > _INVOLVED * chosen.scale
     unknown |= uncertainty.freedom <= 0  # nothing shows the deviation
-    after = decompose(np.vstack([estimate.jacobian, estimator.prior]))
-    held = rates @ held_errors(after, estimate.state.determined.rank, chosen.robot.length)
+    after, rank = np.vstack([estimate.jacobian, estimator.prior]), estimate.state.determined.rank
+    held = rates @ held_errors(after, rank, chosen.robot.length)
     shown = uncertainty.matrix + held @ held.T
     shown[unknown] = shown[:, unknown] = np.nan
     shown[unknown, unknown] = np.inf

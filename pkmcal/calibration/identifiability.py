@@ -95,7 +95,7 @@ def directions(
     return Directions(basis[:, :rank], basis[:, rank:], singular)
 
 
-def held_errors(after: Decomposed, rank: int, size: float) -> FloatArray:
+def held_errors(jacobian: FloatArray, rank: int, size: float) -> FloatArray:
     """What combinations may be off by that are held though errors of the machine show them.
 
     The machine as it was found determines a little what the nominal one does not. That is too
@@ -103,8 +103,8 @@ def held_errors(after: Decomposed, rank: int, size: float) -> FloatArray:
 
     Parameters
     ----------
-    after : tuple
-        `decompose` of the scaled, whitened Jacobian after the fit.
+    jacobian : ndarray (M, n)
+        Scaled and whitened, after the fit, with the rows of a prior.
     rank : int
         How many combinations were identifiable.
     size : float
@@ -115,7 +115,9 @@ def held_errors(after: Decomposed, rank: int, size: float) -> FloatArray:
     ndarray (n, e)
         Scaled standard deviations, a column for each.
     """
-    singular, basis = after
+    if rank == jacobian.shape[1]:
+        return np.zeros((rank, 0))
+    singular, basis = decompose(jacobian)
     shown = _count(singular, np.inf)
     errors: FloatArray = basis[:, rank:shown] * np.minimum(1.0 / singular[rank:shown], size)
     return errors
