@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, Unit
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, Unit
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
@@ -110,6 +110,10 @@ class FitData:
     unknown_attachment: bool = False
     set_name: str = ""
     starts: Mapping[tuple[str, str], Start] = field(default_factory=dict)
+
+    def select(self, chosen: IntArray | BoolArray) -> FitData:
+        """Some of the rows."""
+        return replace(self, measured=self.measured.select(chosen), rows=self.rows[chosen])
 
     @property
     def framed(self) -> bool:
