@@ -12,10 +12,8 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
 
-_PLACE: tuple[tuple[str, Unit], ...] = (
-    ("x", "mm"), ("y", "mm"), ("z", "mm"), ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"),
-)  # fmt: skip
-_POINT, _ANGLES = _PLACE[:3], _PLACE[3:]
+PLACE = KINDS["pose"].components  # names and units, of frames too
+_POINT, _ANGLES = PLACE[:3], PLACE[3:]
 _WHOLE_POINT = (0, 1, 2)
 
 
@@ -134,7 +132,7 @@ class FitData:
         if KINDS[m.kind].point == "platform":
             yield self._point("target", "target", self.unknown_target)
         if m.kind == "pose" and self.unknown_target:
-            yield self._always("tool", "tool", _PLACE, [""] * len(m))
+            yield self._always("tool", "tool", PLACE, [""] * len(m))
         if KINDS[m.kind].point == "base":
             yield self._point("target", "attachment", self.unknown_attachment)
             yield self._point("anchor", "anchor", self.unknown_target)
@@ -150,10 +148,10 @@ class FitData:
                 yield self._always("anchor", "touch", _POINT, names)
                 yield self._always("zero", "touch radius", (("radius", "mm"),), names)
             else:
-                yield self._always("place", "touch", _PLACE, names)
+                yield self._always("place", "touch", PLACE, names)
         if m.kind == "touch-distance":
             one, other = zip(*((one, other) for one, other, _, _ in m.touch_distances), strict=True)
-            yield self._always("place", "touch", _PLACE, one)
+            yield self._always("place", "touch", PLACE, one)
             yield self._always("anchor", "touch", _POINT, other)
 
     def _point(self, argument: str, role: str, unknown: bool) -> Dependence:
