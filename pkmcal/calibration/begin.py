@@ -9,7 +9,7 @@ from pkmcal.calibration.estimator import Estimator
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.loss import LossName
-from pkmcal.calibration.mode_slips import in_their_modes
+from pkmcal.calibration.mode_slips import start_in_modes
 from pkmcal.calibration.parameters import Parameters
 from pkmcal.exceptions import ArgumentError
 
@@ -20,10 +20,7 @@ def begun(
     """The equations, the same with commanded poses, and where these start."""
     equations = Equations(datasets, chosen, unread)
     commanded = equations.commanded()
-    start = commanded.start()
-    if in_their_modes(commanded, start) is not start:
-        start = commanded.start()  # an unknown frame was laid with rows of other modes
-    return equations, commanded, start
+    return equations, commanded, start_in_modes(commanded)
 
 
 def estimator_at(

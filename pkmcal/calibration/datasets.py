@@ -76,13 +76,12 @@ def informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[Fi
     kept, unread = [], 0
     for data in datasets:
         values = data.measured.values.reshape(len(data.measured), -1)
-        read = np.isfinite(values).any(axis=1)
+        read = np.asarray(np.isfinite(values).any(axis=1))
         unread += int((~read).sum())
         if read.all():
             kept.append(data)
         elif read.any():
-            measured = data.measured.select(read)
-            kept.append(replace(data, measured=measured, rows=data.rows[read]))
+            kept.append(data.select(read))
     if not kept:
         raise ArgumentError(
             f"measurements: nothing was read but the actuators; poses of {machine.name} follow from"

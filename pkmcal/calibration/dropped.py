@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -57,7 +56,7 @@ def without(datasets: Sequence[FitData], rows: Sequence[int]) -> list[FitData]:
         kept = np.flatnonzero(~np.isin(data.rows, rows))
         if not len(kept):
             raise ArgumentError("drop: no row of a set is left")
-        found.append(replace(data, measured=data.measured.select(kept), rows=data.rows[kept]))
+        found.append(data.select(kept))
     return found
 
 

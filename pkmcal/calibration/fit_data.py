@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, Unit
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, Unit
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
 
-_PLACE: tuple[tuple[str, Unit], ...] = (
-    ("x", "mm"), ("y", "mm"), ("z", "mm"), ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"),
-)  # fmt: skip
-_POINT, _ANGLES = _PLACE[:3], _PLACE[3:]
+PLACE = KINDS["pose"].components  # names and units, of frames too
+_POINT, _ANGLES = PLACE[:3], PLACE[3:]
 _WHOLE_POINT = (0, 1, 2)
 
 
@@ -111,6 +109,10 @@ class FitData:
     set_name: str = ""
     starts: Mapping[tuple[str, str], Start] = field(default_factory=dict)
 
+    def select(self, chosen: IntArray | BoolArray) -> FitData:
+        """Some of the rows."""
+        return replace(self, measured=self.measured.select(chosen), rows=self.rows[chosen])
+
     @property
     def framed(self) -> bool:
         """Whether these readings depend on the unknown frame."""
@@ -130,7 +132,7 @@ class FitData:
         if KINDS[m.kind].point == "platform":
             yield self._point("target", "target", self.unknown_target)
         if m.kind == "pose" and self.unknown_target:
-            yield self._always("tool", "tool", _PLACE, [""] * len(m))
+            yield self._always("tool", "tool", PLACE, [""] * len(m))
         if KINDS[m.kind].point == "base":
             yield self._point("target", "attachment", self.unknown_attachment)
             yield self._point("anchor", "anchor", self.unknown_target)
@@ -146,10 +148,10 @@ class FitData:
                 yield self._always("anchor", "touch", _POINT, names)
                 yield self._always("zero", "touch radius", (("radius", "mm"),), names)
             else:
-                yield self._always("place", "touch", _PLACE, names)
+                yield self._always("place", "touch", PLACE, names)
         if m.kind == "touch-distance":
             one, other = zip(*((one, other) for one, other, _, _ in m.touch_distances), strict=True)
-            yield self._always("place", "touch", _PLACE, one)
+            yield self._always("place", "touch", PLACE, one)
             yield self._always("anchor", "touch", _POINT, other)
 
     def _point(self, argument: str, role: str, unknown: bool) -> Dependence:

@@ -12,16 +12,12 @@ import numpy as np
 
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
-from pkmcal.calibration.fit_data import FitData, Numbers
+from pkmcal.calibration.fit_data import PLACE, FitData, Numbers
 from pkmcal.calibration.parameters import Asked, Bounds, Parameters, Prior
 from pkmcal.calibration.sessions import Scope, label, matches, scopes
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
-
-_FRAME = (
-    ("x", "mm"), ("y", "mm"), ("z", "mm"), ("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"),
-)  # fmt: skip
 
 
 def parameters(
@@ -122,8 +118,8 @@ def _numbers_of_a_row(robot: Calibratable, datasets: Sequence[FitData], asked: A
     frame = None
     if any(data.framed for data in datasets):
         frame = len(names)
-        names += [f"frame.{axis}" for axis, _ in _FRAME]
-        units += [unit for _, unit in _FRAME]
+        names += [f"frame.{axis}" for axis, _ in PLACE]
+        units += [unit for _, unit in PLACE]
         start += [0.0] * 6
     found_along: dict[tuple[str, str], int] = {}
     known: dict[tuple[str, str], Numbers] = {}

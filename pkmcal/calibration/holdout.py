@@ -113,11 +113,7 @@ def draw(data: FitData, holdout: float) -> tuple[FitData, FitData]:
         measured.actuators, np.arange(len(measured)), "height", group=measured.pose_index
     )
     kept, out = (part.values.astype(np.intp) for part in numbered.split(holdout))
-    return _rows(data, kept), _rows(data, out)
-
-
-def _rows(data: FitData, chosen: IntArray) -> FitData:
-    return replace(data, measured=data.measured.select(chosen), rows=data.rows[chosen])
+    return data.select(kept), data.select(out)
 
 
 def evaluate(

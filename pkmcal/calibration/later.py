@@ -19,7 +19,7 @@ from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.least_squares import Search
 from pkmcal.calibration.loss import Loss
-from pkmcal.calibration.mode_slips import in_their_modes
+from pkmcal.calibration.mode_slips import in_their_modes, start_in_modes
 from pkmcal.calibration.parameters import Parameters
 from pkmcal.calibration.sessions import NONE
 from pkmcal.calibration.uncertainty import Uncertainty
@@ -136,9 +136,7 @@ def compared(
     commanded, theta = whole.commanded(), rows.at(estimate.evaluation.theta)
     if not rows.own.any():
         return commanded, in_their_modes(commanded, commanded.at(theta)), None
-    start = commanded.start(theta, rows.own)
-    if in_their_modes(commanded, start) is not start:
-        start = commanded.start(theta, rows.own)
+    start = start_in_modes(commanded, theta, rows.own)
     found, own = _own_numbers(rows, whole, whole.begin(commanded, start), estimate, sure)
     commanded.warm_start(found)
     return commanded, commanded.at(found.theta), own

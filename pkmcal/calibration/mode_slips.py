@@ -34,6 +34,16 @@ def in_their_modes(equations: Equations, evaluation: Evaluation) -> Evaluation:
     return equations.at(evaluation.theta)
 
 
+def start_in_modes(
+    equations: Equations, near: FloatArray | None = None, own: BoolArray | None = None
+) -> Evaluation:
+    """`Equations.start`, once more where rows of other modes had laid unknown frames."""
+    start = equations.start(near, own)
+    if in_their_modes(equations, start) is not start:
+        start = equations.start(near, own)
+    return start
+
+
 def in_other_modes(equations: Equations, evaluation: Evaluation) -> list[str]:
     """Say which rows fit another assembly mode than the one they were solved in."""
     better, _ = _better(equations, evaluation)

@@ -29,7 +29,6 @@ from pkmcal.statistics.linear_fit import column_basis
 
 Unknown = Literal["frame", "target"]
 UNKNOWN: tuple[Unknown, ...] = ("frame", "target")
-PLANNED: tuple[Kind, ...] = (*("position", "pose", "height", "distance", "orientation", "closure"),)
 
 _UNIDENTIFIABLE = 1e-3  # mm a target moves per mm along an unidentifiable combination
 

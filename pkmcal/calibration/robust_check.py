@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -91,6 +91,5 @@ def _drawn(fit: Fit) -> list[tuple[FitData, int]]:
     for i, data in enumerate(equations.datasets):
         mine = np.flatnonzero(chosen[equations.set_of == i])
         if len(mine):
-            few = replace(data, measured=data.measured.select(mine), rows=data.rows[mine])
-            drawn.append((few, i))
+            drawn.append((data.select(mine), i))
     return drawn
