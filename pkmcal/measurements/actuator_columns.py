@@ -30,7 +30,7 @@ def read_actuators(table: Table, robot: Actuated | None) -> tuple[FloatArray, tu
     for i in range(count):
         of_robot = expected[i] if i < len(expected) else None
         quantities = ("mm", "rad", "count") if of_robot != "mm" else ("mm", "count", "rad")
-        values, unit = _numbers(table, f"q{i + 1}", *quantities, expected=of_robot)
+        values, unit = table.numbers(f"q{i + 1}", *quantities, expected=of_robot)
         if unit == "count":
             unit = _counted(table, i, of_robot, robot)
         columns.append(values)
@@ -80,10 +80,3 @@ def compare(table: Table, units: tuple[str, ...], robot: Actuated | None) -> Non
             raise table.header_error(
                 f"column 'q{i + 1}' is {what[unit]}; the robot's actuator is {what[robots]}"
             )
-
-
-def _numbers(
-    table: Table, name: str, *quantities: str, expected: str | None
-) -> tuple[FloatArray, str]:
-    table.require([name])
-    return table.numbers(name, *quantities, expected=expected)

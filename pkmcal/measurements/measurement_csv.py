@@ -226,7 +226,7 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
             f"column {table.columns['probe'].name!r}: give the robot, as the firmware had it when"
             " it probed"
         )
-    z = _read(table, "probe", "mm")[0]
+    z = table.numbers("probe", "mm")[0]
     sigma = read_sigma(table, "height")
     if any(ACTUATOR.fullmatch(name) for name in table.columns):
         actuators, units = read_actuators(table, robot)
@@ -242,7 +242,7 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
             )
         poses = robot.forward(actuators).pose[:, :3]
     else:
-        poses = np.column_stack([*(_read(table, axis, "mm")[0] for axis in "xy"), z])
+        poses = np.column_stack([*(table.numbers(axis, "mm")[0] for axis in "xy"), z])
     try:
         measured = probed(robot, poses, offset=offset, sigma=sigma)
     except ValueError as error:
@@ -340,10 +340,10 @@ def _read_values(
 ) -> FloatArray | None:
     """What was measured, (N, k) or (N,); None without columns of it."""
     if KINDS[kind].turning is not None and names_in(table) not in ((), _ANGLES):
-        places = [_read(table, axis, "mm")[0] for axis in _AXES] if kind == "pose" else []
+        places = [table.numbers(axis, "mm")[0] for axis in _AXES] if kind == "pose" else []
         nominal = _nominal(robot, actuators)
         return np.column_stack([*places, orientation_columns.read(table, rotation, nominal)])
-    columns = [_read(table, *component, blank=True)[0] for component in value_columns(table, kind)]
+    columns = [table.numbers(*component, blank=True)[0] for component in value_columns(table, kind)]
     if not columns:
         return None
     return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
@@ -378,8 +378,3 @@ def _read_approach(table: Table, count: int) -> FloatArray | None:
 
 def _read_session(table: Table) -> TextArray | None:
     return np.array(table.texts("session")) if "session" in table.columns else None
-
-
-def _read(table: Table, name: str, *quantities: str, blank: bool = False) -> tuple[Any, str]:
-    table.require([name])
-    return table.numbers(name, *quantities, blank=blank)

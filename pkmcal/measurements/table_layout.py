@@ -14,7 +14,8 @@ from pkmcal.arguments import words as as_words
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files import units
 from pkmcal.files.column_names import BESIDE, canonical
-from pkmcal.files.csv_table import Table, parted
+from pkmcal.files.csv_table import Table
+from pkmcal.files.header import parted
 from pkmcal.measurements.point_names import split
 
 _SLIP = 0.8  # how like a known name a mistyped one is, as difflib counts

@@ -91,7 +91,7 @@ def _read_point(table: Table, name: str) -> FloatArray | None:
     columns = [f"{name}.{axis}" for axis in _AXES]
     if not any(column in table.columns for column in columns):
         return None
-    return np.stack([_lengths(table, column) for column in columns], axis=1)
+    return np.stack([table.numbers(column, "mm")[0] for column in columns], axis=1)
 
 
 def _one(places: FloatArray) -> FloatArray:
@@ -99,8 +99,3 @@ def _one(places: FloatArray) -> FloatArray:
     bits = places.view(np.int64)
     one: FloatArray = places[0] if (bits == bits[0]).all() else places
     return one
-
-
-def _lengths(table: Table, name: str) -> FloatArray:
-    table.require([name])
-    return table.numbers(name, "mm")[0]
