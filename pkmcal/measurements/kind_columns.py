@@ -25,7 +25,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, TextArray
 from pkmcal.files.csv_table import Table
-from pkmcal.measurements.actuator_columns import ACTUATOR
+from pkmcal.measurements.actuator_columns import actuators_in
 from pkmcal.measurements.components import (
     KINDS,
     TOUCHES,
@@ -68,7 +68,7 @@ class OfAKind(Protocol):
 def names_of_kinds(table: Table) -> set[str]:
     """Names of columns that are read here."""
     names = {name for name in table.columns if _JOINT.fullmatch(name)}
-    names |= {f"to.{name}" for name in table.columns if ACTUATOR.fullmatch(name)}
+    names |= {f"to.{name}" for name in actuators_in(table)}
     names |= {"tilt1", "tilt2", "touch", *(f"touch:{name}" for name in TOUCHES), *_STATED}
     names |= {name for name in _offsets() if name in table.columns}
     return names | ({"run"} if "distance" in table.columns else set())

@@ -55,7 +55,13 @@ from pkmcal.files.column_names import SYNONYMS
 from pkmcal.files.csv_table import Table
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements import orientation_columns
-from pkmcal.measurements.actuator_columns import ACTUATOR, Actuated, compare, read_actuators
+from pkmcal.measurements.actuator_columns import (
+    Actuated,
+    actuators_in,
+    columns_of_actuators,
+    compare,
+    read_actuators,
+)
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.components import KINDS, Kind
 from pkmcal.measurements.join import JOINS, Join
@@ -228,7 +234,7 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
         )
     z = table.numbers("probe", "mm")[0]
     sigma = read_sigma(table, "height")
-    if any(ACTUATOR.fullmatch(name) for name in table.columns):
+    if actuators_in(table):
         actuators, units = read_actuators(table, robot)
         compare(table, units, robot)
         if not is_of_trigger(robot, actuators, z):
@@ -275,7 +281,7 @@ def _table(
     seen = (*columns.ignore, *columns.rename)
     table = open_table(path, columns, joints, seen, elsewhere=True)
     log = open_table(controller, log_columns, joints, seen)
-    if any(ACTUATOR.fullmatch(name) for name in table.columns):
+    if actuators_in(table):
         table.notes.append(f"has actuators of its own; {log.path} is not used")
         return table
     for name in seen:
@@ -292,12 +298,10 @@ def _has(table: Table, name: str) -> bool:
 def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     """Names of columns that are read."""
     components = _AXES + _ANGLES
-    names = {f"q{i + 1}" for i in range(len(table.columns))}
-    names |= {name for name in table.columns if ACTUATOR.fullmatch(name)}
-    names |= {*components, "distance", "sigma", "group", "session", "target", "probe"}
+    actuators = {f"q{i + 1}" for i in range(len(table.columns))} | {*actuators_in(table)}
+    names = actuators | {*components, "distance", "sigma", "group", "session", "target", "probe"}
     names |= {"actuator_sigma", "approach"}
-    of_actuators = [name for name in names if ACTUATOR.fullmatch(name)]
-    names |= {f"{what}.{q}" for what in ("actuator_sigma", "approach") for q in of_actuators}
+    names |= {f"{what}.{q}" for what in ("actuator_sigma", "approach") for q in actuators}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
     names |= {f"sigma.{name}" for name in component_names()} | names_of_kinds(table)
@@ -364,16 +368,11 @@ def _nominal(robot: Actuated | None, actuators: FloatArray) -> FloatArray | None
 
 def _read_approach(table: Table, count: int) -> FloatArray | None:
     """From where each actuator came (rows, n)."""
-    each = [f"approach.q{i + 1}" for i in range(count)]
-    given = [name for name in table.columns if name.startswith("approach")]
-    if not given:
+    names = columns_of_actuators(table, "approach", count)
+    if not names:
         return None
-    if given != ["approach"]:
-        table.require(each)
-        if len(given) > len(each):
-            raise table.header_error("column 'approach' does not go with those of actuators")
-    names = ["approach"] * count if given == ["approach"] else each
-    return np.stack([table.integers(name) for name in names], axis=1).astype(np.float64)
+    columns = np.stack([table.integers(name) for name in names], axis=1)
+    return np.broadcast_to(columns.astype(np.float64), (len(table), count))
 
 
 def _read_session(table: Table) -> TextArray | None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
+from pkmcal.measurements.actuator_columns import columns_of_actuators
 from pkmcal.measurements.components import Kind
 from pkmcal.measurements.kind_columns import components_in, value_columns
 
@@ -54,20 +55,13 @@ def read_sigma(table: Table, kind: Kind) -> FloatArray | None:
 
 def read_actuator_sigma(table: Table, units: tuple[str, ...]) -> FloatArray | None:
     """Deviations (rows, n) of what the actuators read."""
-    each = [f"actuator_sigma.q{i + 1}" for i in range(len(units))]
-    given = [name for name in table.columns if name.startswith("actuator_sigma")]
-    if not given:
+    names = columns_of_actuators(table, "actuator_sigma", len(units))
+    if not names:
         return None
-    if given == ["actuator_sigma"]:
-        if len(set(units)) > 1:
-            raise table.header_error(
-                "column 'actuator_sigma' for lengths and angles: expected"
-                f" {each[0]!r} to {each[-1]!r}"
-            )
-        columns = [table.numbers("actuator_sigma", units[0])[0]] * len(units)
-    else:
-        table.require(each)
-        if len(given) > len(each):
-            raise table.header_error("column 'actuator_sigma' does not go with those of actuators")
-        columns = [table.numbers(name, unit)[0] for name, unit in zip(each, units, strict=True)]
-    return np.stack(columns, axis=1)
+    if names == ["actuator_sigma"] and len(set(units)) > 1:
+        raise table.header_error(
+            "column 'actuator_sigma' for lengths and angles: expected"
+            f" 'actuator_sigma.q1' to 'actuator_sigma.q{len(units)}'"
+        )
+    columns = [table.numbers(name, unit)[0] for name, unit in zip(names, units, strict=False)]
+    return np.broadcast_to(np.stack(columns, axis=1), (len(table), len(units)))
