@@ -11,7 +11,7 @@ from pkmcal.arguments import shown, words
 from pkmcal.arrays import FloatArray, Int64Array, TextArray, as_numbers
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import LONGEST_NAME
-from pkmcal.measurements.components import KINDS, Kind
+from pkmcal.measurements.components import KINDS, Kind, noun
 from pkmcal.measurements.tracker import Tracker
 
 _ROUNDED = 1e-9  # share by which a covariance may miss symmetry, as what was computed or typed does
@@ -148,8 +148,7 @@ def target_array(
 ) -> FloatArray | None:
     """One target, one per row, or several that an index chooses from; None where none is given."""
     if not KINDS[kind].point and (given is not None or index is not None):
-        own = "a pose is the platform's own" if kind == "pose" else f"a {kind} reads no point"
-        raise ArgumentError(f"target: {own} and takes no target")
+        raise ArgumentError(f"target: {noun(kind)} are not of a point, and take no target")
     if index is not None and index.min() < 0:
         raise ArgumentError(f"target_index counts from 0; found {index.min()}")
     if given is None:

@@ -9,15 +9,10 @@ import numpy as np
 from pkmcal import display
 from pkmcal.arrays import FloatArray
 from pkmcal.display import Table
-from pkmcal.measurements.components import Kind
+from pkmcal.measurements.components import noun
 from pkmcal.measurements.measurement_writer import Writable
 
 _LISTED_ROWS = 12  # a longer list of measurements is printed with its middle left out
-_NOUNS: dict[Kind, tuple[str, str]] = {  # of one and of several, but for those that take an s
-    "between": ("distance between two places", "distances between two places"),
-    "relative-distance": ("relative distance", "relative distances"),
-    "touch": ("touch", "touches"),
-}
 
 
 class Listed(Writable, Protocol):
@@ -87,7 +82,7 @@ def table(m: Listed) -> Table:
 def title(m: Listed) -> str:
     """How many of what they are, and what is known of them."""
     n = m.actuators.shape[1]
-    what = f"{len(m)} measured {_NOUNS.get(m.kind, (m.kind, m.kind + 's'))[len(m) != 1]}"
+    what = f"{len(m)} measured {noun(m.kind, len(m))}"
     if m.kind == "closure":
         what = f"{len(m)} row{'' if len(m) == 1 else 's'} of actuators alone"
     elif missing := int(np.isnan(m.values.reshape(len(m), -1)).all(axis=1).sum()):

@@ -9,7 +9,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
 from pkmcal.measurements.actuator_columns import columns_of_actuators
-from pkmcal.measurements.components import Kind
+from pkmcal.measurements.components import Kind, noun
 from pkmcal.measurements.kind_columns import components_in, value_columns
 
 
@@ -35,7 +35,9 @@ def read_sigma(table: Table, kind: Kind) -> FloatArray | None:
     table.require(forms[form])
     for name in given:
         if name not in forms[form]:
-            raise table.header_error(f"column {name!r} does not go with {given[0]!r} and {kind}s")
+            raise table.header_error(
+                f"column {name!r} does not go with {given[0]!r} and {noun(kind)}"
+            )
     if form == "covariance":
         sigma = np.empty((len(table), len(names), len(names)))
         for name, (i, j) in zip(forms[form], pairs, strict=True):
