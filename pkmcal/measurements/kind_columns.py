@@ -23,7 +23,7 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, TextArray
+from pkmcal.arrays import FloatArray, TextArray, Unit
 from pkmcal.files.csv_table import Table
 from pkmcal.measurements.actuator_columns import actuators_in
 from pkmcal.measurements.components import (
@@ -43,6 +43,18 @@ _ARTEFACT = re.compile(r"touch(?::(.+))?")
 
 class OfAKind(Protocol):
     """The fields of `Measurements` that are written here."""
+
+    @property
+    def kind(self) -> Kind:
+        """Which key of `KINDS` they are."""
+
+    @property
+    def values(self) -> FloatArray:
+        """What was measured, (N, k) or (N,)."""
+
+    @property
+    def joint(self) -> str | None:
+        """Of an angle, the joint."""
 
     @property
     def other(self) -> FloatArray | None:
@@ -164,6 +176,15 @@ def _known_distances(table: Table, touch: str) -> TouchDistances:
         if found.setdefault((touched[row], other), said) != said:
             raise table.cell_error("touch.distance", row, "found another distance than before")
     return tuple((*pair, *said) for pair, said in found.items())
+
+
+def columns_read(m: OfAKind) -> Iterator[tuple[str, Unit, FloatArray]]:
+    """Name, unit and numbers of each column of what was read; none where the machine touched."""
+    if m.touched is not None and not m.values.any() and not np.signbit(m.values).any():
+        return
+    numbers = m.values.reshape(len(m.values), -1).T
+    for (name, unit), column in zip(components(m.kind, m.artefact), numbers, strict=True):
+        yield name if m.joint is None else f"angle:{m.joint}", unit, column
 
 
 def kind_cells(m: OfAKind, units: Sequence[str]) -> Iterator[tuple[str, Sequence[str]]]:

@@ -10,6 +10,7 @@ from pkmcal import display
 from pkmcal.arrays import FloatArray
 from pkmcal.display import Table
 from pkmcal.measurements.components import noun
+from pkmcal.measurements.kind_columns import columns_read
 from pkmcal.measurements.measurement_writer import Writable
 
 _LISTED_ROWS = 12  # a longer list of measurements is printed with its middle left out
@@ -22,12 +23,8 @@ class Listed(Writable, Protocol):
         """Number of rows."""
 
     @property
-    def components(self) -> tuple[str, ...]:
-        """Names of the components of one value."""
-
-    @property
     def units(self) -> tuple[str, ...]:
-        """Their units."""
+        """Units of the components of one value."""
 
     @property
     def sessions(self) -> tuple[str, ...]:
@@ -58,12 +55,9 @@ def table(m: Listed) -> Table:
             heads.append(name)
             columns.append([display.printable(label) for label in labels])
     sigmas = deviations(m)
-    for i, (name, unit) in enumerate(zip(m.components, m.units, strict=True)):
-        if m.touched is not None and not m.values.any():
-            break
-        heads.append(_heading(name if m.joint is None else f"angle:{m.joint}", unit))
-        sigma = None if sigmas is None else sigmas[:, i]
-        columns.append(_column(m.values.reshape(len(m), -1)[:, i], unit, sigma))
+    for i, (name, unit, column) in enumerate(columns_read(m)):
+        heads.append(_heading(name, unit))
+        columns.append(_column(column, unit, None if sigmas is None else sigmas[:, i]))
     if m.target_index is not None and m.target_names is not None:
         heads.append("target")
         columns.append([m.target_names[i] for i in m.target_index])
