@@ -28,6 +28,11 @@ def numbers(name: str, given: ArrayLike, blank: bool = False) -> FloatArray:
     return array
 
 
+def is_name(text: str) -> bool:
+    """Whether a name can be written and read: on one line, not empty, not too long."""
+    return 0 < len(text) <= LONGEST_NAME and text == " ".join(text.split())
+
+
 def integers(name: str, given: ArrayLike, rows: int) -> Int64Array:
     """A copy as whole numbers, one per row."""
     array = numbers(name, given)
@@ -254,7 +259,7 @@ def sessions_array(given: str | Sequence[str] | TextArray | None, rows: int) -> 
             f"session must be one name, or one for each of {rows} rows; found {len(names)}"
         )
     for name in dict.fromkeys(names):
-        if not name or name != " ".join(name.split()) or "@" in name or len(name) > LONGEST_NAME:
+        if not is_name(name) or "@" in name:
             raise ArgumentError(
                 "session must be a name on one line, of at most"
                 f" {LONGEST_NAME} characters and without '@'; found {shown(name)}"
