@@ -215,9 +215,11 @@ def names_of_targets(
         count = int(index.max()) + 1 if target is None else len(target)
         return tuple(str(i + 1) for i in range(count))
     names = words("target_names", given)
-    odd = [name for name in names if name != " ".join(name.split()) or not name]
-    if odd or len(set(names)) < len(names):
-        raise ArgumentError(f"target_names must be different names on one line; found {names!r}")
+    if not all(map(is_name, names)) or len(set(names)) < len(names):
+        raise ArgumentError(
+            f"target_names must be different names on one line, of at most {LONGEST_NAME}"
+            f" characters; found {shown(names)}"
+        )
     if len(names) <= index.max() or (target is not None and len(names) != len(target)):
         wanted = int(index.max()) + 1 if target is None else len(target)
         raise ArgumentError(f"target_names must name {wanted} targets; found {len(names)}")
