@@ -301,6 +301,12 @@ class Table:
             raise self.cell_error(name, row, f"expected a smaller number, found {cell!r}")
         return converted, quantity
 
+    def stacked(self, names: Sequence[str], units: Sequence[str]) -> FloatArray:
+        """Columns of numbers side by side (rows, k), each in its unit; all have to be there."""
+        self.require(names)
+        columns = [self.numbers(name, unit)[0] for name, unit in zip(names, units, strict=True)]
+        return np.stack(columns, axis=1)
+
     def _conversion(
         self, column: Column, quantities: tuple[str, ...], expected: str | None
     ) -> tuple[str, tuple[float, float]]:

@@ -129,10 +129,7 @@ def value_columns(table: Table, kind: Kind) -> Components:
 def read_kind_fields(table: Table, kind: Kind, units: Sequence[str]) -> dict[str, Any]:
     """The fields of `Measurements` that this kind alone has."""
     if kind == "between":
-        names = [f"to.q{i + 1}" for i in range(len(units))]
-        table.require(names)
-        columns = [table.numbers(n, unit)[0] for n, unit in zip(names, units, strict=True)]
-        return {"other": np.stack(columns, axis=1)}
+        return {"other": table.stacked([f"to.q{i + 1}" for i in range(len(units))], units)}
     if kind == "relative-distance":
         return {"run": np.array(table.texts("run"))}
     if kind == "angle":

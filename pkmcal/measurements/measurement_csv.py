@@ -74,7 +74,7 @@ from pkmcal.measurements.kind_columns import (
     value_columns,
 )
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.orientation_columns import checked, names_in
+from pkmcal.measurements.orientation_columns import ANGLES, checked, names_in
 from pkmcal.measurements.probe import (
     agreement,
     apart_from,
@@ -94,7 +94,6 @@ from pkmcal.measurements.table_layout import (
 from pkmcal.measurements.target_columns import read_several, read_targets, several_targets
 
 _AXES = ("x", "y", "z")
-_ANGLES = ("alpha", "beta", "gamma")
 _TRIED = 200  # rows by which an order of angles is told
 
 
@@ -248,7 +247,7 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
             )
         poses = robot.forward(actuators).pose[:, :3]
     else:
-        poses = np.column_stack([*(table.numbers(axis, "mm")[0] for axis in "xy"), z])
+        poses = np.column_stack([table.stacked(["x", "y"], ["mm", "mm"]), z])
     try:
         measured = probed(robot, poses, offset=offset, sigma=sigma)
     except ValueError as error:
@@ -297,7 +296,7 @@ def _has(table: Table, name: str) -> bool:
 
 def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     """Names of columns that are read."""
-    components = _AXES + _ANGLES
+    components = _AXES + ANGLES
     actuators = {f"q{i + 1}" for i in range(len(table.columns))} | {*actuators_in(table)}
     names = actuators | {*components, "distance", "sigma", "group", "session", "target", "probe"}
     names |= {"actuator_sigma", "approach"}
@@ -312,7 +311,7 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
 def _kind(table: Table, several: tuple[str, ...]) -> Kind:
     """What was measured, by the columns that are there."""
     names = table.columns.keys()
-    turned = set(names_in(table)) | (set(_ANGLES) & names)
+    turned = set(names_in(table)) | (set(ANGLES) & names)
     own = kinds_in(table)
     groups = {
         **{title: {title} for title in own},
@@ -343,7 +342,7 @@ def _read_values(
     robot: Actuated | None,
 ) -> FloatArray | None:
     """What was measured, (N, k) or (N,); None without columns of it."""
-    if KINDS[kind].turning is not None and names_in(table) not in ((), _ANGLES):
+    if KINDS[kind].turning is not None and names_in(table) not in ((), ANGLES):
         places = [table.numbers(axis, "mm")[0] for axis in _AXES] if kind == "pose" else []
         nominal = _nominal(robot, actuators)
         return np.column_stack([*places, orientation_columns.read(table, rotation, nominal)])

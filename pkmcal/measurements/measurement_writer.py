@@ -106,12 +106,13 @@ def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
         yield f"{name} [{unit}]", _exact(column)
     yield from _actuator_sigma(m)
     read = components(m.kind, m.artefact)
+    units_read = [unit for _, unit in read]
     if m.sigma is not None and m.sigma.ndim == 3:
         for i, j in itertools.combinations_with_replacement(range(len(read)), 2):
             (a, of_a), (b, of_b) = read[i], read[j]
             yield f"cov.{a}.{b} [{of_a}*{of_b}]", _exact(m.sigma[:, i, j])
-    elif m.sigma is not None and m.kind != "pose" and (m.sigma == m.sigma[:, :1]).all():
-        yield f"sigma [{read[0][1]}]", _exact(m.sigma[:, 0])
+    elif m.sigma is not None and len(set(units_read)) == 1 and (m.sigma == m.sigma[:, :1]).all():
+        yield f"sigma [{units_read[0]}]", _exact(m.sigma[:, 0])
     elif m.sigma is not None:
         for i, (name, unit) in enumerate(read):
             yield f"sigma.{name} [{unit}]", _exact(m.sigma[:, i])

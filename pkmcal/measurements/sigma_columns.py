@@ -28,9 +28,10 @@ def read_sigma(table: Table, kind: Kind) -> FloatArray | None:
         "covariance": [f"cov.{names[i]}.{names[j]}" for i, j in pairs],
     }
     form = "covariance" if given[0].startswith("cov") else "each" if "." in given[0] else "one"
-    if form == "one" and kind == "pose":
+    if form == "one" and len(set(units)) > 1:
         raise table.header_error(
-            f"column 'sigma' for poses: expected {forms['each'][0]!r} to {forms['each'][-1]!r}"
+            f"column 'sigma' for {noun(kind)}: expected {forms['each'][0]!r} to"
+            f" {forms['each'][-1]!r}"
         )
     table.require(forms[form])
     for name in given:
@@ -65,5 +66,5 @@ def read_actuator_sigma(table: Table, units: tuple[str, ...]) -> FloatArray | No
             "column 'actuator_sigma' for lengths and angles: expected"
             f" 'actuator_sigma.q1' to 'actuator_sigma.q{len(units)}'"
         )
-    columns = [table.numbers(name, unit)[0] for name, unit in zip(names, units, strict=False)]
-    return np.broadcast_to(np.stack(columns, axis=1), (len(table), len(units)))
+    stated = table.stacked(names, units[: len(names)])
+    return np.broadcast_to(stated, (len(table), len(units)))

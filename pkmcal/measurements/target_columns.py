@@ -93,7 +93,7 @@ def _read_point(table: Table, name: str) -> FloatArray | None:
     columns = [f"{name}.{axis}" for axis in _AXES]
     if not any(column in table.columns for column in columns):
         return None
-    return np.stack([table.numbers(column, "mm")[0] for column in columns], axis=1)
+    return table.stacked(columns, ["mm"] * 3)
 
 
 def _one(places: FloatArray) -> FloatArray:
