@@ -122,9 +122,7 @@ def _chain(
         if not any(joint.axis):
             raise FileError(f"{path}: joint {joint.name!r}: axis must be a direction, found 0 0 0")
         axis = np.array(joint.axis)
-        kind = _KINDS[joint.type]
-        low, high = (end * (_METRE if kind == "prismatic" else 1.0) for end in joint.limits)
-        joints.append(Joint(joint.name, kind, parent, place, axis, (low, high)))
+        joints.append(Joint(joint.name, _KINDS[joint.type], parent, place, axis, joint.limits))
     if not joints:
         raise FileError(f"{path}: no moving joint above the link {tip!r}")
     return robot.name, joints, place

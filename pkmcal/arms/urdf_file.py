@@ -29,7 +29,7 @@ _XACRO = "{http://www.ros.org/wiki/xacro}"
 class Element:
     """A joint as the file states it: origin (4, 4) in its parent link, mm; axis in its frame.
 
-    Its limits are in m or rad, infinite where it states none.
+    Its limits are in mm or rad, infinite where it states none.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Element:
     origin: FloatArray
     axis: tuple[float, float, float]
     mimics: bool
-    limits: tuple[float, float] = (-math.inf, math.inf)
+    limits: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -134,12 +134,14 @@ def _joint(path: str | PathLike[str], joint: ElementTree.Element) -> Element:
     home = screw.from_pose([*(_METRE * number for number in pose[:3]), *pose[3:]])
     axis = _three(place, _only(place, joint, "axis"), "xyz", default=(1.0, 0.0, 0.0))
     mimics = _only(place, joint, "mimic") is not None
-    limits = _limits(place, joint) if kind in ("revolute", "prismatic") else (-math.inf, math.inf)
+    limits = _limits(place, joint, kind)
     return Element(name, kind, ends[0], ends[1], np.asarray(home), axis, mimics, limits)
 
 
-def _limits(place: str, joint: ElementTree.Element) -> tuple[float, float]:
+def _limits(place: str, joint: ElementTree.Element, kind: str) -> tuple[float, float]:
     """The ends of a joint; both are 0 where they are left out, as URDF has it, which is none."""
+    if kind not in ("revolute", "prismatic"):
+        return -math.inf, math.inf
     stated = _only(place, joint, "limit")
     if stated is None or (stated.get("lower") is None and stated.get("upper") is None):
         return -math.inf, math.inf
@@ -149,7 +151,8 @@ def _limits(place: str, joint: ElementTree.Element) -> tuple[float, float]:
         raise FileError(f"{place}: <limit> lower and upper must be numbers") from None
     if not low <= high:
         raise FileError(f"{place}: <limit> from {low:g} to {high:g}")
-    return low, high
+    per_unit = _METRE if kind == "prismatic" else 1.0
+    return low * per_unit, high * per_unit
 
 
 def _attribute(place: object, element: ElementTree.Element, name: str) -> str:

@@ -202,10 +202,7 @@ def read_reached(path: str | PathLike[str]) -> FloatArray:
         lambda name: name in POSE or _BESIDE.fullmatch(name) is not None, list(POSE)
     )
     wanted = POSE if any(name in table.columns for name in POSE[3:]) else POSE[:3]
-    table.require(wanted)
-    return np.stack(
-        [table.numbers(name, "rad" if name in POSE[3:] else "mm")[0] for name in wanted], axis=1
-    )
+    return table.stacked(wanted, ["rad" if name in POSE[3:] else "mm" for name in wanted])
 
 
 def _orientation(robot: Robot, reached: FloatArray, path: Path) -> Orientation:

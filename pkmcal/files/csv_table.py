@@ -24,20 +24,13 @@ from pkmcal.arrays import FloatArray, Int64Array
 from pkmcal.exceptions import FileError
 from pkmcal.files import reading, units
 from pkmcal.files.column_names import BESIDE, is_known
-from pkmcal.files.header import Header, find_header
+from pkmcal.files.header import Header, find_header, parted
 from pkmcal.files.reading import LONGEST_NAME, MOST_CELLS, MOST_COLUMNS
 from pkmcal.files.text_rows import TextRows, text_rows
 from pkmcal.files.xlsx_rows import xlsx_rows
 
-_LOOSE = re.compile(
-    rf"(?P<name>.*[^\s_/])\s*"
-    rf"(?:\(\s*(?P<in>{units.PATTERN})\s*\)|[_/ ]\s*(?P<after>{units.PATTERN}))",
-    re.IGNORECASE,
-)
-_HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
 _UNSEEN = ("-", "--", "---", "n/a", "na", "nan", "null", "none", "#n/a", "?")
 _SHOWN = 8  # names of columns in a message
-_NUMBERED = re.compile(r"(?P<name>.*)\[(?P<number>[0-9]+)\]\s*")
 
 
 @dataclass(frozen=True)
@@ -123,7 +116,7 @@ class Table:
         if headings is not None:
             header = Header(0, list(headings), text.rows)
         else:
-            header = find_header(self.path, text, _recognised)
+            header = find_header(self.path, text)
         self._comma = packed or text.separator != ","
         self._header_line = header.line
         self._units = dict(header.units)
@@ -251,6 +244,10 @@ class Table:
                     hint = f"; not known: {named}{more}; --rename OLD=NEW says what one is"
                 raise self.header_error(f"missing column {name!r}{hint}")
 
+    def _column(self, name: str) -> Column:
+        self.require([name])
+        return self.columns[name]
+
     def numbers(
         self,
         name: str,
@@ -265,7 +262,7 @@ class Table:
         Parameters
         ----------
         name : str
-            A column that is there.
+            The column.
         *quantities : str
             What it may be: "mm" for lengths, "rad" for angles, "mm*mm", "mm*rad"… for products;
             "count" for steps and revolutions, "1" for a number without unit.
@@ -284,7 +281,7 @@ class Table:
         quantity : str
             Which of `quantities` its unit belongs to.
         """
-        column = self.columns[name]
+        column = self._column(name)
         if column.unit is None and like in self.columns and (unit := self.columns[like].unit):
             other = self.columns[like].name
             self._note(f"column {column.name!r} has no unit, taken as [{unit}] like {other!r}")
@@ -303,6 +300,12 @@ class Table:
             cell = column.cells[row]
             raise self.cell_error(name, row, f"expected a smaller number, found {cell!r}")
         return converted, quantity
+
+    def stacked(self, names: Sequence[str], units: Sequence[str]) -> FloatArray:
+        """Columns of numbers side by side (rows, k), each in its unit; all have to be there."""
+        self.require(names)
+        columns = [self.numbers(name, unit)[0] for name, unit in zip(names, units, strict=True)]
+        return np.stack(columns, axis=1)
 
     def _conversion(
         self, column: Column, quantities: tuple[str, ...], expected: str | None
@@ -358,7 +361,7 @@ class Table:
 
     def texts(self, name: str) -> tuple[str, ...]:
         """A column of names, without unit and none of them empty."""
-        column = self.columns[name]
+        column = self._column(name)
         if column.unit:
             raise self.header_error(f"column {name!r} takes no unit; found [{column.unit}]")
         for row, cell in enumerate(column.cells):
@@ -373,23 +376,6 @@ class Table:
             if not re.fullmatch(r"[+-]?[0-9]{1,18}", cell):
                 raise self.cell_error(name, row, f"expected a whole number, found {cell!r}")
         return np.array([int(cell) for cell in cells], dtype=np.int64)
-
-
-def _recognised(heading: str) -> bool:
-    heading = " ".join(heading.split())
-    return len(heading) <= LONGEST_NAME and is_known(parted(heading)[0])
-
-
-def parted(heading: str) -> tuple[str, str | None]:
-    """Name and unit of a heading."""
-    match, loose = _HEADING.fullmatch(heading), _LOOSE.fullmatch(heading)
-    if numbered := _NUMBERED.fullmatch(heading):  # actual_q[0], not a unit
-        return f"{numbered['name']}{numbered['number']}", None
-    if match is None:
-        return "", None
-    if match["unit"] is None and loose is not None:
-        return loose["name"], loose["in"] or loose["after"]
-    return match["name"], match["unit"]
 
 
 def _fitted(cells: list[str], names: Sequence[str], packed: bool) -> list[str]:

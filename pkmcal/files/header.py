@@ -1,18 +1,28 @@
-"""Which line of a table names its columns, and what the lines above it say."""
+"""Which line of a table names its columns, what a heading says, and the lines above it."""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from pkmcal.exceptions import FileError
 from pkmcal.files import units
+from pkmcal.files.column_names import is_known
+from pkmcal.files.reading import LONGEST_NAME
 from pkmcal.files.text_rows import TextRows, cells, is_number
 
 Row = tuple[int, list[str]]
 POINTS = ("collection", "group", "name")  # names before the coordinates, where no line names them
+_LOOSE = re.compile(
+    rf"(?P<name>.*[^\s_/])\s*"
+    rf"(?:\(\s*(?P<in>{units.PATTERN})\s*\)|[_/ ]\s*(?P<after>{units.PATTERN}))",
+    re.IGNORECASE,
+)
+_HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
+_NUMBERED = re.compile(r"(?P<name>.*)\[(?P<number>[0-9]+)\]\s*")
 
 
 @dataclass
@@ -40,7 +50,7 @@ class Header:
     notes: list[str] = field(default_factory=list)
 
 
-def find_header(path: Path, text: TextRows, recognised: Callable[[str], bool]) -> Header:
+def find_header(path: Path, text: TextRows) -> Header:
     """Find the line of column names: of those above the first numbers the one most recognised.
 
     Parameters
@@ -49,8 +59,6 @@ def find_header(path: Path, text: TextRows, recognised: Callable[[str], bool]) -
         For messages.
     text : TextRows
         The lines of the file.
-    recognised : callable
-        Whether a heading is one of a column that is known.
 
     Raises
     ------
@@ -63,11 +71,11 @@ def find_header(path: Path, text: TextRows, recognised: Callable[[str], bool]) -
     first = _first_data(rows)
     stated = units.stated_in([*text.comments, *((n, " ".join(r)) for n, r in rows[:first])])
     if first == 0:
-        header = _without(path, text, recognised)
+        header = _without(path, text)
         header.units = stated
         return header
     above = rows[: first or 1]
-    counts = [sum(recognised(cell) for cell in row) for _, row in above]
+    counts = [sum(_recognised(cell) for cell in row) for _, row in above]
     best = max(range(len(above)), key=lambda i: (counts[i], i if counts[i] else -i))
     line, headings = above[best]
     below = rows[best + 1 :]
@@ -82,6 +90,23 @@ def find_header(path: Path, text: TextRows, recognised: Callable[[str], bool]) -
         lines = lines if best > 1 else f"line {above[0][0]}"
         header.notes.append(f"column names in line {line}; {lines} above {what} outside the table")
     return header
+
+
+def _recognised(heading: str) -> bool:
+    heading = " ".join(heading.split())
+    return len(heading) <= LONGEST_NAME and is_known(parted(heading)[0])
+
+
+def parted(heading: str) -> tuple[str, str | None]:
+    """Name and unit of a heading."""
+    match, loose = _HEADING.fullmatch(heading), _LOOSE.fullmatch(heading)
+    if numbered := _NUMBERED.fullmatch(heading):  # actual_q[0], not a unit
+        return f"{numbered['name']}{numbered['number']}", None
+    if match is None:
+        return "", None
+    if match["unit"] is None and loose is not None:
+        return loose["name"], loose["in"] or loose["after"]
+    return match["name"], match["unit"]
 
 
 def _first_data(rows: Sequence[Row]) -> int | None:
@@ -138,7 +163,7 @@ def _tell_apart(headings: list[str], above: Sequence[Sequence[str]]) -> None:
                 headings[i] = row[i]
 
 
-def _without(path: Path, text: TextRows, recognised: Callable[[str], bool]) -> Header:
+def _without(path: Path, text: TextRows) -> Header:
     """A table whose first line holds numbers: the names are in a comment, or names and x y z."""
     line, first = text.rows[0]
     for number, comment in reversed(text.comments):
@@ -146,7 +171,7 @@ def _without(path: Path, text: TextRows, recognised: Callable[[str], bool]) -> H
         if (
             ":" not in comment
             and len(names) == len(first)
-            and 2 * sum(map(recognised, names)) >= len(names)
+            and 2 * sum(map(_recognised, names)) >= len(names)
         ):
             note = f"column names in line {number}, a comment"
             return Header(number, names, text.rows, notes=[note])

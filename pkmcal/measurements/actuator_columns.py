@@ -11,7 +11,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
 from pkmcal.kinematics.robot import Robot
 
-ACTUATOR = re.compile(r"q[1-9][0-9]*")
+_ACTUATOR = re.compile(r"q[1-9][0-9]*")
 
 
 class Actuated(Protocol):
@@ -22,15 +22,32 @@ class Actuated(Protocol):
         """Unit of each actuator, "mm" or "rad"."""
 
 
+def actuators_in(table: Table) -> list[str]:
+    """The columns of actuators, as they stand."""
+    return [name for name in table.columns if _ACTUATOR.fullmatch(name)]
+
+
+def columns_of_actuators(table: Table, what: str, count: int) -> list[str]:
+    """The columns that state something of the actuators: one for all, or one of each; or none."""
+    given = [name for name in table.columns if name.startswith(what)]
+    if not given or given == [what]:
+        return given
+    each = [f"{what}.q{i + 1}" for i in range(count)]
+    table.require(each)
+    if len(given) > count:
+        raise table.header_error(f"column {what!r} does not go with those of actuators")
+    return each
+
+
 def read_actuators(table: Table, robot: Actuated | None) -> tuple[FloatArray, tuple[str, ...]]:
     """Actuator coordinates (N, n), and the unit of each, "mm" or "rad"."""
-    count = max((int(n[1:]) for n in table.columns if ACTUATOR.fullmatch(n)), default=1)
+    count = max((int(name[1:]) for name in actuators_in(table)), default=1)
     expected = () if robot is None else tuple(robot.actuator_units)
     columns, units = [], []
     for i in range(count):
         of_robot = expected[i] if i < len(expected) else None
         quantities = ("mm", "rad", "count") if of_robot != "mm" else ("mm", "count", "rad")
-        values, unit = _numbers(table, f"q{i + 1}", *quantities, expected=of_robot)
+        values, unit = table.numbers(f"q{i + 1}", *quantities, expected=of_robot)
         if unit == "count":
             unit = _counted(table, i, of_robot, robot)
         columns.append(values)
@@ -80,10 +97,3 @@ def compare(table: Table, units: tuple[str, ...], robot: Actuated | None) -> Non
             raise table.header_error(
                 f"column 'q{i + 1}' is {what[unit]}; the robot's actuator is {what[robots]}"
             )
-
-
-def _numbers(
-    table: Table, name: str, *quantities: str, expected: str | None
-) -> tuple[FloatArray, str]:
-    table.require([name])
-    return table.numbers(name, *quantities, expected=expected)

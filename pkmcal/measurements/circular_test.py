@@ -123,28 +123,26 @@ def circular_test(
     nominal = number("radius", radius, above=0)
     given = {"path": path} | ({} if other is None else {"other": other})
     paths = [_points(name, points) for name, points in given.items()]
-    circles = [_least_squares(points) for points in paths]
-    centre, mean = _least_squares(np.concatenate(paths))
-    full = all(_goes_round(points, own) for points, (own, _) in zip(paths, circles, strict=True))
+    centres = [_least_squares(points)[0] for points in paths]
+    distances = [_away(points, own) for points, own in zip(paths, centres, strict=True)]
+    centre, size = _least_squares(np.concatenate(paths))
+    full = all(_goes_round(points, own) for points, own in zip(paths, centres, strict=True))
     if centred and not full:
         raise ArgumentError(
             "path: an arc has no least-squares centre that radial deviations may be counted from:"
             " give centred=False"
         )
-    origins = [own if centred else np.zeros(2) for own, _ in circles]
-    off = [_away(points, o) - nominal for points, o in zip(paths, origins, strict=True)]
+    counted = distances if centred else [_away(points, np.zeros(2)) for points in paths]
+    off = [each - nominal for each in counted]
     several = len(paths) > 1
-    radii = [_away(points, own).mean() for points, (own, _) in zip(paths, circles, strict=True)]
+    radii = [each.mean() for each in distances]
     return CircularTest(
-        deviation=tuple(
-            float(np.ptp(_away(points, own)))
-            for points, (own, _) in zip(paths, circles, strict=True)
-        ),
+        deviation=tuple(float(np.ptp(each)) for each in distances),
         bidirectional=float(np.ptp(_away(np.concatenate(paths), centre))) if several else np.nan,
         radial=tuple((float(each.max()), float(each.min())) for each in off),
         mean_radial=float(np.mean(radii)) - nominal if several and full else np.nan,
         centre=centre,
-        radius=mean,
+        radius=size,
         nominal=nominal,
         full=full,
     )

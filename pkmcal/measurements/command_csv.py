@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 
-import numpy as np
-
 from pkmcal.arrays import FloatArray
 from pkmcal.files.column_names import known_as
 from pkmcal.files.csv_table import Table
@@ -37,10 +35,7 @@ def read_commands(path: str | PathLike[str], units: Sequence[str]) -> FloatArray
     """
     table = Table(path)
     table.rename(known_as)
-    names = [f"q{i + 1}" for i in range(len(units))]
-    table.require(names)
-    columns = [table.numbers(name, unit)[0] for name, unit in zip(names, units, strict=True)]
-    return np.stack(columns, axis=1)
+    return table.stacked([f"q{i + 1}" for i in range(len(units))], units)
 
 
 def write_commands(

@@ -33,12 +33,15 @@ class KindOfReading:
         Whether the readings are in the frame of an instrument.
     point : str
         Whose place `Measurements.target` is: of the "platform", of the "base", or "" of neither.
+    nouns : (str, str) or None
+        What one and several are called, where not as the kind and with an s.
     """
 
     components: Components
     turning: int | None = None
     framed: bool = False
     point: Literal["platform", "base", ""] = ""
+    nouns: tuple[str, str] | None = None
 
 
 KINDS: dict[Kind, KindOfReading] = {
@@ -47,12 +50,20 @@ KINDS: dict[Kind, KindOfReading] = {
     "height": KindOfReading((("z", "mm"),), framed=True, point="platform"),
     "distance": KindOfReading(_DISTANCE, point="base"),
     "closure": KindOfReading(()),  # the actuators alone
-    "between": KindOfReading(_DISTANCE, point="platform"),
-    "relative-distance": KindOfReading(_DISTANCE, point="base"),
+    "between": KindOfReading(
+        _DISTANCE,
+        point="platform",
+        nouns=("distance between two places", "distances between two places"),
+    ),
+    "relative-distance": KindOfReading(
+        _DISTANCE, point="base", nouns=("relative distance", "relative distances")
+    ),
     "orientation": KindOfReading(_ANGLES, turning=0, framed=True),
     "tilt": KindOfReading((("tilt1", "rad"), ("tilt2", "rad")), framed=True),
     "angle": KindOfReading((("angle", "rad"),)),
-    "touch": KindOfReading((), point="platform"),  # by artefact, see below
+    "touch": KindOfReading(  # components by artefact, see below
+        (), point="platform", nouns=("touch", "touches")
+    ),
     "touch-distance": KindOfReading(_DISTANCE),  # between two touched points; no pose has to do
 }
 
@@ -68,3 +79,9 @@ TOUCHES: dict[Artefact, Components] = {
 def components(kind: Kind, artefact: Artefact | None = None) -> Components:
     """Names and units of the numbers of one value."""
     return KINDS[kind].components if artefact is None else TOUCHES[artefact]
+
+
+def noun(kind: Kind, count: int = 2) -> str:
+    """What one, or several, are called."""
+    one, several = KINDS[kind].nouns or (kind, f"{kind}s")
+    return one if count == 1 else several

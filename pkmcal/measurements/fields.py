@@ -11,7 +11,7 @@ from pkmcal.arguments import shown, words
 from pkmcal.arrays import FloatArray, Int64Array, TextArray, as_numbers
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import LONGEST_NAME
-from pkmcal.measurements.components import KINDS, Kind
+from pkmcal.measurements.components import KINDS, Kind, noun
 from pkmcal.measurements.tracker import Tracker
 
 _ROUNDED = 1e-9  # share by which a covariance may miss symmetry, as what was computed or typed does
@@ -26,6 +26,11 @@ def numbers(name: str, given: ArrayLike, blank: bool = False) -> FloatArray:
         where = f" at index {', '.join(map(str, first))}" if first else ""
         raise ArgumentError(f"{name} must be finite; found {array[first]}{where}")
     return array
+
+
+def is_name(text: str) -> bool:
+    """Whether a name can be written and read: on one line, not empty, not too long."""
+    return 0 < len(text) <= LONGEST_NAME and text == " ".join(text.split())
 
 
 def integers(name: str, given: ArrayLike, rows: int) -> Int64Array:
@@ -148,8 +153,7 @@ def target_array(
 ) -> FloatArray | None:
     """One target, one per row, or several that an index chooses from; None where none is given."""
     if not KINDS[kind].point and (given is not None or index is not None):
-        own = "a pose is the platform's own" if kind == "pose" else f"a {kind} reads no point"
-        raise ArgumentError(f"target: {own} and takes no target")
+        raise ArgumentError(f"target: {noun(kind)} are not of a point, and take no target")
     if index is not None and index.min() < 0:
         raise ArgumentError(f"target_index counts from 0; found {index.min()}")
     if given is None:
@@ -211,9 +215,11 @@ def names_of_targets(
         count = int(index.max()) + 1 if target is None else len(target)
         return tuple(str(i + 1) for i in range(count))
     names = words("target_names", given)
-    odd = [name for name in names if name != " ".join(name.split()) or not name]
-    if odd or len(set(names)) < len(names):
-        raise ArgumentError(f"target_names must be different names on one line; found {names!r}")
+    if not all(map(is_name, names)) or len(set(names)) < len(names):
+        raise ArgumentError(
+            f"target_names must be different names on one line, of at most {LONGEST_NAME}"
+            f" characters; found {shown(names)}"
+        )
     if len(names) <= index.max() or (target is not None and len(names) != len(target)):
         wanted = int(index.max()) + 1 if target is None else len(target)
         raise ArgumentError(f"target_names must name {wanted} targets; found {len(names)}")
@@ -255,7 +261,7 @@ def sessions_array(given: str | Sequence[str] | TextArray | None, rows: int) -> 
             f"session must be one name, or one for each of {rows} rows; found {len(names)}"
         )
     for name in dict.fromkeys(names):
-        if not name or name != " ".join(name.split()) or "@" in name or len(name) > LONGEST_NAME:
+        if not is_name(name) or "@" in name:
             raise ArgumentError(
                 "session must be a name on one line, of at most"
                 f" {LONGEST_NAME} characters and without '@'; found {shown(name)}"

@@ -11,6 +11,7 @@ import numpy as np
 from pkmcal.arrays import IntArray
 from pkmcal.exceptions import FileError
 from pkmcal.files.csv_table import Table
+from pkmcal.measurements.actuator_columns import actuators_in
 from pkmcal.measurements.point_names import split
 from pkmcal.measurements.time_stamps import seconds
 
@@ -36,7 +37,7 @@ def join(table: Table, log: Table, how: Join) -> None:
     ValueError
         The tables cannot be joined so; the message says why for each way that was tried.
     """
-    actuators = [name for name in log.columns if re.fullmatch(r"q[0-9]+", name)]
+    actuators = actuators_in(log)
     if not actuators:
         raise log.header_error(f"no actuators: expected columns q1, q2 …{_columns(log)}")
     tries = {"name": _by_name, "time": _by_time, "row": _by_row}
@@ -167,7 +168,7 @@ def _moving(log: Table, rows: IntArray) -> int:
     used = np.unique(rows)
     if len(log) < 2 * len(used):
         return 0
-    cells = [c.cells for n, c in log.columns.items() if re.fullmatch(r"q[0-9]+", n)]
+    cells = [log.columns[name].cells for name in actuators_in(log)]
     here = list(zip(*cells, strict=True))
     return sum(here[i] != here[min(i + 1, len(here) - 1)] for i in rows)
 

@@ -23,9 +23,9 @@ from typing import Any, Protocol, cast
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, TextArray
+from pkmcal.arrays import FloatArray, TextArray, Unit
 from pkmcal.files.csv_table import Table
-from pkmcal.measurements.actuator_columns import ACTUATOR
+from pkmcal.measurements.actuator_columns import actuators_in
 from pkmcal.measurements.components import (
     KINDS,
     TOUCHES,
@@ -43,6 +43,18 @@ _ARTEFACT = re.compile(r"touch(?::(.+))?")
 
 class OfAKind(Protocol):
     """The fields of `Measurements` that are written here."""
+
+    @property
+    def kind(self) -> Kind:
+        """Which key of `KINDS` they are."""
+
+    @property
+    def values(self) -> FloatArray:
+        """What was measured, (N, k) or (N,)."""
+
+    @property
+    def joint(self) -> str | None:
+        """Of an angle, the joint."""
 
     @property
     def other(self) -> FloatArray | None:
@@ -68,7 +80,7 @@ class OfAKind(Protocol):
 def names_of_kinds(table: Table) -> set[str]:
     """Names of columns that are read here."""
     names = {name for name in table.columns if _JOINT.fullmatch(name)}
-    names |= {f"to.{name}" for name in table.columns if ACTUATOR.fullmatch(name)}
+    names |= {f"to.{name}" for name in actuators_in(table)}
     names |= {"tilt1", "tilt2", "touch", *(f"touch:{name}" for name in TOUCHES), *_STATED}
     names |= {name for name in _offsets() if name in table.columns}
     return names | ({"run"} if "distance" in table.columns else set())
@@ -117,10 +129,7 @@ def value_columns(table: Table, kind: Kind) -> Components:
 def read_kind_fields(table: Table, kind: Kind, units: Sequence[str]) -> dict[str, Any]:
     """The fields of `Measurements` that this kind alone has."""
     if kind == "between":
-        names = [f"to.q{i + 1}" for i in range(len(units))]
-        table.require(names)
-        columns = [table.numbers(n, unit)[0] for n, unit in zip(names, units, strict=True)]
-        return {"other": np.stack(columns, axis=1)}
+        return {"other": table.stacked([f"to.q{i + 1}" for i in range(len(units))], units)}
     if kind == "relative-distance":
         return {"run": np.array(table.texts("run"))}
     if kind == "angle":
@@ -164,6 +173,15 @@ def _known_distances(table: Table, touch: str) -> TouchDistances:
         if found.setdefault((touched[row], other), said) != said:
             raise table.cell_error("touch.distance", row, "found another distance than before")
     return tuple((*pair, *said) for pair, said in found.items())
+
+
+def columns_read(m: OfAKind) -> Iterator[tuple[str, Unit, FloatArray]]:
+    """Name, unit and numbers of each column of what was read; none where the machine touched."""
+    if m.touched is not None and not m.values.any() and not np.signbit(m.values).any():
+        return
+    numbers = m.values.reshape(len(m.values), -1).T
+    for (name, unit), column in zip(components(m.kind, m.artefact), numbers, strict=True):
+        yield name if m.joint is None else f"angle:{m.joint}", unit, column
 
 
 def kind_cells(m: OfAKind, units: Sequence[str]) -> Iterator[tuple[str, Sequence[str]]]:

@@ -13,7 +13,7 @@ from pkmcal.arrays import FloatArray, TextArray
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.files.reading import LONGEST_NAME
 from pkmcal.measurements.components import TOUCHES, Artefact, Kind
-from pkmcal.measurements.fields import numbers
+from pkmcal.measurements.fields import is_name, numbers
 
 TouchDistances = tuple[tuple[str, str, float, float], ...]  # two names, mm, standard deviation
 GAUGE = 0.001  # mm; standard deviation of a known distance
@@ -24,6 +24,10 @@ _KIND_OF = {
     "touched": "touch",
     "artefact": "touch",
     "joint": "angle",
+}
+_NEEDED = {
+    "other": "a distance between two places needs the actuators at the second",
+    "run": "relative distances need the run that each is of",
 }
 
 
@@ -52,6 +56,8 @@ def kind_fields(
     for name, of in _KIND_OF.items():
         if getattr(given, name) is not None and kind != of:
             raise ArgumentError(f"{name}: goes with values of kind {of!r}, not of {kind!r}")
+        if getattr(given, name) is None and kind == of and name in _NEEDED:
+            raise ArgumentError(f"{name}: {_NEEDED[name]}")
     if given.touch_distances and kind not in ("touch", "touch-distance"):
         raise ArgumentError(f"touch_distances: go with values of kind 'touch', not of {kind!r}")
     touched, artefact = given.touched, given.artefact
@@ -63,8 +69,8 @@ def kind_fields(
             wide = len(TOUCHES[artefact])
             values = np.zeros((rows, wide) if wide > 1 else rows)
     fields = {
-        "other": _other(given.other, kind, shape),
-        "run": _labels("run", given.run, rows, kind == "relative-distance"),
+        "other": _other(given.other, shape),
+        "run": _labels("run", given.run, rows),
         "touched": _labels("values" if given.touched is None else "touched", touched, rows),
         "artefact": artefact,
         "touch_distances": _distances(given.touch_distances, artefact),
@@ -94,12 +100,8 @@ def _names_touched(values: ArrayLike | None) -> Sequence[str] | TextArray:
     return named
 
 
-def _other(given: ArrayLike | None, kind: Kind, shape: tuple[int, ...]) -> FloatArray | None:
+def _other(given: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None:
     if given is None:
-        if kind == "between":
-            raise ArgumentError(
-                "other: a distance between two places needs the actuators at the second"
-            )
         return None
     other = numbers("other", given)
     if other.shape != shape:
@@ -107,19 +109,15 @@ def _other(given: ArrayLike | None, kind: Kind, shape: tuple[int, ...]) -> Float
     return other
 
 
-def _labels(
-    argument: str, given: Sequence[str] | TextArray | None, rows: int, needed: bool = False
-) -> TextArray | None:
+def _labels(argument: str, given: Sequence[str] | TextArray | None, rows: int) -> TextArray | None:
     """One name per row."""
     if given is None:
-        if needed:
-            raise ArgumentError(f"{argument}: relative distances need the run that each is of")
         return None
     names = words(argument, given.tolist() if isinstance(given, np.ndarray) else given)
     if isinstance(given, str) or len(names) != rows:
         raise ArgumentError(f"{argument} must be {rows} names, one a row; found {shown(given)}")
     for name in dict.fromkeys(names):
-        if not name or name != " ".join(name.split()) or len(name) > LONGEST_NAME:
+        if not is_name(name):
             raise ArgumentError(
                 f"{argument} must be names on one line, of at most {LONGEST_NAME} characters;"
                 f" found {shown(name)}"

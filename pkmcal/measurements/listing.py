@@ -9,15 +9,11 @@ import numpy as np
 from pkmcal import display
 from pkmcal.arrays import FloatArray
 from pkmcal.display import Table
-from pkmcal.measurements.components import Kind
+from pkmcal.measurements.components import noun
+from pkmcal.measurements.kind_columns import columns_read
 from pkmcal.measurements.measurement_writer import Writable
 
 _LISTED_ROWS = 12  # a longer list of measurements is printed with its middle left out
-_NOUNS: dict[Kind, tuple[str, str]] = {  # of one and of several, but for those that take an s
-    "between": ("distance between two places", "distances between two places"),
-    "relative-distance": ("relative distance", "relative distances"),
-    "touch": ("touch", "touches"),
-}
 
 
 class Listed(Writable, Protocol):
@@ -27,12 +23,8 @@ class Listed(Writable, Protocol):
         """Number of rows."""
 
     @property
-    def components(self) -> tuple[str, ...]:
-        """Names of the components of one value."""
-
-    @property
     def units(self) -> tuple[str, ...]:
-        """Their units."""
+        """Units of the components of one value."""
 
     @property
     def sessions(self) -> tuple[str, ...]:
@@ -63,12 +55,9 @@ def table(m: Listed) -> Table:
             heads.append(name)
             columns.append([display.printable(label) for label in labels])
     sigmas = deviations(m)
-    for i, (name, unit) in enumerate(zip(m.components, m.units, strict=True)):
-        if m.touched is not None and not m.values.any():
-            break
-        heads.append(_heading(name if m.joint is None else f"angle:{m.joint}", unit))
-        sigma = None if sigmas is None else sigmas[:, i]
-        columns.append(_column(m.values.reshape(len(m), -1)[:, i], unit, sigma))
+    for i, (name, unit, column) in enumerate(columns_read(m)):
+        heads.append(_heading(name, unit))
+        columns.append(_column(column, unit, None if sigmas is None else sigmas[:, i]))
     if m.target_index is not None and m.target_names is not None:
         heads.append("target")
         columns.append([m.target_names[i] for i in m.target_index])
@@ -87,7 +76,7 @@ def table(m: Listed) -> Table:
 def title(m: Listed) -> str:
     """How many of what they are, and what is known of them."""
     n = m.actuators.shape[1]
-    what = f"{len(m)} measured {_NOUNS.get(m.kind, (m.kind, m.kind + 's'))[len(m) != 1]}"
+    what = f"{len(m)} measured {noun(m.kind, len(m))}"
     if m.kind == "closure":
         what = f"{len(m)} row{'' if len(m) == 1 else 's'} of actuators alone"
     elif missing := int(np.isnan(m.values.reshape(len(m), -1)).all(axis=1).sum()):

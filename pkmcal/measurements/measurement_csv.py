@@ -55,7 +55,13 @@ from pkmcal.files.column_names import SYNONYMS
 from pkmcal.files.csv_table import Table
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements import orientation_columns
-from pkmcal.measurements.actuator_columns import ACTUATOR, Actuated, compare, read_actuators
+from pkmcal.measurements.actuator_columns import (
+    Actuated,
+    actuators_in,
+    columns_of_actuators,
+    compare,
+    read_actuators,
+)
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.components import KINDS, Kind
 from pkmcal.measurements.join import JOINS, Join
@@ -68,7 +74,7 @@ from pkmcal.measurements.kind_columns import (
     value_columns,
 )
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.orientation_columns import checked, names_in
+from pkmcal.measurements.orientation_columns import ANGLES, checked, names_in
 from pkmcal.measurements.probe import (
     agreement,
     apart_from,
@@ -88,7 +94,6 @@ from pkmcal.measurements.table_layout import (
 from pkmcal.measurements.target_columns import read_several, read_targets, several_targets
 
 _AXES = ("x", "y", "z")
-_ANGLES = ("alpha", "beta", "gamma")
 _TRIED = 200  # rows by which an order of angles is told
 
 
@@ -226,9 +231,9 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
             f"column {table.columns['probe'].name!r}: give the robot, as the firmware had it when"
             " it probed"
         )
-    z = _read(table, "probe", "mm")[0]
+    z = table.numbers("probe", "mm")[0]
     sigma = read_sigma(table, "height")
-    if any(ACTUATOR.fullmatch(name) for name in table.columns):
+    if actuators_in(table):
         actuators, units = read_actuators(table, robot)
         compare(table, units, robot)
         if not is_of_trigger(robot, actuators, z):
@@ -242,7 +247,7 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
             )
         poses = robot.forward(actuators).pose[:, :3]
     else:
-        poses = np.column_stack([*(_read(table, axis, "mm")[0] for axis in "xy"), z])
+        poses = np.column_stack([table.stacked(["x", "y"], ["mm", "mm"]), z])
     try:
         measured = probed(robot, poses, offset=offset, sigma=sigma)
     except ValueError as error:
@@ -275,7 +280,7 @@ def _table(
     seen = (*columns.ignore, *columns.rename)
     table = open_table(path, columns, joints, seen, elsewhere=True)
     log = open_table(controller, log_columns, joints, seen)
-    if any(ACTUATOR.fullmatch(name) for name in table.columns):
+    if actuators_in(table):
         table.notes.append(f"has actuators of its own; {log.path} is not used")
         return table
     for name in seen:
@@ -291,13 +296,11 @@ def _has(table: Table, name: str) -> bool:
 
 def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     """Names of columns that are read."""
-    components = _AXES + _ANGLES
-    names = {f"q{i + 1}" for i in range(len(table.columns))}
-    names |= {name for name in table.columns if ACTUATOR.fullmatch(name)}
-    names |= {*components, "distance", "sigma", "group", "session", "target", "probe"}
+    components = _AXES + ANGLES
+    actuators = {f"q{i + 1}" for i in range(len(table.columns))} | {*actuators_in(table)}
+    names = actuators | {*components, "distance", "sigma", "group", "session", "target", "probe"}
     names |= {"actuator_sigma", "approach"}
-    of_actuators = [name for name in names if ACTUATOR.fullmatch(name)]
-    names |= {f"{what}.{q}" for what in ("actuator_sigma", "approach") for q in of_actuators}
+    names |= {f"{what}.{q}" for what in ("actuator_sigma", "approach") for q in actuators}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
     names |= {f"sigma.{name}" for name in component_names()} | names_of_kinds(table)
@@ -308,7 +311,7 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
 def _kind(table: Table, several: tuple[str, ...]) -> Kind:
     """What was measured, by the columns that are there."""
     names = table.columns.keys()
-    turned = set(names_in(table)) | (set(_ANGLES) & names)
+    turned = set(names_in(table)) | (set(ANGLES) & names)
     own = kinds_in(table)
     groups = {
         **{title: {title} for title in own},
@@ -339,11 +342,11 @@ def _read_values(
     robot: Actuated | None,
 ) -> FloatArray | None:
     """What was measured, (N, k) or (N,); None without columns of it."""
-    if KINDS[kind].turning is not None and names_in(table) not in ((), _ANGLES):
-        places = [_read(table, axis, "mm")[0] for axis in _AXES] if kind == "pose" else []
+    if KINDS[kind].turning is not None and names_in(table) not in ((), ANGLES):
+        places = [table.numbers(axis, "mm")[0] for axis in _AXES] if kind == "pose" else []
         nominal = _nominal(robot, actuators)
         return np.column_stack([*places, orientation_columns.read(table, rotation, nominal)])
-    columns = [_read(table, *component, blank=True)[0] for component in value_columns(table, kind)]
+    columns = [table.numbers(*component, blank=True)[0] for component in value_columns(table, kind)]
     if not columns:
         return None
     return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
@@ -364,22 +367,12 @@ def _nominal(robot: Actuated | None, actuators: FloatArray) -> FloatArray | None
 
 def _read_approach(table: Table, count: int) -> FloatArray | None:
     """From where each actuator came (rows, n)."""
-    each = [f"approach.q{i + 1}" for i in range(count)]
-    given = [name for name in table.columns if name.startswith("approach")]
-    if not given:
+    names = columns_of_actuators(table, "approach", count)
+    if not names:
         return None
-    if given != ["approach"]:
-        table.require(each)
-        if len(given) > len(each):
-            raise table.header_error("column 'approach' does not go with those of actuators")
-    names = ["approach"] * count if given == ["approach"] else each
-    return np.stack([table.integers(name) for name in names], axis=1).astype(np.float64)
+    columns = np.stack([table.integers(name) for name in names], axis=1)
+    return np.broadcast_to(columns.astype(np.float64), (len(table), count))
 
 
 def _read_session(table: Table) -> TextArray | None:
     return np.array(table.texts("session")) if "session" in table.columns else None
-
-
-def _read(table: Table, name: str, *quantities: str, blank: bool = False) -> tuple[Any, str]:
-    table.require([name])
-    return table.numbers(name, *quantities, blank=blank)

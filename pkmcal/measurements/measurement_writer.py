@@ -8,12 +8,10 @@ from collections.abc import Iterator, Sequence
 from os import PathLike
 from typing import Protocol
 
-import numpy as np
-
 from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.files.csv_writer import write_csv
-from pkmcal.measurements.components import Kind, components
-from pkmcal.measurements.kind_columns import OfAKind, kind_cells
+from pkmcal.measurements.components import components
+from pkmcal.measurements.kind_columns import OfAKind, columns_read, kind_cells
 
 
 class Writable(OfAKind, Protocol):
@@ -26,18 +24,6 @@ class Writable(OfAKind, Protocol):
     @property
     def actuator_units(self) -> tuple[str, ...] | None:
         """Their units."""
-
-    @property
-    def values(self) -> FloatArray:
-        """What was measured, (N, k) or (N,)."""
-
-    @property
-    def kind(self) -> Kind:
-        """Which key of `KINDS` they are."""
-
-    @property
-    def joint(self) -> str | None:
-        """Of an angle, the joint."""
 
     @property
     def sigma(self) -> FloatArray | None:
@@ -116,19 +102,17 @@ def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
     for i, unit in enumerate(units):
         yield f"q{i + 1} [{unit}]", _exact(m.actuators[:, i])
     yield from kind_cells(m, units)
-    read = components(m.kind, m.artefact)
-    for i, (name, unit) in enumerate(read):
-        if m.touched is not None and not m.values.any() and not np.signbit(m.values).any():
-            break  # where it touched, nothing was read
-        heading = name if m.joint is None else f"angle:{m.joint}"
-        yield f"{heading} [{unit}]", _exact(m.values.reshape(len(m.values), -1)[:, i])
+    for name, unit, column in columns_read(m):
+        yield f"{name} [{unit}]", _exact(column)
     yield from _actuator_sigma(m)
+    read = components(m.kind, m.artefact)
+    units_read = [unit for _, unit in read]
     if m.sigma is not None and m.sigma.ndim == 3:
         for i, j in itertools.combinations_with_replacement(range(len(read)), 2):
             (a, of_a), (b, of_b) = read[i], read[j]
             yield f"cov.{a}.{b} [{of_a}*{of_b}]", _exact(m.sigma[:, i, j])
-    elif m.sigma is not None and m.kind != "pose" and (m.sigma == m.sigma[:, :1]).all():
-        yield f"sigma [{read[0][1]}]", _exact(m.sigma[:, 0])
+    elif m.sigma is not None and len(set(units_read)) == 1 and (m.sigma == m.sigma[:, :1]).all():
+        yield f"sigma [{units_read[0]}]", _exact(m.sigma[:, 0])
     elif m.sigma is not None:
         for i, (name, unit) in enumerate(read):
             yield f"sigma.{name} [{unit}]", _exact(m.sigma[:, i])

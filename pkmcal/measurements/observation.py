@@ -93,9 +93,7 @@ def predict(
     """
     artefact, along = touching
     match kind, artefact:
-        case (("distance" | "relative-distance"), _):
-            return _distances(pose, target, anchor, zero)
-        case "touch", "sphere":
+        case ("distance" | "relative-distance", _) | ("touch", "sphere"):
             return _distances(pose, target, anchor, zero)
         case "touch", _:
             return _touched(_points(pose, target, None, origin), place, artefact, along)

@@ -90,15 +90,15 @@ def read(table: Table, rotation: str | None, nominal: FloatArray | None) -> Floa
 
 def _numbers(table: Table, names: Sequence[str]) -> FloatArray:
     if names in (QUATERNION, NUMBERED, MATRIX):
-        given = np.stack([table.numbers(name, "1")[0] for name in names], axis=1)
-        rows = given.reshape(len(given), -1, 3 if names is MATRIX or names == MATRIX else 4)
+        given = table.stacked(names, ["1"] * len(names))
+        rows = given.reshape(len(given), -1, 3 if names == MATRIX else 4)
         off = np.abs(np.linalg.norm(rows, axis=2) - 1.0).max(axis=1)
         if (off > _UNIT).any():
             row = int(np.argmax(off > _UNIT))
             what = "a rotation matrix" if names == MATRIX else "a quaternion of length 1"
             raise table.cell_error(names[0], row, f"is not part of {what}")
         return given
-    return np.stack([table.numbers(name, "rad")[0] for name in names], axis=1)
+    return table.stacked(names, ["rad"] * len(names))
 
 
 def _forms(names: Sequence[str], given: FloatArray) -> dict[str, Rotation]:

@@ -8,7 +8,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
-from pkmcal.measurements.components import Kind
+from pkmcal.measurements.actuator_columns import columns_of_actuators
+from pkmcal.measurements.components import Kind, noun
 from pkmcal.measurements.kind_columns import components_in, value_columns
 
 
@@ -27,14 +28,17 @@ def read_sigma(table: Table, kind: Kind) -> FloatArray | None:
         "covariance": [f"cov.{names[i]}.{names[j]}" for i, j in pairs],
     }
     form = "covariance" if given[0].startswith("cov") else "each" if "." in given[0] else "one"
-    if form == "one" and kind == "pose":
+    if form == "one" and len(set(units)) > 1:
         raise table.header_error(
-            f"column 'sigma' for poses: expected {forms['each'][0]!r} to {forms['each'][-1]!r}"
+            f"column 'sigma' for {noun(kind)}: expected {forms['each'][0]!r} to"
+            f" {forms['each'][-1]!r}"
         )
     table.require(forms[form])
     for name in given:
         if name not in forms[form]:
-            raise table.header_error(f"column {name!r} does not go with {given[0]!r} and {kind}s")
+            raise table.header_error(
+                f"column {name!r} does not go with {given[0]!r} and {noun(kind)}"
+            )
     if form == "covariance":
         sigma = np.empty((len(table), len(names), len(names)))
         for name, (i, j) in zip(forms[form], pairs, strict=True):
@@ -54,20 +58,13 @@ def read_sigma(table: Table, kind: Kind) -> FloatArray | None:
 
 def read_actuator_sigma(table: Table, units: tuple[str, ...]) -> FloatArray | None:
     """Deviations (rows, n) of what the actuators read."""
-    each = [f"actuator_sigma.q{i + 1}" for i in range(len(units))]
-    given = [name for name in table.columns if name.startswith("actuator_sigma")]
-    if not given:
+    names = columns_of_actuators(table, "actuator_sigma", len(units))
+    if not names:
         return None
-    if given == ["actuator_sigma"]:
-        if len(set(units)) > 1:
-            raise table.header_error(
-                "column 'actuator_sigma' for lengths and angles: expected"
-                f" {each[0]!r} to {each[-1]!r}"
-            )
-        columns = [table.numbers("actuator_sigma", units[0])[0]] * len(units)
-    else:
-        table.require(each)
-        if len(given) > len(each):
-            raise table.header_error("column 'actuator_sigma' does not go with those of actuators")
-        columns = [table.numbers(name, unit)[0] for name, unit in zip(each, units, strict=True)]
-    return np.stack(columns, axis=1)
+    if names == ["actuator_sigma"] and len(set(units)) > 1:
+        raise table.header_error(
+            "column 'actuator_sigma' for lengths and angles: expected"
+            f" 'actuator_sigma.q1' to 'actuator_sigma.q{len(units)}'"
+        )
+    stated = table.stacked(names, units[: len(names)])
+    return np.broadcast_to(stated, (len(table), len(units)))

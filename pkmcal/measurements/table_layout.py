@@ -14,7 +14,9 @@ from pkmcal.arguments import words as as_words
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files import units
 from pkmcal.files.column_names import BESIDE, canonical
-from pkmcal.files.csv_table import Table, parted
+from pkmcal.files.csv_table import Table
+from pkmcal.files.header import parted
+from pkmcal.measurements.actuator_columns import actuators_in
 from pkmcal.measurements.point_names import split
 
 _SLIP = 0.8  # how like a known name a mistyped one is, as difflib counts
@@ -200,7 +202,7 @@ def _agrees(table: Table, poses: Sequence[str], names: Sequence[str]) -> bool:
 
     Home that is measured again has another pose's name; a log that runs on has several rows a pose.
     """
-    actuators = [c.cells for n, c in table.columns.items() if re.fullmatch(r"q[0-9]+", n)]
+    actuators = [table.columns[name].cells for name in actuators_in(table)]
     rows = list(zip(*actuators, strict=True)) if actuators else list(poses)
     of_row: dict[object, str] = {}
     of_pose: dict[str, object] = {}

@@ -11,7 +11,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.files.column_names import RESERVED
 from pkmcal.files.csv_table import Table
 from pkmcal.files.reading import LONGEST_NAME
-from pkmcal.measurements.components import KINDS, Kind
+from pkmcal.measurements.components import KINDS, Kind, noun
 
 _AXES = ("x", "y", "z")
 _OF_A_TARGET = re.compile(r"(?P<target>.+)\.[xyz]")
@@ -55,11 +55,13 @@ def read_targets(table: Table, kind: Kind) -> dict[str, Any]:
     named = "target" in table.columns
     point = KINDS[kind].point
     if not point and (named or "target" in fields):
-        raise table.header_error(f"columns of a target do not go with {kind}s")
+        raise table.header_error(f"columns of a target do not go with {noun(kind)}")
     if point == "base" and "target" not in fields:
         raise table.header_error("missing column 'target.x': a distance is measured to a point")
     if point != "base" and "attachment" in fields:
-        raise table.header_error(f"column 'attachment.x' goes with distances, not with {kind}s")
+        raise table.header_error(
+            f"column 'attachment.x' goes with distances, not with {noun(kind)}"
+        )
     if not named:
         return {name: _one(place) for name, place in fields.items()}
     names = table.texts("target")
@@ -91,7 +93,7 @@ def _read_point(table: Table, name: str) -> FloatArray | None:
     columns = [f"{name}.{axis}" for axis in _AXES]
     if not any(column in table.columns for column in columns):
         return None
-    return np.stack([_lengths(table, column) for column in columns], axis=1)
+    return table.stacked(columns, ["mm"] * 3)
 
 
 def _one(places: FloatArray) -> FloatArray:
@@ -99,8 +101,3 @@ def _one(places: FloatArray) -> FloatArray:
     bits = places.view(np.int64)
     one: FloatArray = places[0] if (bits == bits[0]).all() else places
     return one
-
-
-def _lengths(table: Table, name: str) -> FloatArray:
-    table.require([name])
-    return table.numbers(name, "mm")[0]

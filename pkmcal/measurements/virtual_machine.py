@@ -170,18 +170,17 @@ class VirtualMachine:
         machine = self._machine
         if blank.approach is not None and isinstance(machine, Robot):
             machine = machine.approaching(blank.approach)
-        pose = _poses(machine, blank.actuators, "q")
+        solved = _solved(machine, blank.actuators, "q")
         if blank.joint is not None:
             names = getattr(self._machine, "passive_names", ())
             if blank.joint not in names:
                 known = did_you_mean(blank.joint, names)
                 raise ArgumentError(f"joint: no passive joint is called {blank.joint!r}{known}")
-            solved: Any = machine.forward(blank.actuators)
             return np.array(solved.passive[:, [names.index(blank.joint)]])
         return predict(
             blank.kind,
-            pose,
-            other=None if blank.other is None else _poses(machine, blank.other, "other"),
+            np.asarray(solved.pose),
+            other=None if blank.other is None else _solved(machine, blank.other, "other").pose,
             touching=(blank.artefact, np.full(len(blank), 2)),
             **self._arguments(blank, mounting, touched),
         ).values
@@ -223,7 +222,8 @@ class VirtualMachine:
         return sigma * drawn, sigma if (sigma > 0).all() else None
 
 
-def _poses(machine: Solvable, actuators: FloatArray, argument: str) -> FloatArray:
+def _solved(machine: Solvable, actuators: FloatArray, argument: str) -> Any:
+    """What the machine's forward kinematics give, where they do of every row."""
     solved = machine.forward(actuators)
     failed = np.flatnonzero(~np.asarray(solved.ok)).tolist()
     if len(failed):
@@ -231,4 +231,4 @@ def _poses(machine: Solvable, actuators: FloatArray, argument: str) -> FloatArra
             f"{argument}: {len(failed)} of {len(actuators)} rows have no pose on the true machine"
             f" (rows {first_rows(failed, 10)})"
         )
-    return np.asarray(solved.pose)
+    return solved

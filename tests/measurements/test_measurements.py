@@ -176,6 +176,7 @@ BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"target_index": [0, 0.5]}, ValueError, "target_index must be whole numbers.*row 1"),
     ({"target_index": [0, 1], "target_names": 3}, TypeError, "target_names must be"),
     ({"target_index": [0, 1], "target_names": ["A", "A"]}, ValueError, "different names"),
+    ({"target_index": [0, 1], "target_names": ["A" * 201, "B"]}, ValueError, "at most 200"),
     ({"target_index": [0, 1], "target_names": ["A"]}, ValueError, "must name 2 targets; found 1"),
     ({"attachment": [0, 0, 1]}, ValueError, "attachment: distances alone have one.*'position'"),
     (
