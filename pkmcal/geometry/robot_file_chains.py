@@ -22,6 +22,7 @@ from pkmcal.core.chains import (
 from pkmcal.core.library import MAPS, MAX_LIMBS
 from pkmcal.files.toml_table import Table, shown
 from pkmcal.geometry.chains import ERRORS, KINDS, Chains, Joint, across, towards
+from pkmcal.geometry.laws import gain_unit
 from pkmcal.geometry.model import CHAIN, Limb
 from pkmcal.geometry.robot_file_laws import read_law
 from pkmcal.geometry.robot_file_limbs import PARAMETER_NAME, Parameters
@@ -100,8 +101,7 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
                 continue
             if joint.actuator is None:
                 each.fail(key, "only an actuated joint has this")
-            gain_unit = "1" if joint.law is None else joint.law.gain_unit(joint.unit)
-            unit = joint.unit if key == "offset" else gain_unit
+            unit = joint.unit if key == "offset" else gain_unit(joint.law, joint.unit)
             values[f"{key}{joint.actuator + 1}"] = each.number(key, unit, standard)
         if joint.law is not None:
             names = [n.name for n in joint.law.numbers((joint.actuator or 0) + 1, joint.unit)]

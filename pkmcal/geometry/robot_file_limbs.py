@@ -13,6 +13,7 @@ from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, Unit, furthest_axis
 from pkmcal.core.library import AXES, SLOTS
 from pkmcal.files.toml_table import Table, shown, unit_vector
+from pkmcal.geometry.laws import Law, gain_unit
 from pkmcal.geometry.limb_kinds import ALIASES, KINDS, LimbKind
 from pkmcal.geometry.model import Cone, Limb
 from pkmcal.geometry.robot_file_laws import read_law
@@ -123,7 +124,7 @@ def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
     for i, (limb, entries, of_law) in enumerate(read):
         kind, law = KINDS[limb.kind], limb.law
         for slot, name, unit in kind.numbers(i + 1, limb.couple > 0.0):
-            unit = law.gain_unit(unit) if law is not None and slot == "gain" else unit
+            unit = gain_unit(law, kind.actuator_unit) if slot == "gain" else unit
             numbers.append(LimbNumber(name, unit, i, slot, entries[slot].tie))
             values[name] = entries[slot].value
         of = () if law is None else law.numbers(i + 1, kind.actuator_unit)
@@ -155,8 +156,7 @@ def _read_limb(
         return parameters.entry(parameters.term(of, key, value, unit))
 
     law, of_law = read_law(table, kind.actuator_unit, entry)
-    gain_unit: Unit = "1" if law is None else law.gain_unit(kind.actuator_unit)
-    entries = _read_numbers(table, kind, couple > 0.0, parameters, gain_unit)
+    entries = _read_numbers(table, kind, couple > 0.0, parameters, law)
 
     axes = kind.axes_of(couple > 0.0)
     for axis in kind.axes.keys() - axes.keys():
@@ -192,7 +192,7 @@ def _read_limb(
 
 
 def _read_numbers(
-    table: Table, kind: LimbKind, couple: bool, parameters: Parameters, gain_unit: Unit
+    table: Table, kind: LimbKind, couple: bool, parameters: Parameters, law: Law | None
 ) -> dict[str, Entry]:
     def entry(key: str, value: object, unit: Unit) -> Entry:
         return parameters.entry(parameters.term(table, key, value, unit))
@@ -202,7 +202,8 @@ def _read_numbers(
         for coordinate, found in zip("xyz", _point(table, point, parameters), strict=True):
             entries[f"{point}.{coordinate}"] = found
     entries["offset"] = entry("offset", table.data.get("offset", 0.0), kind.actuator_unit)
-    entries["gain"] = entry("gain", table.data.get("gain", 1.0), gain_unit)
+    of_gain = gain_unit(law, kind.actuator_unit)
+    entries["gain"] = entry("gain", table.data.get("gain", 1.0), of_gain)
     if entries["gain"].value == 0.0:
         table.fail("gain", "must not be 0: the actuator would not move the limb")
     for key in kind.lengths:
