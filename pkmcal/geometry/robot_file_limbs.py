@@ -13,7 +13,7 @@ from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, Unit, furthest_axis
 from pkmcal.core.library import AXES, SLOTS
 from pkmcal.files.toml_table import Table, shown, unit_vector
-from pkmcal.geometry.laws import Law, gain_unit
+from pkmcal.geometry.laws import Law, LawNumber, gain_unit
 from pkmcal.geometry.limb_kinds import ALIASES, KINDS, LimbKind
 from pkmcal.geometry.model import Cone, Limb
 from pkmcal.geometry.robot_file_laws import read_law
@@ -127,8 +127,7 @@ def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
             unit = gain_unit(law, kind.actuator_unit) if slot == "gain" else unit
             numbers.append(LimbNumber(name, unit, i, slot, entries[slot].tie))
             values[name] = entries[slot].value
-        of = () if law is None else law.numbers(i + 1, kind.actuator_unit)
-        for j, (number, entry) in enumerate(zip(of, of_law, strict=True)):
+        for j, (number, entry) in enumerate(of_law):
             slot, place = f"drive.{number.name.partition('.')[2]}", i * width + len(SLOTS) + j
             numbers.append(LimbNumber(number.name, number.unit, i, slot, entry.tie, place))
             values[number.name] = entry.value
@@ -143,7 +142,7 @@ def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
 
 def _read_limb(
     table: Table, i: int, parameters: Parameters
-) -> tuple[Limb, dict[str, Entry], list[Entry]]:
+) -> tuple[Limb, dict[str, Entry], list[tuple[LawNumber, Entry]]]:
     name = table.text("kind")
     if name not in (known := (*KINDS, *ALIASES)):
         near = did_you_mean(name, known)
@@ -155,7 +154,7 @@ def _read_limb(
     def entry(of: Table, key: str, value: object, unit: Unit) -> Entry:
         return parameters.entry(parameters.term(of, key, value, unit))
 
-    law, of_law = read_law(table, kind.actuator_unit, entry)
+    law, of_law = read_law(table, i + 1, kind.actuator_unit, entry)
     entries = _read_numbers(table, kind, couple > 0.0, parameters, law)
 
     axes = kind.axes_of(couple > 0.0)
