@@ -11,7 +11,7 @@ import numpy as np
 from pkmcal import arguments, screw
 from pkmcal.arms.inputs import ERRORS, KINDS, ArmArguments, kinds_of
 from pkmcal.arrays import FloatArray, Unit
-from pkmcal.core.library import POSE
+from pkmcal.core.library import COORDINATE_UNITS, POSE
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table, shown
@@ -114,8 +114,7 @@ def _home(tool: Table) -> FloatArray:
     if isinstance(value, Mapping):
         pose = tool.table("home")
         pose.only(POSE)
-        units: dict[str, Unit] = {name: "mm" if name in "xyz" else "rad" for name in POSE}
-        return np.array([pose.number(name, units[name], 0.0) for name in POSE])
+        return np.array([pose.number(name, COORDINATE_UNITS[name], 0.0) for name in POSE])
     rows = tool.list_of("home", 3, "a pose, or three rows of four numbers")
     if not all(isinstance(row, list) and len(row) == 4 for row in rows):
         tool.fail("home", f"must be a pose, or three rows of four numbers, found {shown(value)}")

@@ -8,7 +8,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.checks.finding import Finding, named
-from pkmcal.checks.function import singular, turning
+from pkmcal.checks.function import outside_workspace, singular, turning
 from pkmcal.kinematics.robot import Robot
 
 _NONE = 1e-7  # of the largest: a singular value that is none
@@ -68,7 +68,7 @@ def strokes(robot: Robot) -> Iterator[Finding]:
             )
 
 
-CHAIN_CHECKS = (mobility, home_values, strokes, turning, singular)
+CHAIN_CHECKS = (outside_workspace, mobility, home_values, strokes, turning, singular)
 
 
 def surplus(robot: Robot) -> str:

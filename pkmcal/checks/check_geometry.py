@@ -151,7 +151,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
         found = [finding for check in ARM_CHECKS for finding in check(robot)]
     else:
         instance("robot", robot, Robot, " or SerialArm")
-        checks = CHECKS if robot.model.chains is None else (outside_workspace, *CHAIN_CHECKS)
+        checks = CHECKS if robot.model.chains is None else CHAIN_CHECKS
         found = [finding for check in checks for finding in check(robot)]
     return GeometryCheck(robot, tuple(found))
 

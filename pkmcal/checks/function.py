@@ -9,7 +9,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.checks.finding import Finding, named
 from pkmcal.checks.joint_layout import ALIKE, joints, size
-from pkmcal.core.library import POSE, SLOTS
+from pkmcal.core.library import COORDINATE_UNITS, POSE, SLOTS
 from pkmcal.display import displayed
 from pkmcal.geometry.box import in_box
 from pkmcal.geometry.limb_kinds import KINDS
@@ -199,23 +199,20 @@ def not_closed(robot: Robot) -> Iterator[Finding]:
 
 def outside_workspace(robot: Robot) -> Iterator[Finding]:
     """Home outside the box that the file states."""
-    box = robot.model.workspace
-    if in_box(box, robot.home):
-        return
     parts = []
-    for name, ends in box.items():
-        value = robot.home[POSE.index(name)]
-        if not ends[0] <= value <= ends[1]:
-            unit = "mm" if name in "xyz" else "rad"
-            pairs = (displayed(float(each), unit) for each in (value, *ends))
-            numbers = [f"{number:.6g} {shown}" for number, shown in pairs]
-            parts.append(f"{name} is {numbers[0]}, the workspace {numbers[1]} to {numbers[2]}")
-    yield Finding(
-        "workspace",
-        (),
-        f"home is outside the workspace of the file: {'; '.join(parts)}",
-        "check [workspace] and the home pose; both are in the base frame",
-    )
+    for name, ends in robot.model.workspace.items():
+        if not in_box({name: ends}, robot.home):
+            values = (float(robot.home[POSE.index(name)]), *ends)
+            pairs = (displayed(value, COORDINATE_UNITS[name]) for value in values)
+            home, low, high = (f"{number:.6g} {shown}" for number, shown in pairs)
+            parts.append(f"{name} is {home}, the workspace {low} to {high}")
+    if parts:
+        yield Finding(
+            "workspace",
+            (),
+            f"home is outside the workspace of the file: {'; '.join(parts)}",
+            "check [workspace] and the home pose; both are in the base frame",
+        )
 
 
 def unreachable(robot: Robot) -> Iterator[Finding]:
@@ -277,12 +274,11 @@ def _reached(robot: Robot, ends: FloatArray) -> float:
 
 def turning(robot: Robot) -> Iterator[Finding]:
     """Drive laws without an inverse."""
-    for d, why in robot.model.doubts().items():
-        limb = robot.model.limb_of_drive(d) + 1
+    for limb, why in robot.model.doubts():
         yield Finding(
             "drive",
-            (limb,),
-            f"the drive law of limb {limb} has no inverse: {why}",
+            (limb + 1,),
+            f"the drive law of limb {limb + 1} has no inverse: {why}",
             "such numbers fit noise: free fewer, or hold them by a prior or a smoothness",
         )
 

@@ -20,7 +20,7 @@ from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
-from pkmcal.core.library import POSE
+from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.box import Box
 from pkmcal.kinematics.robot import Robot
@@ -148,7 +148,7 @@ def _box(machine: Robot | SerialArm, given: list[str]) -> Box:
     if isinstance(machine, SerialArm):
         units = {f"q{i + 1}": unit for i, unit in enumerate(machine.actuator_units)}
     else:
-        units = {name: "mm" if name in "xyz" else "rad" for name in POSE}
+        units = COORDINATE_UNITS
     box = {}
     for text in (part.strip() for each in given for part in each.split(",")):
         name, _, ends = text.partition("=")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from pkmcal._core import ffi, lib
 from pkmcal.arguments import whole
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, Unit
 from pkmcal.exceptions import ArgumentError
 
 
@@ -37,6 +37,7 @@ MAPS: dict[str, tuple[str, ...]] = {
     )
 }
 POSE = ("x", "y", "z", "alpha", "beta", "gamma")
+COORDINATE_UNITS: dict[str, Unit] = {name: "mm" if name in "xyz" else "rad" for name in POSE}
 MAX_LIMBS: int = lib.PKM_MAX_LIMBS
 ISAS = ("base", "avx2", "avx512")
 STATUS = {

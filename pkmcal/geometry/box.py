@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from pkmcal.arguments import did_you_mean
-from pkmcal.arrays import BoolArray, FloatArray, Unit
-from pkmcal.core.library import POSE
+from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.core.library import COORDINATE_UNITS, POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_table import Table, shown
 
@@ -22,9 +22,8 @@ def read_box(table: Table) -> Box:
     table.only(POSE)
     box = {}
     for name in (name for name in POSE if name in table):
-        unit: Unit = "mm" if name in "xyz" else "rad"
         ends = table.list_of(name, 2, "the least and the largest value")
-        low, high = (table.as_number(name, end, unit) for end in ends)
+        low, high = (table.as_number(name, end, COORDINATE_UNITS[name]) for end in ends)
         if not low < high:
             table.fail(name, f"the least value must be below the largest, found {shown(ends)}")
         box[name] = (low, high)

@@ -17,7 +17,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray, Unit, furthest_axis
 from pkmcal.core.chains import ChainLayout
 from pkmcal.display import Table, fixed
-from pkmcal.geometry.laws import Law, LawNumber
+from pkmcal.geometry.laws import Law, LawNumber, gain_unit
 from pkmcal.geometry.ties import LimbNumber
 from pkmcal.screw import from_pose
 
@@ -222,7 +222,7 @@ class Chains:
                 if first == i:
                     place = places[f"drive{a + 1}"]
                     made.append(LimbNumber(f"offset{a + 1}", joint.unit, i, "offset", None, place))
-                    unit = "1" if joint.law is None else joint.law.gain_unit(joint.unit)
+                    unit = gain_unit(joint.law, joint.unit)
                     made.append(LimbNumber(f"gain{a + 1}", unit, i, "gain", None, place + 1))
                     for j, number in enumerate(self._law_numbers(a)):
                         place, slot = self._law_start(a) + j, f"drive.{number.key}"

@@ -45,10 +45,6 @@ class Law:
     smoothness: float | None = None
     backlash: bool = False
 
-    def gain_unit(self, unit: Unit) -> Unit:
-        """Unit of the gain, which turns the spool, where the drive is in mm or rad."""
-        return "1/mm" if self.spool and unit == "mm" else "1"
-
     def numbers(self, drive: int | Literal[""], unit: Unit) -> tuple[LawNumber, ...]:
         """The numbers of the law of a drive in mm or rad, counted from 1, in the stated order."""
         start = f"drive{drive}."
@@ -71,6 +67,11 @@ class Law:
         if self.backlash:
             add("backlash", unit)
         return tuple(found)
+
+
+def gain_unit(law: Law | None, unit: Unit) -> Unit:
+    """Unit of the gain of a drive in mm or rad: with a spool it turns that."""
+    return "1/mm" if law is not None and law.spool and unit == "mm" else "1"
 
 
 def drive(

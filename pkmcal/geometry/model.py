@@ -188,11 +188,13 @@ class Model:
             for i, limb in enumerate(self.limbs, 1)
         )  # fmt: skip
 
-    def doubts(self) -> dict[int, str]:
-        """Drives whose law has no inverse over their stroke, counted from 0, and why."""
+    def doubts(self) -> list[tuple[int, str]]:
+        """Drive laws without an inverse over their stroke: limbs, counted from 0, and why."""
         if not self.driven:
-            return {}
-        return Laws(self.drives, self.geometry.slots.size).doubts(self.geometry.slots)
+            return []
+        slots = self.geometry.slots
+        found = Laws(self.drives, slots.size).doubts(slots)
+        return [(self.limb_of_drive(d), why) for d, why in found.items()]
 
     def limb_of_drive(self, d: int) -> int:
         """The limb, counted from 0, that a drive is in."""

@@ -13,7 +13,7 @@ import numpy as np
 from pkmcal import arguments
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, Unit
-from pkmcal.core.library import MAPS, MAX_LIMBS, POSE
+from pkmcal.core.library import COORDINATE_UNITS, MAPS, MAX_LIMBS, POSE
 from pkmcal.exceptions import ArgumentTypeError, FileError
 from pkmcal.files import reading
 from pkmcal.files.atomic import write_whole
@@ -211,8 +211,7 @@ def _check_rows(pose: Table, pose_map: str, limbs: tuple[Limb, ...]) -> None:
 def _read_pose(table: Table, key: str, known: tuple[str, ...], owner: str = "") -> FloatArray:
     pose = table.table(key) if key in table or known[0] in "xyz" else Table({}, table.source)
     pose.only(known, owner)
-    units: dict[str, Unit] = {name: "mm" if name in "xyz" else "rad" for name in POSE}
-    found = np.array([pose.number(name, units[name], 0.0) for name in POSE])
+    found = np.array([pose.number(name, COORDINATE_UNITS[name], 0.0) for name in POSE])
     found.flags.writeable = False
     return found
 

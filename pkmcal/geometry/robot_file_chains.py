@@ -22,6 +22,7 @@ from pkmcal.core.chains import (
 from pkmcal.core.library import MAPS, MAX_LIMBS
 from pkmcal.files.toml_table import Table, shown
 from pkmcal.geometry.chains import ERRORS, KINDS, Chains, Joint, across, towards
+from pkmcal.geometry.laws import gain_unit
 from pkmcal.geometry.model import CHAIN, Limb
 from pkmcal.geometry.robot_file_laws import read_law
 from pkmcal.geometry.robot_file_limbs import PARAMETER_NAME, Parameters
@@ -93,22 +94,9 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
         if share in known and set(each.data) == {"share"}:
             joints.append(known[share])
             continue
-        joint = _joint(each, parameters, map, joints)
+        joint, of_drive = _with_drive(each, _joint(each, parameters, map, joints))
         joints.append(joint)
-        for key, standard in (("offset", 0.0), ("gain", 1.0)):
-            if key not in each:
-                continue
-            if joint.actuator is None:
-                each.fail(key, "only an actuated joint has this")
-            gain_unit = "1" if joint.law is None else joint.law.gain_unit(joint.unit)
-            unit = joint.unit if key == "offset" else gain_unit
-            values[f"{key}{joint.actuator + 1}"] = each.number(key, unit, standard)
-        if joint.law is not None:
-            names = [n.name for n in joint.law.numbers((joint.actuator or 0) + 1, joint.unit)]
-            found = read_law(each, joint.unit, Table.as_number)[1]
-            values |= dict(zip(names, found, strict=True))
-        if values.get(f"gain{(joint.actuator or 0) + 1}", 1.0) == 0.0:
-            each.fail("gain", "must not be 0: the actuator would not move the limb")
+        values |= of_drive
         if k + 1 > MAX_CHAIN:
             each.fail("", f"a chain has at most {MAX_CHAIN} axes")
     joints = [_with_axes(each, joints, k, map) for k, each in enumerate(listed)]
@@ -178,8 +166,23 @@ def _joint(table: Table, parameters: Parameters, map: str, before: Sequence[Join
     if not soft > 0.0:
         table.fail("soft", f"must be positive, found {shown(table['soft'])}")
     home_value = table.number("home_value", joint.unit, 0.0)
-    law = read_law(table, joint.unit, Table.as_number)[0]
-    return replace(joint, stroke=stroke, cone=cone, soft=soft, home_value=home_value, law=law)
+    return replace(joint, stroke=stroke, cone=cone, soft=soft, home_value=home_value)
+
+
+def _with_drive(table: Table, joint: Joint) -> tuple[Joint, dict[str, float]]:
+    """The joint with its drive law, and the numbers of its drive that are stated, by name."""
+    if joint.actuator is None:
+        return joint, {}
+    number = joint.actuator + 1
+    values: dict[str, float] = {}
+    law, of_law = read_law(table, number, joint.unit, Table.as_number)
+    for key, unit in (("offset", joint.unit), ("gain", gain_unit(law, joint.unit))):
+        if key in table:
+            values[f"{key}{number}"] = table.number(key, unit)
+    if values.get(f"gain{number}") == 0.0:
+        table.fail("gain", "must not be 0: the actuator would not move the limb")
+    values |= {each.name: value for each, value in of_law}
+    return replace(joint, law=law), values
 
 
 def _with_axes(table: Table, joints: Sequence[Joint], k: int, map: str) -> Joint:

@@ -8,7 +8,7 @@ from typing import Any
 
 from pkmcal.arrays import Unit
 from pkmcal.files.toml_table import Table, shown
-from pkmcal.geometry.laws import Law
+from pkmcal.geometry.laws import Law, LawNumber
 from pkmcal.geometry.model import Model
 
 KEYS = ("quadratic", "spool", "buildup", "harmonics", "table", "smoothness", "backlash")
@@ -16,10 +16,12 @@ KEYS = ("quadratic", "spool", "buildup", "harmonics", "table", "smoothness", "ba
 Reader = Callable[[Table, str, object, Unit], Any]
 
 
-def read_law(table: Table, unit: Unit, read: Reader) -> tuple[Law | None, list[Any]]:
-    """The law of a limb or joint whose drive is in mm or rad, and its numbers as `read` has them.
+def read_law(
+    table: Table, number: int, unit: Unit, read: Reader
+) -> tuple[Law | None, list[tuple[LawNumber, Any]]]:
+    """The law of a drive in mm or rad, and its numbers with their values as `read` has them.
 
-    None where the table has no key ``drive``.
+    `number` is that of the drive, counted from 1. None where the table has no key ``drive``.
     """
     if "drive" not in table:
         return None, []
@@ -50,16 +52,10 @@ def read_law(table: Table, unit: Unit, read: Reader) -> tuple[Law | None, list[A
         backlash="backlash" in drive,
     )
     numbers = []
-    for number in law.numbers(1, unit):
-        of, key, value = drive, number.key, None
-        if key in ("cos", "sin"):
-            of = waves[number.entry]
-            value = of.data.get(key, 0.0)
-        elif key == "table":
-            value = corrections[number.entry]
-        else:
-            value = drive.data.get(key, 0.0)
-        numbers.append(read(of, key, value, number.unit))
+    for each in law.numbers(number, unit):
+        of = waves[each.entry] if each.key in ("cos", "sin") else drive
+        value = corrections[each.entry] if each.key == "table" else of.data.get(each.key, 0.0)
+        numbers.append((each, read(of, each.key, value, each.unit)))
     return law, numbers
 
 
@@ -99,8 +95,7 @@ def law_table(law: Law, unit: Unit, written: Callable[[str], Any]) -> dict[str, 
 
 def refuse_turning(model: Model, tables: list[Table]) -> None:
     """Refuse laws whose inverse is not known over the stroke, with the line of their limb."""
-    for d, why in model.doubts().items():
-        limb = model.limb_of_drive(d)
+    for limb, why in model.doubts():
         tables[min(limb, len(tables) - 1)].fail(
             "drive" if model.chains is None else "joints", f"limb {limb + 1}: {why}"
         )

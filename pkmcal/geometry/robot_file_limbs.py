@@ -13,6 +13,7 @@ from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, Unit, furthest_axis
 from pkmcal.core.library import AXES, SLOTS
 from pkmcal.files.toml_table import Table, shown, unit_vector
+from pkmcal.geometry.laws import Law, LawNumber, gain_unit
 from pkmcal.geometry.limb_kinds import ALIASES, KINDS, LimbKind
 from pkmcal.geometry.model import Cone, Limb
 from pkmcal.geometry.robot_file_laws import read_law
@@ -123,11 +124,10 @@ def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
     for i, (limb, entries, of_law) in enumerate(read):
         kind, law = KINDS[limb.kind], limb.law
         for slot, name, unit in kind.numbers(i + 1, limb.couple > 0.0):
-            unit = law.gain_unit(unit) if law is not None and slot == "gain" else unit
+            unit = gain_unit(law, kind.actuator_unit) if slot == "gain" else unit
             numbers.append(LimbNumber(name, unit, i, slot, entries[slot].tie))
             values[name] = entries[slot].value
-        of = () if law is None else law.numbers(i + 1, kind.actuator_unit)
-        for j, (number, entry) in enumerate(zip(of, of_law, strict=True)):
+        for j, (number, entry) in enumerate(of_law):
             slot, place = f"drive.{number.name.partition('.')[2]}", i * width + len(SLOTS) + j
             numbers.append(LimbNumber(number.name, number.unit, i, slot, entry.tie, place))
             values[number.name] = entry.value
@@ -142,7 +142,7 @@ def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
 
 def _read_limb(
     table: Table, i: int, parameters: Parameters
-) -> tuple[Limb, dict[str, Entry], list[Entry]]:
+) -> tuple[Limb, dict[str, Entry], list[tuple[LawNumber, Entry]]]:
     name = table.text("kind")
     if name not in (known := (*KINDS, *ALIASES)):
         near = did_you_mean(name, known)
@@ -154,9 +154,8 @@ def _read_limb(
     def entry(of: Table, key: str, value: object, unit: Unit) -> Entry:
         return parameters.entry(parameters.term(of, key, value, unit))
 
-    law, of_law = read_law(table, kind.actuator_unit, entry)
-    gain_unit: Unit = "1" if law is None else law.gain_unit(kind.actuator_unit)
-    entries = _read_numbers(table, kind, couple > 0.0, parameters, gain_unit)
+    law, of_law = read_law(table, i + 1, kind.actuator_unit, entry)
+    entries = _read_numbers(table, kind, couple > 0.0, parameters, law)
 
     axes = kind.axes_of(couple > 0.0)
     for axis in kind.axes.keys() - axes.keys():
@@ -192,7 +191,7 @@ def _read_limb(
 
 
 def _read_numbers(
-    table: Table, kind: LimbKind, couple: bool, parameters: Parameters, gain_unit: Unit
+    table: Table, kind: LimbKind, couple: bool, parameters: Parameters, law: Law | None
 ) -> dict[str, Entry]:
     def entry(key: str, value: object, unit: Unit) -> Entry:
         return parameters.entry(parameters.term(table, key, value, unit))
@@ -202,7 +201,8 @@ def _read_numbers(
         for coordinate, found in zip("xyz", _point(table, point, parameters), strict=True):
             entries[f"{point}.{coordinate}"] = found
     entries["offset"] = entry("offset", table.data.get("offset", 0.0), kind.actuator_unit)
-    entries["gain"] = entry("gain", table.data.get("gain", 1.0), gain_unit)
+    of_gain = gain_unit(law, kind.actuator_unit)
+    entries["gain"] = entry("gain", table.data.get("gain", 1.0), of_gain)
     if entries["gain"].value == 0.0:
         table.fail("gain", "must not be 0: the actuator would not move the limb")
     for key in kind.lengths:

@@ -27,34 +27,25 @@ def machine_of(model: Model, slots: FloatArray, length: float) -> CompiledMachin
     length : float
         Characteristic length, mm.
     """
-    if model.driven:
-        return _driven(model, slots, length)
-    if model.chains is not None:
-        return ChainMachine(model.chains.layout, model.closure_tolerance)
-    return _of_limbs(model, slots, length, [_limb(limb) for limb in model.limbs])
-
-
-def _driven(model: Model, slots: FloatArray, length: float) -> DrivenMachine:
-    """A machine with drive laws: the machine within has a drive of its own for each of them."""
     inner: AnyMachine
     if model.chains is not None:
-        inner, width = (
-            ChainMachine(model.chains.layout, model.closure_tolerance),
-            model.chains.count,
-        )
+        inner = ChainMachine(model.chains.layout, model.closure_tolerance)
+        width = model.chains.count
     else:
-        width = len(SLOTS)
-        bare = np.ascontiguousarray(slots[:, :width])
-        bare[:, [SLOTS.index("offset"), SLOTS.index("gain")]] = 0.0, 1.0
-        limbs = [_limb(limb) | {"actuator": i} for i, limb in enumerate(model.limbs)]
-        inner = _of_limbs(model, bare, length, limbs)
+        inner, width = _of_limbs(model, slots, length), len(SLOTS)
+    if not model.driven:
+        return inner
     rows, columns = slots.shape
     return DrivenMachine(inner, model.drives, (rows, columns), width)
 
 
-def _of_limbs(
-    model: Model, slots: FloatArray, length: float, limbs: list[dict[str, Any]]
-) -> Machine:
+def _of_limbs(model: Model, slots: FloatArray, length: float) -> Machine:
+    """A machine of limbs; one with drive laws has a drive of its own for each of them."""
+    limbs = [_limb(limb) for limb in model.limbs]
+    if model.driven:
+        slots = np.ascontiguousarray(slots[:, : len(SLOTS)])
+        slots[:, [SLOTS.index("offset"), SLOTS.index("gain")]] = 0.0, 1.0
+        limbs = [limb | {"actuator": i} for i, limb in enumerate(limbs)]
     if sum(len(limb["weights"]) for limb in limbs) == len(MAPS[model.map]):
         for limb in limbs:  # nothing to weigh: all closures hold
             limb["weights"] = [1.0] * len(limb["weights"])

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.core.driven import CompiledMachine, DrivenMachine
+from pkmcal.core.driven import CompiledMachine
 from pkmcal.screw import from_pose, log
 
 # Of the size, to each side. The step's square is what differences of third order leave out, the
@@ -49,11 +49,8 @@ def error_jacobian(
     size = machine.struct.size
     steps = {"mm": _STEP * size, "rad": _STEP, "1": _STEP}
     out = np.empty((len(pose), 6, len(columns)))
+    columns, units, factor = machine.as_offsets(slots, q, columns, units)
     unit_of = dict(zip(columns.tolist(), units, strict=True))
-    factor = np.ones((len(pose), len(columns)))
-    if isinstance(machine, DrivenMachine):  # a law moves its drive, however large its numbers are
-        columns, factor = machine.as_offsets(slots, q, columns)
-        unit_of |= {d.offset: "rad" if d.angle else "mm" for d in machine.laws.drives}
     for column in np.unique(columns).tolist():
         step = steps[unit_of[column]]
         start, end = (

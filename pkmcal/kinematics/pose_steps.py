@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
+from pkmcal.arrays import FloatArray, IntArray, Unit, mm_per_unit
 from pkmcal.core.chains import ChainMachine
 from pkmcal.core.driven import DrivenMachine
+from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.core.machine import Machine
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
@@ -84,9 +85,9 @@ def row_roles(robot: Robot) -> RowRoles:
     )
 
 
-def step_units(robot: Robot) -> list[str]:
+def step_units(robot: Robot) -> list[Unit]:
     """Unit of each of the m numbers of a step, "mm" or "rad"."""
-    return ["mm" if name in ("x", "y", "z") else "rad" for name in robot.coordinates]
+    return [COORDINATE_UNITS[name] for name in robot.coordinates]
 
 
 def moved(robot: Robot, pose: FloatArray, step: FloatArray) -> FloatArray:

@@ -17,7 +17,7 @@ from pkmcal import arguments
 from pkmcal.arguments import instance, whole
 from pkmcal.arrays import FloatArray, as_rows, wrapped
 from pkmcal.core.chains import ChainMachine
-from pkmcal.core.driven import CompiledMachine, DrivenMachine
+from pkmcal.core.driven import CompiledMachine
 from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
@@ -149,37 +149,33 @@ class Robot(Kinematics, Result):
             ``.ok`` for each pose; reach, stroke and joint cones for each limb. What exceeds a
             limit by rounding, 1e-10 of the machine's size or rad, keeps it.
         """
-        rows, shape = self.own_rows(pose)
-        chains = self.model.chains
-        if chains is not None:
-            q = (
-                self.machine.inverse(self.slots, rows)
-                if actuators is None
-                else (self._batch(actuators, shape))
-            )
-            machine, slots, at = self.machine.bare(self.slots, q)
-            assert isinstance(machine, ChainMachine)
-            found = chain_limits.feasibility(chains, machine, slots, rows, at)
-            return self._shaped(found, pose, shape)
-        drive, on_base, on_platform = self.limb_machine.limbs(self.slots, rows)
-        if actuators is not None:
-            there = self.drives(self._batch(actuators, shape))
+        given, shape = as_rows("pose", pose, 6)
+        own = self.frames.inward(given)
+        q = None if actuators is None else self._batch(actuators, shape)
+        limits = (
+            self._limb_limits(own, q) if self.model.chains is None else self._chain_limits(own, q)
+        )
+        found = replace(limits, workspace=box.in_box(self.model.workspace, given))
+        each = (getattr(found, field.name) for field in fields(Feasibility))
+        return Feasibility(*(array.reshape(*shape, *array.shape[1:]) for array in each))
+
+    def _limb_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
+        """Limits of limbs in closed form at own poses (N, 6), with coordinates (N, n) or without."""
+        drive, on_base, on_platform = self.limb_machine.limbs(self.slots, own)
+        if q is not None:
+            there = self.drives(q)
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
             drive = np.where(angle, there + wrapped(drive - there), drive)
         size = self.machine.struct.size
-        found = feasibility(self.model.limbs, drive, on_base, on_platform, size)
-        return self._shaped(found, pose, shape)
+        return feasibility(self.model.limbs, drive, on_base, on_platform, size)
 
-    def _shaped(self, found: Feasibility, pose: ArrayLike, shape: tuple[int, ...]) -> Feasibility:
-        """Limits of N rows as those of a batch, and whether its poses are in the workspace."""
-        each = {
-            f.name: getattr(found, f.name) for f in fields(Feasibility) if f.name != "workspace"
-        }
-        at = as_rows("pose", pose, 6)[0].reshape(*shape, 6)
-        return Feasibility(
-            **{name: array.reshape(*shape, array.shape[-1]) for name, array in each.items()},
-            workspace=box.in_box(self.model.workspace, at),
-        )
+    def _chain_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
+        """Limits of chains at own poses (N, 6) with coordinates (N, n), by default the inverse."""
+        if q is None:
+            q = self.machine.inverse(self.slots, own)
+        machine, slots, at = self.machine.bare(self.slots, q)
+        assert isinstance(machine, ChainMachine) and self.model.chains is not None
+        return chain_limits.feasibility(self.model.chains, machine, slots, own, at)
 
     def within(self, ends: box.Box) -> Robot:
         """The robot with a smaller workspace: coordinates with their ends, mm and rad.
@@ -514,7 +510,7 @@ class Robot(Kinematics, Result):
         rows, shape = as_rows("approach", approach, self.n_actuators)
         if not np.isin(rows, (-1.0, 0.0, 1.0)).all():
             raise ArgumentError("approach must be 1, -1 or 0 for each actuator")
-        if not isinstance(self.machine, DrivenMachine):
+        if not self.model.driven:
             return self
         other = copy(self)
         other.__dict__.pop("_of_any_misfit", None)  # of the same directions
@@ -577,9 +573,8 @@ class Robot(Kinematics, Result):
             `like` describes another robot; a drive law has no inverse over its stroke, so that
             the file could not be read.
         """
-        for d, why in self.model.doubts().items():
-            limb = self.model.limb_of_drive(d) + 1
-            raise ArgumentError(f"robot: limb {limb} of {self.name}: its drive law: {why}")
+        for limb, why in self.model.doubts():
+            raise ArgumentError(f"robot: limb {limb + 1} of {self.name}: its drive law: {why}")
         if like is None or self.model.chains is not None:
             robot_file.write(self.model, path, comment)
             return

@@ -32,7 +32,7 @@ def element(found: Identification) -> tuple[str, str]:
     Nothing, and "none", of a machine that the page cannot hold: the still pictures stay.
     """
     robot = found.robot
-    if isinstance(robot, Robot) and any(law is not None for law in robot.model.laws):
+    if isinstance(robot, Robot) and robot.model.driven:
         return "", "none"
     data = page.machine(robot)
     data.pop("cloud", None)  # the report has its own pictures of the workspace

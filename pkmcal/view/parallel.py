@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.core.driven import DrivenMachine
+from pkmcal.core.chains import ChainMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.core.poses import invert
@@ -27,14 +27,14 @@ _TRACK = 25  # points of the path of a crank's end
 def data(robot: Robot) -> dict[str, Any]:
     """All that the page needs of a robot, as JSON has it; mm and rad."""
     model, machine = robot.model, robot.machine
-    if isinstance(machine, DrivenMachine):
+    if model.driven:
         raise ArgumentError(f"robot: {model.name} has drive laws, which the page cannot hold")
     size = float(machine.struct.size)
     spans = ranges.poses(robot, size)
     if isinstance(machine, Machine):
         blob, numbers, strokes = memory.limbs(machine, robot.slots), 0, _strokes(robot)
     else:
-        assert model.chains is not None
+        assert isinstance(machine, ChainMachine) and model.chains is not None
         blob, numbers = memory.chains(machine, robot.slots)
         strokes = chains.strokes(model.chains, robot.slots)
     moves = ranges.actuators(robot, strokes, spans)

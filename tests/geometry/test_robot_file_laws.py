@@ -109,6 +109,17 @@ def test_a_kept_file_keeps_its_laws_and_comments(tmp_path: Path) -> None:
         assert again.geometry[name] == pytest.approx(value, rel=1e-13)
 
 
+def test_the_gain_of_a_spool_is_by_length_and_kept_in_the_files_unit(tmp_path: Path) -> None:
+    path = file(tmp_path, "{ spool = 0.05 }\ngain = 20.0", THREE[1], '{ quadratic = "bend" }')
+    robot = pk.load(path)
+    units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
+    assert (units["gain1"], units["gain2"]) == ("1/mm", "1")
+    assert robot.geometry["gain1"] == pytest.approx(0.02, rel=1e-13)  # 20 a metre
+    changed = robot.replace({"gain1": 0.021})
+    changed.save(tmp_path / "kept.toml", like=path)
+    assert pk.load(tmp_path / "kept.toml").geometry["gain1"] == pytest.approx(0.021, rel=1e-13)
+
+
 @pytest.mark.parametrize(("drive", "message"), [
     ("{}", r"line 17: \[\[limb\]\] 1: drive: states no law; it may have quadratic"),
     ("{ quadratik = 1.0 }", r"line 17: .*unknown key 'quadratik' of a drive law.*quadratic"),
