@@ -16,7 +16,7 @@ from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers.laws import require_no_laws
-from pkmcal.controllers.loss import Loss, cylinder, loss, nearest
+from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
@@ -57,19 +57,15 @@ def hangprinter(robot: Robot, path: str | PathLike[str], project: bool = False) 
     _require(robot)
     built = robot.slots[:, 0:3] - robot.slots[:, 3:6]
     poses, over = _workspace(robot, built)
-    q = robot.inverse(poses)
-    lost = loss(as_robot(built), q, poses, over)
-    if not lost.exact:
-        built = nearest(lambda x: as_robot(x.reshape(-1, 3)), built.ravel(), q, poses)
-        built = built.reshape(-1, 3)
-        lost = loss(as_robot(built), q, poses, over)
-        if not project:
-            raise ArgumentError(
-                f"robot: {robot.name}: the firmware takes the length of a line at the origin for"
-                f" the distance of its anchor, and 1 for its gain, this robot has others; its"
-                f" numbers can be projected onto that, {lost}"
-            )
-    write_whole(path, text_of(built))
+    anchors, lost = fitted(
+        lambda x: as_robot(x.reshape(-1, 3)), built.ravel(), robot.inverse(poses), poses, over
+    )
+    lacks = (
+        "the firmware takes the length of a line at the origin for the distance of its anchor, and"
+        " 1 for its gain, this robot has others"
+    )
+    require_held(robot, lost, project, lacks)
+    write_whole(path, text_of(anchors.reshape(-1, 3)))
     return lost
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers.laws import require_no_laws
-from pkmcal.controllers.loss import Loss, cylinder, loss, nearest
+from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_lines import Source
@@ -69,15 +69,13 @@ def of_robot(robot: Robot, project: bool) -> tuple[FirmwareDelta, Loss]:
     q = robot.inverse(poses)
     if not np.isfinite(q).all():
         raise ArgumentError(f"robot: {robot.name} does not reach its bed: no pose for some {over}")
-    lost = loss(as_robot(firmware, gains(robot)), q, poses, over)
-    if not lost.exact:
-        firmware = _projected(firmware, robot, q, poses)
-        lost = loss(as_robot(firmware, gains(robot)), q, poses, over)
-        if not project:
-            raise ArgumentError(
-                f"robot: {robot.name}: the firmware has one radius and vertical towers, this robot"
-                f" has not; its numbers can be projected onto that, {lost}"
-            )
+    built = [firmware.radius, *firmware.angles, *firmware.arms, *firmware.carriages]
+    x, lost = fitted(
+        lambda x: as_robot(_with_numbers(x), gains(robot)), np.array(built), q, poses, over
+    )
+    lacks = "the firmware has one radius and vertical towers, this robot has not"
+    require_held(robot, lost, project, lacks)
+    firmware = _with_numbers(x)
     if min(firmware.endstops) <= 0.0:
         raise ArgumentError(
             f"robot: {robot.name}: the end stops would be {min(firmware.endstops):.6g} mm over the"
@@ -138,19 +136,10 @@ def _workspace(firmware: FirmwareDelta) -> tuple[FloatArray, str]:
     return cylinder(across, high, _POSES), over
 
 
-def _projected(
-    firmware: FirmwareDelta, robot: Robot, q: FloatArray, poses: FloatArray
-) -> FirmwareDelta:
-    """The numbers whose model is nearest to the robot, by least squares over the poses."""
-
-    def of(x: FloatArray) -> FirmwareDelta:
-        angles, arms, carriages = (tuple(part.tolist()) for part in x[1:].reshape(3, _TOWERS))
-        return FirmwareDelta(float(x[0]), angles, arms, carriages)
-
-    start = np.array(
-        [firmware.radius, *firmware.angles, *firmware.arms, *firmware.carriages], dtype=float
-    )
-    return of(nearest(lambda x: as_robot(of(x), gains(robot)), start, q, poses))
+def _with_numbers(x: FloatArray) -> FirmwareDelta:
+    """The delta with its numbers in a row: radius, angles, arms, carriages."""
+    angles, arms, carriages = (tuple(part.tolist()) for part in x[1:].reshape(3, _TOWERS))
+    return FirmwareDelta(float(x[0]), angles, arms, carriages)
 
 
 def as_robot(

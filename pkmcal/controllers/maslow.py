@@ -18,7 +18,7 @@ from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers.laws import require_no_laws
-from pkmcal.controllers.loss import Loss, loss, nearest
+from pkmcal.controllers.loss import Loss, fitted, require_held
 from pkmcal.controllers.printer_config import text_in
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
@@ -93,20 +93,15 @@ def maslow(
     path, project = as_path("path", path), flag("project", project)
     require_parallel(robot)
     corner = _corners(robot)
-    anchors = (robot.slots[:, 0:2] - robot.slots[:, 3:5])[corner]
-    poses, over = _workspace(anchors)
+    built = (robot.slots[:, 0:2] - robot.slots[:, 3:5])[corner]
+    poses = _workspace(built)
     q = robot.inverse(poses)[:, corner]
-    lost = loss(as_robot(anchors), q, poses, over)
-    if not lost.exact:
-        found = nearest(lambda x: as_robot(x.reshape(4, 2)), anchors.ravel(), q, poses)
-        anchors = found.reshape(4, 2)
-        lost = loss(as_robot(anchors), q, poses, over)
-        if not project:
-            raise ArgumentError(
-                f"robot: {robot.name}: the firmware has no offset and no gain of a belt, this robot"
-                f" has; its numbers can be projected onto anchors alone, {lost}"
-            )
-    values = dict(zip(_NAMES, (anchors + 0.0).ravel().tolist(), strict=True))
+    anchors, lost = fitted(
+        lambda x: as_robot(x.reshape(4, 2)), built.ravel(), q, poses, "between the anchors"
+    )
+    lacks = "the firmware has anchors alone, no offset and no gain of a belt as this robot has"
+    require_held(robot, lost, project, lacks)
+    values = dict(zip(_NAMES, (anchors + 0.0).tolist(), strict=True))
     if config is None:
         numbers = "".join(f"    {name}: {value:.6f}\n" for name, value in values.items())
         text = "kinematics:\n  MaslowKinematics:\n" + numbers
@@ -183,8 +178,8 @@ def _corners(robot: Robot) -> list[int]:
     return [corners.index(corner) for corner in CORNERS]
 
 
-def _workspace(anchors: FloatArray) -> tuple[FloatArray, str]:
-    """Poses between the anchors, and what to call them."""
+def _workspace(anchors: FloatArray) -> FloatArray:
+    """Poses between the anchors."""
     u, v = (
         grid.ravel()[:, None] for grid in np.meshgrid(*[np.linspace(_HOLDS, 1 - _HOLDS, _SIDE)] * 2)
     )
@@ -192,7 +187,7 @@ def _workspace(anchors: FloatArray) -> tuple[FloatArray, str]:
     poses = np.zeros((len(u), 6))
     poses[:, :2] = v * ((1 - u) * top_left + u * top_right)
     poses[:, :2] += (1 - v) * ((1 - u) * low_left + u * low_right)
-    return poses, "between the anchors"
+    return poses
 
 
 def _changed(text: str, place: str, values: dict[str, float]) -> str:

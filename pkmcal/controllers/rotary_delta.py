@@ -14,7 +14,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers.c_header import prepared
 from pkmcal.controllers.laws import require_no_laws
-from pkmcal.controllers.loss import Loss, loss, nearest
+from pkmcal.controllers.loss import Loss, fitted, require_held
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.toml_lines import Source
@@ -86,28 +86,25 @@ def of_robot(robot: Robot, project: bool, one_height: bool) -> tuple[RotaryDelta
     """
     require_rotary_delta(robot)
     home = float(robot.home[2])
-    delta = as_built(robot, one_height)
+    built = as_built(robot, one_height)
     poses = sample_poses(robot, _POSES)
     q = robot.inverse(poses)
-    lost = loss(as_robot(delta, home), q, poses, OVER)
-    if not lost.exact:
 
-        def of(x: FloatArray) -> RotaryDelta:
-            heights = x[13:] if len(x) > 14 else np.repeat(x[13:], _TOWERS)
-            angles, cranks, rods, elbows = map(tuple, x[1:13].reshape(4, _TOWERS).tolist())
-            numbers = (float(x[0]), tuple(heights.tolist()), angles, cranks, rods, elbows)
-            return RotaryDelta(*numbers, delta.gains)
+    def of(x: FloatArray) -> RotaryDelta:
+        heights = x[13:] if len(x) > 14 else np.repeat(x[13:], _TOWERS)
+        angles, cranks, rods, elbows = map(tuple, x[1:13].reshape(4, _TOWERS).tolist())
+        numbers = (float(x[0]), tuple(heights.tolist()), angles, cranks, rods, elbows)
+        return RotaryDelta(*numbers, built.gains)
 
-        heights = delta.heights[: 1 if one_height else _TOWERS]
-        start = [delta.radius, *delta.angles, *delta.cranks, *delta.rods, *delta.elbows, *heights]
-        delta = of(nearest(lambda x: as_robot(of(x), home), np.array(start), q, poses))
-        lost = loss(as_robot(delta, home), q, poses, OVER)
-        if not project:
-            raise ArgumentError(
-                f"robot: {robot.name}: the firmware has one radius{' and one height' * one_height},"
-                f" and cranks that turn in radial planes, this robot has not; its numbers can be"
-                f" projected onto that, {lost}"
-            )
+    heights = built.heights[: 1 if one_height else _TOWERS]
+    start = [built.radius, *built.angles, *built.cranks, *built.rods, *built.elbows, *heights]
+    x, lost = fitted(lambda x: as_robot(of(x), home), np.array(start), q, poses, OVER)
+    lacks = (
+        f"the firmware has one radius{' and one height' * one_height}, and cranks that turn in"
+        " radial planes, this robot has not"
+    )
+    require_held(robot, lost, project, lacks)
+    delta = of(x)
     if min(delta.endstops) <= 0.0:
         raise ArgumentError(
             f"robot: {robot.name}: the end stops would be {min(delta.endstops):.6g} mm over the"
