@@ -15,13 +15,11 @@ import numpy as np
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers import robot_files
 from pkmcal.controllers.laws import require_no_laws
 from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
-from pkmcal.files.toml_lines import Source
-from pkmcal.geometry import robot_file
-from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 _LETTERS = "ABCD"
@@ -108,23 +106,23 @@ def of_text(text: str, place: str = "M669") -> FloatArray:
 
 def as_robot(anchors: FloatArray, name: str = "hangprinter", head: str = "") -> Robot:
     """The robot with these anchors."""
-    source = Source(robot_text(anchors, name, head).encode(), "M669")
-    return Robot(robot_file.parse(source, None))
+    return robot_files.robot_of(robot_text(anchors, name, head), "M669")
 
 
 def robot_text(anchors: FloatArray, name: str, head: str) -> str:
     """A robot file with these anchors; home is below the highest one."""
     home = round(0.2 * float(anchors[:, 2].max()), 3)
-    blocks = [
-        head,
-        lines({"name": name, "units": {"length": "mm", "angle": "deg"}}),
-        "[pose]\n" + lines({"map": "translation", "home": {"z": home}}),
-        "[calibration]\n" + lines({"free": ["base*", "offset*"]}),
+    pose = {"map": "translation", "home": {"z": home}}
+    limbs = [
+        {
+            "kind": "UPS",
+            "base": anchor,
+            "platform": [0.0, 0.0, 0.0],
+            "offset": float(np.linalg.norm(anchor)),
+        }
+        for anchor in anchors.tolist()
     ]
-    for anchor in anchors.tolist():
-        limb: dict[str, object] = {"kind": "UPS", "base": anchor, "platform": [0.0, 0.0, 0.0]}
-        blocks.append("[[limb]]\n" + lines(limb | {"offset": float(np.linalg.norm(anchor))}))
-    return "\n".join(block for block in blocks if block)
+    return robot_files.text_of(name, head, pose, ["base*", "offset*"], limbs)
 
 
 def _require(robot: Robot) -> None:

@@ -13,13 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers import robot_files
 from pkmcal.controllers.laws import require_no_laws
 from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
-from pkmcal.files.toml_lines import Source
-from pkmcal.geometry import robot_file
-from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 _TOWERS = 3
@@ -146,8 +144,7 @@ def as_robot(
     firmware: FirmwareDelta, gains: Sequence[float], name: str = "linear delta", head: str = ""
 ) -> Robot:
     """The robot with the firmware's numbers; `gains` as in `text_of`."""
-    text = text_of(firmware, gains, name, head)
-    return Robot(robot_file.parse(Source(text.encode(), "the firmware's numbers"), None))
+    return robot_files.robot_of(text_of(firmware, gains, name, head), "the firmware's numbers")
 
 
 def text_of(firmware: FirmwareDelta, gains: Sequence[float], name: str, head: str) -> str:
@@ -164,26 +161,27 @@ def text_of(firmware: FirmwareDelta, gains: Sequence[float], name: str, head: st
     """
     parameters = {"radius": firmware.radius}
     parameters |= {f"angle{i}": angle for i, angle in enumerate(firmware.angles, 1)}
-    blocks = [
-        head,
-        lines({"name": name, "units": {"length": "mm", "angle": "deg"}}),
-        "[pose]\n"
-        + lines({"map": "translation", "home": {"z": round(0.5 * max(firmware.endstops), 3)}}),
-        "[parameters]\n" + lines(parameters),
-        "# Heights do not determine which way x is, so angle3 stays, and hardly the rods.\n"
-        "[calibration]\n"
-        + lines({"free": ["radius", "angle1", "angle2", "offset1", "offset2", "offset3"]}),
-    ]
-    for i, (arm, carriage, gain) in enumerate(
-        zip(firmware.arms, firmware.carriages, gains, strict=True), 1
-    ):
-        base = {"radius": "radius", "angle": f"angle{i}", "z": 0.0}
-        limb: dict[str, object] = {
+    limbs = [
+        {
             "kind": "PUS",
-            "base": base,
+            "base": {"radius": "radius", "angle": f"angle{i}", "z": 0.0},
             "platform": [0.0, 0.0, 0.0],
             "slider": [0, 0, 1],
+            "rod": arm,
+            "offset": carriage,
+            "gain": gain,
+            "branch": -1,
         }
-        limb |= {"rod": arm, "offset": carriage, "gain": gain, "branch": -1}
-        blocks.append("[[limb]]\n" + lines(limb))
-    return "\n".join(block for block in blocks if block)
+        for i, (arm, carriage, gain) in enumerate(
+            zip(firmware.arms, firmware.carriages, gains, strict=True), 1
+        )
+    ]
+    return robot_files.text_of(
+        name,
+        head,
+        {"map": "translation", "home": {"z": round(0.5 * max(firmware.endstops), 3)}},
+        ["radius", "angle1", "angle2", "offset1", "offset2", "offset3"],
+        limbs,
+        parameters,
+        "# Heights do not determine which way x is, so angle3 stays, and hardly the rods.\n",
+    )

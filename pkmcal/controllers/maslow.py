@@ -17,14 +17,12 @@ import numpy as np
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers import robot_files
 from pkmcal.controllers.laws import require_no_laws
 from pkmcal.controllers.loss import Loss, fitted, require_held
 from pkmcal.controllers.printer_config import text_in
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
-from pkmcal.files.toml_lines import Source
-from pkmcal.geometry import robot_file
-from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 CORNERS = ("tl", "tr", "bl", "br")  # in the order of the motors
@@ -141,23 +139,17 @@ def of_text(text: str, place: str) -> tuple[FloatArray, FloatArray]:
 
 def as_robot(anchors: FloatArray, name: str = "maslow", head: str = "") -> Robot:
     """The robot with these anchors (4, 2)."""
-    source = Source(robot_text(anchors, name, head).encode(), "maslow.yaml")
-    return Robot(robot_file.parse(source, None))
+    return robot_files.robot_of(robot_text(anchors, name, head), "maslow.yaml")
 
 
 def robot_text(anchors: FloatArray, name: str, head: str) -> str:
     """A robot file with these anchors; home is in their middle."""
     home = dict(zip("xy", np.round(anchors.mean(axis=0), 3).tolist(), strict=True))
-    blocks = [
-        head,
-        lines({"name": name, "units": {"length": "mm", "angle": "deg"}}),
-        "[pose]\n" + lines({"map": "xy", "home": home}),
-        "[calibration]\n" + lines({"free": _FREE}),
+    limbs = [
+        {"kind": "cable", "base": [x, y, 0.0], "platform": [0.0, 0.0, 0.0]}
+        for x, y in anchors.tolist()
     ]
-    for x, y in anchors.tolist():
-        limb = {"kind": "cable", "base": [x, y, 0.0], "platform": [0.0, 0.0, 0.0]}
-        blocks.append("[[limb]]\n" + lines(limb))
-    return "\n".join(block for block in blocks if block)
+    return robot_files.text_of(name, head, {"map": "xy", "home": home}, _FREE, limbs)
 
 
 def _corners(robot: Robot) -> list[int]:
