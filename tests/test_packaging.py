@@ -129,6 +129,23 @@ def test_a_machine_loads_numpy_and_the_core_alone(tmp_path: Path) -> None:
     assert not heavy & set(loaded)
 
 
+def test_a_calibration_without_a_report_loads_nothing_of_a_report(tmp_path: Path) -> None:
+    files = [str(ROOT / "examples" / "linear-delta" / name) for name in ("robot.toml", "probe.csv")]
+    code = f"""
+import sys
+from pkmcal.cli.main import main
+sys.argv[1:] = ["calibrate", "--free", "offset*", *{files}]
+try:
+    main()
+except SystemExit:
+    print(*sys.modules)
+"""
+    loaded = set(run("-c", code, cwd=tmp_path).split())
+    assert "pkmcal.calibration.identification" in loaded
+    assert not loaded & {"pkmcal.view", "pkmcal.report.report", "pkmcal.report.certificate"}
+    assert not loaded & {"jinja2", "matplotlib"}
+
+
 def test_version_is_stated_once() -> None:
     files = [ROOT / "pyproject.toml", ROOT / "setup.py"]
     for folder in ("pkmcal", "derive", "csrc", "generated"):

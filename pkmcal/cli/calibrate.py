@@ -36,12 +36,11 @@ from pkmcal.cli.progress import progress
 from pkmcal.cli.sessions import in_sessions
 from pkmcal.display import printable
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.reading import Input
 from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.report.as_json import as_json
-from pkmcal.report.certificate import read as read_statement
-from pkmcal.report.report import FILES as REPORT
 from pkmcal.statistics.covariance import RULES
 
 
@@ -198,12 +197,10 @@ def calibrate(
     urdf = isinstance(given, pk.SerialArm) and given.source is not None
     names = ["robot.toml", "residuals.png", *["robot.urdf"] * urdf]
     output = None if out is None else Output(out, names, read, force)
-    reported = None if report is None else Output(report, REPORT, read, force)
+    reported = None if report is None else _report_files(report, read, force)
     if certificate is not None and report is None:
         raise ArgumentError("--certificate: it is part of the report, --report DIR")
-    stated = None if certificate is None else read.file(certificate)
-    if stated is not None:
-        read_statement(stated)  # a mistake in it is said before the work
+    stated = None if certificate is None else _checked_statement(certificate, read)
     if tracker is not None:
         seen = read_tracker(tracker)
         measured = [_seen_by(seen, each) for each in measured]
@@ -255,6 +252,20 @@ def calibrate(
         if reported is not None:
             say(f"\nreport: {reported.paths[0]}")
     return 0 if found.verdict.state == "calibrated" and not doubts else 1
+
+
+def _report_files(folder: Path, read: Inputs, force: bool) -> Output:
+    from pkmcal.report.report import FILES  # and all that a report needs: only if there is one
+
+    return Output(folder, FILES, read, force)
+
+
+def _checked_statement(certificate: Path, read: Inputs) -> Input:
+    """The file of ``--certificate``: a mistake in it is said before the work."""
+    from pkmcal.report.certificate import read as statement
+
+    statement(file := read.file(certificate))
+    return file
 
 
 def _save(found: pk.Identification, path: Path, read: Inputs, robot: str) -> None:

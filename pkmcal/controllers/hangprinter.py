@@ -15,13 +15,11 @@ import numpy as np
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers import robot_files
 from pkmcal.controllers.laws import require_no_laws
-from pkmcal.controllers.loss import Loss, cylinder, loss, nearest
+from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
-from pkmcal.files.toml_lines import Source
-from pkmcal.geometry import robot_file
-from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 _LETTERS = "ABCD"
@@ -57,19 +55,15 @@ def hangprinter(robot: Robot, path: str | PathLike[str], project: bool = False) 
     _require(robot)
     built = robot.slots[:, 0:3] - robot.slots[:, 3:6]
     poses, over = _workspace(robot, built)
-    q = robot.inverse(poses)
-    lost = loss(as_robot(built), q, poses, over)
-    if not lost.exact:
-        built = nearest(lambda x: as_robot(x.reshape(-1, 3)), built.ravel(), q, poses)
-        built = built.reshape(-1, 3)
-        lost = loss(as_robot(built), q, poses, over)
-        if not project:
-            raise ArgumentError(
-                f"robot: {robot.name}: the firmware takes the length of a line at the origin for"
-                f" the distance of its anchor, and 1 for its gain, this robot has others; its"
-                f" numbers can be projected onto that, {lost}"
-            )
-    write_whole(path, text_of(built))
+    anchors, lost = fitted(
+        lambda x: as_robot(x.reshape(-1, 3)), built.ravel(), robot.inverse(poses), poses, over
+    )
+    lacks = (
+        "the firmware takes the length of a line at the origin for the distance of its anchor, and"
+        " 1 for its gain, this robot has others"
+    )
+    require_held(robot, lost, project, lacks)
+    write_whole(path, text_of(anchors.reshape(-1, 3)))
     return lost
 
 
@@ -112,23 +106,23 @@ def of_text(text: str, place: str = "M669") -> FloatArray:
 
 def as_robot(anchors: FloatArray, name: str = "hangprinter", head: str = "") -> Robot:
     """The robot with these anchors."""
-    source = Source(robot_text(anchors, name, head).encode(), "M669")
-    return Robot(robot_file.parse(source, None))
+    return robot_files.robot_of(robot_text(anchors, name, head), "M669")
 
 
 def robot_text(anchors: FloatArray, name: str, head: str) -> str:
     """A robot file with these anchors; home is below the highest one."""
     home = round(0.2 * float(anchors[:, 2].max()), 3)
-    blocks = [
-        head,
-        lines({"name": name, "units": {"length": "mm", "angle": "deg"}}),
-        "[pose]\n" + lines({"map": "translation", "home": {"z": home}}),
-        "[calibration]\n" + lines({"free": ["base*", "offset*"]}),
+    pose = {"map": "translation", "home": {"z": home}}
+    limbs = [
+        {
+            "kind": "UPS",
+            "base": anchor,
+            "platform": [0.0, 0.0, 0.0],
+            "offset": float(np.linalg.norm(anchor)),
+        }
+        for anchor in anchors.tolist()
     ]
-    for anchor in anchors.tolist():
-        limb: dict[str, object] = {"kind": "UPS", "base": anchor, "platform": [0.0, 0.0, 0.0]}
-        blocks.append("[[limb]]\n" + lines(limb | {"offset": float(np.linalg.norm(anchor))}))
-    return "\n".join(block for block in blocks if block)
+    return robot_files.text_of(name, head, pose, ["base*", "offset*"], limbs)
 
 
 def _require(robot: Robot) -> None:

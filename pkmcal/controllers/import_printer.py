@@ -12,10 +12,8 @@ import numpy as np
 
 from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
-from pkmcal.controllers import maslow, rotary_delta, rotary_gcode
+from pkmcal.controllers import hangprinter, maslow, rotary_delta, rotary_gcode
 from pkmcal.controllers.delta_gcode import of_marlin, of_reprap
-from pkmcal.controllers.hangprinter import as_robot as robot_of_anchors
-from pkmcal.controllers.hangprinter import of_text, robot_text
 from pkmcal.controllers.linear_delta import FirmwareDelta, as_robot, text_of
 from pkmcal.controllers.printer_config import (
     ANGLES,
@@ -141,9 +139,9 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     word("firmware", firmware, get_args(Firmware))
     if firmware == "hangprinter":
         where = as_path("path", path)
-        anchors = of_text(text_in(path), str(where))
-        text = robot_text(anchors, where.stem, _ANCHORS_HEAD.format(file=where.name))
-        return Printer(robot_of_anchors(anchors, where.stem), None, 0, text)
+        anchors = hangprinter.of_text(text_in(path), str(where))
+        text = hangprinter.robot_text(anchors, where.stem, _ANCHORS_HEAD.format(file=where.name))
+        return Printer(hangprinter.as_robot(anchors, where.stem), None, 0, text)
     if firmware == "maslow":
         where = as_path("path", path)
         anchors, belts = maslow.of_text(text_in(path), str(where))

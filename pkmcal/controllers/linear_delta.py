@@ -13,13 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers import robot_files
 from pkmcal.controllers.laws import require_no_laws
-from pkmcal.controllers.loss import Loss, cylinder, loss, nearest
+from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
-from pkmcal.files.toml_lines import Source
-from pkmcal.geometry import robot_file
-from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 _TOWERS = 3
@@ -69,15 +67,13 @@ def of_robot(robot: Robot, project: bool) -> tuple[FirmwareDelta, Loss]:
     q = robot.inverse(poses)
     if not np.isfinite(q).all():
         raise ArgumentError(f"robot: {robot.name} does not reach its bed: no pose for some {over}")
-    lost = loss(as_robot(firmware, gains(robot)), q, poses, over)
-    if not lost.exact:
-        firmware = _projected(firmware, robot, q, poses)
-        lost = loss(as_robot(firmware, gains(robot)), q, poses, over)
-        if not project:
-            raise ArgumentError(
-                f"robot: {robot.name}: the firmware has one radius and vertical towers, this robot"
-                f" has not; its numbers can be projected onto that, {lost}"
-            )
+    built = [firmware.radius, *firmware.angles, *firmware.arms, *firmware.carriages]
+    x, lost = fitted(
+        lambda x: as_robot(_with_numbers(x), gains(robot)), np.array(built), q, poses, over
+    )
+    lacks = "the firmware has one radius and vertical towers, this robot has not"
+    require_held(robot, lost, project, lacks)
+    firmware = _with_numbers(x)
     if min(firmware.endstops) <= 0.0:
         raise ArgumentError(
             f"robot: {robot.name}: the end stops would be {min(firmware.endstops):.6g} mm over the"
@@ -138,27 +134,17 @@ def _workspace(firmware: FirmwareDelta) -> tuple[FloatArray, str]:
     return cylinder(across, high, _POSES), over
 
 
-def _projected(
-    firmware: FirmwareDelta, robot: Robot, q: FloatArray, poses: FloatArray
-) -> FirmwareDelta:
-    """The numbers whose model is nearest to the robot, by least squares over the poses."""
-
-    def of(x: FloatArray) -> FirmwareDelta:
-        angles, arms, carriages = (tuple(part.tolist()) for part in x[1:].reshape(3, _TOWERS))
-        return FirmwareDelta(float(x[0]), angles, arms, carriages)
-
-    start = np.array(
-        [firmware.radius, *firmware.angles, *firmware.arms, *firmware.carriages], dtype=float
-    )
-    return of(nearest(lambda x: as_robot(of(x), gains(robot)), start, q, poses))
+def _with_numbers(x: FloatArray) -> FirmwareDelta:
+    """The delta with its numbers in a row: radius, angles, arms, carriages."""
+    angles, arms, carriages = (tuple(part.tolist()) for part in x[1:].reshape(3, _TOWERS))
+    return FirmwareDelta(float(x[0]), angles, arms, carriages)
 
 
 def as_robot(
     firmware: FirmwareDelta, gains: Sequence[float], name: str = "linear delta", head: str = ""
 ) -> Robot:
     """The robot with the firmware's numbers; `gains` as in `text_of`."""
-    text = text_of(firmware, gains, name, head)
-    return Robot(robot_file.parse(Source(text.encode(), "the firmware's numbers"), None))
+    return robot_files.robot_of(text_of(firmware, gains, name, head), "the firmware's numbers")
 
 
 def text_of(firmware: FirmwareDelta, gains: Sequence[float], name: str, head: str) -> str:
@@ -175,26 +161,27 @@ def text_of(firmware: FirmwareDelta, gains: Sequence[float], name: str, head: st
     """
     parameters = {"radius": firmware.radius}
     parameters |= {f"angle{i}": angle for i, angle in enumerate(firmware.angles, 1)}
-    blocks = [
-        head,
-        lines({"name": name, "units": {"length": "mm", "angle": "deg"}}),
-        "[pose]\n"
-        + lines({"map": "translation", "home": {"z": round(0.5 * max(firmware.endstops), 3)}}),
-        "[parameters]\n" + lines(parameters),
-        "# Heights do not determine which way x is, so angle3 stays, and hardly the rods.\n"
-        "[calibration]\n"
-        + lines({"free": ["radius", "angle1", "angle2", "offset1", "offset2", "offset3"]}),
-    ]
-    for i, (arm, carriage, gain) in enumerate(
-        zip(firmware.arms, firmware.carriages, gains, strict=True), 1
-    ):
-        base = {"radius": "radius", "angle": f"angle{i}", "z": 0.0}
-        limb: dict[str, object] = {
+    limbs = [
+        {
             "kind": "PUS",
-            "base": base,
+            "base": {"radius": "radius", "angle": f"angle{i}", "z": 0.0},
             "platform": [0.0, 0.0, 0.0],
             "slider": [0, 0, 1],
+            "rod": arm,
+            "offset": carriage,
+            "gain": gain,
+            "branch": -1,
         }
-        limb |= {"rod": arm, "offset": carriage, "gain": gain, "branch": -1}
-        blocks.append("[[limb]]\n" + lines(limb))
-    return "\n".join(block for block in blocks if block)
+        for i, (arm, carriage, gain) in enumerate(
+            zip(firmware.arms, firmware.carriages, gains, strict=True), 1
+        )
+    ]
+    return robot_files.text_of(
+        name,
+        head,
+        {"map": "translation", "home": {"z": round(0.5 * max(firmware.endstops), 3)}},
+        ["radius", "angle1", "angle2", "offset1", "offset2", "offset3"],
+        limbs,
+        parameters,
+        "# Heights do not determine which way x is, so angle3 stays, and hardly the rods.\n",
+    )

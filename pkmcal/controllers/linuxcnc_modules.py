@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from pkmcal.arrays import FloatArray, first_largest
 from pkmcal.controllers import linear_delta, rotary_delta
 from pkmcal.controllers.linear_delta import FirmwareDelta
-from pkmcal.controllers.loss import Loss, loss, nearest
+from pkmcal.controllers.loss import Loss, fitted
 from pkmcal.controllers.rotary_delta import OVER, RotaryDelta
 from pkmcal.core.poses import invert
 from pkmcal.kinematics.robot import Robot
@@ -119,14 +119,8 @@ def _rotary(robot: Robot) -> Module:
 def _fitted(
     model: Callable[[FloatArray], Robot], start: FloatArray, robot: Robot
 ) -> tuple[FloatArray, Loss]:
-    """Numbers as built where they are exact, else the nearest."""
     poses = sample_poses(robot, _POSES)
-    q = robot.inverse(poses)
-    lost = loss(model(start), q, poses, OVER)
-    if lost.exact:
-        return start, lost
-    found = nearest(model, start, q, poses)
-    return found, loss(model(found), q, poses, OVER)
+    return fitted(model, start, robot.inverse(poses), poses, OVER)
 
 
 def _order(angles: tuple[float, ...], joints: tuple[float, ...]) -> list[int]:

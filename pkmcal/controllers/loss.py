@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from pkmcal.arrays import FloatArray, rms
+from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
 
 EXACT = 1e-6  # mm: firmware numbers have six decimals
@@ -61,11 +62,44 @@ def loss(model: Robot, q: FloatArray, poses: FloatArray, over: str) -> Loss:
     return Loss(rms(off), float(off.max()), over)
 
 
-def nearest(
-    model: Callable[[FloatArray], Robot], start: FloatArray, q: FloatArray, poses: FloatArray
-) -> FloatArray:
-    """The numbers whose model is nearest to poses at the same actuators, by least squares."""
+def fitted(
+    model: Callable[[FloatArray], Robot],
+    built: FloatArray,
+    q: FloatArray,
+    poses: FloatArray,
+    over: str,
+) -> tuple[FloatArray, Loss]:
+    """Numbers of a controller's model: as built where these are exact, else the nearest.
+
+    Parameters
+    ----------
+    model : callable
+        The robot with such numbers.
+    built : ndarray (n,)
+        Numbers of the robot as if the controller could hold it.
+    q, poses : ndarray (N, n), (N, 6)
+        Of the robot, over its workspace.
+    over : str
+        What to call the workspace.
+    """
+    lost = loss(model(built), q, poses, over)
+    if lost.exact:
+        return built, lost
     found: FloatArray = least_squares(
-        lambda x: off_by(model(x), q, poses).ravel(), start, x_scale="jac", xtol=1e-12
+        lambda x: off_by(model(x), q, poses).ravel(), built, x_scale="jac", xtol=1e-12
     ).x
-    return found
+    return found, loss(model(found), q, poses, over)
+
+
+def require_held(robot: Robot, lost: Loss, project: bool, lacks: str) -> None:
+    """Refuse a robot that the controller cannot hold, unless its numbers are to be projected.
+
+    Raises
+    ------
+    ValueError
+        `lacks` says what the controller cannot hold.
+    """
+    if not (lost.exact or project):
+        raise ArgumentError(
+            f"robot: {robot.name}: {lacks}; its numbers can be projected onto that, {lost}"
+        )

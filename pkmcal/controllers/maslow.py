@@ -17,14 +17,12 @@ import numpy as np
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers import robot_files
 from pkmcal.controllers.laws import require_no_laws
-from pkmcal.controllers.loss import Loss, loss, nearest
+from pkmcal.controllers.loss import Loss, fitted, require_held
 from pkmcal.controllers.printer_config import text_in
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
-from pkmcal.files.toml_lines import Source
-from pkmcal.geometry import robot_file
-from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 CORNERS = ("tl", "tr", "bl", "br")  # in the order of the motors
@@ -93,20 +91,15 @@ def maslow(
     path, project = as_path("path", path), flag("project", project)
     require_parallel(robot)
     corner = _corners(robot)
-    anchors = (robot.slots[:, 0:2] - robot.slots[:, 3:5])[corner]
-    poses, over = _workspace(anchors)
+    built = (robot.slots[:, 0:2] - robot.slots[:, 3:5])[corner]
+    poses = _workspace(built)
     q = robot.inverse(poses)[:, corner]
-    lost = loss(as_robot(anchors), q, poses, over)
-    if not lost.exact:
-        found = nearest(lambda x: as_robot(x.reshape(4, 2)), anchors.ravel(), q, poses)
-        anchors = found.reshape(4, 2)
-        lost = loss(as_robot(anchors), q, poses, over)
-        if not project:
-            raise ArgumentError(
-                f"robot: {robot.name}: the firmware has no offset and no gain of a belt, this robot"
-                f" has; its numbers can be projected onto anchors alone, {lost}"
-            )
-    values = dict(zip(_NAMES, (anchors + 0.0).ravel().tolist(), strict=True))
+    anchors, lost = fitted(
+        lambda x: as_robot(x.reshape(4, 2)), built.ravel(), q, poses, "between the anchors"
+    )
+    lacks = "the firmware has anchors alone, no offset and no gain of a belt as this robot has"
+    require_held(robot, lost, project, lacks)
+    values = dict(zip(_NAMES, (anchors + 0.0).tolist(), strict=True))
     if config is None:
         numbers = "".join(f"    {name}: {value:.6f}\n" for name, value in values.items())
         text = "kinematics:\n  MaslowKinematics:\n" + numbers
@@ -146,23 +139,17 @@ def of_text(text: str, place: str) -> tuple[FloatArray, FloatArray]:
 
 def as_robot(anchors: FloatArray, name: str = "maslow", head: str = "") -> Robot:
     """The robot with these anchors (4, 2)."""
-    source = Source(robot_text(anchors, name, head).encode(), "maslow.yaml")
-    return Robot(robot_file.parse(source, None))
+    return robot_files.robot_of(robot_text(anchors, name, head), "maslow.yaml")
 
 
 def robot_text(anchors: FloatArray, name: str, head: str) -> str:
     """A robot file with these anchors; home is in their middle."""
     home = dict(zip("xy", np.round(anchors.mean(axis=0), 3).tolist(), strict=True))
-    blocks = [
-        head,
-        lines({"name": name, "units": {"length": "mm", "angle": "deg"}}),
-        "[pose]\n" + lines({"map": "xy", "home": home}),
-        "[calibration]\n" + lines({"free": _FREE}),
+    limbs = [
+        {"kind": "cable", "base": [x, y, 0.0], "platform": [0.0, 0.0, 0.0]}
+        for x, y in anchors.tolist()
     ]
-    for x, y in anchors.tolist():
-        limb = {"kind": "cable", "base": [x, y, 0.0], "platform": [0.0, 0.0, 0.0]}
-        blocks.append("[[limb]]\n" + lines(limb))
-    return "\n".join(block for block in blocks if block)
+    return robot_files.text_of(name, head, {"map": "xy", "home": home}, _FREE, limbs)
 
 
 def _corners(robot: Robot) -> list[int]:
@@ -183,8 +170,8 @@ def _corners(robot: Robot) -> list[int]:
     return [corners.index(corner) for corner in CORNERS]
 
 
-def _workspace(anchors: FloatArray) -> tuple[FloatArray, str]:
-    """Poses between the anchors, and what to call them."""
+def _workspace(anchors: FloatArray) -> FloatArray:
+    """Poses between the anchors."""
     u, v = (
         grid.ravel()[:, None] for grid in np.meshgrid(*[np.linspace(_HOLDS, 1 - _HOLDS, _SIDE)] * 2)
     )
@@ -192,7 +179,7 @@ def _workspace(anchors: FloatArray) -> tuple[FloatArray, str]:
     poses = np.zeros((len(u), 6))
     poses[:, :2] = v * ((1 - u) * top_left + u * top_right)
     poses[:, :2] += (1 - v) * ((1 - u) * low_left + u * low_right)
-    return poses, "between the anchors"
+    return poses
 
 
 def _changed(text: str, place: str, values: dict[str, float]) -> str:

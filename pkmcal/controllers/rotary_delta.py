@@ -12,14 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.controllers import robot_files
 from pkmcal.controllers.c_header import prepared
 from pkmcal.controllers.laws import require_no_laws
-from pkmcal.controllers.loss import Loss, loss, nearest
+from pkmcal.controllers.loss import Loss, fitted, require_held
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
-from pkmcal.files.toml_lines import Source
-from pkmcal.geometry import robot_file
-from pkmcal.geometry.robot_file_writer import lines
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.kinematics.workspace import sample_poses
 
@@ -86,28 +84,25 @@ def of_robot(robot: Robot, project: bool, one_height: bool) -> tuple[RotaryDelta
     """
     require_rotary_delta(robot)
     home = float(robot.home[2])
-    delta = as_built(robot, one_height)
+    built = as_built(robot, one_height)
     poses = sample_poses(robot, _POSES)
     q = robot.inverse(poses)
-    lost = loss(as_robot(delta, home), q, poses, OVER)
-    if not lost.exact:
 
-        def of(x: FloatArray) -> RotaryDelta:
-            heights = x[13:] if len(x) > 14 else np.repeat(x[13:], _TOWERS)
-            angles, cranks, rods, elbows = map(tuple, x[1:13].reshape(4, _TOWERS).tolist())
-            numbers = (float(x[0]), tuple(heights.tolist()), angles, cranks, rods, elbows)
-            return RotaryDelta(*numbers, delta.gains)
+    def of(x: FloatArray) -> RotaryDelta:
+        heights = x[13:] if len(x) > 14 else np.repeat(x[13:], _TOWERS)
+        angles, cranks, rods, elbows = map(tuple, x[1:13].reshape(4, _TOWERS).tolist())
+        numbers = (float(x[0]), tuple(heights.tolist()), angles, cranks, rods, elbows)
+        return RotaryDelta(*numbers, built.gains)
 
-        heights = delta.heights[: 1 if one_height else _TOWERS]
-        start = [delta.radius, *delta.angles, *delta.cranks, *delta.rods, *delta.elbows, *heights]
-        delta = of(nearest(lambda x: as_robot(of(x), home), np.array(start), q, poses))
-        lost = loss(as_robot(delta, home), q, poses, OVER)
-        if not project:
-            raise ArgumentError(
-                f"robot: {robot.name}: the firmware has one radius{' and one height' * one_height},"
-                f" and cranks that turn in radial planes, this robot has not; its numbers can be"
-                f" projected onto that, {lost}"
-            )
+    heights = built.heights[: 1 if one_height else _TOWERS]
+    start = [built.radius, *built.angles, *built.cranks, *built.rods, *built.elbows, *heights]
+    x, lost = fitted(lambda x: as_robot(of(x), home), np.array(start), q, poses, OVER)
+    lacks = (
+        f"the firmware has one radius{' and one height' * one_height}, and cranks that turn in"
+        " radial planes, this robot has not"
+    )
+    require_held(robot, lost, project, lacks)
+    delta = of(x)
     if min(delta.endstops) <= 0.0:
         raise ArgumentError(
             f"robot: {robot.name}: the end stops would be {min(delta.endstops):.6g} mm over the"
@@ -164,8 +159,7 @@ def as_built(robot: Robot, one_height: bool = True) -> RotaryDelta:
 
 def as_robot(delta: RotaryDelta, home: float, name: str = "rotary delta", head: str = "") -> Robot:
     """The robot with these numbers, as it is in `text_of`."""
-    source = Source(text_of(delta, home, name, head).encode(), "the firmware's numbers")
-    return Robot(robot_file.parse(source, None))
+    return robot_files.robot_of(text_of(delta, home, name, head), "the firmware's numbers")
 
 
 def text_of(delta: RotaryDelta, home: float, name: str, head: str) -> str:
@@ -185,14 +179,9 @@ def text_of(delta: RotaryDelta, home: float, name: str, head: str) -> str:
     parameters |= {f"angle{i}": angle for i, angle in enumerate(delta.angles, 1)}
     heights = ["height"] if alike else ["base*.z"]
     free = ["radius", *heights, "offset1", "offset2", "offset3"]
-    blocks = [
-        head,
-        lines({"name": name, "units": {"length": "mm", "angle": "deg"}}),
-        "[pose]\n" + lines({"map": "translation", "home": {"z": home}}),
-        "[parameters]\n" + lines(parameters),
-        "# The angles stay: the axes of the cranks would not turn with them.\n"
-        "[calibration]\n" + lines({"free": free}),
-    ]
+    pose = {"map": "translation", "home": {"z": home}}
+    remark = "# The angles stay: the axes of the cranks would not turn with them.\n"
+    limbs = []
     for i in range(_TOWERS):
         angle = np.radians(delta.angles[i])
         base: dict[str, object] = {"radius": "radius", "angle": f"angle{i + 1}", "z": "height"}
@@ -204,8 +193,8 @@ def text_of(delta: RotaryDelta, home: float, name: str, head: str) -> str:
         limb |= {"crank": delta.cranks[i], "rod": delta.rods[i]}
         limb |= {"offset": float(np.degrees(delta.elbows[i])), "branch": 1}
         limb |= {"gain": delta.gains[i]}
-        blocks.append("[[limb]]\n" + lines(limb))
-    return "\n".join(block for block in blocks if block)
+        limbs.append(limb)
+    return robot_files.text_of(name, head, pose, free, limbs, parameters, remark)
 
 
 def _point(x: float, y: float) -> list[float]:

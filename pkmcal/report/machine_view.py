@@ -34,8 +34,7 @@ def element(found: Identification) -> tuple[str, str]:
     robot = found.robot
     if isinstance(robot, Robot) and robot.model.driven:
         return "", "none"
-    data = page.machine(robot)
-    data.pop("cloud", None)  # the report has its own pictures of the workspace
+    data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
     data["places"] = _measured(found)
     data["calibration"] = {"points": _points(found), "change": _change(found)}
     return page.plain_element(data)

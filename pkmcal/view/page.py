@@ -44,9 +44,9 @@ def html(robot: Robot | SerialArm, poses: FloatArray | None = None) -> str:
     )
 
 
-def machine(robot: Robot | SerialArm) -> dict[str, Any]:
-    """A robot or an arm as the scripts take it."""
-    found = serial.data(robot) if isinstance(robot, SerialArm) else parallel.data(robot)
+def machine(robot: Robot | SerialArm, cloud: bool = True) -> dict[str, Any]:
+    """A robot or an arm as the scripts take it; of a robot with a cloud of where it gets to."""
+    found = serial.data(robot) if isinstance(robot, SerialArm) else parallel.data(robot, cloud)
     found["name"] = printable(found["name"])
     found["machine"] = packed(found["machine"])
     if "cloud" in found:

@@ -24,8 +24,11 @@ _OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 _TRACK = 25  # points of the path of a crank's end
 
 
-def data(robot: Robot) -> dict[str, Any]:
-    """All that the page needs of a robot, as JSON has it; mm and rad."""
+def data(robot: Robot, cloud: bool) -> dict[str, Any]:
+    """All that the page needs of a robot, as JSON has it; mm and rad.
+
+    With `cloud` the positions of good poses too, which take a while to find.
+    """
     model, machine = robot.model, robot.machine
     if model.driven:
         raise ArgumentError(f"robot: {model.name} has drive laws, which the page cannot hold")
@@ -64,9 +67,10 @@ def data(robot: Robot) -> dict[str, Any]:
         "near": machine.reference(robot.slots).tolist(),
         "frames": _frames(robot),
         "modes": ranges.modes(robot),
-        "cloud": ranges.cloud(robot, spans),
         "machine": blob,
     }
+    if cloud:
+        found["cloud"] = ranges.cloud(robot, spans)
     if model.chains is None:
         return found | {"limbs": _limbs(robot, np.array(moves))}
     return found | chains.looks(robot, moves)

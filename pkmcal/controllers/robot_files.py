@@ -1,0 +1,44 @@
+"""Robot files made of a controller's numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from pkmcal.files.toml_lines import Source
+from pkmcal.geometry import robot_file
+from pkmcal.geometry.robot_file_writer import lines
+from pkmcal.kinematics.robot import Robot
+
+
+def text_of(
+    name: str,
+    head: str,
+    pose: Mapping[str, object],
+    free: Sequence[str],
+    limbs: Iterable[Mapping[str, object]],
+    parameters: Mapping[str, object] | None = None,
+    remark: str = "",
+) -> str:
+    """The text of a robot file in mm and degrees.
+
+    Parameters
+    ----------
+    name, head : str
+        The robot's name; lines of comment.
+    pose, free, limbs, parameters
+        What the file's keys of these names say.
+    remark : str
+        A line of comment on what is free.
+    """
+    blocks = [head, lines({"name": name, "units": {"length": "mm", "angle": "deg"}})]
+    blocks.append("[pose]\n" + lines(pose))
+    if parameters:
+        blocks.append("[parameters]\n" + lines(parameters))
+    blocks.append(remark + "[calibration]\n" + lines({"free": free}))
+    blocks += ["[[limb]]\n" + lines(limb) for limb in limbs]
+    return "\n".join(block for block in blocks if block)
+
+
+def robot_of(text: str, place: str) -> Robot:
+    """The robot of such a text; `place` is what messages call it."""
+    return Robot(robot_file.parse(Source(text.encode(), place), None))
