@@ -16,6 +16,8 @@ from pkmcal.arrays import FloatArray, first_largest
 from pkmcal.statistics.linear_fit import ROUNDING, triangle
 
 _KINDS = 4  # kinds of parameters whose combinations are looked for
+# Nuisance parameters: one kind each, however many there are. A kind more is many combinations more.
+_NUISANCE = re.compile(r"(frame|target|anchor|tool|mounting|touch|run)\d*\.")
 _OUTSIDE = 1e-5  # share of a combination outside some parameters that does not count
 _ALIKE = 1e-3  # share by which entries of a combination differ that are not equal
 _SURE = 6  # decimals of a coefficient that are more than rounding
@@ -215,12 +217,10 @@ def _reduced(basis: FloatArray) -> FloatArray:
 
 
 def _family(name: str) -> str:
-    """The kind of a parameter: its name without the limb; the frame is one kind, as are targets."""
+    """The kind of a parameter: its name without the limb, or what of the set-up it describes."""
     name = name.partition("@")[0]
-    first = name.split(".")[0]
-    if first == "frame" or first.startswith(("target", "anchor")):
-        return re.sub("(frame|target|anchor).*", r"\1", first)
-    return re.sub(r"\d+", "", name)
+    along = _NUISANCE.match(name)
+    return along[1] if along else re.sub(r"\d+", "", name)
 
 
 def as_sum(combination: FloatArray, names: Sequence[str]) -> str:

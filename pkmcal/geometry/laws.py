@@ -30,7 +30,7 @@ class Law:
     quadratic, spool, backlash : bool
         Whether it has these.
     harmonics : tuple of float
-        k of each, in waves a radian or a mm.
+        Angular frequency k of each, 1 or 1/mm: waves a turn of an angle.
     table : tuple of float or None
         Readings, rising, at which corrections are stated; mm or rad.
     smoothness : float or None

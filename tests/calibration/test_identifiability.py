@@ -119,3 +119,11 @@ def test_sparse_basis_spans_the_same_combinations() -> None:
     assert basis.shape == (8, 3)
     np.testing.assert_allclose(open_ones @ (open_ones.T @ basis), basis, atol=1e-9)
     assert np.linalg.matrix_rank(basis) == 3
+
+
+def test_numbers_of_one_set_up_are_one_kind_however_many_they_are() -> None:
+    """With an offset six touched places rise, or a base joint moves."""
+    names = ["offset1", "base1.x", *(f"touch.{place}.z" for place in "ABCDEF")]
+    risen, moved = [1.0, 0, *[1] * 6], [1.0, 1, *[0] * 6]
+    basis = sparse_basis(np.linalg.qr(np.column_stack([risen, moved])).Q, names)
+    assert sorted(map(tuple, np.abs(basis.T).round(9))) == sorted(map(tuple, [risen, moved]))

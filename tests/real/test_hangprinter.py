@@ -96,7 +96,7 @@ def test_rows_that_nobody_measured_place_what_was_left_out(
             found = fitted(printer, turned[chosen], seen[chosen]).robot
             there = found.forward(turned[i], guess=[*seen[i], 0, 0, 0]).pose[:3]
             off[name].append(float(np.linalg.norm(there - seen[i])))
-    assert np.sqrt(np.mean(np.square(off["all"]))) <= 3.0  # mm
+    assert np.sqrt(np.mean(np.square(off["all"]))) < 1.75  # mm; self-calibration.md says 1.7
     highest = int(np.argmax(seen[known, 2]))
     assert off["all"][highest] <= 5.6
     assert not off["measured"][highest] < 50.0  # far above the others; none is found at all
