@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.chains import (
     GROUPS,
     MAX_CHAIN,
@@ -107,7 +107,7 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
     if "errors" in table:
         errors = table.table("errors")
         for name in errors.data:
-            unit = "mm" if name.rpartition(".")[2] in ERRORS[:3] else "rad"
+            unit: Unit = "mm" if name.rpartition(".")[2] in ERRORS[:3] else "rad"
             values[name] = errors.number(name, unit)
     copies = table.integer("copies", 1)
     if copies < 1:

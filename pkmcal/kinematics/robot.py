@@ -160,7 +160,7 @@ class Robot(Kinematics, Result):
         return Feasibility(*(array.reshape(*shape, *array.shape[1:]) for array in each))
 
     def _limb_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
-        """Limits of limbs in closed form at own poses (N, 6), with coordinates (N, n) or without."""
+        """Limits of limbs in closed form at own poses (N, 6), by actuators (N, n) or without."""
         drive, on_base, on_platform = self.limb_machine.limbs(self.slots, own)
         if q is not None:
             there = self.drives(q)
