@@ -157,7 +157,7 @@ class Robot(Kinematics, Result):
         )
         found = replace(limits, workspace=box.in_box(self.model.workspace, given))
         each = (getattr(found, field.name) for field in fields(Feasibility))
-        return Feasibility(*(array.reshape(*shape, *array.shape[1:]) for array in each))
+        return Feasibility(*(array.reshape((*shape, *array.shape[1:])) for array in each))
 
     def _limb_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
         """Limits of limbs in closed form at own poses (N, 6), by actuators (N, n) or without."""
