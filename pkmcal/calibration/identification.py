@@ -15,6 +15,7 @@ from pkmcal import arguments
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
+from pkmcal.calibration.estimator import FEW
 from pkmcal.calibration.law_tests import LawTest, law_tests
 from pkmcal.calibration.moved import Moved, moved
 from pkmcal.calibration.parts import Parts
@@ -53,9 +54,12 @@ class Identification(Parts, Result):
     def moved(self) -> tuple[Moved, ...]:
         """What moved between the fitted measurements and others that were held out.
 
-        Empty where nothing did, or where the points held out were drawn from the same measurements.
+        Empty where nothing did: where the points held out were drawn from the same measurements,
+        and where they do not contradict a fit of several spare equations.
         """
         later, end = self.holdout.later, self.holdout.end
+        if not self.holdout_contradicts and self.fit.uncertainty.fit.freedom >= FEW:
+            return ()
         if self.holdout.drawn or later is None or end is None or not self.fit.uncertainty.known:
             return ()
         return moved(self.fit, later, end)
