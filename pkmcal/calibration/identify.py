@@ -25,6 +25,7 @@ from pkmcal.calibration.dropped import (
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.expansion import Coefficients, expansion_of
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.fit_statistics import (
@@ -81,6 +82,7 @@ def identify(
     fix: str | Sequence[str] = (),
     datum: DatumRule = "none",
     drop: Drop = None,
+    expansion: Coefficients = None,
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -146,6 +148,10 @@ def identify(
         Rows that are left out, fitted or drawn to be held out: by their numbers, counted from 0
         through all sets, or those that the others contradict in a robust fit. They are
         `Identification.dropped`.
+    expansion : float or mapping of str to float, optional
+        Coefficients of thermal expansion in 1/K, of steel 11.5e-6: one for all, or of "base",
+        "platform" (with the targets on it), "limbs" or single ones, "limb3"; parts that are not
+        named do not grow. With `Measurements.temperature` the numbers are those at 20 °C.
 
     Returns
     -------
@@ -181,7 +187,8 @@ def identify(
     unknown = {"frame": frame, "target": target, "attachment": attachment}
     anew = words("per_session", per_session)
     asked = Asked(free, prior, bounds, anew, by_set(unknown), words("fix", fix))
-    given = as_fit_data(machine, measurements, unknown, sessions=bool(anew))
+    grows = expansion_of(machine, expansion)
+    given = as_fit_data(machine, measurements, unknown, bool(anew), grows)
     dropped = named_rows(drop, sum(len(data.rows) for data in given))
     datasets, unread = informative(machine, given)
     held: list[tuple[FitData, int]] = []

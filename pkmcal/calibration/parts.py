@@ -37,6 +37,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "rank",
     "gap",
     "datum",
+    "expansion",
     "unidentifiable",
     "gauges",
     "rms",
@@ -82,6 +83,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "robots",
     "holdout_parameters",
     "law_tests",
+    "drift",
     "warnings",
 )
 
@@ -141,6 +143,12 @@ class Parts(MisfitNames):
     def sessions(self) -> tuple[str, ...]:
         """The fitted sessions, in the order of their first rows; empty without `per_session`."""
         return self.fit.parameters.sessions
+
+    @property
+    def expansion(self) -> dict[str, float]:
+        """Coefficients of thermal expansion, 1/K, by part; empty where none were stated."""
+        grows = self.fit.equations.datasets[0].expansion
+        return {} if grows is None else dict(grows.given)
 
     @property
     def holdout_parameters(self) -> dict[str, dict[str, float]]:

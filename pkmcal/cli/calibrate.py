@@ -16,7 +16,12 @@ from pkmcal.arguments import word
 from pkmcal.calibration.datum import DATUMS
 from pkmcal.calibration.loss import LIMITS
 from pkmcal.calibration.parameters import KNOWN, Known
-from pkmcal.cli.geometry_options import free_names, matching, read_deviations
+from pkmcal.cli.geometry_options import (
+    free_names,
+    matching,
+    read_coefficients,
+    read_deviations,
+)
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.measured import (
     Columns,
@@ -122,6 +127,15 @@ def calibrate(
             " finite ±. none: hold none.",
         ),
     ] = "none",
+    expansion: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[PART=]NUMBER",
+            help="How the machine expands, in 1/K, of steel 11.5e-6: all of it, or base, platform,"
+            " limbs, limb3. With a column temperature the numbers are those at 20 °C. Repeat it for"
+            " other parts, or separate them with commas.",
+        ),
+    ] = None,
     drop: Annotated[
         list[str] | None,
         typer.Option(
@@ -228,6 +242,7 @@ def calibrate(
             fix=fixed,
             datum=word("--datum", datum, DATUMS),
             drop="outliers" if drop_outliers else dropped,
+            expansion=read_coefficients("--expansion", expansion or []),
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:
