@@ -16,7 +16,7 @@ from pkmcal.arguments import word
 from pkmcal.calibration.datum import DATUMS
 from pkmcal.calibration.loss import LIMITS
 from pkmcal.calibration.parameters import KNOWN, Known
-from pkmcal.cli.geometry_options import free_names, matching, read_deviations
+from pkmcal.cli.geometry_options import free_names, matching, read_prior
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.measured import (
     Columns,
@@ -217,7 +217,7 @@ def calibrate(
             given,
             measured[0] if len(measured) == 1 else measured,
             free=chosen or None,
-            prior=read_deviations("--prior", prior or [], machine, chosen),
+            prior=read_prior(prior or [], machine, chosen),
             loss=word("--loss", loss, LIMITS),
             frame=_known("--frame", frame, measured),
             target=_known("--target", target, measured),
