@@ -98,11 +98,13 @@ def identify(
         Of any kinds.
     free : str or sequence of str, optional
         Names of numbers to find, or wildcards (``"base*.x"``). None: the robot's own default set.
-    prior : float or mapping of str to float, optional
+    prior : float or mapping of str to float or (float, float), optional
         Standard deviation around the present value. A number, in mm, holds for all free numbers
         of the geometry (an angle as its arc at the machine's characteristic length); a mapping
-        gives it by name or wildcard in mm and rad, later entries before earlier ones. None: no
-        prior; unidentifiable combinations then move as little as possible.
+        gives it by name or wildcard in mm and rad, later entries before earlier ones. A key may
+        also be a function of numbers: a sum, ``"gain1 - gain2"``, or the length of a sum of points,
+        ``"|base1 - base2|"``; a pair is a value that was measured otherwise, and its deviation.
+        None: no prior; unidentifiable combinations then move as little as possible.
     loss : {"linear", "huber", "cauchy"}
         Weight of rows with large residuals, by the length of the whole measured vector.
     frame : {"known", "unknown"} or a sequence of them
@@ -259,7 +261,7 @@ def _warnings(
     if notes or result.rms > _POOR * result.rms_before or result.chi2_per_dof > _NOISY:
         notes = likely_unit_errors(datasets, equations.parameters, fit.start) or notes
     notes += insufficient_data(
-        estimator.equations, result.rank, result.dof, bool(len(estimator.prior))
+        estimator.equations, result.rank, result.dof, bool(len(estimate.prior))
     )
     if result.chi2_per_dof > _NOISY:
         notes.append(

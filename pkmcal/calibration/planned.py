@@ -119,7 +119,9 @@ def design_of(
         )
 
     def design(aimed: FloatArray) -> Design:
-        return Design(blocks, chosen.prior_rows, aimed, criterion, chosen.robot.length)
+        return Design(
+            blocks, chosen.prior_rows(chosen.start), aimed, criterion, chosen.robot.length
+        )
 
     made = design(aimed)
     moved = aimed.reshape(-1, len(chosen)) @ made.unidentifiable
