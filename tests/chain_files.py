@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import pkmcal as pk
 from pkmcal import Robot
-from pkmcal.geometry.chains import ERRORS
+from pkmcal.geometry.chain_joints import ERRORS
 from pkmcal.geometry.limb_kinds import KINDS
 
 FloatArray = NDArray[np.float64]

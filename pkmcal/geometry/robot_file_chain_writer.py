@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from pkmcal.geometry.chains import PARTS, Chains, Joint
+from pkmcal.geometry.chain_joints import PARTS, Joint
+from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import CHAIN
 from pkmcal.geometry.robot_file_laws import law_table

@@ -21,7 +21,8 @@ from pkmcal.core.chains import (
 )
 from pkmcal.core.library import MAPS, MAX_LIMBS
 from pkmcal.files.toml_table import Table, shown
-from pkmcal.geometry.chains import ERRORS, KINDS, Chains, Joint, across, towards
+from pkmcal.geometry.chain_joints import ERRORS, KINDS, Joint, across, towards
+from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.laws import gain_unit
 from pkmcal.geometry.model import CHAIN, Limb
 from pkmcal.geometry.robot_file_laws import read_law

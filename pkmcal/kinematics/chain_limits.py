@@ -6,7 +6,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import ChainMachine
-from pkmcal.geometry.chains import PARTS, Chains, Joint, towards
+from pkmcal.geometry.chain_joints import PARTS, Joint, towards
+from pkmcal.geometry.chains import Chains
 from pkmcal.kinematics.limits import Feasibility, kept, margin_of
 from pkmcal.screw import from_pose
 

@@ -8,7 +8,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import ChainMachine
-from pkmcal.geometry.chains import Chains, Joint
+from pkmcal.geometry.chain_joints import Joint
+from pkmcal.geometry.chains import Chains
 from pkmcal.kinematics.chain_limits import bend_direction, home_axes, passive_coordinate
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
