@@ -44,7 +44,10 @@ class Joint:
     stroke : tuple of float or None
         Limits of what it turns or slides: of an actuated joint the drive, else from home.
     cone : float or None
-        How far U and S bend from home, rad.
+        How far U and S bend, rad: from home, or from `cone_axis`.
+    cone_axis : ndarray (3,) or None
+        The middle of the cone, at home: of the last joint it goes with the platform, of others
+        with the body before the joint.
     soft : float
         Compliance beside that of other joints.
     law : Law or None
@@ -59,6 +62,7 @@ class Joint:
     home_value: float = 0.0
     stroke: tuple[float, float] | None = None
     cone: float | None = None
+    cone_axis: FloatArray | None = None
     soft: float = 1.0
     law: Law | None = None
 

@@ -60,7 +60,8 @@ def _joint(joint: Joint, geometry: Geometry) -> dict[str, Any]:
     if joint.stroke is not None:
         data["stroke"] = list(joint.stroke)
     if joint.cone is not None:
-        data["cone"] = joint.cone
+        axis = joint.cone_axis
+        data["cone"] = joint.cone if axis is None else {"angle": joint.cone, "axis": axis.tolist()}
     if joint.soft != 1.0:
         data["soft"] = joint.soft
     return data
