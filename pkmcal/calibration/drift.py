@@ -24,7 +24,7 @@ _HOUR = 3600.0  # s
 
 @dataclass(frozen=True)
 class Drift:
-    """How far repeated poses moved from the first of them to the last.
+    """How far repeated poses moved, each from its first visit to its last.
 
     Attributes
     ----------
@@ -39,7 +39,8 @@ class Drift:
     poses, visits : int
         How many poses were measured again, and how often in all.
     hours : float
-        How long it took; NaN where the measurements have no time.
+        How long that was, of the pose for which it was longest; NaN where the measurements have no
+        time.
     temperatures : (float, float)
         The lowest and the highest of the machine, °C, where it was read and not allowed for; else
         NaN.
@@ -151,8 +152,8 @@ def _tested(parts: Sequence[tuple[FitData, FloatArray]], odd: Collection[int]) -
         return None
     pose = rows.pose[first]
     again = np.bincount(pose)[pose] > 1
-    times = rows.time[first][again]
-    span = float(times.max() - times.min())
+    times = rows.time[first]
+    span = max(float(np.ptp(times[pose == each])) for each in np.unique(pose[again]))
     timed = measured.time is not None
     return Drift(
         components=tuple(measured.components[k] for k in lengths),

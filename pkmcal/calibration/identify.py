@@ -149,7 +149,8 @@ def identify(
     drop : sequence of int or "outliers", optional
         Rows that are left out, fitted or drawn to be held out: by their numbers, counted from 0
         through all sets, or those that the others contradict in a robust fit. They are
-        `Identification.dropped`.
+        `Identification.dropped`. Of other measurements that are held out the "outliers" are
+        `Identification.holdout_dropped`; where most rows contradict the fit none is left out.
     expansion : float or mapping of str to float, optional
         Coefficients of thermal expansion in 1/K, of steel 11.5e-6: one for all, or of "base",
         "platform" (with the targets on it), "limbs" or single ones, "limb3"; parts that are not
@@ -235,9 +236,13 @@ def identify(
     drawn = not isinstance(holdout, Measurements)
     held = held_without(held, dropped) if drawn else held
     outside = evaluate(held, estimator, estimate, sure)
-    if drop == OUTLIERS and drawn and outside.odd:
-        dropped = tuple(sorted({*dropped, *outside.odd}))
-        outside = evaluate(held_without(held, dropped), estimator, estimate, sure)
+    if drop == OUTLIERS and outside.odd and not outside.contradicts:
+        odd, names = outside.odd, row_names(outside.data, outside.odd)
+        outside = evaluate(held_without(held, odd), estimator, estimate, sure)
+        if drawn:
+            dropped = tuple(sorted({*dropped, *odd}))
+        else:
+            outside = replace(outside, dropped=odd, dropped_names=names)
     result = _result(estimator, estimate, commanded, start, replace(outside, drawn=drawn), sure)
     result = replace(
         result,

@@ -263,9 +263,8 @@ def _remarks(found: Parts, robust: RobustCheck | None, drift: Drift | None) -> t
     remarks = []
     if drift is not None and drift.found and not drift.large:
         remarks.append(str(drift))
-    if found.dropped:
-        many = f"{len(found.dropped)} rows were" if len(found.dropped) > 1 else "1 row was"
-        remarks.append(f"{many} left out, as asked: {found.dropped_names}")
+    if found.left_out:
+        remarks.append(found.left_out)
     if robust is not None and _DISAGREES < robust.ratio <= _CARRIED:
         remarks.append(_disagreement(found, robust))
     if found.holdout_outliers and not found.holdout_contradicts:

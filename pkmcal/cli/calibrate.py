@@ -34,6 +34,7 @@ from pkmcal.cli.measured import (
     Rotation,
     Units,
     rows_to_drop,
+    without_lines,
 )
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm
 from pkmcal.cli.output import Output, say
@@ -218,9 +219,12 @@ def calibrate(
     if tracker is not None:
         seen = read_tracker(tracker)
         measured = [_seen_by(seen, each) for each in measured]
-    dropped = rows_to_drop(drop or [], measured)
-    if dropped and drop_outliers:
+    if drop and drop_outliers:
         raise ArgumentError("--drop names rows, --drop-outliers finds them: one of the two")
+    named = drop or []
+    if isinstance(held, Measurements):
+        named, held = without_lines(named, held, measured)
+    dropped = rows_to_drop(named, measured)
     fixed = matching("--fix", machine, fix or [])
     chosen = [name for name in free_names(machine, free) if name not in fixed]
     if fixed and not chosen:
