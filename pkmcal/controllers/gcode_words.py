@@ -1,20 +1,53 @@
-"""Words of G-code, by their letters: out and in."""
+"""Settings in G-code: words of commands such as M665, by their letters, out and in.
+
+Own code: where each word stands is needed, to change it and nothing else, and what is no plain
+number, such as an expression, has to be refused rather than passed over.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from pkmcal.exceptions import FileError
+from pkmcal.files.text_lines import MARK
 
 TOWERS = (210.0, 330.0, 90.0)  # of RepRapFirmware and Marlin
-_WORD = re.compile(r"([A-Z])([-+]?[\d.]+(?::[-+]?[\d.]+)*)")
+SAME = 5e-7  # of numbers with six decimals
+_LINE = re.compile(r"[^\r\n]+")
+_REMARK = re.compile(r"\([^)]*\)|;.*|\*\s*\d+\s*$")  # a checksum, too
+_START = re.compile(  # as M503 lists it, or numbered
+    MARK + r"?(?:[^;]*\becho:|\s*N\s*\d+)?\s*", re.IGNORECASE
+)
+_CODE = re.compile(r"([GM])\s*0*(\d+)(?![\d.])", re.IGNORECASE)
+_WORD = re.compile(
+    r'\s*([A-Za-z])\s*(\{[^}]*\}|"[^"]*"|(?:[^A-Za-z\s]|(?<=[\d.])[eE](?=[-+]?\d))*)\s*'
+)
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
+
+
+class Setting(NamedTuple):
+    """What stands behind a letter, and where in the text."""
+
+    value: str
+    start: int
+    end: int
+
+
+Settings = dict[str, Setting]
 
 
 def words(letters: str, values: Sequence[float]) -> str:
     """Numbers with six decimals behind their letters."""
-    pairs = zip(letters, values, strict=True)
-    return " ".join(f"{letter}{round(value, 6) + 0.0:.6f}" for letter, value in pairs)
+    return " ".join(
+        f"{letter}{written(value)}" for letter, value in zip(letters, values, strict=True)
+    )
+
+
+def written(*values: float) -> str:
+    """Numbers with six decimals and colons between them."""
+    return ":".join(f"{round(value, 6) + 0.0:.6f}" for value in values)
 
 
 def corrections(angles: Sequence[float]) -> str:
@@ -25,9 +58,103 @@ def corrections(angles: Sequence[float]) -> str:
     return words("XYZ", off)
 
 
-def words_of(text: str, command: str, place: str) -> dict[str, str]:
-    """The words of the last such command, as text."""
-    lines = re.findall(rf"^\s*(?:echo:\s*)?{command}\b([^;\n]*)", text, re.MULTILINE)
-    if not lines:
+def settings(text: str, command: str, place: str, missing: bool = False) -> Settings:
+    """The words of a command: what was set last, in one of them or in several.
+
+    Another K starts anew: it is another kinematics. With `missing` there may be no such command.
+
+    Raises
+    ------
+    FileError
+        There is no such command, or something beside words in it.
+    """
+    found: Settings = {}
+    times = 0
+    for line, code in _codes(text):
+        if code[0] != command:
+            continue
+        times += 1
+        new = _words_of(line, code[1], command, place)
+        if "K" in new and new["K"].value != found.get("K", new["K"]).value:
+            found = {}
+        found |= new
+    if not times and not missing:
         raise FileError(f"{place}: {command} is missing")
-    return dict(_WORD.findall(lines[-1]))
+    return found
+
+
+def in_inches(text: str) -> bool:
+    """Whether G20 is in force at the end."""
+    units = [code[0] for _, code in _codes(text) if code[0] in ("G20", "G21")]
+    return units[-1:] == ["G20"]
+
+
+def changed(text: str, values: Mapping[Setting, Sequence[float]]) -> str:
+    """The text with other numbers where they are not the same, and not a character else."""
+    for setting, new in sorted(values.items(), key=lambda pair: -pair[0].start):
+        old = [float(each) for each in setting.value.split(":")]
+        same = len(old) == len(new) and all(
+            abs(one - other) <= SAME for one, other in zip(old, new, strict=True)
+        )
+        if not same:
+            text = text[: setting.start] + written(*new) + text[setting.end :]
+    return text
+
+
+def numbers(
+    found: Settings,
+    letter: str,
+    command: str,
+    place: str,
+    default: float | None = None,
+    *,
+    counts: tuple[int, ...] = (1,),
+) -> list[float]:
+    """The numbers behind a letter, as many as one of `counts`.
+
+    Raises
+    ------
+    FileError
+        It is missing and has no default, or is something else.
+    """
+    if letter not in found and default is not None:
+        return [default]
+    if letter not in found:
+        raise FileError(f"{place}: {letter} of {command} is missing")
+    value = found[letter].value
+    parts = value.split(":")
+    if len(parts) not in counts or not all(_NUMBER.fullmatch(part) for part in parts):
+        wanted = "a number" if counts == (1,) else f"{' or '.join(map(str, counts))} numbers"
+        raise FileError(f"{place}: {letter} of {command} must be {wanted}, found {value!r}")
+    return [float(part) for part in parts]
+
+
+def number(
+    found: Settings, letter: str, command: str, place: str, default: float | None = None
+) -> float:
+    """The number behind a letter; as `numbers`."""
+    return numbers(found, letter, command, place, default)[0]
+
+
+def _codes(text: str) -> list[tuple[re.Match[str], tuple[str, int]]]:
+    """Lines that begin with a G or M code: the line, the code, and where it ends in the line."""
+    found = []
+    for line in _LINE.finditer(text):
+        start = _START.match(line[0])
+        code = _CODE.match(line[0], start.end() if start else 0)
+        if code:
+            found.append((line, (f"{code[1].upper()}{code[2]}", code.end())))
+    return found
+
+
+def _words_of(line: re.Match[str], start: int, command: str, place: str) -> Settings:
+    code = _REMARK.sub(lambda found: " " * len(found[0]), line[0])
+    at, found = start, {}
+    while code[at:].strip():
+        word = _WORD.match(code, at)
+        if word is None:
+            where = f"{place}, line {line.string.count(chr(10), 0, line.start()) + 1}"
+            raise FileError(f"{where}: {code.strip()!r:.60}: {command} must have words alone")
+        found[word[1].upper()] = Setting(word[2], *(line.start() + end for end in word.span(2)))
+        at = word.end()
+    return found

@@ -50,6 +50,7 @@ def reprap_model(text: str, nozzle: Any) -> Any:
     arms, (r,), (homed,) = np.array(size["L"]), size["R"], size["H"]
     adjustment = np.array([ends[letter][0] for letter in "XYZ"])
     assert abs(adjustment.mean()) < 1e-6  # as the firmware normalizes them
+    assert ends["A"] == ends["B"] == [0.0]  # no tilt of the bed that was set before stays in force
     switch = homed + np.sqrt(arms**2 - r**2) + adjustment
     across = ((nozzle[:, None, :2] - towers_of(size)) ** 2).sum(axis=2)
     return switch - (np.sqrt(arms**2 - across) + nozzle[:, 2:3])
@@ -112,7 +113,9 @@ def test_lines_are_found_as_firmwares_print_them(tmp_path: Path) -> None:
 
 def test_a_rod_among_three_that_is_no_number_is_named(tmp_path: Path) -> None:
     (tmp_path / "config.g").write_text("M665 L250:25..0:250 R125 H300\nM666 X0\n")
-    with pytest.raises(pk.FileError, match=r"L must be a number, found '25\.\.0'"):
+    with pytest.raises(
+        pk.FileError, match=r"L of M665 must be 1 or 3 numbers, found '250:25\.\.0:250'"
+    ):
         pk.import_printer(tmp_path / "config.g", "reprap")
 
 
@@ -122,7 +125,10 @@ def test_a_rod_among_three_that_is_no_number_is_named(tmp_path: Path) -> None:
         ("M666 X0\n", "M665 is missing"),
         ("M665 L250 H300\nM666 X0\n", "R of M665 is missing"),
         ("M665 L100 R125 H300\nM666 X0\n", "longer than R"),
-        ("M665 L250 R1.2.3 H300\nM666 X0\n", "R must be a number"),
+        ("M665 L250 R1.2.3 H300\nM666 X0\n", "R of M665 must be a number"),
+        ("M665 L250 R1.2e2 H300\nM666 X0\n", "R of M665 must be a number, found '1.2e2'"),
+        ("M665 L250 R125 H300\nM666 X{-0.2}\n", r"X of M666 must be a number, found '\{-0.2}'"),
+        ("\nM665 L250 R125 ?\nM666 X0\n", "line 2: .*: M665 must have words alone"),
     ],
 )
 def test_mistakes_are_named(text: str, message: str, tmp_path: Path) -> None:
@@ -130,6 +136,45 @@ def test_mistakes_are_named(text: str, message: str, tmp_path: Path) -> None:
     for firmware in ("reprap", "marlin"):
         with pytest.raises(pk.FileError, match=message):
             pk.import_printer(tmp_path / "config.g", firmware)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("firmware", MODELS)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "m665 l250 r125 h300 x0.5\nm666 y-0.2\n",
+        "N1 M665 L250 R125 H300 X0.5 *77\r\nN2 M666 Y-0.2*12\r\n",
+        "\ufeffM665 L250 R125 H300 (as M665 R9) X0.5 ; R8\nM666 Y-0.2\n; M666 Y9\n",
+        "M665 L250 H300\nM665 R125 X0.5\nM666 Y-0.2\nM666 Z0\n",  # each sets what it names
+        "M665 L 250 R 125 H300 X.5\n  M666 Y-.2\n",
+        "12:01 < echo:  M665 L250 R125 H300 X0.5\n12:01 < echo:  M666 Y-0.2\n",
+    ],
+)
+def test_settings_are_found_however_they_are_written(
+    text: str, firmware: str, tmp_path: Path
+) -> None:
+    (tmp_path / "config.g").write_bytes(b"; D\xfcse\n"[: 9 * (text[0] != "\ufeff")] + text.encode())
+    g = pk.import_printer(tmp_path / "config.g", firmware).robot.geometry  # type: ignore[arg-type]
+    assert (g["rod1"], g["radius"]) == (250.0, 125.0)
+    assert np.degrees(g["angle1"]) == pytest.approx(210.5)
+    lower = g["offset2"] - g["offset1"]
+    assert lower == pytest.approx(-0.2 if firmware == "reprap" else 0.2, abs=1e-12)
+
+
+def test_what_a_robot_file_cannot_hold_is_no_silent_zero(tmp_path: Path) -> None:
+    """A tilt of the bed, inches, and adjustments beyond the switch."""
+    for firmware, text, message in (
+        (
+            "reprap",
+            "M665 L250 R125 H300\nM666 X0.1 A0 B-1.5\n",
+            "B of M666 tilts the bed by -1.5 %",
+        ),
+        ("marlin", "G20\nM665 L10 R5 H12\nM666 X0\n", "G20: the numbers are in inches"),
+        ("marlin", "M665 L250 R125 H300\nM666 X0.2\n", "must not be above 0, found 0.2"),
+    ):
+        (tmp_path / "c.g").write_text(text)
+        with pytest.raises(pk.FileError, match=message):
+            pk.import_printer(tmp_path / "c.g", firmware)  # type: ignore[arg-type]
 
 
 def test_leaning_towers_are_refused(tmp_path: Path) -> None:
@@ -199,5 +244,5 @@ def test_cranks_go_where_the_model_of_reprap_says_and_are_read_back(tmp_path: Pa
     with pytest.raises(pk.ArgumentError, match="no linear delta"):
         pk.export.marlin(robot, tmp_path / "x.g")
     (tmp_path / "delta.g").write_text(text.replace("R180", "P180"))
-    with pytest.raises(pk.FileError, match="R of M669 must be a number"):
+    with pytest.raises(pk.FileError, match="R of M669 is missing"):
         pk.import_printer(tmp_path / "delta.g", "reprap")
