@@ -16,7 +16,7 @@ from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
-from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
@@ -126,7 +126,7 @@ def robot_text(anchors: FloatArray, name: str, head: str) -> str:
 
 
 def _require(robot: Robot) -> None:
-    require_no_laws(robot, "M669")
+    require_plain_limbs(robot, "M669")
     limbs = [(limb.kind, limb.actuator) for limb in robot.model.limbs]
     lines_of_its_own = limbs == [("UPS", i) for i in range(len(_LETTERS))]
     if robot.model.map != "translation" or not lines_of_its_own or not robot.frames.trivial:

@@ -14,7 +14,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.controllers import linuxcnc_modules
 from pkmcal.controllers.c_header import text_of as header_of
 from pkmcal.controllers.comp_file import comp_texts, without_laws
-from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.rendering import rendered
 from pkmcal.core.library import POSE, SLOTS
@@ -110,7 +110,7 @@ def _tables(robot: Robot, plain: Robot) -> dict[int, str]:
     if not robot.model.driven:
         return {}
     if robot.model.chains is not None:
-        require_no_laws(robot, "a kinematics module")
+        require_plain_limbs(robot, "a kinematics module")
     at_home = plain.inverse(plain.home, match=True)
     return comp_texts(robot, *_limits(plain, at_home, plain.machine.struct.size))
 

@@ -11,6 +11,7 @@ from pkmcal.core.chains import ChainMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.core.poses import invert
+from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Cone
@@ -32,6 +33,8 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
     model, machine = robot.model, robot.machine
     if model.driven:
         raise ArgumentError(f"robot: {model.name} has drive laws, which the page cannot hold")
+    if isinstance(machine, PulleyMachine):
+        raise ArgumentError(f"robot: {model.name} has pulleys, which the page cannot hold")
     size = float(machine.struct.size)
     spans = ranges.poses(robot, size)
     if isinstance(machine, Machine):
