@@ -27,7 +27,7 @@ from pkmcal.controllers.gcode_words import (
     settings,
     written,
 )
-from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.laws import require_no_laws, require_no_pulleys
 from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
@@ -264,6 +264,7 @@ def _model(
 
 def _require(robot: Robot) -> bool:
     """Refuse what is no Hangprinter; whether it has spools."""
+    require_no_pulleys(robot, "M669")
     limbs = [(limb.kind, limb.actuator) for limb in robot.model.limbs]
     lines_of_its_own = limbs == [("UPS", i) for i in range(_LINES)]
     if robot.model.map != "translation" or not lines_of_its_own or not robot.frames.trivial:
