@@ -94,6 +94,11 @@ class Equations(Readings):
         """Build the units for these closures; `estimated`: their deviations are not known."""
         self.closures = closures
         if closures.unknowns:
+            if any(growth is not None for growth in self._growth):
+                raise ArgumentError(
+                    "expansion: needs poses that follow from the actuators: no actuator_sigma, and"
+                    " no surplus actuators; found others"
+                )
             for m in self.sets:
                 if m.kind in ("between", "angle"):
                     raise ArgumentError(
@@ -247,7 +252,7 @@ class Equations(Readings):
         noise: FloatArray,
         left: FloatArray,
         prior_centre: FloatArray,
-        bent: FloatArray | None = None,
+        drawn: FloatArray | None = None,
     ) -> tuple[Equations, Evaluation]:
         """The same with other readings, and evaluated where these have been drawn.
 
@@ -259,7 +264,7 @@ class Equations(Readings):
             See `whitened`.
         left : ndarray (M,)
             What its readings leave there, as `residual`.
-        bent : ndarray (s,), optional
+        drawn : ndarray (s,), optional
             That of `Parameters`.
         prior_centre : ndarray (n,)
             Another centre of the prior.
@@ -277,7 +282,7 @@ class Equations(Readings):
             replace(m, values=corrected(m.kind, seen.values, residual).reshape(m.values.shape))
             for m, seen, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
-        other.parameters = replace(self.parameters, start=prior_centre, bent=bent)
+        other.parameters = replace(self.parameters, start=prior_centre, drawn=drawn)
         other.warm_start(at)
         if unknowns:
             return other, other.at(at.theta, noise)

@@ -25,6 +25,7 @@ from pkmcal.calibration.dropped import (
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.expansion import Coefficients, expansion_of
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.fit_statistics import (
@@ -81,6 +82,7 @@ def identify(
     fix: str | Sequence[str] = (),
     datum: DatumRule = "none",
     drop: Drop = None,
+    expansion: Coefficients = None,
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -96,11 +98,13 @@ def identify(
         Of any kinds.
     free : str or sequence of str, optional
         Names of numbers to find, or wildcards (``"base*.x"``). None: the robot's own default set.
-    prior : float or mapping of str to float, optional
+    prior : float or mapping of str to float or (float, float), optional
         Standard deviation around the present value. A number, in mm, holds for all free numbers
         of the geometry (an angle as its arc at the machine's characteristic length); a mapping
-        gives it by name or wildcard in mm and rad, later entries before earlier ones. None: no
-        prior; unidentifiable combinations then move as little as possible.
+        gives it by name or wildcard in mm and rad, later entries before earlier ones. A key may
+        also be a function of numbers: a sum, ``"gain1 - gain2"``, or the length of a sum of points,
+        ``"|base1 - base2|"``; a pair is a value that was measured otherwise, and its deviation.
+        None: no prior; unidentifiable combinations then move as little as possible.
     loss : {"linear", "huber", "cauchy"}
         Weight of rows with large residuals, by the length of the whole measured vector.
     frame : {"known", "unknown"} or a sequence of them
@@ -145,7 +149,12 @@ def identify(
     drop : sequence of int or "outliers", optional
         Rows that are left out, fitted or drawn to be held out: by their numbers, counted from 0
         through all sets, or those that the others contradict in a robust fit. They are
-        `Identification.dropped`.
+        `Identification.dropped`. Of other measurements that are held out the "outliers" are
+        `Identification.holdout_dropped`; where most rows contradict the fit none is left out.
+    expansion : float or mapping of str to float, optional
+        Coefficients of thermal expansion in 1/K, of steel 11.5e-6: one for all, or of "base",
+        "platform" (with the targets on it), "limbs" or single ones, "limb3"; parts that are not
+        named do not grow. With `Measurements.temperature` the numbers are those at 20 °C.
 
     Returns
     -------
@@ -181,7 +190,8 @@ def identify(
     unknown = {"frame": frame, "target": target, "attachment": attachment}
     anew = words("per_session", per_session)
     asked = Asked(free, prior, bounds, anew, by_set(unknown), words("fix", fix))
-    given = as_fit_data(machine, measurements, unknown, sessions=bool(anew))
+    grows = expansion_of(machine, expansion)
+    given = as_fit_data(machine, measurements, unknown, bool(anew), grows)
     dropped = named_rows(drop, sum(len(data.rows) for data in given))
     datasets, unread = informative(machine, given)
     held: list[tuple[FitData, int]] = []
@@ -226,9 +236,13 @@ def identify(
     drawn = not isinstance(holdout, Measurements)
     held = held_without(held, dropped) if drawn else held
     outside = evaluate(held, estimator, estimate, sure)
-    if drop == OUTLIERS and drawn and outside.odd:
-        dropped = tuple(sorted({*dropped, *outside.odd}))
-        outside = evaluate(held_without(held, dropped), estimator, estimate, sure)
+    if drop == OUTLIERS and outside.odd and not outside.contradicts:
+        odd, names = outside.odd, row_names(outside.data, outside.odd)
+        outside = evaluate(held_without(held, odd), estimator, estimate, sure)
+        if drawn:
+            dropped = tuple(sorted({*dropped, *odd}))
+        else:
+            outside = replace(outside, dropped=odd, dropped_names=names)
     result = _result(estimator, estimate, commanded, start, replace(outside, drawn=drawn), sure)
     result = replace(
         result,
@@ -252,7 +266,7 @@ def _warnings(
     if notes or result.rms > _POOR * result.rms_before or result.chi2_per_dof > _NOISY:
         notes = likely_unit_errors(datasets, equations.parameters, fit.start) or notes
     notes += insufficient_data(
-        estimator.equations, result.rank, result.dof, bool(len(estimator.prior))
+        estimator.equations, result.rank, result.dof, bool(len(estimate.prior))
     )
     if result.chi2_per_dof > _NOISY:
         notes.append(

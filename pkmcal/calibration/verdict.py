@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from pkmcal.calibration.drift import Drift
 from pkmcal.calibration.estimator import LEAST_FREEDOM
 from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.moved import Moved
@@ -54,7 +55,9 @@ class Verdict:
         return f"{self.state.capitalize()}: {self.reasons[0]}"
 
 
-def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) -> Verdict:
+def judge(
+    found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...], drift: Drift | None = None
+) -> Verdict:
     """Judge a calibration.
 
     Parameters
@@ -65,6 +68,8 @@ def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) ->
         A robust fit beside it, where there is one.
     moved : tuple of Moved
         What moved between the fitted points and those held out.
+    drift : Drift or None
+        Whether repeated poses moved with time, where any were.
     """
     grave = _grave(found, robust)
     doubts = [*_contradicted(found, moved), *_few(found)]
@@ -73,10 +78,12 @@ def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) ->
             f"{listed(found.at_bounds)} ended at a bound: the fit would go further; widen the"
             " bound, or see what else is wrong"
         )
+    if drift is not None and drift.large:
+        doubts.append(str(drift))
     doubts += found.warnings
     if not grave and not doubts and _little_gained(found):
         doubts.append(f"little was gained, {_change(found)}")
-    remarks = _remarks(found, robust)
+    remarks = _remarks(found, robust, drift)
     reasons = tuple(printable(text, _LONGEST) for text in grave + doubts)
     if grave:
         return Verdict("not calibrated", reasons, remarks)
@@ -252,11 +259,12 @@ def _disagreement(found: Parts, robust: RobustCheck) -> str:
     )
 
 
-def _remarks(found: Parts, robust: RobustCheck | None) -> tuple[str, ...]:
+def _remarks(found: Parts, robust: RobustCheck | None, drift: Drift | None) -> tuple[str, ...]:
     remarks = []
-    if found.dropped:
-        many = f"{len(found.dropped)} rows were" if len(found.dropped) > 1 else "1 row was"
-        remarks.append(f"{many} left out, as asked: {found.dropped_names}")
+    if drift is not None and drift.found and not drift.large:
+        remarks.append(str(drift))
+    if found.left_out:
+        remarks.append(found.left_out)
     if robust is not None and _DISAGREES < robust.ratio <= _CARRIED:
         remarks.append(_disagreement(found, robust))
     if found.holdout_outliers and not found.holdout_contradicts:

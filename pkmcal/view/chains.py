@@ -8,8 +8,9 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import ChainMachine
-from pkmcal.geometry.chains import Chains, Joint
-from pkmcal.kinematics.chain_limits import bend_direction, home_axes, passive_coordinate
+from pkmcal.geometry.chain_joints import Joint
+from pkmcal.geometry.chains import Chains
+from pkmcal.kinematics.chain_limits import cone_axes, home_axes, passive_coordinate
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
 
@@ -58,13 +59,13 @@ def looks(robot: Robot, moves: list[list[float]]) -> dict[str, Any]:
                 if joint.actuator is None:
                     seen["passive"] = passive_coordinate(chains, i, k)
             if joint.cone is not None:
-                direction = bend_direction(limb, k)
+                one, other = cone_axes(limb, k)
                 after = platform if behind is None else axes[behind]
                 seen["cone"] = {
                     "angle": joint.cone,
                     "after": behind,
-                    "from": (axes[frame].T @ direction).tolist(),
-                    "to": (after.T @ direction).tolist(),
+                    "from": (axes[frame].T @ one).tolist(),
+                    "to": (after.T @ other).tolist(),
                 }
             if k == 0 and joint.kind == "P" and joint.actuator is not None:
                 a = joint.actuator
