@@ -32,6 +32,8 @@ _PREFIX = "#*# "
 _SECTION = re.compile(r"\[([^\]]+)\]")
 _INCLUDE = re.compile(r"\[include +([^\]]+)\]")
 _OPTION = re.compile(r"(?P<name>.*?)\s*[:=]\s*(?P<value>.*)")
+_NAMED = re.compile(r"\$\{(?:([^.:${}]+)[.:])?([^${}]+)\}")  # Kalico: a value of another option
+_MOST_NAMES = 10  # of which each names the next
 _REMARK = re.compile(r"#.*|(?:^|(?<=\s));.*")
 
 
@@ -173,8 +175,8 @@ class PrinterConfig:
         """Whether there is such an option."""
         return (section, option) in self._options
 
-    def text(self, section: str, option: str, default: str | None = None) -> str:
-        """What an option says.
+    def text(self, section: str, option: str, default: str | None = None, depth: int = 0) -> str:
+        """What an option says, `depth` names away from the one that was asked for.
 
         Raises
         ------
@@ -182,7 +184,12 @@ class PrinterConfig:
             It is not there and has no default.
         """
         if (section, option) in self._options:
-            return self._options[section, option].text
+            if depth > _MOST_NAMES:
+                raise self.wrong(section, option, "names itself")
+            return _NAMED.sub(
+                lambda named: self.text(named[1] or section, named[2].lower(), depth=depth + 1),
+                self._options[section, option].text,
+            )
         if default is not None:
             return default
         raise FileError(f"{self.place}: [{section}] {option} is missing{self._lacking()}")

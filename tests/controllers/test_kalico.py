@@ -66,7 +66,10 @@ ODD = """\
 \tmicrosteps:\t16
 \tposition_endstop:
 \t\t297.05
-\tarm_length: 333.0# by hand
+\tarm_length: ${lengths.arm}.0# by hand
+[lengths]
+Arm: 3${tail}
+tail: 33
 [stepper_b]
 rotation_distance: 40
 microsteps: 32

@@ -216,6 +216,14 @@ def test_included_files_are_read_where_they_are_named_and_never_written(tmp_path
         pk.import_printer(file)
 
 
+def test_a_value_that_names_itself_is_no_number(tmp_path: Path) -> None:
+    text = OWN.replace("arm_length: 333.0", "arm_length: ${arm_length}")
+    with pytest.raises(pk.FileError, match=r"line 12: .* arm_length names itself"):
+        pk.import_printer(own(tmp_path, text))
+    with pytest.raises(pk.FileError, match=r"\[rods\] long is missing"):
+        pk.import_printer(own(tmp_path, text.replace("${arm_length}", "${rods.long}")))
+
+
 def test_a_saved_block_that_the_firmware_leaves_out_is_not_read(tmp_path: Path) -> None:
     assert pk.import_printer(own(tmp_path, OWN + "\n\n")).measurements is not None
     text = OWN + "\n[gcode_macro LATE]\ngcode: G28\n"
