@@ -346,6 +346,19 @@ class Laws:
         found: FloatArray = rows("law_drive_inverse", x.reshape(-1, 5))[0].reshape(way.shape)
         return found
 
+    def reading(
+        self, slots: FloatArray, way: FloatArray, d: int, approach: FloatArray | None = None
+    ) -> FloatArray:
+        """`readings` (N,) of one drive at its ways (N,)."""
+        numbers = self._numbers(slots)
+        rest = way - numbers[:, self._offset[d]]
+        if approach is not None:
+            rest = rest + 0.5 * approach[..., d] * numbers[:, self._backlash[d]]
+        if self.drives[d].corrected:
+            return self._newton(numbers, rest, d, self.spans(slots)[d])
+        q: FloatArray = self._uncorrected(numbers, rest[:, None], [d])[:, 0]
+        return q
+
     def _newton(self, numbers: FloatArray, way: FloatArray, d: int, span: FloatArray) -> FloatArray:
         """The readings of a drive with corrections, within brackets that Newton's method keeps."""
         drive = self.drives[d]
@@ -364,7 +377,7 @@ class Laws:
         q: FloatArray = 0.5 * (low + high)
         offset, sign = numbers[0, drive.offset], 1.0 if rising else -1.0
         scale = np.abs(way) + most + abs(offset)
-        done, alone = np.zeros(len(q), dtype=bool), self._alone(d)
+        alone, settled = self._alone(d), np.isnan(q)  # no row depends on how long others take
         for _ in range(_MOST_STEPS):
             found = alone.ways(numbers[:, :-2], q[:, None])
             off = found.way[:, 0] - offset - way
@@ -372,10 +385,11 @@ class Laws:
             with np.errstate(divide="ignore", invalid="ignore"):
                 step = q - off / found.slope[:, 0]
             inside = (step >= low) & (step <= high)
-            over = done.all()
             done = np.abs(off) <= _ROUNDING * scale
-            q = np.where(inside, step, np.where(done, q, 0.5 * (low + high)))
-            if over or not np.isfinite(q).any():
+            closer = np.where(inside, step, np.where(done, q, 0.5 * (low + high)))
+            q = np.where(settled, q, closer)
+            settled |= done
+            if settled.all():
                 break
-        q[~done | (q < span[0]) | (q > span[1])] = np.nan
+        q[~settled | (q < span[0]) | (q > span[1])] = np.nan
         return q
