@@ -54,6 +54,7 @@ from pkmcal.calibration.plausibility import (
 )
 from pkmcal.calibration.row_errors import likely_row_errors
 from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.set_noise import unlike_noise
 from pkmcal.calibration.starts import known_distances
 from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
@@ -279,6 +280,7 @@ def _warnings(
     notes += distant_points(fit.end, equations.parameters)
     notes += shrunk(equations, fit.start, fit.end)
     notes += beyond_linear(estimate, fit.uncertainty)
+    notes += unlike_noise(fit.uncertainty.slips)
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():
