@@ -91,6 +91,8 @@ class Table:
         The line of each row.
     notes : list of str
         What was assumed where the file does not say.
+    elsewhere : list of str
+        The same of tables that were joined with it, each with its file.
 
     Raises
     ------
@@ -122,7 +124,7 @@ class Table:
         self._units = dict(header.units)
         self.left_out: tuple[str, ...] = ()  # headings of unknown columns
         self._default_units = dict(default_units or {})
-        self.notes = [*text.notes, *header.notes]
+        self.notes, self.elsewhere = [*text.notes, *header.notes], list[str]()
         names = header.headings
         if len(names) > MOST_COLUMNS or len(names) * len(text.rows) > MOST_CELLS:
             raise FileError(

@@ -229,7 +229,7 @@ def read_measurements(
 
 
 def _notes(table: Table) -> tuple[str, ...]:
-    return tuple(f"{table.path}: {note}" for note in table.notes)
+    return (*table.elsewhere, *(f"{table.path}: {note}" for note in table.notes))
 
 
 def _read_probe(
