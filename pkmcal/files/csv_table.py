@@ -239,12 +239,16 @@ class Table:
         """Raise for the first of `names` that is not a column."""
         for name in names:
             if name not in self.columns:
-                hint = ""
-                if self.left_out:
-                    named = ", ".join(map(repr, self.left_out[:_SHOWN]))
-                    more = ", …" if len(self.left_out) > _SHOWN else ""
-                    hint = f"; not known: {named}{more}; --rename OLD=NEW says what one is"
-                raise self.header_error(f"missing column {name!r}{hint}")
+                raise self.missing(name)
+
+    def missing(self, name: str, otherwise: str = "") -> FileError:
+        """An error that a column is not there; `otherwise` is said where none was left out."""
+        hint = otherwise
+        if self.left_out:
+            named = ", ".join(map(repr, self.left_out[:_SHOWN]))
+            more = ", …" if len(self.left_out) > _SHOWN else ""
+            hint = f"; not known: {named}{more}; --rename OLD=NEW says what one is"
+        return self.header_error(f"missing column {name!r}{hint}")
 
     def _column(self, name: str) -> Column:
         self.require([name])
@@ -313,14 +317,17 @@ class Table:
         self, column: Column, quantities: tuple[str, ...], expected: str | None
     ) -> tuple[str, tuple[float, float]]:
         known = {unit: q for q in reversed(quantities) for unit in units.factors(q)}
-        usual = ", ".join(u for q in quantities for u in units.factors(q) if u.isascii())
+        usual = ", ".join(
+            u for q in quantities for u in units.factors(q) if u.isascii() and u.isalnum()
+        )
         if not column.unit and "1" in quantities:
             return "1", (1.0, 1.0)
+        column_unit = {"rad": "deg"}.get(quantities[0], quantities[0])
         stated = column.unit or self._stated(column, (expected,) if expected else quantities)
         if not stated:
             raise self.header_error(
                 f"column {column.name!r} has no unit: expected '{column.name} [{quantities[0]}]'"
-                f" (or another of {usual})",
+                f" (or another of {usual}), or --units {column_unit} for all columns without one",
                 column,
             )
         unit = units.plain(stated, known)

@@ -11,6 +11,10 @@ from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
 from pkmcal.kinematics.robot import Robot
 
+_WITHOUT = (
+    "; the actuators at each row are needed: of a log of the controller with --controller LOG; of"
+    " where a printer's probe triggered, column probe beside x and y"
+)
 _ACTUATOR = re.compile(r"q[1-9][0-9]*")
 
 
@@ -41,7 +45,9 @@ def columns_of_actuators(table: Table, what: str, count: int) -> list[str]:
 
 def read_actuators(table: Table, robot: Actuated | None) -> tuple[FloatArray, tuple[str, ...]]:
     """Actuator coordinates (N, n), and the unit of each, "mm" or "rad"."""
-    count = max((int(name[1:]) for name in actuators_in(table)), default=1)
+    count = max((int(name[1:]) for name in actuators_in(table)), default=0)
+    if not count:
+        raise table.missing("q1", _WITHOUT)
     expected = () if robot is None else tuple(robot.actuator_units)
     columns, units = [], []
     for i in range(count):
