@@ -15,6 +15,11 @@ _WITHOUT = (
     "; the actuators at each row are needed: of a log of the controller with --controller LOG; of"
     " where a printer's probe triggered, column probe beside x and y"
 )
+_QUANTITIES: dict[str | None, tuple[str, ...]] = {  # the one that is meant where two have a unit
+    "mm": ("mm", "count", "rad"),
+    "rad": ("rad", "mm", "count"),
+    None: ("mm", "rad", "count"),
+}
 _ACTUATOR = re.compile(r"q[1-9][0-9]*")
 
 
@@ -52,7 +57,7 @@ def read_actuators(table: Table, robot: Actuated | None) -> tuple[FloatArray, tu
     columns, units = [], []
     for i in range(count):
         of_robot = expected[i] if i < len(expected) else None
-        quantities = ("mm", "rad", "count") if of_robot != "mm" else ("mm", "count", "rad")
+        quantities = _QUANTITIES[of_robot]
         values, unit = table.numbers(f"q{i + 1}", *quantities, expected=of_robot)
         if unit == "count":
             unit = _counted(table, i, of_robot, robot)
