@@ -52,7 +52,7 @@ from pkmcal.calibration.plausibility import (
     likely_unit_errors,
     shrunk,
 )
-from pkmcal.calibration.row_errors import likely_row_errors
+from pkmcal.calibration.row_errors import likely_mistakes
 from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.set_noise import unlike_noise
 from pkmcal.calibration.starts import known_distances
@@ -225,7 +225,7 @@ def identify(
             estimator = estimator_at(equations, commanded, start, loss)
             estimate = estimator.solve()
     except ValueError as error:
-        hint = likely_unit_errors(datasets, chosen, start) or likely_row_errors(datasets, chosen)
+        hint = likely_mistakes(datasets, chosen, start)
         if not hint and not start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
@@ -317,7 +317,7 @@ def _remedy(result: Identification) -> str:
     if not np.isfinite(scatter):
         cure += ", or state the true sigma"
     if result.outliers:
-        cure = "look at the outliers, fit with loss='cauchy', or " + cure
+        cure = "look at the outliers, fit with --loss cauchy (loss='cauchy'), or " + cure
     return cure
 
 
