@@ -1,5 +1,5 @@
 /* Generated from derive/pulleys.py by `python -m derive`; never edited by hand.
- * derivation dd1d67fe6e7a2d3a
+ * derivation 2878e994a0b06bcf
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW

@@ -52,6 +52,7 @@ from pkmcal.calibration.plausibility import (
 )
 from pkmcal.calibration.row_errors import likely_row_errors
 from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.slack import SLACK, Cell, Slack, said_slack, slack_cables, taut
 from pkmcal.calibration.starts import known_distances
 from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
@@ -81,6 +82,7 @@ def identify(
     fix: str | Sequence[str] = (),
     datum: DatumRule = "none",
     drop: Drop = None,
+    slack: Slack = "keep",
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -148,6 +150,10 @@ def identify(
         Rows that are left out, fitted or drawn to be held out: by their numbers, counted from 0
         through all sets, or those that the others contradict in a robust fit. They are
         `Identification.dropped`.
+    slack : {"keep", "drop"}
+        What becomes of readings of cables that the others show to be slack, on a machine with more
+        cables than needed: "keep" says so in a warning, "drop" leaves these readings out and keeps
+        the rest of their rows. They are `Identification.slack`.
 
     Returns
     -------
@@ -198,13 +204,18 @@ def identify(
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
     word("datum", datum, DATUMS)
+    word("slack", slack, SLACK)
     equations, commanded, start = begun(datasets, chosen, unread)
+    cells: tuple[Cell, ...] = ()
     held_numbers = NO_DATUM
     try:
         if drop == OUTLIERS:
             dropped = robust_outliers(equations, commanded, start)
             datasets = without(datasets, dropped)
             equations, commanded, start = begun(datasets, chosen, unread)
+        if slack == "drop":
+            equations, cells = taut(equations, commanded, start)
+            commanded = equations.commanded() if cells else commanded
         estimator = estimator_at(equations, commanded, start, loss)
         estimate = estimator.solve()
         if datum == "auto":
@@ -212,6 +223,10 @@ def identify(
         if held_numbers.names:
             chosen = parameters(machine, datasets, held_numbers.asked(asked))
             equations, commanded, start = begun(datasets, chosen, unread)
+            if cells:
+                keys = [(cell.pose, cell.closures[0]) for cell in cells]
+                equations = equations.without_closures(keys, estimate.evaluation)
+                commanded = equations.commanded()
             estimator = estimator_at(equations, commanded, start, loss)
             estimate = estimator.solve()
     except ValueError as error:
@@ -238,7 +253,13 @@ def identify(
         dropped=dropped,
         dropped_names=row_names(given, dropped),
     )
+    if slack == "keep" and result.outliers:
+        _, cells = taut(equations, commanded, start)
+    slack_ones = slack_cables(estimator.equations, estimate.evaluation, cells)
+    result = replace(result, slack=slack_ones)
     notes = _warnings(result, estimator, estimate, datasets)
+    if slack == "keep" and result.slack:
+        notes.append(said_slack(result.slack))
     for text in notes:
         warnings.warn(text, CalibrationWarning, stacklevel=2)
     return replace(result, warnings=tuple(notes))

@@ -14,6 +14,7 @@ from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import RobustCheck
 from pkmcal.calibration.row_errors import likely_row_errors
 from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.slack import listed_slack
 from pkmcal.calibration.uncertainty import FEW
 from pkmcal.display import chance_text, decimals, displayed, fixed, printable
 from pkmcal.statistics.distributions import deviation_interval
@@ -257,6 +258,9 @@ def _remarks(found: Parts, robust: RobustCheck | None) -> tuple[str, ...]:
     if found.dropped:
         many = f"{len(found.dropped)} rows were" if len(found.dropped) > 1 else "1 row was"
         remarks.append(f"{many} left out, as asked: {found.dropped_names}")
+    if found.slack and found.fit.uncertainty.equations.slack_cells:
+        many = f"{len(found.slack)} readings" if len(found.slack) > 1 else "1 reading"
+        remarks.append(f"{many} of slack cables left out, as asked: {listed_slack(found.slack)}")
     if robust is not None and _DISAGREES < robust.ratio <= _CARRIED:
         remarks.append(_disagreement(found, robust))
     if found.holdout_outliers and not found.holdout_contradicts:
