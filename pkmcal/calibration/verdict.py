@@ -15,6 +15,7 @@ from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import RobustCheck
 from pkmcal.calibration.row_errors import likely_row_errors
 from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.slack import listed_slack
 from pkmcal.calibration.uncertainty import FEW
 from pkmcal.display import chance_text, decimals, displayed, fixed, printable
 from pkmcal.statistics.covariance import spare
@@ -287,6 +288,9 @@ def _remarks(found: Parts, robust: RobustCheck | None, drift: Drift | None) -> t
         remarks.append(str(drift))
     if found.left_out:
         remarks.append(found.left_out)
+    if found.slack and found.fit.uncertainty.equations.slack_cells:
+        many = f"{len(found.slack)} readings" if len(found.slack) > 1 else "1 reading"
+        remarks.append(f"{many} of slack cables left out, as asked: {listed_slack(found.slack)}")
     if robust is not None and robust.disagrees and not robust.carried:
         remarks.append(_disagreement(found, robust))
     if found.holdout_outliers and not found.holdout_contradicts:
