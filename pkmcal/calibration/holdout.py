@@ -62,6 +62,11 @@ class HeldOut:
         These parameters, of sessions that were not fitted: value and standard deviation.
     spare : float
         Lengths that are left to compare when these parameters have taken theirs.
+    dropped : tuple of int
+        Rows of other measurements that were left out as outliers; of those that were drawn, see
+        `Identification.dropped`.
+    dropped_names : str
+        The same by lines of files, poses and targets.
     drawn : bool
         Whether they are of the same measurements as the fitted points, drawn at random.
     """
@@ -81,6 +86,8 @@ class HeldOut:
     end: Evaluation | None = None
     own: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     spare: float = float("nan")
+    dropped: tuple[int, ...] = ()
+    dropped_names: str = ""
     drawn: bool = False
 
     @property

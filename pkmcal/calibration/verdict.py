@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.calibration.drift import Drift
 from pkmcal.calibration.estimator import FEW, LEAST_FREEDOM
 from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.linearity import Weak, beyond_linear
@@ -16,6 +17,7 @@ from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import RobustCheck
 from pkmcal.calibration.row_errors import likely_row_errors
 from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.slack import listed_slack
 from pkmcal.display import chance_text, decimals, displayed, fixed, printable
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import spare
@@ -58,7 +60,9 @@ class Verdict:
         return f"{self.state.capitalize()}: {self.reasons[0]}"
 
 
-def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) -> Verdict:
+def judge(
+    found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...], drift: Drift | None = None
+) -> Verdict:
     """Judge a calibration.
 
     Parameters
@@ -69,6 +73,8 @@ def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) ->
         A robust fit beside it, where there is one.
     moved : tuple of Moved
         What moved between the fitted points and those held out.
+    drift : Drift or None
+        Whether repeated poses moved with time, where any were.
     """
     grave = _grave(found, robust)
     doubts = [*_contradicted(found, moved), *_few(found)]
@@ -77,13 +83,15 @@ def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) ->
             f"{listed(found.at_bounds)} ended at a bound: the fit would go further; widen the"
             " bound, or see what else is wrong"
         )
+    if drift is not None and drift.large:
+        doubts.append(str(drift))
     doubts += found.warnings
     weak = beyond_linear(found.fit.estimate, found.fit.uncertainty)
     if weak is not None and not weak.assembled:
         doubts.append(str(weak))
     if not grave and not doubts and _little_gained(found):
         doubts.append(f"little was gained, {_change(found)}: {_other_causes(found)}")
-    remarks = _remarks(found, robust, weak)
+    remarks = _remarks(found, robust, weak, drift)
     reasons = tuple(printable(text, _LONGEST) for text in grave + doubts)
     if grave:
         return Verdict("not calibrated", reasons, remarks)
@@ -156,11 +164,13 @@ def _moved_text(moved: tuple[Moved, ...]) -> str:
         sizes = ", ".join(map(_size, each.shift, each.stderr, each.units))
         also = f" (or as well {', '.join(each.also)})" if each.also else ""
         parts.append(f"{each} by {sizes}{also}")
-    anew = ", ".join(repr(each) for each in dict.fromkeys(each.per_session for each in moved))
+    several = [repr(each) for each in dict.fromkeys(each.per_session for each in moved)]
+    anew = several[0] if len(several) == 1 else f"[{', '.join(several)}]"
+    options = " ".join(f"--per-session {each}" for each in several)
     return (
         "between the fitted and the held-out points moved, or the model is wrong there:"
-        f" {'; '.join(parts)}; per_session={anew if ',' not in anew else f'[{anew}]'} finds such"
-        " numbers anew in each session"
+        f" {'; '.join(parts)}; {options} (per_session={anew}) finds such numbers anew in each"
+        " session"
     )
 
 
@@ -276,21 +286,28 @@ def _disagreement(found: Parts, robust: RobustCheck) -> str:
     if not count:
         return (
             f"a robust fit has {robust.ratio:.2g} times less noise: many rows disagree with the"
-            " rest; fit with loss='cauchy' and look at the residuals"
+            " rest; fit with --loss cauchy (loss='cauchy') and look at the residuals"
         )
     rows = "row disagrees" if count == 1 else "rows disagree"
     return (
         f"{count} {rows} with the rest: {row_names(found.fit.equations.datasets, robust.rows)};"
         f" a robust fit leaves {_mm(robust.rms)} in the others, this one {_mm(found.rms)} in all:"
-        " fit with loss='cauchy'"
+        " leave them out with --drop-outliers (drop='outliers'), or fit with --loss cauchy"
+        " (loss='cauchy')"
     )
 
 
-def _remarks(found: Parts, robust: RobustCheck | None, weak: Weak | None) -> tuple[str, ...]:
+def _remarks(
+    found: Parts, robust: RobustCheck | None, weak: Weak | None, drift: Drift | None
+) -> tuple[str, ...]:
     remarks = []
-    if found.dropped:
-        many = f"{len(found.dropped)} rows were" if len(found.dropped) > 1 else "1 row was"
-        remarks.append(f"{many} left out, as asked: {found.dropped_names}")
+    if drift is not None and drift.found and not drift.large:
+        remarks.append(str(drift))
+    if found.left_out:
+        remarks.append(found.left_out)
+    if found.slack and found.fit.uncertainty.equations.slack_cells:
+        many = f"{len(found.slack)} readings" if len(found.slack) > 1 else "1 reading"
+        remarks.append(f"{many} of slack cables left out, as asked: {listed_slack(found.slack)}")
     if robust is not None and robust.disagrees and not robust.carried:
         remarks.append(_disagreement(found, robust))
     if found.holdout_outliers and not found.holdout_contradicts:

@@ -148,7 +148,7 @@ def test_one_pose_that_is_wrong_by_far_is_found_beside_a_linear_fit() -> None:
     assert found.verdict.state == "not calibrated"
     first = found.verdict.reasons[0]
     assert first.startswith("3 rows disagree with the rest: row 30 (1), row 31 (2), row 32 (3);")
-    assert first.endswith("fit with loss='cauchy'")
+    assert first.endswith("or fit with --loss cauchy (loss='cauchy')")
     robust = fitted(arm, replace(measured, values=values), loss="cauchy", **UNKNOWN)
     assert robust.outliers == (30, 31, 32)
     assert robust.distances.rms_without_outliers < 0.15 < robust.rms
@@ -174,7 +174,7 @@ def test_outliers_are_named_by_line_and_target(tmp_path: Path) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     found = fitted(arm, pk.read_measurements(path), **UNKNOWN)
     assert found.outliers == (37,)
-    assert "outliers: rows 37: log.csv line 15 (B)" in str(found)
+    assert "outliers: row 37: log.csv line 15 (B)" in str(found)
 
 
 @pytest.mark.parametrize("by", [1, -1, 2])
