@@ -86,7 +86,7 @@ def judge(
     if drift is not None and drift.large:
         doubts.append(str(drift))
     doubts += found.warnings
-    weak = beyond_linear(found.fit.estimate, found.fit.uncertainty)
+    weak = None if grave else beyond_linear(found.fit.estimate, found.fit.uncertainty)
     if weak is not None and not weak.assembled:
         doubts.append(str(weak))
     if not grave and not doubts and _little_gained(found):
