@@ -51,7 +51,8 @@ def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double")
     Raises
     ------
     ValueError
-        The machine has more closures than free coordinates; nothing is written.
+        The machine has more closures than free coordinates, or cranks on one actuator that have
+        different gains; nothing is written.
     OSError
         The folder does not exist or cannot be written.
 
@@ -82,7 +83,21 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"
             " a header holds machines with as many of both"
         )
+    _require_no_gears(robot)
     return rendered("robot.h.jinja", _contents(robot, prefix, number))
+
+
+def _require_no_gears(robot: Robot) -> None:
+    """Refuse limbs on one actuator that do not turn together: which turn is meant is a search."""
+    for actuator in range(robot.n_actuators):
+        mine = [i for i, limb in enumerate(robot.model.limbs) if limb.actuator == actuator]
+        gains = {abs(robot.geometry[f"gain{i + 1}"]) for i in mine}
+        turning = {KINDS[robot.model.limbs[i].kind].actuator_unit for i in mine}
+        if "rad" in turning and (len(gains) > 1 or len(turning) > 1):
+            raise ArgumentError(
+                f"robot: limbs of {robot.name} that share actuator {actuator + 1} do not turn"
+                " alike; a header holds cranks with the same gain on an actuator"
+            )
 
 
 def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
@@ -109,6 +124,7 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
     def whole(values: Any) -> str:
         return ", ".join(str(int(value)) for value in values)
 
+    angles = list(machine.struct.angle[0 : len(limbs)])
     first, second, frame, axis = prepared(robot)
     texts = [c_source.as_c99(f, prefix, number, _ENUMERATORS) for f in functions]
     slots = c_source.slots_read(texts, prefix, _ENUMERATORS)
@@ -140,6 +156,10 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
         "second": [several(row) for row in second],
         "frame": [several(row) for row in frame],
         "axis": [", ".join(f"{{ {several(each)} }}" for each in row) for row in axis],
+        "near": several(np.where(angles, list(machine.struct.near[0 : len(limbs)]), 0.0)),
+        "angles": whole(angles) if any(angles) else "",
+        "two_pi": one(2.0 * np.pi),
+        "beta": MAPS[map].index("beta") if machine.turns_freely else None,
         "branch": several([float(limb.branch) for limb in limbs]),
         "rows": rows,
         "drivers": [{"name": driver} for driver in drivers],
