@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arguments import did_you_mean
+from pkmcal.arguments import did_you_mean, number
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.fit_data import PLACE, FitData, Numbers
 from pkmcal.calibration.parameters import Asked, Bounds, Parameters, Prior
@@ -233,7 +233,7 @@ def _positive(what: str, value: object) -> float:
         raise ArgumentTypeError(f"{what} must be a number, a standard deviation; found {value!r}")
     if not value > 0:
         raise ArgumentError(f"{what} must be positive; found {value}")
-    return float(value)
+    return number(what, value, above=0) if value < np.inf else np.inf  # of none
 
 
 def _bounds(

@@ -178,6 +178,7 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
             machine.struct.near[i] if turns else 0.0 for i, turns in enumerate(turning)
         ),
         "turn": one(2.0 * np.pi),
+        "beta": MAPS[map].index("beta") if machine.turns_freely else None,
         "laws": [
             {
                 "base": several(law.base),

@@ -12,7 +12,7 @@ import pytest
 
 import pkmcal as pk
 
-from .. import robots
+from .. import generated, robots
 from .c_headers import PARALLEL, STRICT, compiled, needed
 
 FRAMES = {
@@ -124,6 +124,33 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
         return compiled(CASES[case](), tmp_path_factory.mktemp("header"), number)
 
     return of_case
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("kind", ["six", "pairs", "tripod", "planar", "spherical"])
+def test_machines_that_nobody_drew_turn_their_cranks_as_python_does(
+    kind: str, seed: int, tmp_path: Path
+) -> None:
+    """Strokes of any turn, cranks near half a turn, limbs that share one; rotations either way."""
+    rng = np.random.default_rng([seed, generated.KINDS.index(kind), 31])
+    robot = generated.machine(kind, rng, errors=0.3)
+    header = compiled(robot, tmp_path)
+    at = robot.frames.outward(generated.poses(kind, robot, 100, rng))
+    if kind in generated.CONSTRAINED:
+        at = robot.complete(at)
+        at = at[np.isfinite(at).all(axis=1)]
+    other = at.copy()
+    if kind != "planar":
+        other[:, 3:] = other[:, 3:] * [1, -1, 1] + np.pi
+    assert len(at) > 20
+    for poses in (at, other):
+        for name in ("inverse", "jacobian"):
+            status, found = getattr(header, name)(poses)
+            want = getattr(robot, name)(poses)
+            np.testing.assert_array_equal(
+                status == 0, np.isfinite(want.reshape(len(at), -1)).all(1)
+            )
+            np.testing.assert_array_equal(found, want)
 
 
 @pytest.mark.parametrize("case", CASES)
