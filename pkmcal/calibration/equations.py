@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
+from pkmcal.calibration import joint_angles
 from pkmcal.calibration.closures import RowStates
 from pkmcal.calibration.elimination import Blocks, Shares
 from pkmcal.calibration.evaluation import Evaluation
@@ -100,7 +101,8 @@ class Equations(Readings):
                     " no surplus actuators; found others"
                 )
             for m in self.sets:
-                if m.kind in ("between", "angle"):
+                follows = m.joint and joint_angles.follows_pose(self.parameters.robot, m.joint)
+                if m.kind in ("between", "angle") and not follows:
                     raise ArgumentError(
                         f"measurements: readings of kind {m.kind!r} need poses that follow from the"
                         " actuators: no actuator_sigma, and no surplus actuators"

@@ -21,8 +21,7 @@ from pkmcal.report.as_json import as_json
 _OF_ARMS = ("urdf", "sdf", "dh", "dh-modified", "ur")
 _FIRMWARE = ("klipper", "reprap", "marlin", "hangprinter", "maslow")
 TARGETS = ("c", *_FIRMWARE, "linuxcnc", "mjcf", *_OF_ARMS)
-_LINES = {"reprap": pk.export.reprap, "marlin": pk.export.marlin}
-_IN_A_FILE = {"klipper": pk.export.klipper, "maslow": pk.export.maslow}  # of the user's
+_IN_A_FILE = ("klipper", "maslow", "reprap", "hangprinter")  # of the user's
 
 
 def export(
@@ -41,7 +40,7 @@ def export(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Of Klipper, a Maslow or a Hangprinter: your printer.cfg, maslow.yaml or config.g,"
+            help="Of Klipper, RepRapFirmware, a Maslow: your printer.cfg, config.g or maslow.yaml,"
             " written with the changed numbers and otherwise as it is; by default the lines alone.",
         ),
     ] = None,
@@ -69,7 +68,7 @@ def export(
     """
     word("--as", target, TARGETS)
     _only(target, ("c",), number=number)
-    _only(target, (*_IN_A_FILE, "hangprinter"), config=config)
+    _only(target, _IN_A_FILE, config=config)
     _only(target, _FIRMWARE, project=project or None)
     read = Inputs()
     if target in _OF_ARMS:
@@ -134,16 +133,21 @@ def _write(
     project: bool,
 ) -> pk.export.Loss | None:
     """Write one file, and say what is lost."""
-    if target == "c":
-        pk.export.c_header(machine, path, _number(number))
-    elif target == "mjcf":
-        pk.export.mjcf(machine, path)
-    elif target in _IN_A_FILE:
-        return _IN_A_FILE[target](machine, path, config, project)
-    elif target == "hangprinter":
-        return pk.export.hangprinter(machine, path, project, config)
-    else:
-        return _LINES[target](machine, path, project)
+    match target:
+        case "c":
+            pk.export.c_header(machine, path, _number(number))
+        case "mjcf":
+            pk.export.mjcf(machine, path)
+        case "klipper":
+            return pk.export.klipper(machine, path, config, project)
+        case "maslow":
+            return pk.export.maslow(machine, path, config, project)
+        case "reprap":
+            return pk.export.reprap(machine, path, project, config)
+        case "marlin":
+            return pk.export.marlin(machine, path, project)
+        case "hangprinter":
+            return pk.export.hangprinter(machine, path, project, config)
     return None
 
 

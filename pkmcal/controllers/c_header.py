@@ -14,6 +14,7 @@ from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import c_source
 from pkmcal.controllers.c_source import Number
+from pkmcal.controllers.laws import require_no_pulleys
 from pkmcal.controllers.rendering import rendered
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.laws import MOST_STEPS, ROUNDING, LawNumbers
@@ -76,6 +77,7 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
     """The header whose names begin with `prefix`."""
     word("number", number, ("double", "float"))
     machine = robot.machine
+    require_no_pulleys(robot, "a header")
     if robot.model.chains is not None:
         raise ArgumentError(f"robot: {robot.name} has chains of joints; a header holds other limbs")
     if machine.rows != machine.m:

@@ -19,26 +19,35 @@ from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.controllers.gcode_words import (
     TOWERS,
+    Commands,
     Settings,
-    corrections,
+    changed,
+    each,
     in_inches,
+    lines,
     number,
     numbers,
+    off_towers,
     settings,
-    words,
-    written,
 )
 from pkmcal.controllers.linear_delta import FirmwareDelta, of_robot
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.rotary_delta import is_rotary_delta
 from pkmcal.controllers.rotary_delta import of_robot as rotary_of_robot
-from pkmcal.controllers.rotary_gcode import reprap_text as rotary_text
+from pkmcal.controllers.rotary_gcode import reprap_commands as rotary_commands
+from pkmcal.controllers.rotary_gcode import reprap_lines as rotary_lines
 from pkmcal.exceptions import FileError
 from pkmcal.files.atomic import write_whole
+from pkmcal.files.text_lines import text_in
 from pkmcal.kinematics.robot import Robot
 
 
-def reprap(robot: Robot, path: str | PathLike[str], project: bool = False) -> Loss:
+def reprap(
+    robot: Robot,
+    path: str | PathLike[str],
+    project: bool = False,
+    config: str | PathLike[str] | None = None,
+) -> Loss:
     """Write a delta's numbers for RepRapFirmware 3: M665 and M666 for config.g.
 
     Of a rotary delta M669 and M666, with the end stops at the greatest angle of the cranks.
@@ -51,6 +60,9 @@ def reprap(robot: Robot, path: str | PathLike[str], project: bool = False) -> Lo
         Where to write; an existing file is replaced, whole or not at all.
     project : bool, optional
         Write the nearest numbers where the firmware cannot hold the robot.
+    config : str or path, optional
+        The printer's own config.g: it is written with the changed numbers, and not a character
+        else of it. By default the two lines alone are written.
 
     Returns
     -------
@@ -60,15 +72,25 @@ def reprap(robot: Robot, path: str | PathLike[str], project: bool = False) -> Lo
     Raises
     ------
     ValueError
-        The firmware cannot hold the robot; nothing is written.
+        The firmware cannot hold the robot, or the file has no such lines; nothing is written.
+    OSError
+        A file that cannot be read or written.
     """
     path, project = as_path("path", path), flag("project", project)
+    place = str(as_path("config", "config.g" if config is None else config))
+    text = None if config is None else text_in(config, "surrogateescape")
+    shift = 0.0 if text is None else mean_adjustment(text, place)
     if is_rotary_delta(robot):
         turning, loss = rotary_of_robot(robot, project, one_height=False)
-        write_whole(path, rotary_text(turning))
-        return loss
-    firmware, loss = of_robot(robot, project)
-    write_whole(path, reprap_text(firmware))
+        commands = rotary_commands(turning, shift, text, place)
+        new = rotary_lines(commands)
+    else:
+        firmware, loss = of_robot(robot, project)
+        commands = reprap_commands(firmware, shift)
+        new = lines(commands)
+    if text is not None:
+        new = changed(text, place, commands)
+    write_whole(path, new.encode("utf-8", "surrogateescape"))
     return loss
 
 
@@ -100,26 +122,27 @@ def marlin(robot: Robot, path: str | PathLike[str], project: bool = False) -> Lo
     return loss
 
 
-def reprap_text(firmware: FirmwareDelta) -> str:
-    """The two lines for RepRapFirmware."""
-    height = float(np.mean(firmware.endstops))
-    return (
-        f"M665 L{written(*firmware.arms)} {words('RH', [firmware.radius, height])}"
-        f" {corrections(firmware.angles)}\n"
-        f"M666 {words('XYZ', [endstop - height for endstop in firmware.endstops])} A0 B0\n"
-    )
+def reprap_commands(firmware: FirmwareDelta, shift: float) -> Commands:
+    """The settings of RepRapFirmware, whose adjustments have the mean `shift`."""
+    height = float(np.mean(firmware.endstops)) - shift
+    size = {"L": firmware.arms, "R": [firmware.radius], "H": [height]}
+    ends = each("XYZ", [endstop - height for endstop in firmware.endstops])
+    return {"M665": size | off_towers(firmware.angles), "M666": ends | each("AB", [0.0, 0.0])}
+
+
+def mean_adjustment(text: str, place: str) -> float:
+    """The mean of X Y Z of M666."""
+    ends = settings(text, "M666", place)
+    return float(np.mean([number(ends, letter, "M666", place, 0.0) for letter in "XYZ"]))
 
 
 def marlin_text(firmware: FirmwareDelta) -> str:
     """The two lines for Marlin."""
-    height = min(firmware.endstops)
-    rod = float(np.mean(firmware.arms))
-    trims = words("ABC", [arm - rod for arm in firmware.arms])
-    towers = corrections(firmware.angles)
-    return (
-        f"M665 L{rod:.6f} R{firmware.radius:.6f} H{height:.6f} {towers} {trims}\n"
-        f"M666 {words('XYZ', [height - endstop for endstop in firmware.endstops])}\n"
-    )
+    height, rod = min(firmware.endstops), float(np.mean(firmware.arms))
+    size = each("LRH", [rod, firmware.radius, height]) | off_towers(firmware.angles)
+    trims = each("ABC", [arm - rod for arm in firmware.arms])
+    ends = each("XYZ", [height - endstop for endstop in firmware.endstops])
+    return lines({"M665": size | trims, "M666": ends})
 
 
 def of_reprap(text: str, place: str = "M665") -> FirmwareDelta:

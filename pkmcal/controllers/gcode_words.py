@@ -36,13 +36,7 @@ class Setting(NamedTuple):
 
 
 Settings = dict[str, Setting]
-
-
-def words(letters: str, values: Sequence[float]) -> str:
-    """Numbers with six decimals behind their letters."""
-    return " ".join(
-        f"{letter}{written(value)}" for letter, value in zip(letters, values, strict=True)
-    )
+Commands = Mapping[str, Mapping[str, Sequence[float]]]  # numbers by command and letter
 
 
 def written(*values: float) -> str:
@@ -50,12 +44,25 @@ def written(*values: float) -> str:
     return ":".join(f"{round(value, 6) + 0.0:.6f}" for value in values)
 
 
-def corrections(angles: Sequence[float]) -> str:
+def lines(commands: Commands, **kinds: int) -> str:
+    """The lines of commands; of those of `kinds` with a K before the other words."""
+    text = ""
+    for command, values in commands.items():
+        kind = f" K{kinds[command]}" if command in kinds else ""
+        words = " ".join(letter + written(*each) for letter, each in values.items())
+        text += f"{command}{kind} {words}\n"
+    return text
+
+
+def each(letters: str, values: Sequence[float]) -> dict[str, list[float]]:
+    """A number for each letter."""
+    return {letter: [value] for letter, value in zip(letters, values, strict=True)}
+
+
+def off_towers(angles: Sequence[float]) -> dict[str, list[float]]:
     """X Y Z: by how much towers stand off the firmware's angles, deg."""
-    off = [
-        (angle - tower + 180.0) % 360.0 - 180.0 for angle, tower in zip(angles, TOWERS, strict=True)
-    ]
-    return words("XYZ", off)
+    pairs = zip(angles, TOWERS, strict=True)
+    return each("XYZ", [(angle - tower + 180.0) % 360.0 - 180.0 for angle, tower in pairs])
 
 
 def settings(text: str, command: str, place: str, missing: bool = False) -> Settings:
@@ -89,15 +96,33 @@ def in_inches(text: str) -> bool:
     return units[-1:] == ["G20"]
 
 
-def changed(text: str, values: Mapping[Setting, Sequence[float]]) -> str:
-    """The text with other numbers where they are not the same, and not a character else."""
-    for setting, new in sorted(values.items(), key=lambda pair: -pair[0].start):
-        old = [float(each) for each in setting.value.split(":")]
-        same = len(old) == len(new) and all(
-            abs(one - other) <= SAME for one, other in zip(old, new, strict=True)
-        )
-        if not same:
-            text = text[: setting.start] + written(*new) + text[setting.end :]
+def changed(text: str, place: str, commands: Commands) -> str:
+    """The text with these numbers by command and letter, and not a character else changed.
+
+    Numbers that say the same stay as they are written, also one that stands for several. A letter
+    that is missing is 0, or added to the last such command.
+
+    Raises
+    ------
+    FileError
+        There is no such command, or what stands there is no number.
+    """
+    edits: list[tuple[int, int, str]] = []
+    for command, values in commands.items():
+        found = settings(text, command, place)
+        last = max((setting.end for setting in found.values()), default=0)
+        for letter, new in values.items():
+            if letter in found:
+                old = numbers(found, letter, command, place, counts=(1, len(new)))
+                old *= len(new) // len(old)
+                start, end = found[letter][1:]
+            else:
+                old, start, end = [0.0] * len(new), last, last
+            if any(abs(one - other) > SAME for one, other in zip(old, new, strict=True)):
+                word = written(*new) if letter in found else f" {letter}{written(*new)}"
+                edits.append((start, end, word))
+    for start, end, word in sorted(edits, key=lambda edit: edit[:2], reverse=True):
+        text = text[:start] + word + text[end:]
     return text
 
 

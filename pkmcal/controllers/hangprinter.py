@@ -20,6 +20,7 @@ from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
 from pkmcal.controllers.gcode_words import (
+    Commands,
     Settings,
     changed,
     number,
@@ -27,7 +28,7 @@ from pkmcal.controllers.gcode_words import (
     settings,
     written,
 )
-from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.laws import require_no_laws, require_no_pulleys
 from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
@@ -129,7 +130,7 @@ def hangprinter(
     )
     require_held(robot, lost, project, lacks)
     found = model(x)
-    write_whole(path, text_of(found) if text is None else _changed(text, place, found))
+    write_whole(path, text_of(found) if text is None else changed(text, place, _commands(found)))
     return lost
 
 
@@ -198,17 +199,13 @@ def _spools(wound: Settings, place: str) -> Spools:
     )
 
 
-def _changed(text: str, place: str, found: Hangprinter) -> str:
-    """The user's file with other numbers in it."""
-    size = settings(text, "M669", place)
-    values = {
-        size[letter]: anchor
-        for letter, anchor in zip(_LETTERS, found.anchors.tolist(), strict=True)
-    }
+def _commands(found: Hangprinter) -> Commands:
+    """The settings that hold it, by command and letter."""
+    anchors = found.anchors.tolist()
+    commands = {"M669": dict(zip(_LETTERS, anchors, strict=True))}
     if found.spools is not None:
-        wound = settings(text, "M666", place)
-        values |= {wound["Q"]: [found.spools.buildup], wound["R"]: found.spools.radii.tolist()}
-    return changed(text, values)
+        commands["M666"] = {"Q": [found.spools.buildup], "R": found.spools.radii.tolist()}
+    return commands
 
 
 def as_robot(machine: Hangprinter, name: str = "hangprinter", head: str = "") -> Robot:
@@ -264,6 +261,7 @@ def _model(
 
 def _require(robot: Robot) -> bool:
     """Refuse what is no Hangprinter; whether it has spools."""
+    require_no_pulleys(robot, "M669")
     limbs = [(limb.kind, limb.actuator) for limb in robot.model.limbs]
     lines_of_its_own = limbs == [("UPS", i) for i in range(_LINES)]
     if robot.model.map != "translation" or not lines_of_its_own or not robot.frames.trivial:

@@ -19,7 +19,7 @@ from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
 from pkmcal.controllers.gcode_words import SAME
-from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, fitted, require_held
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
@@ -160,7 +160,7 @@ def _corners(robot: Robot) -> list[int]:
         raise ArgumentError(f"robot: {robot.name} is no point in the plane (map xy) on four cables")
     if not robot.frames.trivial:
         raise ArgumentError(f"robot: {robot.name} has base and tool frames, the firmware has none")
-    require_no_laws(robot, "a firmware")
+    require_plain_limbs(robot, "a firmware")
     anchors = robot.slots[:, 0:2]
     left, low = (anchors < anchors.mean(axis=0)).T.tolist()
     corners = [("b" if low[i] else "t") + ("l" if left[i] else "r") for i in range(4)]

@@ -28,9 +28,12 @@ ANGLES = {  # by kinematics, where the file says nothing
 SAME = 5e-7  # of numbers with six decimals
 
 _SAVED = re.compile(r"#\*# <-+ SAVE_CONFIG -+>")
+_PREFIX = "#*# "
 _SECTION = re.compile(r"\[([^\]]+)\]")
 _INCLUDE = re.compile(r"\[include +([^\]]+)\]")
 _OPTION = re.compile(r"(?P<name>.*?)\s*[:=]\s*(?P<value>.*)")
+_NAMED = re.compile(r"\$\{(?:([^.:${}]+)[.:])?([^${}]+)\}")  # Kalico: a value of another option
+_MOST_NAMES = 10  # of which each names the next
 _REMARK = re.compile(r"#.*|(?:^|(?<=\s));.*")
 
 
@@ -124,13 +127,15 @@ class PrinterConfig:
 
     def _read(self, lines: list[str], file: str, within: tuple[str, ...]) -> None:
         above, saved, start = _Reader(file), None, 0
+        while lines and not lines[-1].strip():
+            lines = lines[:-1]
         for i, whole in enumerate(lines):
             line = whole.rstrip("\r\n")
             if len(within) == 1 and _SAVED.match(line):
                 saved = _Reader(file)
             elif saved is not None:
-                if line.startswith("#*#"):
-                    saved.take(i, line, 4 if line.startswith("#*# ") else 3)
+                self._require_saved(i, line)
+                saved.take(i, line, len(_PREFIX))
             elif include := _INCLUDE.match(line):
                 self._options |= above.options
                 above.options = {}
@@ -145,10 +150,20 @@ class PrinterConfig:
             self._options = saved.options | self._options
             self._saved = saved.ends
 
+    def _require_saved(self, i: int, line: str) -> None:
+        """Refuse lines for which the firmware would leave the block of SAVE_CONFIG out."""
+        if line != _PREFIX.rstrip() and not line.startswith(_PREFIX):
+            raise FileError(
+                f"{self.place}, line {i + 1}: behind SAVE_CONFIG lines must begin with"
+                f" {_PREFIX!r}, or the firmware leaves the whole block out: move others above it"
+            )
+
     def _include(self, named: str, within: tuple[str, ...]) -> None:
         """Read the files that a line names, relative to the file it is in."""
         pattern = Path(within[-1]).parent / named
-        found = sorted(each for each in glob.glob(str(pattern)) if Path(each).is_file())
+        found = sorted(
+            each for each in glob.glob(str(pattern), recursive=True) if Path(each).is_file()
+        )
         if not found and not glob.has_magic(named):
             self.absent.append(named)
         for file in found:
@@ -160,8 +175,8 @@ class PrinterConfig:
         """Whether there is such an option."""
         return (section, option) in self._options
 
-    def text(self, section: str, option: str, default: str | None = None) -> str:
-        """What an option says.
+    def text(self, section: str, option: str, default: str | None = None, depth: int = 0) -> str:
+        """What an option says, `depth` names away from the one that was asked for.
 
         Raises
         ------
@@ -169,7 +184,12 @@ class PrinterConfig:
             It is not there and has no default.
         """
         if (section, option) in self._options:
-            return self._options[section, option].text
+            if depth > _MOST_NAMES:
+                raise self.wrong(section, option, "names itself")
+            return _NAMED.sub(
+                lambda named: self.text(named[1] or section, named[2].lower(), depth=depth + 1),
+                self._options[section, option].text,
+            )
         if default is not None:
             return default
         raise FileError(f"{self.place}: [{section}] {option} is missing{self._lacking()}")
@@ -241,7 +261,7 @@ class PrinterConfig:
         last = self._ends.get(section) or self._saved[section]
         before = text[last.line]
         end = "\r\n" if before.endswith("\r\n") else "\n"
-        prefix = last.indent if section in self._ends else "#*# "
+        prefix = last.indent if section in self._ends else _PREFIX
         text[last.line] = before + ("" if before.endswith("\n") else end) + prefix + line + end
 
 

@@ -6,16 +6,19 @@ above the horizontal; shoulders may have heights of their own.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pkmcal.controllers.gcode_words import (
     TOWERS,
-    corrections,
+    Commands,
+    each,
+    lines,
     number,
     numbers,
+    off_towers,
     settings,
-    words,
-    written,
 )
 from pkmcal.controllers.rotary_delta import RotaryDelta
 
@@ -29,17 +32,23 @@ def is_rotary(text: str, place: str) -> bool:
     return number(found, "K", "M669", place, 0.0) == _KIND
 
 
-def reprap_text(delta: RotaryDelta) -> str:
-    """The two lines."""
+def reprap_commands(
+    delta: RotaryDelta, shift: float, text: str | None = None, place: str = "M669"
+) -> Commands:
+    """The settings, whose adjustments have the mean `shift`; the least angle is that of `text`."""
     angles = [-float(np.degrees(elbow)) for elbow in delta.elbows]
-    greatest = float(np.mean(angles))
-    three = {"U": delta.cranks, "L": delta.rods, "H": delta.heights}
-    lengths = " ".join(letter + written(*values) for letter, values in three.items())
-    return (
-        f"M669 K{_KIND} {lengths} R{written(delta.radius)} A{_LEAST:g}:{written(greatest)}"
-        f" {corrections(delta.angles)}\n"
-        f"M666 {words('XYZ', [angle - greatest for angle in angles])}\n"
-    )
+    greatest = float(np.mean(angles)) - shift
+    least = _LEAST
+    if text is not None:
+        least, _ = numbers(settings(text, "M669", place), "A", "M669", place, counts=(2,))
+    size: dict[str, Sequence[float]] = {"U": delta.cranks, "L": delta.rods, "H": delta.heights}
+    size |= {"R": [delta.radius], "A": [least, greatest], **off_towers(delta.angles)}
+    return {"M669": size, "M666": each("XYZ", [angle - greatest for angle in angles])}
+
+
+def reprap_lines(commands: Commands) -> str:
+    """The two lines."""
+    return lines(commands, M669=_KIND)
 
 
 def of_reprap(text: str, place: str = "M669") -> RotaryDelta:

@@ -26,10 +26,14 @@ _POSES = 200  # measured poses that can be visited
 
 
 def element(found: Identification) -> tuple[str, str]:
-    """The element of the report, and the hash by which its policy names the script."""
-    data = page.machine(
-        found.robot, cloud=False
-    )  # the report has its own pictures of the workspace
+    """The element of the report, and the hash by which its policy names the script.
+
+    Both are empty for a machine that the page cannot hold: the still pictures stay.
+    """
+    robot = found.robot
+    if isinstance(robot, Robot) and any(limb.kind == "pulley" for limb in robot.model.limbs):
+        return "", ""
+    data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
     data["places"] = _measured(found)
     data["calibration"] = {"points": _points(found), "change": _change(found)}
     return page.plain_element(data)

@@ -165,6 +165,31 @@ def test_clang_too_has_nothing_to_say(case: str, number: str, tmp_path: Path) ->
     compiled(CASES[case](), tmp_path, number, "clang")  # gcc: in every test here
 
 
+@pytest.mark.parametrize("case", ["mixed, framed", "drive laws", "paired, with laws"])
+def test_cpp_takes_it_too(case: str, tmp_path: Path) -> None:
+    needed("g++")
+    for number in ("double", "float"):
+        pk.export.c_header(CASES[case](), tmp_path / f"a_{number}.h", number)  # type: ignore[arg-type]
+    (tmp_path / "a.cpp").write_text(
+        '#include "a_double.h"\n#include "a_float.h"\nint main()\n'
+        "{ double q[6]; float l[6]; return a_double_inverse(a_double_home, q)\n"
+        "    + a_float_inverse(a_float_home, l); }\n"
+    )
+    flags = [flag.replace("c99", "c++11") for flag in STRICT]
+    subprocess.run(["g++", *flags, "-o", tmp_path / "a", tmp_path / "a.cpp"], check=True)
+    subprocess.run([tmp_path / "a"], check=True)
+
+
+def test_a_double_that_is_a_float_is_refused_when_it_is_compiled(tmp_path: Path) -> None:
+    """As on processors of eight bits."""
+    needed("gcc")
+    pk.export.c_header(pk.load("hexapod"), tmp_path / "robot.h")
+    small = ["-U__DBL_MANT_DIG__", "-D__DBL_MANT_DIG__=24"]
+    command = ["gcc", "-fsyntax-only", *small, "-x", "c", tmp_path / "robot.h"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and "export it with --number float" in done.stderr
+
+
 def test_what_is_refused_leaves_the_numbers_alone(tmp_path: Path) -> None:
     robot = pk.load("linear-delta")
     library = compiled(robot, tmp_path)

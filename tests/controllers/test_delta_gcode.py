@@ -97,6 +97,51 @@ def test_what_is_written_is_read_back(firmware: str, run: Any, tmp_path: Path) -
     np.testing.assert_allclose(found, poses, rtol=0, atol=1e-5)
 
 
+OWN = """\
+; Dre\xfcs config.g
+M569 P0 S1 ; drive 0 goes forwards
+M665 L250 R125.0 B85 H300.00 ; set delta radius and the rest
+M665 X0.5 (left) Z-0
+m666 x-0.2 Y0.1
+M208 Z-0.2 S1 ; M665 L1 R1
+"""
+
+
+def test_users_config_is_kept_but_for_changed_numbers(run: Any, tmp_path: Path) -> None:
+    """What it is read to is what was exported, and what is the same stays as it was written."""
+    file, out = tmp_path / "config.g", tmp_path / "new.g"
+    for newline in ("\n", "\r\n"):
+        text = OWN.replace("\n", newline).encode("latin-1")
+        file.write_bytes(text)
+        robot = pk.import_printer(file, "reprap").robot
+        pk.export.reprap(robot, out, config=file)
+        assert out.read_bytes() == text
+        out.unlink()
+        g = robot.geometry
+        height = g["offset1"] - np.sqrt(250.0**2 - 125.0**2)
+        changes = {"radius": 125.6, "angle2": g["angle2"] + np.radians(0.25), "rod3": 250.4}
+        for i, rod in ((1, 250.0), (2, 250.0), (3, 250.4)):  # the same heights at the switches
+            changes[f"offset{i}"] = height + np.sqrt(rod**2 - 125.6**2)
+        better = robot.replace(changes | {"offset2": changes["offset2"] + 0.3 + 0.2})
+        better = better.replace({"offset3": better.geometry["offset3"] + 0.2})
+        better.save(tmp_path / "better.toml")
+        arguments = ("export", tmp_path / "better.toml", "--as", "reprap", "--config", file)
+        assert run(*arguments, "--out", out).exit_code == 0
+        want = text.replace(b"L250", b"L250.000000:250.000000:250.400000")
+        want = want.replace(b"R125.0", b"R125.600000").replace(b"H300.00", b"H300.066667")
+        want = want.replace(b"Z-0" + newline.encode(), b"Z-0 Y0.250000" + newline.encode())
+        want = want.replace(b"x-0.2 Y0.1", b"x-0.266667 Y0.233333 Z-0.066667")
+        assert out.read_bytes() == want
+        again = pk.import_printer(out, "reprap").robot.geometry
+        for name in ("radius", "rod1", "rod3", "angle1", "angle2", "offset1", "offset2", "offset3"):
+            assert again[name] == pytest.approx(better.geometry[name], abs=2e-6)
+        out.unlink()
+    file.write_text("M665 L250 R125 H300\n")
+    with pytest.raises(pk.FileError, match="M666 is missing"):
+        pk.export.reprap(robot, out, config=file)
+    assert not out.exists()
+
+
 def test_lines_are_found_as_firmwares_print_them(tmp_path: Path) -> None:
     """Marlin's M503 and a commented config.g; the last command counts, one rod stands for three."""
     (tmp_path / "m503").write_text("echo:  M665 L250.00 R125.00 H300.00 X0.5\necho:  M666 X-0.20\n")
@@ -237,6 +282,10 @@ def test_cranks_go_where_the_model_of_reprap_says_and_are_read_back(tmp_path: Pa
     again = pk.import_printer(tmp_path / "delta.g", "reprap")
     assert str(again) == "delta: a rotary delta, no stored heights"
     np.testing.assert_allclose(again.robot.inverse(poses), robot.inverse(poses), atol=1e-7)
+    own = text.replace("A-90.000000", "A-35.5").replace(" X0.5", " X+0.5")
+    (tmp_path / "own.g").write_text(own)
+    pk.export.reprap(robot, tmp_path / "new.g", config=tmp_path / "own.g")
+    assert (tmp_path / "new.g").read_text() == own
     with pytest.raises(pk.ArgumentError, match="one radius and one height"):
         pk.export.klipper(robot, tmp_path / "x.cfg")
     with pytest.raises(pk.ArgumentError, match="one radius, and cranks"):

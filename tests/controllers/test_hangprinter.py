@@ -118,6 +118,36 @@ def test_calibrated_spools_go_into_the_users_file_and_nothing_else_changes(
     np.testing.assert_allclose(firmware_turns(new, nozzle), turns, rtol=0, atol=1e-6)
 
 
+def test_turns_of_the_motors_lead_from_the_users_file_to_its_changed_numbers(
+    run: Any, tmp_path: Path
+) -> None:
+    file, made = tmp_path / "config.g", tmp_path / "made"
+    file.write_text(CONFIG)
+    assert run("import", file, "--from", "hangprinter", "--out", made).exit_code == 0
+    true = CONFIG.replace("R75.1:75.2:74.9:75.0", "R75.6:75.0:75.4:75.3")
+    nozzle = np.random.default_rng(3).uniform([-600, -600, 0], [600, 600, 1000], (40, 3))
+    deviations = np.full((40, 2), 0.01)
+    table = np.hstack([firmware_turns(true, nozzle), nozzle, deviations])
+    heading = "q1 [rev],q2 [rev],q3 [rev],q4 [rev],x [mm],y [mm],z [mm]"
+    heading += ",sigma [mm],actuator_sigma [rev]"
+    np.savetxt(tmp_path / "m.csv", table, "%.7f", ",", header=heading, comments="")
+    files = (made / "robot.toml", tmp_path / "m.csv")
+    done = run("calibrate", *files, "--free", "drive*.spool", "--report", tmp_path / "r")
+    assert done.exit_code == 0, done.stderr
+    assert "(0.1232 rad of the spool each)" in done.stderr
+    (tmp_path / "mm.csv").write_text(
+        (tmp_path / "m.csv").read_text().replace("sigma [rev]", "sigma [mm]")
+    )
+    done = run("calibrate", files[0], tmp_path / "mm.csv")  # turns are no mm
+    assert done.exit_code == 2
+    assert "has unit [mm], and 'q1' [rev]: expected the same" in " ".join(done.stderr.split())
+    out = tmp_path / "new.g"
+    arguments = ("export", tmp_path / "r" / "robot.toml", "--as", "hangprinter", "--out", out)
+    assert run(*arguments, "--config", file).exit_code == 0
+    radii = re.findall(r" R(\S+)", out.read_text())[0].split(":")
+    np.testing.assert_allclose([float(r) for r in radii], [75.6, 75.0, 75.4, 75.3], atol=1e-3)
+
+
 def test_spools_that_the_gears_have_not_are_refused_or_projected(
     refused: Any, tmp_path: Path
 ) -> None:

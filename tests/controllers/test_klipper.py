@@ -194,7 +194,7 @@ def test_characters_that_end_no_line_do_not_and_a_mark_stays(tmp_path: Path) -> 
 
 
 def test_included_files_are_read_where_they_are_named_and_never_written(tmp_path: Path) -> None:
-    file = own(tmp_path, OWN.replace("[printer]", "[include towers/*.cfg]\n[printer]"))
+    file = own(tmp_path, OWN.replace("\n[printer]", "\n[include towers/*.cfg]\n[printer]", 1))
     (tmp_path / "towers").mkdir()
     (tmp_path / "towers" / "a.cfg").write_text("[stepper_a]\narm_length: 336\n[include b/c.cfg]\n")
     (tmp_path / "towers" / "b").mkdir()
@@ -214,6 +214,21 @@ def test_included_files_are_read_where_they_are_named_and_never_written(tmp_path
     (tmp_path / "other.cfg").write_text("[include mine.cfg]\n")
     with pytest.raises(pk.FileError, match="includes itself"):
         pk.import_printer(file)
+
+
+def test_a_value_that_names_itself_is_no_number(tmp_path: Path) -> None:
+    text = OWN.replace("arm_length: 333.0", "arm_length: ${arm_length}")
+    with pytest.raises(pk.FileError, match=r"line 12: .* arm_length names itself"):
+        pk.import_printer(own(tmp_path, text))
+    with pytest.raises(pk.FileError, match=r"\[rods\] long is missing"):
+        pk.import_printer(own(tmp_path, text.replace("${arm_length}", "${rods.long}")))
+
+
+def test_a_saved_block_that_the_firmware_leaves_out_is_not_read(tmp_path: Path) -> None:
+    assert pk.import_printer(own(tmp_path, OWN + "\n\n")).measurements is not None
+    text = OWN + "\n[gcode_macro LATE]\ngcode: G28\n"
+    with pytest.raises(pk.FileError, match="line 44: behind SAVE_CONFIG lines must begin with"):
+        pk.import_printer(own(tmp_path, text))
 
 
 def test_comments_stay_and_a_gain_becomes_a_rotation_distance(tmp_path: Path) -> None:
