@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
+from pkmcal.calibration import joint_angles
 from pkmcal.calibration.closures import RowStates
 from pkmcal.calibration.elimination import Blocks, Shares
 from pkmcal.calibration.evaluation import Evaluation
@@ -100,7 +101,8 @@ class Equations(Readings):
                     " no surplus actuators; found others"
                 )
             for m in self.sets:
-                if m.kind in ("between", "angle"):
+                follows = m.joint and joint_angles.follows_pose(self.parameters.robot, m.joint)
+                if m.kind in ("between", "angle") and not follows:
                     raise ArgumentError(
                         f"measurements: readings of kind {m.kind!r} need poses that follow from the"
                         " actuators: no actuator_sigma, and no surplus actuators"
@@ -252,7 +254,7 @@ class Equations(Readings):
         noise: FloatArray,
         left: FloatArray,
         prior_centre: FloatArray,
-        bent: FloatArray | None = None,
+        drawn: FloatArray | None = None,
     ) -> tuple[Equations, Evaluation]:
         """The same with other readings, and evaluated where these have been drawn.
 
@@ -264,7 +266,7 @@ class Equations(Readings):
             See `whitened`.
         left : ndarray (M,)
             What its readings leave there, as `residual`.
-        bent : ndarray (s,), optional
+        drawn : ndarray (s,), optional
             That of `Parameters`.
         prior_centre : ndarray (n,)
             Another centre of the prior.
@@ -282,7 +284,7 @@ class Equations(Readings):
             replace(m, values=corrected(m.kind, seen.values, residual).reshape(m.values.shape))
             for m, seen, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
-        other.parameters = replace(self.parameters, start=prior_centre, bent=bent)
+        other.parameters = replace(self.parameters, start=prior_centre, drawn=drawn)
         other.warm_start(at)
         if unknowns:
             return other, other.at(at.theta, noise)

@@ -75,9 +75,8 @@ class Identification(Parts, Result):
         """
         if isinstance(self.robot, SerialArm):
             return ()
-        prior = np.asarray(self.fit.parameters.prior_rows.any(axis=0))
-        given = (self.robot.geometry, self.table, self.covariance, prior, self.covariance_rule)
-        return law_tests(*given)
+        prior = np.asarray(self.fit.estimate.prior.any(axis=0))
+        return law_tests(self.robot.geometry, self.table, self.fit.uncertainty, prior)
 
     @property
     def loss(self) -> str:

@@ -39,6 +39,7 @@ from pkmcal.calibration.fit_statistics import (
 from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.linearity import beyond_linear
 from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.mode_slips import in_other_modes
 from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior
@@ -98,11 +99,13 @@ def identify(
         Of any kinds.
     free : str or sequence of str, optional
         Names of numbers to find, or wildcards (``"base*.x"``). None: the robot's own default set.
-    prior : float or mapping of str to float, optional
+    prior : float or mapping of str to float or (float, float), optional
         Standard deviation around the present value. A number, in mm, holds for all free numbers
         of the geometry (an angle as its arc at the machine's characteristic length); a mapping
-        gives it by name or wildcard in mm and rad, later entries before earlier ones. None: no
-        prior; unidentifiable combinations then move as little as possible.
+        gives it by name or wildcard in mm and rad, later entries before earlier ones. A key may
+        also be a function of numbers: a sum, ``"gain1 - gain2"``, or the length of a sum of points,
+        ``"|base1 - base2|"``; a pair is a value that was measured otherwise, and its deviation.
+        None: no prior; unidentifiable combinations then move as little as possible.
     loss : {"linear", "huber", "cauchy"}
         Weight of rows with large residuals, by the length of the whole measured vector.
     frame : {"known", "unknown"} or a sequence of them
@@ -264,7 +267,7 @@ def _warnings(
     if notes or result.rms > _POOR * result.rms_before or result.chi2_per_dof > _NOISY:
         notes = likely_unit_errors(datasets, equations.parameters, fit.start) or notes
     notes += insufficient_data(
-        estimator.equations, result.rank, result.dof, bool(len(estimator.prior))
+        estimator.equations, result.rank, result.dof, bool(len(estimate.prior))
     )
     if result.chi2_per_dof > _NOISY:
         notes.append(
@@ -275,6 +278,7 @@ def _warnings(
     notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
     notes += shrunk(equations, fit.start, fit.end)
+    notes += beyond_linear(estimate, fit.uncertainty)
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():

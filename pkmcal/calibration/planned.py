@@ -131,7 +131,8 @@ def design_of(
         )
 
     def design(aimed: FloatArray) -> Design:
-        return Design(blocks, chosen.prior_rows, aimed, criterion, chosen.robot.length, sort)
+        rows = chosen.prior_rows(chosen.start)
+        return Design(blocks, rows, aimed, criterion, chosen.robot.length, sort)
 
     made = design(aimed)
     moved = aimed.reshape(-1, len(chosen)) @ made.unidentifiable

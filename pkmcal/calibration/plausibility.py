@@ -250,9 +250,7 @@ def contradicted_prior(
     if test is None or not test.contradicted:
         return []
     pulls = np.nan_to_num(test.pulls)
-    stated = [n for n, s in zip(parameters.names, parameters.prior, strict=True) if np.isfinite(s)]
-    bends = parameters.prior_rows[len(stated) :]
-    stated += [f"the smoothness at {parameters.names[np.abs(row).argmax()]}" for row in bends]
+    stated = parameters.prior_names
     worst = [k for k in largest_first(np.abs(pulls), _ALIKE)[:3] if abs(pulls[k]) > _PULLED]
     shown = ", ".join(f"{stated[k]} {abs(pulls[k]):.1f}" for k in worst)
     pulled = f" and pull {shown} times as far as prior and noise let expect" if worst else ""

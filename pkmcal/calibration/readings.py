@@ -230,7 +230,7 @@ class Readings:
         kind, mine, there = measured.kind, pose[self.pose_of[i]], self.other_of[i]
         touching = (measured.artefact, self._along[i])
         if measured.joint is not None:
-            return read_angles(self._angles(i, pose, theta), **places)
+            return read_angles(*self._angles(i, pose, theta), **places)
         if not self._frames[i]:
             return predict(
                 kind,
@@ -252,15 +252,22 @@ class Readings:
         ]
         return joined(parts, [rows for _, rows in self._frames[i]])
 
-    def _angles(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray:
-        """Angles (N,) of the passive joint that set `i` reads."""
+    def _angles(
+        self, i: int, pose: FloatArray, theta: FloatArray
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """Angles (N,) of the passive joint that set `i` reads, and by the twist (N, 6), or None."""
         measured, joint = self.sets[i], str(self.sets[i].joint)
-        found = np.empty(len(measured))
+        found, by_twist = np.empty(len(measured)), np.empty((len(measured), 6))
+        if joint_angles.follows_pose(self.parameters.robot, joint):
+            for machine, rows in self._machines(i, theta):
+                at, none = pose[self.pose_of[i][rows]], np.empty(0, dtype=np.intp)
+                found[rows], by_twist[rows], _ = joint_angles.swivels(machine, at, joint, none)
+            return found, by_twist
         for machine, rows in self._machines(i, theta):
             q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
             approach = None if measured.approach is None else measured.approach[rows]
             found[rows] = joint_angles.angles(machine, q, at, joint, approach)
-        return found
+        return found, None
 
     def by_numbers(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray | None:
         """How readings of set `i` follow the geometry not by the pose alone, (N, k, g)."""
@@ -270,6 +277,9 @@ class Readings:
         found = np.empty((len(measured), 1, len(places)))
         for machine, rows in self._machines(i, theta):
             q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
+            if joint_angles.follows_pose(machine, measured.joint):
+                found[rows, 0] = joint_angles.swivels(machine, at, measured.joint, places)[2]
+                continue
             approach = None if measured.approach is None else measured.approach[rows]
             found[rows, 0] = joint_angles.rates(machine, q, at, measured.joint, places, approach)
         return found

@@ -235,7 +235,7 @@ def _linear_fit(
     fit = linear_fit(
         estimate.jacobian,
         pseudo.residual,
-        estimator.prior,
+        estimate.prior,
         state.determined.identifiable,
         named.pose,
         named.component,

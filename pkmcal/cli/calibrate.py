@@ -20,7 +20,7 @@ from pkmcal.cli.geometry_options import (
     free_names,
     matching,
     read_coefficients,
-    read_deviations,
+    read_prior,
 )
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.measured import (
@@ -235,7 +235,7 @@ def calibrate(
             given,
             measured[0] if len(measured) == 1 else measured,
             free=chosen or None,
-            prior=read_deviations("--prior", prior or [], machine, chosen),
+            prior=read_prior(prior or [], machine, chosen),
             loss=word("--loss", loss, LIMITS),
             frame=_known("--frame", frame, measured),
             target=_known("--target", target, measured),

@@ -15,7 +15,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.optimal_design import CRITERIA
 from pkmcal.calibration.plan_poses import PLANNED, Plan, plan_poses
 from pkmcal.calibration.planned import UNKNOWN
-from pkmcal.cli.geometry_options import free_names, read_deviations
+from pkmcal.cli.geometry_options import free_names, read_prior
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
 from pkmcal.cli.output import Output, say
@@ -146,7 +146,7 @@ def plan(
             noise=_noise(noise, kinds),
             actuator_noise=actuator_noise,
             free=chosen or None,
-            prior=read_deviations("--prior", prior or [], seen, chosen),
+            prior=read_prior(prior or [], seen, chosen),
             unknown=[word("--unknown", each, UNKNOWN) for each in unknown or ()],
         )
     written: list[Path] = []

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pkmcal.exceptions import FileError
+from pkmcal.files.text_lines import lines_of
 
 SEPARATORS = ("\t", ";", ",", " ")  # the first of those that fit equally well
 _LOOKED_AT = 200  # lines
@@ -73,9 +74,7 @@ def text_rows(path: Path, content: bytes) -> TextRows:
             lines.append((number, line.rstrip("\n")))
     if any(words in text for words in _REPORTS):
         reports = {
-            what: [
-                (n, m) for n, line in enumerate(text.splitlines(), 1) if (m := form.search(line))
-            ]
+            what: [(n, m) for n, line in enumerate(lines_of(text), 1) if (m := form.search(line))]
             for what, form in (("probe", _TRIGGER), ("contact", _CONTACT))
         }
         if all(reports.values()):
@@ -84,9 +83,9 @@ def text_rows(path: Path, content: bytes) -> TextRows:
                 f"{path}, line {new}: the firmware reports its probe in another way than in line"
                 f" {old}: make two files of it"
             )
-        for what, lines_of in reports.items():
-            if lines_of:
-                _take_triggers(found, what, lines_of)
+        for what, told in reports.items():
+            if told:
+                _take_triggers(found, what, told)
                 return found
     found.separator = _separator([line for _, line in lines[:_LOOKED_AT]])
     found.rows = [(number, cells(path, number, line, found.separator)) for number, line in lines]

@@ -32,7 +32,9 @@ def element(found: Identification) -> tuple[str, str]:
     Nothing, and "none", of a machine that the page cannot hold: the still pictures stay.
     """
     robot = found.robot
-    if isinstance(robot, Robot) and robot.model.driven:
+    if isinstance(robot, Robot) and (
+        robot.model.driven or any(limb.kind == "pulley" for limb in robot.model.limbs)
+    ):
         return "", "none"
     data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
     data["places"] = _measured(found)
