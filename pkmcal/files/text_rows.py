@@ -83,9 +83,9 @@ def text_rows(path: Path, content: bytes) -> TextRows:
                 f"{path}, line {new}: the firmware reports its probe in another way than in line"
                 f" {old}: make two files of it"
             )
-        for what, told in reports.items():
-            if told:
-                _take_triggers(found, what, told)
+        for what, found_in in reports.items():
+            if found_in:
+                _take_triggers(found, what, found_in)
                 return found
     found.separator = _separator([line for _, line in lines[:_LOOKED_AT]])
     found.rows = [(number, cells(path, number, line, found.separator)) for number, line in lines]
