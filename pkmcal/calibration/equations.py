@@ -89,6 +89,8 @@ class Equations(Readings):
         machines = range(len(self.machine_columns))
         self._own = tuple(np.flatnonzero(self.machine_of_pose == s) for s in machines)
         closures = closures_of_sessions(parameters.robot, self._own, self.actuators, sigma)
+        self._slack = np.zeros((len(guess), closures.equations), dtype=bool)
+        self._if_taut = self.actuators
         self._take(closures, sigma is None)
 
     def _take(self, closures: SessionClosures, estimated: bool) -> None:
@@ -118,7 +120,7 @@ class Equations(Readings):
             return
         self.unstated = np.append(self._no_sigma, estimated)
         poses = len(self.actuators)
-        own = np.repeat(np.arange(poses), closures.equations)
+        own = np.nonzero(~self._slack)[0]
         pose_of_equation = np.concatenate([own, np.repeat(pose_of_row, of_row)])
         self._group_of_equation = np.concatenate([
             np.full(len(own), len(self.sets)),
@@ -137,7 +139,8 @@ class Equations(Readings):
         if not self.closures.unknowns:
             return self
         other = copy.copy(self)
-        other._take(commanded_closures(self._own, self.actuators), estimated=False)
+        other._slack = self._slack[:, :0]
+        other._take(commanded_closures(self._own, self._if_taut), estimated=False)
         return other
 
     def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
@@ -194,7 +197,7 @@ class Equations(Readings):
         off, by_unknown = self.closures.residual(machines, states)
         off /= noise[-1]
         by_unknown /= noise[-1]
-        equation, by_unknown = off.reshape(-1), by_unknown.reshape(-1, self.closures.unknowns)
+        equation, by_unknown = self._told(off), self._told(by_unknown)
         if not self.count.any():
             return equation, by_unknown
         twists = self.closures.twists(machines, states)
@@ -237,10 +240,55 @@ class Equations(Readings):
             evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
         )
         of_closures /= noise[-1]
-        by_all = of_closures.reshape(-1, len(p))
+        by_all = self._told(of_closures)
         if len(readings):
             by_all = np.concatenate([by_all, readings])
         return self._blocks.left(by_unknown, by_all)
+
+    @property
+    def slack_cells(self) -> list[tuple[int, int]]:
+        """Closures that are left out, of slack cables: their poses and numbers."""
+        pose, closure = np.nonzero(self._slack)
+        return list(zip(pose.tolist(), closure.tolist(), strict=True))
+
+    def _told(self, part: FloatArray) -> FloatArray:
+        """Equations of closures (K, equations, ...) that count, one after another."""
+        whole = part.reshape(-1, *part.shape[2:])
+        return whole[~self._slack.reshape(-1)] if self._slack.any() else whole
+
+    def closure_residuals(
+        self, evaluation: Evaluation, noise: FloatArray, weights: FloatArray, taken: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Closures read less needed (K, equations), whitened, and their degrees of freedom.
+
+        None of those that do not count. Arguments are those of `by_groups`.
+        """
+        off, by_unknown = self._at(evaluation, noise)
+        own = int((~self._slack).sum())
+        longer, freedom = np.zeros((2, *self._slack.shape))
+        longer[~self._slack] = -off[:own]
+        freedom[~self._slack] = self._blocks.redundancy(by_unknown, weights, taken)[:own]
+        if self._slack.any():
+            whole, _ = self.closures.residual(evaluation.machines, evaluation.states)
+            longer[self._slack] = -whole[self._slack] / noise[-1]
+        return longer, freedom
+
+    def without_closures(
+        self, cells: Sequence[tuple[int, int]], evaluation: Evaluation
+    ) -> Equations:
+        """The same without some closures, by pose and number: of cables that are slack.
+
+        Where poses are to follow from the actuators these read what they would at `evaluation`.
+        """
+        other = copy.copy(self)
+        other._slack = np.zeros_like(self._slack)
+        other._slack[tuple(np.array(cells, dtype=np.intp).reshape(-1, 2).T)] = True
+        needed = self.closures_off(evaluation) / self.closures.lengths(evaluation.machines)
+        other._if_taut = self.actuators.copy()
+        for pose, cell in zip(*np.nonzero(other._slack), strict=True):
+            other._if_taut[pose, self.closures.actuators[cell]] += needed[pose, cell]
+        other._take(self.closures, bool(self.unstated[-1]))
+        return other
 
     def start_from(self, rows: IntArray, poses: FloatArray) -> None:
         """Start the forward kinematics of some distinct rows of actuators from poses (s, 6)."""
@@ -275,9 +323,9 @@ class Equations(Readings):
         if unknowns:
             off, by_unknown = self._at(at, noise)
             errors = self._blocks.spread(by_unknown, left)
-            own = len(self.actuators) * self.closures.equations
-            change = -noise[-1] * (errors + off)[:own]
-            other.closures = self.closures.shifted(change.reshape(len(self.actuators), -1))
+            change, own = np.zeros(self._slack.shape), int((~self._slack).sum())
+            change[~self._slack] = -noise[-1] * (errors + off)[:own]
+            other.closures = self.closures.shifted(change)
             errors = errors[own:]
         residuals = tuple(self.unwhiten(errors, noise[: len(self.sets)]))
         other.sets = tuple(
@@ -415,14 +463,17 @@ class Equations(Readings):
 
     def closure_rms(self, evaluation: Evaluation) -> float:
         """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
-        return rms(self._closures_off(evaluation)[evaluation.status == 0])
+        found = self.closures_off(evaluation)[evaluation.status == 0]
+        return rms(found[~self._slack[evaluation.status == 0]])
 
     def worst_closures(self, evaluation: Evaluation) -> FloatArray:
         """The largest of them at each pose (K,); NaN where they hold."""
-        off = np.abs(self._closures_off(evaluation))
+        off = np.abs(self.closures_off(evaluation))
+        off[self._slack] = 0.0
         return off.max(axis=1) if off.shape[1] else np.full(len(off), np.nan)
 
-    def _closures_off(self, evaluation: Evaluation) -> FloatArray:
+    def closures_off(self, evaluation: Evaluation) -> FloatArray:
+        """What actuators would read at the poses less what they read (K, equations), mm."""
         sigma, machines = self.closures.sigma, evaluation.machines
         off, _ = self.closures.residual(machines, evaluation.states)
         return off if sigma is None else off * sigma * self.closures.lengths(machines)

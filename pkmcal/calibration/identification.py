@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +29,9 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.observation import predict
 from pkmcal.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _STRONG = 0.95  # correlation worth a word
 _ALIKE = 9  # decimals to which correlations differ that are not equal
@@ -185,13 +188,18 @@ class Identification(Parts, Result):
         moved = np.linalg.norm(by_geometry @ undetermined[own], axis=(1, 2))
         return np.where(moved < _UNIDENTIFIABLE, deviation, np.inf).reshape(shape)
 
-    def plot(self, path: str | PathLike[str]) -> None:
+    def plot(self, path: str | PathLike[str] | None = None) -> Figure:
         """Draw the residuals by row, over the workspace and as quantiles.
 
         Parameters
         ----------
-        path : str or path
-            A file that ends in ``.png`` or ``.svg``.
+        path : str or path, optional
+            A file that ends in ``.png`` or ``.svg``, to be written.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, which notebooks show.
 
         Raises
         ------
@@ -200,7 +208,11 @@ class Identification(Parts, Result):
         """
         from pkmcal.report import drawing, residual_figure
 
-        drawing.write(residual_figure.residuals(self), arguments.path("path", path))
+        figure = residual_figure.residuals(self)
+        figure.set_facecolor("white")  # a notebook may be dark, and the texts are
+        if path is not None:
+            drawing.write(figure, arguments.path("path", path))
+        return figure
 
     def report(
         self,

@@ -52,8 +52,10 @@ from pkmcal.calibration.plausibility import (
     likely_unit_errors,
     shrunk,
 )
-from pkmcal.calibration.row_errors import likely_row_errors
+from pkmcal.calibration.row_errors import likely_mistakes
 from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.set_noise import unlike_noise
+from pkmcal.calibration.slack import SLACK, Cell, Slack, said_slack, slack_cables, taut
 from pkmcal.calibration.starts import known_distances
 from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
@@ -84,6 +86,7 @@ def identify(
     datum: DatumRule = "none",
     drop: Drop = None,
     expansion: Coefficients = None,
+    slack: Slack = "keep",
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -156,6 +159,10 @@ def identify(
         Coefficients of thermal expansion in 1/K, of steel 11.5e-6: one for all, or of "base",
         "platform" (with the targets on it), "limbs" or single ones, "limb3"; parts that are not
         named do not grow. With `Measurements.temperature` the numbers are those at 20 °C.
+    slack : {"keep", "drop"}
+        What becomes of readings of cables that the others show to be slack, on a machine with more
+        cables than needed: "keep" says so in a warning, "drop" leaves these readings out and keeps
+        the rest of their rows. They are `Identification.slack`.
 
     Returns
     -------
@@ -207,13 +214,18 @@ def identify(
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
     word("datum", datum, DATUMS)
+    word("slack", slack, SLACK)
     equations, commanded, start = begun(datasets, chosen, unread)
+    cells: tuple[Cell, ...] = ()
     held_numbers = NO_DATUM
     try:
         if drop == OUTLIERS:
             dropped = robust_outliers(equations, commanded, start)
             datasets = without(datasets, dropped)
             equations, commanded, start = begun(datasets, chosen, unread)
+        if slack == "drop":
+            equations, cells = taut(equations, commanded, start)
+            commanded = equations.commanded() if cells else commanded
         estimator = estimator_at(equations, commanded, start, loss)
         estimate = estimator.solve()
         if datum == "auto":
@@ -221,10 +233,14 @@ def identify(
         if held_numbers.names:
             chosen = parameters(machine, datasets, held_numbers.asked(asked))
             equations, commanded, start = begun(datasets, chosen, unread)
+            if cells:
+                keys = [(cell.pose, cell.closures[0]) for cell in cells]
+                equations = equations.without_closures(keys, estimate.evaluation)
+                commanded = equations.commanded()
             estimator = estimator_at(equations, commanded, start, loss)
             estimate = estimator.solve()
     except ValueError as error:
-        hint = likely_unit_errors(datasets, chosen, start) or likely_row_errors(datasets, chosen)
+        hint = likely_mistakes(datasets, chosen, start)
         if not hint and not start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
@@ -251,7 +267,13 @@ def identify(
         dropped=dropped,
         dropped_names=row_names(given, dropped),
     )
+    if slack == "keep" and result.outliers:
+        _, cells = taut(equations, commanded, start)
+    slack_ones = slack_cables(estimator.equations, estimate.evaluation, cells)
+    result = replace(result, slack=slack_ones)
     notes = _warnings(result, estimator, estimate, datasets)
+    if slack == "keep" and result.slack:
+        notes.append(said_slack(result.slack))
     for text in notes:
         warnings.warn(text, CalibrationWarning, stacklevel=2)
     return replace(result, warnings=tuple(notes))
@@ -279,6 +301,7 @@ def _warnings(
     notes += distant_points(fit.end, equations.parameters)
     notes += shrunk(equations, fit.start, fit.end)
     notes += beyond_linear(estimate, fit.uncertainty)
+    notes += unlike_noise(fit.uncertainty.slips)
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():
@@ -315,7 +338,7 @@ def _remedy(result: Identification) -> str:
     if not np.isfinite(scatter):
         cure += ", or state the true sigma"
     if result.outliers:
-        cure = "look at the outliers, fit with loss='cauchy', or " + cure
+        cure = "look at the outliers, fit with --loss cauchy (loss='cauchy'), or " + cure
     return cure
 
 

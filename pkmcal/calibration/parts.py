@@ -19,6 +19,7 @@ from pkmcal.calibration.fit_statistics import (
 )
 from pkmcal.calibration.holdout import HeldOut
 from pkmcal.calibration.misfit_names import MisfitNames
+from pkmcal.calibration.slack import SlackCable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.prior_test import PriorTest
 
@@ -71,6 +72,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "outliers",
     "dropped",
     "holdout_dropped",
+    "slack",
     "distances_before",
     "distances",
     "holdout_distances_before",
@@ -123,6 +125,9 @@ class Parts(MisfitNames):
         Rows that were left out, by their numbers.
     dropped_names : str
         The same by lines of files, poses and targets.
+    slack : tuple of SlackCable
+        Readings of cables that the others show to be slack, the longest first: left out, or with
+        ``slack="keep"`` fitted.
     """
 
     robot: Robot | SerialArm
@@ -139,6 +144,7 @@ class Parts(MisfitNames):
     datum: Datum = NO_DATUM
     dropped: tuple[int, ...] = ()
     dropped_names: str = ""
+    slack: tuple[SlackCable, ...] = ()
 
     @property
     def sessions(self) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import RobustCheck
 from pkmcal.calibration.row_errors import likely_row_errors
 from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.slack import listed_slack
 from pkmcal.calibration.uncertainty import FEW
 from pkmcal.display import chance_text, decimals, displayed, fixed, printable
 from pkmcal.statistics.covariance import spare
@@ -158,11 +159,13 @@ def _moved_text(moved: tuple[Moved, ...]) -> str:
         sizes = ", ".join(map(_size, each.shift, each.stderr, each.units))
         also = f" (or as well {', '.join(each.also)})" if each.also else ""
         parts.append(f"{each} by {sizes}{also}")
-    anew = ", ".join(repr(each) for each in dict.fromkeys(each.per_session for each in moved))
+    several = [repr(each) for each in dict.fromkeys(each.per_session for each in moved)]
+    anew = several[0] if len(several) == 1 else f"[{', '.join(several)}]"
+    options = " ".join(f"--per-session {each}" for each in several)
     return (
         "between the fitted and the held-out points moved, or the model is wrong there:"
-        f" {'; '.join(parts)}; per_session={anew if ',' not in anew else f'[{anew}]'} finds such"
-        " numbers anew in each session"
+        f" {'; '.join(parts)}; {options} (per_session={anew}) finds such numbers anew in each"
+        " session"
     )
 
 
@@ -268,13 +271,14 @@ def _disagreement(found: Parts, robust: RobustCheck) -> str:
     if not count:
         return (
             f"a robust fit has {robust.ratio:.2g} times less noise: many rows disagree with the"
-            " rest; fit with loss='cauchy' and look at the residuals"
+            " rest; fit with --loss cauchy (loss='cauchy') and look at the residuals"
         )
     rows = "row disagrees" if count == 1 else "rows disagree"
     return (
         f"{count} {rows} with the rest: {row_names(found.fit.equations.datasets, robust.rows)};"
         f" a robust fit leaves {_mm(robust.rms)} in the others, this one {_mm(found.rms)} in all:"
-        " fit with loss='cauchy'"
+        " leave them out with --drop-outliers (drop='outliers'), or fit with --loss cauchy"
+        " (loss='cauchy')"
     )
 
 
@@ -284,6 +288,9 @@ def _remarks(found: Parts, robust: RobustCheck | None, drift: Drift | None) -> t
         remarks.append(str(drift))
     if found.left_out:
         remarks.append(found.left_out)
+    if found.slack and found.fit.uncertainty.equations.slack_cells:
+        many = f"{len(found.slack)} readings" if len(found.slack) > 1 else "1 reading"
+        remarks.append(f"{many} of slack cables left out, as asked: {listed_slack(found.slack)}")
     if robust is not None and robust.disagrees and not robust.carried:
         remarks.append(_disagreement(found, robust))
     if found.holdout_outliers and not found.holdout_contradicts:

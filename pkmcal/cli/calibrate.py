@@ -149,6 +149,14 @@ def calibrate(
         bool,
         typer.Option("--drop-outliers", help="Leave out the rows that the others contradict."),
     ] = False,
+    drop_slack: Annotated[
+        bool,
+        typer.Option(
+            "--drop-slack",
+            help="Leave out readings of cables that the others show to be slack, and keep the rest"
+            " of their rows.",
+        ),
+    ] = False,
     controller: Controller = None,
     join: JoinBy = "auto",
     ignore: Ignore = None,
@@ -247,6 +255,7 @@ def calibrate(
             datum=word("--datum", datum, DATUMS),
             drop="outliers" if drop_outliers else dropped,
             expansion=read_coefficients("--expansion", expansion or []),
+            slack="drop" if drop_slack else "keep",
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:
