@@ -39,7 +39,6 @@ from pkmcal.calibration.fit_statistics import (
 from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.linearity import beyond_linear
 from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.mode_slips import in_other_modes
 from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior
@@ -300,8 +299,7 @@ def _warnings(
     notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
     notes += shrunk(equations, fit.start, fit.end)
-    notes += beyond_linear(estimate, fit.uncertainty)
-    notes += unlike_noise(fit.uncertainty.slips)
+    notes += unlike_noise(equations, fit.uncertainty.slips)
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():
