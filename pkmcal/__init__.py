@@ -23,6 +23,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
     from pkmcal.calibration.datum import Datum as Datum
     from pkmcal.calibration.distances import Distances as Distances
+    from pkmcal.calibration.drift import Drift as Drift
     from pkmcal.calibration.identification import Identification as Identification
     from pkmcal.calibration.identify import identify as identify
     from pkmcal.calibration.law_tests import LawTest as LawTest
@@ -95,6 +96,7 @@ _HOMES = {
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
     "calibration.datum": ("Datum",),
     "calibration.distances": ("Distances",),
+    "calibration.drift": ("Drift",),
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),
     "calibration.law_tests": ("LawTest",),

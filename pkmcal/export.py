@@ -10,6 +10,7 @@ from pkmcal.controllers.linuxcnc import linuxcnc
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.maslow import maslow
 from pkmcal.controllers.mjcf import mjcf
+from pkmcal.controllers.sdf import sdf
 from pkmcal.controllers.urdf import urdf
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "maslow",
     "mjcf",
     "reprap",
+    "sdf",
     "universal_robots",
     "urdf",
 ]

@@ -97,6 +97,11 @@ class Equations(Readings):
         """Build the units for these closures; `estimated`: their deviations are not known."""
         self.closures = closures
         if closures.unknowns:
+            if any(growth is not None for growth in self._growth):
+                raise ArgumentError(
+                    "expansion: needs poses that follow from the actuators: no actuator_sigma, and"
+                    " no surplus actuators; found others"
+                )
             for m in self.sets:
                 follows = m.joint and joint_angles.follows_pose(self.parameters.robot, m.joint)
                 if m.kind in ("between", "angle") and not follows:

@@ -15,6 +15,8 @@ from pkmcal import arguments
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
+from pkmcal.calibration.drift import Drift, drift
+from pkmcal.calibration.expansion import in_words
 from pkmcal.calibration.law_tests import LawTest, law_tests
 from pkmcal.calibration.moved import Moved, moved
 from pkmcal.calibration.parts import Parts
@@ -47,7 +49,7 @@ class Identification(Parts, Result):
         looked for where held-out points contradict the fit.
         """
         robust = robust_check(self.fit) if self.loss == "linear" else None
-        return judge(self, robust, self.moved)
+        return judge(self, robust, self.moved, self.drift)
 
     @cached_property
     def moved(self) -> tuple[Moved, ...]:
@@ -61,6 +63,11 @@ class Identification(Parts, Result):
         return moved(self.fit, later, end)
 
     @cached_property
+    def drift(self) -> Drift | None:
+        """Whether repeated poses moved with time; None where too few were repeated to say."""
+        return drift(self.fit, self.holdout, {*self.outliers, *self.holdout.odd})
+
+    @cached_property
     def law_tests(self) -> tuple[LawTest, ...]:
         """Whether the free numbers of drive laws are needed: an F test of each kind against 0.
 
@@ -69,8 +76,7 @@ class Identification(Parts, Result):
         if isinstance(self.robot, SerialArm):
             return ()
         prior = np.asarray(self.fit.estimate.prior.any(axis=0))
-        given = (self.robot.geometry, self.table, self.covariance, prior, self.covariance_rule)
-        return law_tests(*given)
+        return law_tests(self.robot.geometry, self.table, self.fit.uncertainty, prior)
 
     @property
     def loss(self) -> str:
@@ -254,6 +260,8 @@ class Identification(Parts, Result):
         )
         if self.sessions:
             yield summary.sessions(self.sessions)
+        if heat := in_words(self.fit.equations.sets, self.expansion):
+            yield summary.filled("", heat)
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)
         datasets, chosen = self.fit.equations.datasets, self.fit.parameters

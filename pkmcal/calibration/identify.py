@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -25,6 +26,7 @@ from pkmcal.calibration.dropped import (
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.expansion import Coefficients, expansion_of
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.fit_statistics import (
@@ -38,6 +40,7 @@ from pkmcal.calibration.fit_statistics import (
 from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.linearity import beyond_linear
 from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.mode_slips import in_other_modes
 from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior
@@ -83,6 +86,7 @@ def identify(
     datum: DatumRule = "none",
     drop: Drop = None,
     slack: Slack = "keep",
+    expansion: Coefficients = None,
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -149,11 +153,16 @@ def identify(
     drop : sequence of int or "outliers", optional
         Rows that are left out, fitted or drawn to be held out: by their numbers, counted from 0
         through all sets, or those that the others contradict in a robust fit. They are
-        `Identification.dropped`.
+        `Identification.dropped`. Of other measurements that are held out the "outliers" are
+        `Identification.holdout_dropped`; where most rows contradict the fit none is left out.
     slack : {"keep", "drop"}
         What becomes of readings of cables that the others show to be slack, on a machine with more
         cables than needed: "keep" says so in a warning, "drop" leaves these readings out and keeps
         the rest of their rows. They are `Identification.slack`.
+    expansion : float or mapping of str to float, optional
+        Coefficients of thermal expansion in 1/K, of steel 11.5e-6: one for all, or of "base",
+        "platform" (with the targets on it), "limbs" or single ones, "limb3"; parts that are not
+        named do not grow. With `Measurements.temperature` the numbers are those at 20 °C.
 
     Returns
     -------
@@ -189,7 +198,8 @@ def identify(
     unknown = {"frame": frame, "target": target, "attachment": attachment}
     anew = words("per_session", per_session)
     asked = Asked(free, prior, bounds, anew, by_set(unknown), words("fix", fix))
-    given = as_fit_data(machine, measurements, unknown, sessions=bool(anew))
+    grows = expansion_of(machine, expansion)
+    given = as_fit_data(machine, measurements, unknown, bool(anew), grows)
     dropped = named_rows(drop, sum(len(data.rows) for data in given))
     datasets, unread = informative(machine, given)
     held: list[tuple[FitData, int]] = []
@@ -243,9 +253,13 @@ def identify(
     drawn = not isinstance(holdout, Measurements)
     held = held_without(held, dropped) if drawn else held
     outside = evaluate(held, estimator, estimate, sure)
-    if drop == OUTLIERS and drawn and outside.odd:
-        dropped = tuple(sorted({*dropped, *outside.odd}))
-        outside = evaluate(held_without(held, dropped), estimator, estimate, sure)
+    if drop == OUTLIERS and outside.odd and not outside.contradicts:
+        odd, names = outside.odd, row_names(outside.data, outside.odd)
+        outside = evaluate(held_without(held, odd), estimator, estimate, sure)
+        if drawn:
+            dropped = tuple(sorted({*dropped, *odd}))
+        else:
+            outside = replace(outside, dropped=odd, dropped_names=names)
     result = _result(estimator, estimate, commanded, start, replace(outside, drawn=drawn), sure)
     result = replace(
         result,
@@ -254,9 +268,9 @@ def identify(
         dropped_names=row_names(given, dropped),
     )
     if slack == "keep" and result.outliers:
-        _, cells = taut(equations, commanded, start)
-    slack_ones = slack_cables(estimator.equations, estimate.evaluation, cells)
-    result = replace(result, slack=slack_ones)
+        with suppress(ArgumentError):  # a robust fit that does not come to an end says nothing
+            _, cells = taut(equations, commanded, start)
+    result = replace(result, slack=slack_cables(estimator.equations, estimate.evaluation, cells))
     notes = _warnings(result, estimator, estimate, datasets)
     if slack == "keep" and result.slack:
         notes.append(said_slack(result.slack))
@@ -286,6 +300,7 @@ def _warnings(
     notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
     notes += shrunk(equations, fit.start, fit.end)
+    notes += beyond_linear(estimate, fit.uncertainty)
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():

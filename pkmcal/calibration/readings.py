@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +17,14 @@ from pkmcal.measurements import orientation
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import Predicted, difference, joined, predict, read_angles
+from pkmcal.measurements.observation import (
+    Predicted,
+    corrected,
+    difference,
+    joined,
+    predict,
+    read_angles,
+)
 
 ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
 
@@ -90,6 +98,10 @@ class Readings:
             for of_set, part in zip(self._numbers, self.spread.part_of, strict=True)
         ]
         self._along = [data.along for data in datasets]
+        self._growth = [
+            None if data.expansion is None else data.expansion.growth(data.measured)
+            for data in datasets
+        ]
         # several targets or repeats at the same actuators are one pose
         double = [i for i, m in enumerate(self.sets) if m.other is not None]
         actuators = np.concatenate([
@@ -185,7 +197,33 @@ class Readings:
 
     def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Readings of each set at poses (K, 6)."""
-        return tuple(self._predicted_of(i, pose, theta) for i in range(len(self.sets)))
+        return tuple(
+            self._grown(i, self._predicted_of(i, pose, theta), pose, theta)
+            for i in range(len(self.sets))
+        )
+
+    def _grown(self, i: int, seen: Predicted, pose: FloatArray, theta: FloatArray) -> Predicted:
+        """What is read of set `i` where the machine has grown with its temperature."""
+        growth = self._growth[i]
+        if growth is None:
+            return seen
+        by_number, of_platform = growth
+        places = [(self.pose_of[i], seen.by_twist)]
+        if seen.by_other is not None and (there := self.other_of[i]) is not None:
+            places.append((there, seen.by_other))
+        moved = np.zeros(seen.values.shape)
+        for machine, rows in self._machines(i, theta):
+            grown = machine.geometry.values[: by_number.shape[1]] * by_number[rows]
+            for place, by_twist in places:
+                at = place[rows]
+                twists = machine.error_twists(pose[at], self.actuators[at])[..., : grown.shape[1]]
+                twist = np.einsum("nij,nj->ni", twists, grown)
+                moved[rows] += np.einsum("nki,ni->nk", by_twist[rows], twist)
+        target = self.arguments_of(i, theta).get("target")
+        if target is not None and "target" in seen.by:
+            moved += np.einsum("nki,ni->nk", seen.by["target"], target * of_platform[:, None])
+        values = corrected(self.sets[i].kind, seen.values, moved)
+        return replace(seen, values=values)
 
     def _predicted_of(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
         places, measured = self.arguments_of(i, theta), self.sets[i]

@@ -82,6 +82,26 @@ def read_deviations(
     return sigmas or None
 
 
+def read_coefficients(option: str, given: Sequence[str]) -> float | Mapping[str, float] | None:
+    """Coefficients from the command line: "NUMBER" for all, or "PART=NUMBER"; None without.
+
+    Raises
+    ------
+    ValueError
+        No number, a part twice, a number for all beside others.
+    """
+    found: dict[str, float] = {}
+    for text in [part.strip() for each in given for part in each.split(",")]:
+        match = _DEVIATION.fullmatch(text)
+        name = "" if match is None else (match["name"] or "").strip()
+        if match is None or match["unit"] or name in found:
+            raise ArgumentError(f"{option} {text}: expected PART=NUMBER, such as base=11.5e-6")
+        found[name] = float(match["number"])
+    if "" in found and len(found) > 1:
+        raise ArgumentError(f"{option}: a number without a part stands alone, for all")
+    return found.get("", found or None)
+
+
 def read_prior(
     given: Sequence[str], robot: Calibratable, names: Sequence[str]
 ) -> float | Mapping[str, float | tuple[float, float]] | None:

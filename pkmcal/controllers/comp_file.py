@@ -21,6 +21,7 @@ from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files import reading
+from pkmcal.files.text_lines import lines_of
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import Limb
 from pkmcal.kinematics.robot import Robot
@@ -100,7 +101,7 @@ def import_comp_file(path: str | PathLike[str], rows: Meaning = "positions") -> 
     place = as_path("path", path)
     text = reading.content(place, reading.MOST_ROBOT).decode("utf-8", "replace")
     found: list[list[float]] = []
-    for line in text.splitlines():
+    for line in lines_of(text):
         try:
             found.append([float(cell) for cell in line.split()[:3]])
         except ValueError:

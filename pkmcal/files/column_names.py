@@ -13,7 +13,17 @@ from collections.abc import Sequence
 from pkmcal.core.library import POSE
 
 BESIDE = ("index", "time", "date", "comment", "name", "collection")  # not looked at by themselves
-RESERVED = ("sigma", "cov", "target", "attachment", "actuator_sigma", "approach", "to", "touch")
+RESERVED = (
+    "sigma",
+    "cov",
+    "target",
+    "attachment",
+    "actuator_sigma",
+    "approach",
+    "to",
+    "touch",
+    "temperature",
+)
 EULER = (("rx", "ry", "rz"), ("a", "b", "c"), ("w", "p", "r"))  # in the order of their letters
 VECTOR = ("rvx", "rvy", "rvz")
 QUATERNION = ("qw", "qx", "qy", "qz")
@@ -52,8 +62,11 @@ _SYNONYMS: dict[str, str] = {
     "time": "timestamp|time stamp|datetime|date time|time seconds|time s|time utc|utc|date and time"
     "|measurement time|meas time|clock|uhrzeit|zeit|heure",
     "date": "day|measurement date|datum",
-    "temperature": "temp|temp c|air temperature|t c|temperature c|machine temperature"
-    "|ambient temperature",
+    "temperature": "temp|temp c|t c|temperature c|machine temperature|machine temp"
+    "|temperatur|température|temperature machine",
+    "temperature.base": "temp base|base temp|base temperature|temperature base",
+    "temperature.platform": "temp platform|platform temp|platform temperature|temperature platform",
+    "air temperature": "air temp|temperature air|ambient temperature|ambient temp|room temperature",
     "probe": "probed|probed z|z probed|probe z|z probe|trigger z|z trigger|triggered|mesh|mesh z"
     "|bed mesh|bed z",
     "rx": "rot x|rotx|x rotation|euler x|angle x|actual rx",
@@ -88,6 +101,12 @@ _DRIVEN = re.compile(
 _QUATERNION = re.compile(r"(?:q|quat|quaternion) ?([0-4])")
 _OF_A_TARGET = re.compile(r"(?P<target>.*[^\s_\-.:/])[\s_\-.:/]+(?P<axis>[xyz])", re.IGNORECASE)
 _OF_A_KIND = re.compile(r"(?:angle|touch):.+", re.IGNORECASE)
+_TEMPERATURE = re.compile(  # of what an actuator drives
+    r"(?:temp|temperature) (?:q|joint|axis|leg|limb|strut|actuator|motor|drive|slider|tower) ?"
+    r"(?P<after>[1-9][0-9]?)"
+    r"|(?:q|joint|axis|leg|limb|strut|actuator|motor|drive|slider|tower) ?(?P<before>[1-9][0-9]?)"
+    r" (?:temp|temperature)(?: c)?"
+)
 _SIGMA = re.compile(
     r"(?:sigma|std|stdev|stddev|std dev|s) (?P<one>x|y|z|alpha|beta|gamma)"
     r"|(?P<other>x|y|z) (?:sigma|std|stdev|stddev|std dev)"
@@ -102,6 +121,7 @@ def is_known(name: str) -> bool:
             plain in _NAMES
             or _DRIVEN.fullmatch(plain)
             or _SIGMA.fullmatch(plain)
+            or _TEMPERATURE.fullmatch(plain)
             or _OF_A_KIND.fullmatch(name)
             or _dotted(name)
         )
@@ -180,6 +200,8 @@ def _alone(name: str) -> str:
         return _NAMES[plain]
     if match := _SIGMA.fullmatch(plain):
         return f"sigma.{match['one'] or match['other']}"
+    if match := _TEMPERATURE.fullmatch(plain):
+        return f"temperature.q{match['after'] or match['before']}"
     if dotted := _dotted(name):
         return dotted
     small = name.lower()

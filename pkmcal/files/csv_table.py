@@ -284,14 +284,14 @@ class Table:
         column = self._column(name)
         if column.unit is None and like in self.columns and (unit := self.columns[like].unit):
             other = self.columns[like].name
-            self._note(f"column {column.name!r} has no unit, taken as [{unit}] like {other!r}")
+            self.note(f"column {column.name!r} has no unit, taken as [{unit}] like {other!r}")
             column = replace(column, unit=unit)
         quantity, (times, over) = self._conversion(column, quantities, expected)
         values = np.empty(len(self))
         for row, cell in enumerate(column.cells):
             if unseen and cell.lower() in _UNSEEN:
                 values[row] = math.nan
-                self._note(f"cells with {cell!r} taken as not measured")
+                self.note(f"cells with {cell!r} taken as not measured")
                 continue
             values[row] = math.nan if blank and not cell else self._number(name, row, cell)
         with np.errstate(over="ignore"):
@@ -339,10 +339,11 @@ class Table:
             return self._default_units[of[0]]
         unit, line = column.stated[of[0]]
         where = f"line {line}" if column.place == str(self.path) else f"{column.place}, line {line}"
-        self._note(f"{what} without a unit in {unit}, as {where} states")
+        self.note(f"{what} without a unit in {unit}, as {where} states")
         return unit
 
-    def _note(self, text: str) -> None:
+    def note(self, text: str) -> None:
+        """Say what was assumed, once."""
         if text not in self.notes:
             self.notes.append(text)
 

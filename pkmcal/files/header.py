@@ -18,7 +18,7 @@ Row = tuple[int, list[str]]
 POINTS = ("collection", "group", "name")  # names before the coordinates, where no line names them
 _LOOSE = re.compile(
     rf"(?P<name>.*[^\s_/])\s*"
-    rf"(?:\(\s*(?P<in>{units.PATTERN})\s*\)|[_/ ]\s*(?P<after>{units.PATTERN}))",
+    rf"(?:\(\s*(?P<in>{units.IN_BRACKETS})\s*\)|[_/ ]\s*(?P<after>{units.PATTERN}))",
     re.IGNORECASE,
 )
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pkmcal.exceptions import FileError
+from pkmcal.files.text_lines import lines_of
 
 SEPARATORS = ("\t", ";", ",", " ")  # the first of those that fit equally well
 _LOOKED_AT = 200  # lines
@@ -70,7 +71,7 @@ def text_rows(path: Path, content: bytes) -> TextRows:
             lines.append((number, line.rstrip("\n")))
     if any(words in text for words in _REPORTS):
         triggers = [
-            (n, m) for n, line in enumerate(text.splitlines(), 1) if (m := _TRIGGER.search(line))
+            (n, m) for n, line in enumerate(lines_of(text), 1) if (m := _TRIGGER.search(line))
         ]
         if triggers:
             _take_triggers(found, triggers)

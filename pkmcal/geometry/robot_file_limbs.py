@@ -116,7 +116,7 @@ class Limbs(NamedTuple):
 
 def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
     """Read every ``[[limb]]`` table."""
-    read = [_read_limb(table, i, parameters) for i, table in enumerate(tables)]
+    read = [read_limb(table, i, parameters) for i, table in enumerate(tables)]
     limbs = [limb for limb, _, _ in read]
     width = len(SLOTS) + max(len(of_law) for _, _, of_law in read)
     numbers: list[LimbNumber] = []
@@ -140,9 +140,10 @@ def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
     return Limbs(tuple(limbs), numbers, {n: v for n, v in values.items() if n in free}, blank)
 
 
-def _read_limb(
+def read_limb(
     table: Table, i: int, parameters: Parameters
 ) -> tuple[Limb, dict[str, Entry], list[tuple[LawNumber, Entry]]]:
+    """Read one ``[[limb]]`` table, limb `i` counted from 0; its numbers by slot, and its law's."""
     name = table.text("kind")
     if name not in (known := (*KINDS, *ALIASES)):
         near = did_you_mean(name, known)

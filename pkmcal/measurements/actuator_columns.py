@@ -63,25 +63,29 @@ def _counted(table: Table, i: int, of_robot: str | None, robot: Actuated | None)
             f"column {column.name!r} has unit [{column.unit}]: give the robot, whose gain says"
             " how much one is"
         )
-    gain = _gain(robot, i)
+    gain, winds = _gain(robot, i)
     if gain is None or abs(gain) == 1.0:
         raise table.header_error(
             f"column {column.name!r} has unit [{column.unit}], and the robot does not state how"
             f" much one is: set the gain of the limb, in {of_robot} each"
         )
-    note = f"actuators in {column.unit}, converted by the robot's gain ({gain:.6g} {of_robot} each)"
+    turns = "rad of the spool" if winds else of_robot
+    note = f"actuators in {column.unit}, converted by the robot's gain ({gain:.6g} {turns} each)"
     if note not in table.notes:
         table.notes.append(note)
     return of_robot
 
 
-def _gain(robot: object, actuator: int) -> float | None:
-    """The gain of the first limb of an actuator; None where there is none."""
+def _gain(robot: object, actuator: int) -> tuple[float | None, bool]:
+    """The gain of the first limb of an actuator, and whether it turns a spool; None: no limb."""
     if not isinstance(robot, Robot):
-        return None
+        return None, False
     limbs = robot.model.limbs
     limb = next((k for k, limb in enumerate(limbs) if limb.actuator == actuator), None)
-    return None if limb is None else float(robot.geometry[f"gain{limb + 1}"])
+    if limb is None:
+        return None, False
+    law = limbs[limb].law
+    return float(robot.geometry[f"gain{limb + 1}"]), law is not None and law.spool
 
 
 def compare(table: Table, units: tuple[str, ...], robot: Actuated | None) -> None:

@@ -19,6 +19,9 @@ columns                               meaning
 ``actuator_sigma.q1 [mm]`` …          … or of each of them
 ``group``                             a whole number, the same for repeats of one pose
 ``session``                           when the row was measured, by a name
+``time``                              when, in seconds or as a time-stamp
+``temperature [°C]``                  of the machine; or ``temperature.base``, ``.platform``,
+                                      ``.q1`` …, of what that actuator drives
 ``approach.q1`` …                     1 or -1: the reading had grown or fallen; 0: not known
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
@@ -92,6 +95,8 @@ from pkmcal.measurements.table_layout import (
     split_names,
 )
 from pkmcal.measurements.target_columns import read_several, read_targets, several_targets
+from pkmcal.measurements.temperature_columns import WHOLE, parts_of, read_temperature
+from pkmcal.measurements.time_stamps import times_of
 
 _AXES = ("x", "y", "z")
 _TRIED = 200  # rows by which an order of angles is told
@@ -177,9 +182,10 @@ def read_measurements(
     split_names(table)
     number_groups(table)
     several = several_targets(table)
+    times = times_of(table)
     leave_out_unknown(table, _known(table, several), SYNONYMS)
     if "probe" in table.columns:
-        return _read_probe(table, robot, probe_offset)
+        return _read_probe(table, robot, probe_offset, times)
     actuators, actuator_units = read_actuators(table, robot)
     compare(table, actuator_units, robot)
     kind = _kind(table, several)
@@ -189,6 +195,8 @@ def read_measurements(
     if "group" in table.columns:
         fields["group"] = table.integers("group")
     fields["session"] = _read_session(table)
+    fields["time"] = times
+    fields["temperature"] = read_temperature(table, len(actuator_units))
     fields["approach"] = _read_approach(table, len(actuator_units))
     values: FloatArray | None
     if several:
@@ -224,7 +232,9 @@ def _notes(table: Table) -> tuple[str, ...]:
     return tuple(f"{table.path}: {note}" for note in table.notes)
 
 
-def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Measurements:
+def _read_probe(
+    table: Table, robot: Actuated | None, offset: ArrayLike, times: FloatArray | None
+) -> Measurements:
     """Heights of a probe's tip where it triggered: 0, on the bed."""
     if not isinstance(robot, Robot):
         raise table.header_error(
@@ -262,6 +272,8 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
         lines=np.array(table.lines),
         file=table.path.name,
         session=_read_session(table),
+        time=times,
+        temperature=read_temperature(table, measured.actuators.shape[1]),
         approach=_read_approach(table, measured.actuators.shape[1]),
     )
 
@@ -299,8 +311,9 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     components = _AXES + ANGLES
     actuators = {f"q{i + 1}" for i in range(len(table.columns))} | {*actuators_in(table)}
     names = actuators | {*components, "distance", "sigma", "group", "session", "target", "probe"}
-    names |= {"actuator_sigma", "approach"}
-    names |= {f"{what}.{q}" for what in ("actuator_sigma", "approach") for q in actuators}
+    names |= {"actuator_sigma", "approach", *parts_of(0), WHOLE}
+    whats = ("actuator_sigma", "approach", WHOLE)
+    names |= {f"{what}.{q}" for what in whats for q in actuators}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
     names |= {f"sigma.{name}" for name in component_names()} | names_of_kinds(table)

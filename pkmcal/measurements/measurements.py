@@ -24,9 +24,11 @@ from pkmcal.measurements.fields import (
     names_of_targets,
     number_of_row,
     numbers,
+    row_numbers,
     sessions_array,
     sigma_array,
     target_array,
+    temperature_array,
     units_of_actuators,
     value_of_row,
     values_array,
@@ -44,7 +46,7 @@ from pkmcal.result import Result
 
 _PER_ROW = (
     "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines", "session",
-    "approach", "other", "run", "touched",
+    "approach", "other", "run", "touched", "temperature", "time",
 )  # fmt: skip
 
 
@@ -118,6 +120,12 @@ class Measurements(Result):
         From where each actuator came, for drives with backlash: 1 where its reading had grown, -1
         where it had fallen, 0 where that is not known. "order": the machine was driven from row to
         row as they stand. Kept as (N, n).
+    temperature : scalar, (N,) or (N, 2 + n) array, optional
+        °C, of the whole machine, or of base, platform and what each actuator drives; NaN: not read.
+        `identify` refers numbers to 20 °C where it is told how the machine expands. Kept as
+        (N, 2 + n).
+    time : (N,) array, optional
+        When each row was measured, in seconds from any start: for the test of drift.
     lines : (N,) array of int, optional
         The line of each row in the file it was read from, to name it by.
     file : str
@@ -158,6 +166,8 @@ class Measurements(Result):
     joint: str | None = None
     session: TextArray | None = None
     approach: FloatArray | None = None
+    temperature: FloatArray | None = None
+    time: FloatArray | None = None
     lines: Int64Array | None = None
     file: str = ""
     notes: tuple[str, ...] = ()
@@ -185,6 +195,8 @@ class Measurements(Result):
         joint: str | None = None,
         session: str | Sequence[str] | TextArray | None = None,
         approach: ArrayLike | None = None,
+        temperature: ArrayLike | None = None,
+        time: ArrayLike | None = None,
         lines: ArrayLike | None = None,
         file: str = "",
         notes: Sequence[str] = (),
@@ -203,7 +215,9 @@ class Measurements(Result):
         k = len(components(kind, own["artefact"]))
         if alone:
             values = value_of_row(values, kind, k, q.shape[1:])
-            group, target_index, lines = map(number_of_row, (group, target_index, lines))
+            group, target_index, lines, time = map(
+                number_of_row, (group, target_index, lines, time)
+            )
             if k > 1 and not isinstance(sigma, Tracker) and np.asarray(sigma).shape == (k, k):
                 sigma = np.asarray(sigma)[None]
         shape = (len(q), k)
@@ -226,6 +240,8 @@ class Measurements(Result):
             **own,
             "session": sessions_array(session, len(q)),
             "approach": approach_array(approach, q),
+            "temperature": temperature_array(temperature, q.shape),
+            "time": None if time is None else row_numbers("time", time, len(q)),
             "lines": None if lines is None else integers("lines", lines, len(q)),
             "file": file,
             "notes": words("notes", notes),

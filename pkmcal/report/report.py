@@ -10,6 +10,7 @@ import numpy as np
 
 from pkmcal import display
 from pkmcal.arms.arm import SerialArm
+from pkmcal.calibration.expansion import in_words, temperatures
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.row_names import row_names
 from pkmcal.display import printable
@@ -72,7 +73,9 @@ def gather(
     signed = None
     if stated is not None:
         sure = np.empty(0) if accuracy is None else accuracy.predicted
-        signed = certificate.as_data(stated, certificate.budget(found, stated, sure))
+        made = certificate.budget(found, stated, sure)
+        read = temperatures(found.fit.equations.sets)
+        signed = certificate.as_data(stated, made, read)
     return {
         "state": state,
         "verdict": sentence,
@@ -88,6 +91,7 @@ def gather(
         "iso9283": contents.iso9283(found),
         "axes": axes(found),
         "certificate": signed,
+        "heat": in_words(found.fit.equations.sets, found.expansion),
         "accuracy": accuracy,
         "slice": None if isinstance(predicted, str) else predicted[1],
         "no_accuracy": predicted if isinstance(predicted, str) else "",
@@ -131,7 +135,7 @@ def html(facts: Mapping[str, Any]) -> str:
 
 def _as_data(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Select what goes into the JSON file: the facts, and every attribute of the calibration."""
-    left_out = ("found", "worst", "outlier_names", "moved", "arm")
+    left_out = ("found", "heat", "worst", "outlier_names", "moved", "arm")
     kept = {name: value for name, value in facts.items() if name not in left_out}
     return kept | {"calibration": facts["found"]}
 

@@ -154,10 +154,8 @@ def test_revolutions_of_a_turning_joint_are_angles(tmp_path: Path) -> None:
 
 
 def test_unknown_columns_are_left_out_in_one_line(tmp_path: Path) -> None:
-    m = read(tmp_path, "q1 [mm],z [mm],Temperature,Operator\n1,2,20.4,someone\n")
-    assert m.notes == (
-        f"{tmp_path / 'm.csv'}: unknown columns left out: 'Temperature', 'Operator'",
-    )
+    m = read(tmp_path, "q1 [mm],z [mm],Humidity,Operator\n1,2,40,someone\n")
+    assert m.notes == (f"{tmp_path / 'm.csv'}: unknown columns left out: 'Humidity', 'Operator'",)
 
 
 @pytest.mark.parametrize("head", ["sigmas [mm]", "taget", "grp1,groups"])
