@@ -16,6 +16,7 @@ import pkmcal as pk
 from pkmcal import arguments, screw, trajectory
 
 ROBOT, ARM, FLAT = pk.load("hexapod"), pk.load("3r"), pk.load("2tpr2tps")
+CABLES = pk.load(Path(__file__).parents[1] / "examples" / "belts" / "robot.toml")
 POSES = ROBOT.home + [[20.0 * i, 5.0 * i**2, 0, 0, 0, 0] for i in range(8)]
 Q = ROBOT.inverse(POSES)
 MEASURED = pk.Measurements(Q, POSES, "pose", sigma=0.01)
@@ -288,6 +289,7 @@ CALLS: dict[str, Call] = {
             "free": "names",
             "prior": "one or by name",
             "loss": "word",
+            "slack": "word",
             "frame": "word",
             "target": "word",
             "attachment": "word",
@@ -410,6 +412,17 @@ CALLS: dict[str, Call] = {
         pk.dexterity,
         {"robot": ROBOT, "poses": POSES},
         {"robot": "parallel", "poses": "numbers"},
+    ),
+    "tensions": (
+        pk.tensions,
+        {"robot": CABLES, "poses": POSES, "force": [0, 0, -9.81], "at": [0, 0, 1], "least": 1.0},
+        {
+            "robot": "parallel",
+            "poses": "numbers",
+            "force": "numbers",
+            "at": "numbers",
+            "least": "number",
+        },
     ),
     "workspace": (
         pk.workspace,
