@@ -16,7 +16,6 @@ import pkmcal as pk
 from pkmcal import arguments, screw, trajectory
 
 ROBOT, ARM, FLAT = pk.load("hexapod"), pk.load("3r"), pk.load("2tpr2tps")
-CABLES = pk.load(Path(__file__).parents[1] / "examples" / "belts" / "robot.toml")
 POSES = ROBOT.home + [[20.0 * i, 5.0 * i**2, 0, 0, 0, 0] for i in range(8)]
 Q = ROBOT.inverse(POSES)
 MEASURED = pk.Measurements(Q, POSES, "pose", sigma=0.01)
@@ -415,7 +414,7 @@ CALLS: dict[str, Call] = {
     ),
     "tensions": (
         pk.tensions,
-        {"robot": CABLES, "poses": POSES, "force": [0, 0, -9.81], "at": [0, 0, 1], "least": 1.0},
+        {"robot": BELTS, "poses": POSES, "force": [0, 0, -9.81], "at": [0, 0, 1], "least": 1.0},
         {
             "robot": "parallel",
             "poses": "numbers",
