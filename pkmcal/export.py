@@ -3,6 +3,7 @@
 from pkmcal.controllers.arm_dh import dh, universal_robots
 from pkmcal.controllers.c_header import c_header
 from pkmcal.controllers.delta_gcode import marlin, reprap
+from pkmcal.controllers.fmu import fmu
 from pkmcal.controllers.hangprinter import hangprinter
 from pkmcal.controllers.import_printer import Printer
 from pkmcal.controllers.klipper import klipper
@@ -18,6 +19,7 @@ __all__ = [
     "Printer",
     "c_header",
     "dh",
+    "fmu",
     "hangprinter",
     "klipper",
     "linuxcnc",

@@ -187,23 +187,10 @@ def _rows(
 
 
 def _poses(m: Measurements) -> IntArray:
-    """The pose of each row (N,): rows of one group are, and rows at the same actuators."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    places = m.actuators if m.approach is None else np.hstack([m.actuators, m.approach])
-    pose = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
-    if m.session is not None:
-        pose = numbered(pose, np.unique(m.session, return_inverse=True)[1].reshape(-1))
-    if m.group is None:
-        return pose
-    group = numbered(m.group)
-    if m.session is not None:
-        group = numbered(group, np.unique(m.session, return_inverse=True)[1].reshape(-1))
-    size = int(pose.max()) + 1
-    nodes = size + int(group.max()) + 1
-    links = coo_array((np.ones(len(m)), (pose, size + group)), (nodes, nodes))
-    return np.asarray(connected_components(links, directed=False)[1][:size][pose], dtype=np.intp)
+    """The pose of each row (N,), of each session for itself."""
+    if m.session is None:
+        return m.pose_index
+    return numbered(m.pose_index, np.unique(m.session, return_inverse=True)[1].reshape(-1))
 
 
 def _visits(rows: _Rows) -> IntArray:

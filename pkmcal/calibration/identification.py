@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
 from pkmcal.calibration.drift import Drift, drift
+from pkmcal.calibration.estimator import FEW
 from pkmcal.calibration.expansion import in_words
 from pkmcal.calibration.law_tests import LawTest, law_tests
 from pkmcal.calibration.moved import Moved, moved
@@ -29,6 +30,9 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.observation import predict
 from pkmcal.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _STRONG = 0.95  # correlation worth a word
 _ALIKE = 9  # decimals to which correlations differ that are not equal
@@ -55,9 +59,12 @@ class Identification(Parts, Result):
     def moved(self) -> tuple[Moved, ...]:
         """What moved between the fitted measurements and others that were held out.
 
-        Empty where nothing did, or where the points held out were drawn from the same measurements.
+        Empty where nothing did: where the points held out were drawn from the same measurements,
+        and where they do not contradict a fit of several spare equations.
         """
         later, end = self.holdout.later, self.holdout.end
+        if not self.holdout_contradicts and self.fit.uncertainty.fit.freedom >= FEW:
+            return ()
         if self.holdout.drawn or later is None or end is None or not self.fit.uncertainty.known:
             return ()
         return moved(self.fit, later, end)
@@ -185,13 +192,18 @@ class Identification(Parts, Result):
         moved = np.linalg.norm(by_geometry @ undetermined[own], axis=(1, 2))
         return np.where(moved < _UNIDENTIFIABLE, deviation, np.inf).reshape(shape)
 
-    def plot(self, path: str | PathLike[str]) -> None:
+    def plot(self, path: str | PathLike[str] | None = None) -> Figure:
         """Draw the residuals by row, over the workspace and as quantiles.
 
         Parameters
         ----------
-        path : str or path
-            A file that ends in ``.png`` or ``.svg``.
+        path : str or path, optional
+            A file that ends in ``.png`` or ``.svg``, to be written.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, which notebooks show.
 
         Raises
         ------
@@ -200,7 +212,11 @@ class Identification(Parts, Result):
         """
         from pkmcal.report import drawing, residual_figure
 
-        drawing.write(residual_figure.residuals(self), arguments.path("path", path))
+        figure = residual_figure.residuals(self)
+        figure.set_facecolor("white")  # a notebook may be dark, and the texts are
+        if path is not None:
+            drawing.write(figure, arguments.path("path", path))
+        return figure
 
     def report(
         self,

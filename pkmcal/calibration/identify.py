@@ -40,7 +40,6 @@ from pkmcal.calibration.fit_statistics import (
 from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.linearity import beyond_linear
 from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.mode_slips import in_other_modes
 from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior
@@ -53,8 +52,9 @@ from pkmcal.calibration.plausibility import (
     likely_unit_errors,
     shrunk,
 )
-from pkmcal.calibration.row_errors import likely_row_errors
+from pkmcal.calibration.row_errors import likely_mistakes
 from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.set_noise import unlike_noise
 from pkmcal.calibration.slack import SLACK, Cell, Slack, said_slack, slack_cables, taut
 from pkmcal.calibration.starts import known_distances
 from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
@@ -85,8 +85,8 @@ def identify(
     fix: str | Sequence[str] = (),
     datum: DatumRule = "none",
     drop: Drop = None,
-    slack: Slack = "keep",
     expansion: Coefficients = None,
+    slack: Slack = "keep",
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -155,14 +155,14 @@ def identify(
         through all sets, or those that the others contradict in a robust fit. They are
         `Identification.dropped`. Of other measurements that are held out the "outliers" are
         `Identification.holdout_dropped`; where most rows contradict the fit none is left out.
-    slack : {"keep", "drop"}
-        What becomes of readings of cables that the others show to be slack, on a machine with more
-        cables than needed: "keep" says so in a warning, "drop" leaves these readings out and keeps
-        the rest of their rows. They are `Identification.slack`.
     expansion : float or mapping of str to float, optional
         Coefficients of thermal expansion in 1/K, of steel 11.5e-6: one for all, or of "base",
         "platform" (with the targets on it), "limbs" or single ones, "limb3"; parts that are not
         named do not grow. With `Measurements.temperature` the numbers are those at 20 °C.
+    slack : {"keep", "drop"}
+        What becomes of readings of cables that the others show to be slack, on a machine with more
+        cables than needed: "keep" says so in a warning, "drop" leaves these readings out and keeps
+        the rest of their rows. They are `Identification.slack`.
 
     Returns
     -------
@@ -240,7 +240,7 @@ def identify(
             estimator = estimator_at(equations, commanded, start, loss)
             estimate = estimator.solve()
     except ValueError as error:
-        hint = likely_unit_errors(datasets, chosen, start) or likely_row_errors(datasets, chosen)
+        hint = likely_mistakes(datasets, chosen, start)
         if not hint and not start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
@@ -300,7 +300,7 @@ def _warnings(
     notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
     notes += shrunk(equations, fit.start, fit.end)
-    notes += beyond_linear(estimate, fit.uncertainty)
+    notes += unlike_noise(equations, fit.uncertainty.slips)
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():
@@ -337,7 +337,7 @@ def _remedy(result: Identification) -> str:
     if not np.isfinite(scatter):
         cure += ", or state the true sigma"
     if result.outliers:
-        cure = "look at the outliers, fit with loss='cauchy', or " + cure
+        cure = "look at the outliers, fit with --loss cauchy (loss='cauchy'), or " + cure
     return cure
 
 

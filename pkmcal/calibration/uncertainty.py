@@ -9,8 +9,9 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.estimator import FEW, Estimate, Estimator
 from pkmcal.calibration.labels import Labels, labels, poses_of_rows
+from pkmcal.calibration.set_noise import slipped
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.clusters import shared_error_score
 from pkmcal.statistics.covariance import SHARED, Covariance, CovarianceRule, covariance
@@ -18,8 +19,6 @@ from pkmcal.statistics.linear_fit import LinearFit, linear_fit, numbered
 from pkmcal.statistics.noise import Noise, Split, joined, noise, split
 from pkmcal.statistics.pseudo_residuals import PseudoResiduals, pseudo_residuals
 from pkmcal.statistics.variance_components import told_apart, variance_components
-
-FEW = 5.0  # degrees of freedom below which residuals hardly show the noise
 
 
 def stated_variances(measured: Measurements) -> FloatArray | None:
@@ -57,6 +56,8 @@ class Uncertainty:
         What was fitted.
     factors : ndarray (G,)
         `IterationState.noise`.
+    slips : ndarray
+        Of each set, `slipped`.
     """
 
     labels: Labels
@@ -67,6 +68,7 @@ class Uncertainty:
     unknown: BoolArray
     equations: Equations
     factors: FloatArray
+    slips: FloatArray
 
     @property
     def known(self) -> bool:
@@ -198,6 +200,9 @@ def uncertainty(
     rates = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
     if rule == "auto" and equations.closures.unknowns and fit.clusters < len(equations.components):
         rule = "cluster"  # no two mixtures can be compared to see whether they share an error
+    slips = slipped(estimator, estimate)
+    if rule == "auto" and (slips != 1.0).any():
+        rule = "cluster"  # which holds whatever the weights
     apart = None
     if classes is not None:
         apart = variance_components(fit, classes, _prior_residual(estimator, estimate))
@@ -216,6 +221,7 @@ def uncertainty(
         unknown=estimator.unknown_noise(estimate),
         equations=equations,
         factors=state.noise,
+        slips=slips,
     )
 
 

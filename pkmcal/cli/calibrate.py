@@ -254,8 +254,8 @@ def calibrate(
             fix=fixed,
             datum=word("--datum", datum, DATUMS),
             drop="outliers" if drop_outliers else dropped,
-            slack="drop" if drop_slack else "keep",
             expansion=read_coefficients("--expansion", expansion or []),
+            slack="drop" if drop_slack else "keep",
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:

@@ -20,7 +20,7 @@ from pkmcal.report.as_json import as_json
 
 _OF_ARMS = ("urdf", "sdf", "dh", "dh-modified", "ur")
 _FIRMWARE = ("klipper", "reprap", "marlin", "hangprinter", "maslow")
-TARGETS = ("c", *_FIRMWARE, "linuxcnc", "mjcf", *_OF_ARMS)
+TARGETS = ("c", *_FIRMWARE, "linuxcnc", "mjcf", "fmu", *_OF_ARMS)
 _IN_A_FILE = ("klipper", "maslow", "reprap", "hangprinter")  # of the user's
 
 
@@ -58,9 +58,9 @@ def export(
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
     linear or rotary delta for Klipper or Kalico; reprap, marlin: its M665 and M666, or M669;
     hangprinter: M669 and M666. maslow: the anchors of a maslow.yaml. linuxcnc: a kinematics
-    component, and a simulation that runs it. mjcf: a model for MuJoCo. Of serial arms: urdf and
-    sdf, a tree of links; dh and dh-modified, a table of Denavit-Hartenberg numbers; ur, the lists
-    of a calibration.conf of Universal Robots.
+    component, and a simulation that runs it. mjcf: a model for MuJoCo. fmu: an FMU for
+    co-simulation. Of serial arms: urdf and sdf, a tree of links; dh and dh-modified, a table of
+    Denavit-Hartenberg numbers; ur, the lists of a calibration.conf of Universal Robots.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -138,6 +138,8 @@ def _write(
             pk.export.c_header(machine, path, _number(number))
         case "mjcf":
             pk.export.mjcf(machine, path)
+        case "fmu":
+            pk.export.fmu(machine, path)
         case "klipper":
             return pk.export.klipper(machine, path, config, project)
         case "maslow":

@@ -390,6 +390,19 @@ class Laws:
         found: FloatArray = rows("law_drive_inverse", x.reshape(-1, 5))[0].reshape(way.shape)
         return found
 
+    def reading(
+        self, slots: FloatArray, way: FloatArray, d: int, approach: FloatArray | None = None
+    ) -> FloatArray:
+        """`readings` (N,) of one drive at its ways (N,)."""
+        numbers = self._numbers(slots)
+        rest = way - numbers[:, self._offset[d]]
+        if approach is not None:
+            rest = rest + 0.5 * approach[..., d] * numbers[:, self._backlash[d]]
+        if self.drives[d].corrected:
+            return self._newton(numbers, rest, d, self.spans(slots)[d])
+        q: FloatArray = self._uncorrected(numbers, rest[:, None], [d])[:, 0]
+        return q
+
     def _most(self, numbers: FloatArray, d: int) -> float:
         """How large the corrections of a drive can be."""
         drive = self.drives[d]

@@ -20,9 +20,11 @@ from pkmcal.core.library import (
     ensure,
     pointer,
 )
+from pkmcal.core.path_differences import platform_motion
 
 CLOSURE_TOLERANCE = 2e-3  # of a machine's size
 FAR_HOME = 10.0  # times the limbs' numbers: a home beyond is that of another geometry
+_MET = 1e-12  # of the size: closures that are met to rounding
 _OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 
 
@@ -183,7 +185,7 @@ class Machine(CoreMachine):
         """∂q/∂free at poses (N, 6): (N, n, m)."""
         out = np.empty((len(pose), self.actuators, self.m))
         call("jacobian", self.struct, len(pose), slots, _by_row(slots), pose, out, isa=self.isa)
-        return out
+        return self.as_written(pose, out, 2)
 
     def forward_jacobian(
         self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool = False
@@ -192,7 +194,7 @@ class Machine(CoreMachine):
         out = np.empty((len(pose), 6, self.actuators))
         given = (len(pose), slots, _by_row(slots), pose, q, twists, out)
         call("forward_jacobian", self.struct, *given, isa=self.isa)
-        return out
+        return out if twists else self.as_written(pose, out, 1)
 
     def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators, (N, n) each.
@@ -211,13 +213,40 @@ class Machine(CoreMachine):
         """The platform's motion at poses (N, 6) as the actuators move with q1 and q2 (N, n).
 
         The homogeneous matrix with its first and second derivative by time (N, 3, 4, 4), and
-        velocity and acceleration of the pose (N, 6) each. NaN where singular.
+        velocity and acceleration of the pose (N, 6) each. NaN where singular. With more rows than
+        free coordinates it is that of the poses which miss them least, solved again.
         """
         n = len(pose)
         motion, rates = np.empty((n, 3, 4, 4)), np.empty((n, 2, 6))
         given = (n, slots, _by_row(slots), pose, q, q1, q2, motion, rates)
         call("motion", self.struct, *given, isa=self.isa)
-        return motion, rates[:, 0], rates[:, 1]
+        found = (motion, rates[:, 0], rates[:, 1])
+        return found if self.rows == self.m else self._missing(slots, pose, q, q1, q2, found)
+
+    def _missing(
+        self,
+        slots: FloatArray,
+        pose: FloatArray,
+        q: FloatArray,
+        q1: FloatArray,
+        q2: FloatArray,
+        exact: tuple[FloatArray, FloatArray, FloatArray],
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """`motion` where not all closures can be met: the rows that they are exact for stay."""
+        closing, missed = self.with_tolerance(np.inf), np.zeros(len(pose))
+
+        def forward(at: FloatArray) -> FloatArray:
+            found, _, _, residual = closing.forward(slots, at, pose, threads=None)
+            np.fmax(missed, residual, out=missed)
+            return found
+
+        scale = np.full(self.actuators, 1.0 / self.struct.size)
+        scale[list(self._angles)] = 1.0
+        found = platform_motion(forward, pose, q, q1, q2, scale)
+        rows = missed > _MET * self.struct.size
+        for each, solved in zip(exact, found, strict=True):
+            each[rows] = solved[rows]
+        return exact
 
     def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
         """The closure rows and their derivatives at poses (N, 6) and coordinates (N, n)."""
@@ -231,6 +260,7 @@ class Machine(CoreMachine):
             np.empty((n, 6, m)),
         )
         call("closure", self.struct, n, slots, _by_row(slots), pose, q, *out, isa=self.isa)
+        self.as_written(pose, out.by_free, 2)
         return out
 
     def readings(

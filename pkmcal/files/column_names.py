@@ -46,7 +46,8 @@ _SYNONYMS: dict[str, str] = {
     "gamma": "yaw|yaw angle",
     "distance": "dist|length measured|measured length|measured distance|ball bar length",
     "sigma": "std|stdev|stddev|std dev|standard deviation|sigma xyz",
-    "group": "pose|pose id|pose no|pose nr|pose number|pose name|configuration|config",
+    "group": "pose|pose id|pose no|pose nr|pose number|pose name|configuration|config|pos|pos id"
+    "|pos no|pos nr|pos number|position id|position no|position nr|position number|position name",
     "run": "run id|run no|run number|run name",
     "tilt1": "tilt 1|inclination 1|inclinometer 1",
     "tilt2": "tilt 2|inclination 2|inclinometer 2",
@@ -60,7 +61,8 @@ _SYNONYMS: dict[str, str] = {
     "comment": "comments|note|notes|remark|remarks|description",
     "index": "no|nr|frame|sub frame|sample|number|#|line|row|count|item",
     "time": "timestamp|time stamp|datetime|date time|time seconds|time s|time utc|utc|date and time"
-    "|measurement time|meas time|clock|uhrzeit|zeit|heure",
+    "|measurement time|meas time|clock|uhrzeit|zeit|heure|datum zeit|datum uhrzeit"
+    "|datum und uhrzeit",
     "date": "day|measurement date|datum",
     "temperature": "temp|temp c|t c|temperature c|machine temperature|machine temp"
     "|temperatur|température|temperature machine",
@@ -72,7 +74,11 @@ _SYNONYMS: dict[str, str] = {
     "rx": "rot x|rotx|x rotation|euler x|angle x|actual rx",
     "ry": "rot y|roty|y rotation|euler y|angle y|actual ry",
     "rz": "rot z|rotz|z rotation|euler z|angle z|actual rz",
-    **{axis: f"rotvec {axis[-1]}|rotation vector {axis[-1]}|rv {axis[-1]}" for axis in VECTOR},
+    **{
+        axis: f"rotvec {axis[-1]}|rot vec {axis[-1]}|rotation vector {axis[-1]}|rv {axis[-1]}"
+        f"|rvec {axis[-1]}"
+        for axis in VECTOR
+    },
     **{
         part: f"q {part[1]}|quat {part[1]}|quaternion {part[1]}|quat{part[1]}|rotation {part[1]}"
         f"|orientation {part[1]}|pose orientation {part[1]}|pose pose orientation {part[1]}"

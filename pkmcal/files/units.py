@@ -15,6 +15,7 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
         "cm": (10.0, 1.0),
         "m": (1000.0, 1.0),
         "in": (25.4, 1.0),
+        '"': (25.4, 1.0),
     },
     "rad": {
         "rad": (1.0, 1.0),
@@ -25,6 +26,9 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
         "arcmin": (math.pi, 10_800.0),
         "arcsec": (math.pi, 648_000.0),
         "″": (math.pi, 648_000.0),
+        '"': (math.pi, 648_000.0),
+        "′": (math.pi, 10_800.0),
+        "'": (math.pi, 10_800.0),
     },
     "°C": {"°C": (1.0, 1.0)},
     "K": {"K": (1.0, 1.0)},
@@ -49,7 +53,7 @@ SPELLINGS = {
     "ticks": "counts", "pulses": "counts",
 }  # fmt: skip
 _KNOWN = {unit for units in UNITS.values() for unit in units}
-_LETTERS = {"K", "k", "c", "f"}  # which behind a name may as well be a part of it
+_LETTERS = {"K", "k", "c", "f", '"', "'"}  # which behind a name may as well be a part of it
 
 
 def _pattern(without: Collection[str] = ()) -> str:

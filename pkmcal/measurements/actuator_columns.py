@@ -11,6 +11,15 @@ from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
 from pkmcal.kinematics.robot import Robot
 
+_WITHOUT = (
+    "; the actuators at each row are needed: of a log of the controller with --controller LOG; of"
+    " where a printer's probe triggered, column probe beside x and y"
+)
+_QUANTITIES: dict[str | None, tuple[str, ...]] = {  # the one that is meant where two have a unit
+    "mm": ("mm", "count", "rad"),
+    "rad": ("rad", "mm", "count"),
+    None: ("mm", "rad", "count"),
+}
 _ACTUATOR = re.compile(r"q[1-9][0-9]*")
 
 
@@ -41,12 +50,14 @@ def columns_of_actuators(table: Table, what: str, count: int) -> list[str]:
 
 def read_actuators(table: Table, robot: Actuated | None) -> tuple[FloatArray, tuple[str, ...]]:
     """Actuator coordinates (N, n), and the unit of each, "mm" or "rad"."""
-    count = max((int(name[1:]) for name in actuators_in(table)), default=1)
+    count = max((int(name[1:]) for name in actuators_in(table)), default=0)
+    if not count:
+        raise table.missing("q1", _WITHOUT)
     expected = () if robot is None else tuple(robot.actuator_units)
     columns, units = [], []
     for i in range(count):
         of_robot = expected[i] if i < len(expected) else None
-        quantities = ("mm", "rad", "count") if of_robot != "mm" else ("mm", "count", "rad")
+        quantities = _QUANTITIES[of_robot]
         values, unit = table.numbers(f"q{i + 1}", *quantities, expected=of_robot)
         if unit == "count":
             unit = _counted(table, i, of_robot, robot)

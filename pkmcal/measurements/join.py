@@ -79,7 +79,8 @@ def _put(table: Table, log: Table, actuators: Sequence[str], rows: Rows, said: s
     ]
     for name in [*actuators, *beside]:
         table.put(name, log.columns[name].take(chosen))
-    table.notes += [*(f"{log.path}: {note}" for note in log.notes), said]
+    table.elsewhere += [f"{log.path}: {note}" for note in log.notes]
+    table.notes.append(said)
 
 
 def _by_name(table: Table, log: Table) -> tuple[Rows, str] | str:

@@ -52,8 +52,8 @@ from numpy.typing import ArrayLike
 
 from pkmcal import arguments
 from pkmcal.arguments import word
-from pkmcal.arrays import FloatArray, TextArray
-from pkmcal.exceptions import ArgumentTypeError, FileError
+from pkmcal.arrays import FloatArray, TextArray, as_rows
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError, FileError
 from pkmcal.files.column_names import SYNONYMS
 from pkmcal.files.csv_table import Table
 from pkmcal.kinematics.robot import Robot
@@ -184,7 +184,7 @@ def read_measurements(
     several = several_targets(table)
     times = times_of(table)
     leave_out_unknown(table, _known(table, several), SYNONYMS)
-    if "probe" in table.columns:
+    if not table.columns.keys().isdisjoint(("probe", "contact")):
         return _read_probe(table, robot, probe_offset, times)
     actuators, actuator_units = read_actuators(table, robot)
     compare(table, actuator_units, robot)
@@ -229,20 +229,22 @@ def read_measurements(
 
 
 def _notes(table: Table) -> tuple[str, ...]:
-    return tuple(f"{table.path}: {note}" for note in table.notes)
+    return (*table.elsewhere, *(f"{table.path}: {note}" for note in table.notes))
 
 
 def _read_probe(
     table: Table, robot: Actuated | None, offset: ArrayLike, times: FloatArray | None
 ) -> Measurements:
     """Heights of a probe's tip where it triggered: 0, on the bed."""
+    what = "probe" if "probe" in table.columns else "contact"
     if not isinstance(robot, Robot):
         raise table.header_error(
-            f"column {table.columns['probe'].name!r}: give the robot, as the firmware had it when"
+            f"column {table.columns[what].name!r}: give the robot, as the firmware had it when"
             " it probed"
         )
+    if what == "contact":
+        return _read_contacts(table, robot, offset, times)
     z = table.numbers("probe", "mm")[0]
-    sigma = read_sigma(table, "height")
     if actuators_in(table):
         actuators, units = read_actuators(table, robot)
         compare(table, units, robot)
@@ -258,14 +260,37 @@ def _read_probe(
         poses = robot.forward(actuators).pose[:, :3]
     else:
         poses = np.column_stack([table.stacked(["x", "y"], ["mm", "mm"]), z])
-    try:
-        measured = probed(robot, poses, offset=offset, sigma=sigma)
-    except ValueError as error:
-        raise FileError(f"{table.path}: {error}") from None
     table.notes.append(
         f"{table.columns['probe'].name!r} taken as the firmware's z when the probe triggered: the"
         " actuators are those that the robot file has there, and the probe's tip is at 0"
     )
+    return _probed(table, robot, poses, offset, times)
+
+
+def _read_contacts(
+    table: Table, robot: Robot, offset: ArrayLike, times: FloatArray | None
+) -> Measurements:
+    """The same where the firmware says where the nozzle would touch: its offsets are taken off."""
+    places = table.stacked(["x", "y", "contact"], ["mm", "mm", "mm"])
+    given, shape = as_rows("probe_offset", offset, 3)
+    if shape != () or not np.isfinite(given).all():
+        raise ArgumentError("probe_offset must be three finite numbers; found others")
+    shown = ", ".join(f"{value:g}" for value in given[0])
+    table.notes.append(
+        "the firmware says where the nozzle would touch the bed, by its offsets of the probe;"
+        f" they are taken as {shown} mm (--probe-offset, x_offset, y_offset and z_offset of its"
+        " configuration)"
+    )
+    return _probed(table, robot, places - given[0] * [1.0, 1.0, -1.0], offset, times)
+
+
+def _probed(
+    table: Table, robot: Robot, points: FloatArray, offset: ArrayLike, times: FloatArray | None
+) -> Measurements:
+    try:
+        measured = probed(robot, points, offset=offset, sigma=read_sigma(table, "height"))
+    except ValueError as error:
+        raise FileError(f"{table.path}: {error}") from None
     return replace(
         measured,
         notes=_notes(table),
@@ -310,7 +335,16 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     """Names of columns that are read."""
     components = _AXES + ANGLES
     actuators = {f"q{i + 1}" for i in range(len(table.columns))} | {*actuators_in(table)}
-    names = actuators | {*components, "distance", "sigma", "group", "session", "target", "probe"}
+    names = actuators | {
+        *components,
+        "distance",
+        "sigma",
+        "group",
+        "session",
+        "target",
+        "probe",
+        "contact",
+    }
     names |= {"actuator_sigma", "approach", *parts_of(0), WHOLE}
     whats = ("actuator_sigma", "approach", WHOLE)
     names |= {f"{what}.{q}" for what in whats for q in actuators}

@@ -41,6 +41,7 @@ from pkmcal.measurements.kind_fields import (
 )
 from pkmcal.measurements.listing import deviations, table, title
 from pkmcal.measurements.measurement_writer import write_measurements
+from pkmcal.measurements.poses import pose_index
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.result import Result
 
@@ -85,8 +86,8 @@ class Measurements(Result):
         with `target_index`. None: the platform's origin. For distances: the fixed point of the
         base frame, and required.
     group : (N,) array of int, optional
-        Rows with the same number are repeats of one pose. None: rows with the same actuator
-        readings are.
+        Rows with the same number are repeats of one pose, as rows with the same actuator readings
+        are.
     target_index : (N,) array of int, optional
         Which of several targets each row measured, counted from 0. With `target=None` the
         targets' places on the platform are not known.
@@ -279,7 +280,8 @@ class Measurements(Result):
         if self.target is None and self.target_names is not None:
             raise ArgumentError(
                 f"target: the places of {', '.join(self.target_names)} on the platform are not"
-                ' known; give them as an array, or identify them with target="unknown"'
+                " known; give them as an array, or identify them with --target unknown"
+                ' (target="unknown")'
             )
         return self._of_rows(self.target)
 
@@ -296,13 +298,11 @@ class Measurements(Result):
 
     @property
     def pose_index(self) -> Int64Array:
-        """Which pose each row belongs to, (N,), counted from 0: by `group`, else by actuators."""
-        rows: FloatArray | Int64Array = self.actuators
-        if self.group is not None:
-            rows = self.group[:, None]
-        elif self.approach is not None:  # backlash is between them
-            rows = np.hstack([self.actuators, self.approach])
-        return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+        """Which pose each row belongs to, (N,), counted from 0.
+
+        Rows of one `group` are of one pose, and rows at the same actuators.
+        """
+        return pose_index(self.actuators, self.approach, self.group)
 
     @property
     def sessions(self) -> tuple[str, ...]:

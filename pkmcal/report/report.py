@@ -25,6 +25,7 @@ from pkmcal.view import page
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_CERTAIN = 1e4  # degrees of freedom that are as good as infinitely many
 _SMALL = 1e-3  # below which numbers are written with a power of ten
 _TEMPLATE = "report.html.jinja"
 FILES = ("report.html", "report.json", "robot.toml")
@@ -116,6 +117,7 @@ def html(facts: Mapping[str, Any]) -> str:
     )
     environment.filters |= {
         "short": _short,
+        "of_freedom": lambda dof: "∞" if dof > _CERTAIN else _short(dof),
         "shown": contents.shown,
         "fixed": lambda value, unit, places: display.fixed(
             display.displayed(value, unit)[0], places
@@ -148,7 +150,7 @@ def _figures(facts: Mapping[str, Any]) -> dict[str, str]:
 
     found: Identification = facts["found"]
     fitted = np.array([[row["before"], row["after"]] for row in facts["points"]]).T
-    groups = {f"fitted, {len(found.rows)} points": (fitted[0], fitted[1])}
+    groups = {f"fitted, {int(np.isfinite(fitted[1]).sum())} points": (fitted[0], fitted[1])}
     held = int(np.isfinite(found.holdout_off).sum())
     if held:
         pair = (found.holdout_off_before, found.holdout_off)

@@ -84,11 +84,11 @@ def test_a_holdout_without_sigma_has_the_noise_of_the_fit(
     first, other = session(hexapod, true, 40, 0), session(hexapod, true, 30, 1)
     stated = fitted(hexapod, replace(first, sigma=0.02), free="offset*", holdout=other)
     assert stated.holdout_expected == pytest.approx(0.02 * np.sqrt(3), rel=0.2)
-    alone = fitted(hexapod, first, free="offset*", holdout=other)
-    assert stated.holdout_expected == pytest.approx(alone.holdout_expected, rel=1e-6)
+    alone = fitted(hexapod, first, free="offset*", holdout=other)  # x, y and z may be told apart
+    assert stated.holdout_expected == pytest.approx(alone.holdout_expected, rel=1e-2)
     both = replace(first, sigma=0.02), replace(other, sigma=0.02)
     twice = fitted(hexapod, both[0], free="offset*", holdout=both[1])
-    assert twice.holdout_expected == pytest.approx(alone.holdout_expected, rel=1e-6)
+    assert twice.holdout_expected == pytest.approx(stated.holdout_expected, rel=1e-6)
 
 
 def test_a_few_held_out_points_that_are_off_are_named(hexapod: pk.Robot, true: pk.Robot) -> None:
@@ -148,7 +148,7 @@ def test_one_pose_that_is_wrong_by_far_is_found_beside_a_linear_fit() -> None:
     assert found.verdict.state == "not calibrated"
     first = found.verdict.reasons[0]
     assert first.startswith("3 rows disagree with the rest: row 30 (1), row 31 (2), row 32 (3);")
-    assert first.endswith("fit with loss='cauchy'")
+    assert first.endswith("or fit with --loss cauchy (loss='cauchy')")
     robust = fitted(arm, replace(measured, values=values), loss="cauchy", **UNKNOWN)
     assert robust.outliers == (30, 31, 32)
     assert robust.distances.rms_without_outliers < 0.15 < robust.rms

@@ -83,9 +83,17 @@ def paired(**changes: Any) -> pk.Robot:
     return robots.made("spatial", {"z": -350.0}, limbs, match=["x", "y", "z"])
 
 
+def cables() -> pk.Robot:
+    """A point on three cables."""
+    anchors = ([0, -1600, -120], [1400, 800, -120], [0, 0, 2300])
+    limbs = [{"kind": "cable", "base": at, "platform": [0, 0, 0]} for at in anchors]
+    return robots.made("translation", {"z": 400.0}, limbs)
+
+
 CASES = {name: lambda name=name: pk.load(name) for name in PARALLEL}
 CASES |= {
     "mixed, framed": mixed,
+    "cables": cables,
     "drive laws": lawful,
     "turned": turned,
     "turned, with laws": lambda: turned(harmonics=[{"k": 1.0, "cos": 0.01, "sin": 0.02}]),
