@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import pkmcal as pk
 from pkmcal import Robot
-from pkmcal.geometry.chains import ERRORS
+from pkmcal.geometry.chain_joints import ERRORS
 from pkmcal.geometry.limb_kinds import KINDS
 
 FloatArray = NDArray[np.float64]
@@ -79,7 +79,10 @@ def as_chains(robot: Robot) -> str:
             carriage = base + q[limb.actuator] * frame[:, 2]
             axis = frame[:, 2].tolist()
             joints.append(f'kind = "P", at = {base.tolist()}, axis = {axis}, {drive}')
-            joints.append(f'kind = "U", at = {carriage.tolist()}')
+            swings = '"U"'
+            if limb.kind == "PRS":
+                swings = '"R", axis = ' + str(limb.frames["hinge"][:, 2].tolist())
+            joints.append(f"kind = {swings}, at = {carriage.tolist()}")
         else:
             joint = "R" if robot.model.map == "planar" else "U"
             end = base + robot.geometry[f"crank{i + 1}"] * crank_direction(robot, i, q)

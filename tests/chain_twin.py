@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pkmcal import Robot
-from pkmcal.geometry.chains import ERRORS
+from pkmcal.geometry.chain_joints import ERRORS
 
 FloatArray = NDArray[np.float64]
 

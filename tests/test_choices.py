@@ -23,7 +23,7 @@ import pkmcal as pk
 from pkmcal.arms.inputs import joint_frames
 from pkmcal.calibration.alignment import PointPairs, of_points
 from pkmcal.calibration.optimal_design import CRITERIA
-from pkmcal.geometry.chains import across
+from pkmcal.geometry.chain_joints import across
 from pkmcal.geometry.model import Cone
 from pkmcal.kinematics.independent import independent_numbers
 from pkmcal.modes.find import frames_of

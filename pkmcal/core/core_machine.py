@@ -182,6 +182,7 @@ class CoreMachine(ABC):
         Or of the twist (ω, v) of the platform by them.
         """
         out = np.empty((len(pose), 6, len(columns)))
-        given = (len(pose), slots, 0, pose, q, columns, len(columns), twists)
+        stride = slots[0].size if slots.ndim == 3 else 0
+        given = (len(pose), slots, stride, pose, q, columns, len(columns), twists)
         call(self._ERRORS, self.struct, *given, out, isa=self.isa)
         return out if twists else self.as_written(pose, out, 1)

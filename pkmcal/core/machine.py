@@ -75,9 +75,12 @@ class Machine(CoreMachine):
         size.
     isa : int
         Index into `ISAS`.
+
+    A geometry is (limbs, SLOTS), or (N, limbs, SLOTS) with one for each row of a call.
     """
 
     _FORWARD, _ERRORS = "forward", "error_jacobian"
+    fixed_spheres = True  # the actuators say where anchors are and how long, whatever the pose
 
     def __init__(
         self,
@@ -135,7 +138,8 @@ class Machine(CoreMachine):
         """
         q = np.empty((len(pose), self.actuators))
         stride = self.actuators if near is not None and near.ndim == 2 else 0
-        call("inverse", self.struct, len(pose), slots, 0, pose, near, stride, q, isa=self.isa)
+        given = (len(pose), slots, _by_row(slots), pose, near, stride, q)
+        call("inverse", self.struct, *given, isa=self.isa)
         return q
 
     def turns(self, slots: FloatArray) -> FloatArray:
@@ -180,7 +184,7 @@ class Machine(CoreMachine):
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m)."""
         out = np.empty((len(pose), self.actuators, self.m))
-        call("jacobian", self.struct, len(pose), slots, 0, pose, out, isa=self.isa)
+        call("jacobian", self.struct, len(pose), slots, _by_row(slots), pose, out, isa=self.isa)
         return self.as_written(pose, out, 2)
 
     def forward_jacobian(
@@ -188,7 +192,7 @@ class Machine(CoreMachine):
     ) -> FloatArray:
         """∂pose/∂q at poses (N, 6): (N, 6, n), or of the twist (ω, v) of the platform by them."""
         out = np.empty((len(pose), 6, self.actuators))
-        given = (len(pose), slots, 0, pose, q, twists, out)
+        given = (len(pose), slots, _by_row(slots), pose, q, twists, out)
         call("forward_jacobian", self.struct, *given, isa=self.isa)
         return out if twists else self.as_written(pose, out, 1)
 
@@ -199,7 +203,7 @@ class Machine(CoreMachine):
         derivative by time.
         """
         velocity, acceleration = np.empty((2, len(motion), self.actuators))
-        given = (len(motion), slots, motion, velocity, acceleration)
+        given = (len(motion), slots, _by_row(slots), motion, velocity, acceleration)
         call("rates", self.struct, *given, isa=self.isa)
         return velocity, acceleration
 
@@ -214,7 +218,8 @@ class Machine(CoreMachine):
         """
         n = len(pose)
         motion, rates = np.empty((n, 3, 4, 4)), np.empty((n, 2, 6))
-        call("motion", self.struct, n, slots, pose, q, q1, q2, motion, rates, isa=self.isa)
+        given = (n, slots, _by_row(slots), pose, q, q1, q2, motion, rates)
+        call("motion", self.struct, *given, isa=self.isa)
         found = (motion, rates[:, 0], rates[:, 1])
         return found if self.rows == self.m else self._missing(slots, pose, q, q1, q2, found)
 
@@ -254,7 +259,7 @@ class Machine(CoreMachine):
             np.empty((n, 6)),
             np.empty((n, 6, m)),
         )
-        call("closure", self.struct, n, slots, pose, q, *out, isa=self.isa)
+        call("closure", self.struct, n, slots, _by_row(slots), pose, q, *out, isa=self.isa)
         self.as_written(pose, out.by_free, 2)
         return out
 
@@ -272,7 +277,7 @@ class Machine(CoreMachine):
         residual, by_step = np.empty((n, self.rows)), np.empty((n, self.rows, self.m))
         count = 0 if columns is None else len(columns)
         by_number = None if columns is None else np.empty((n, self.rows, count))
-        given = (n, slots, pose, q, columns, count, residual, by_step, by_number)
+        given = (n, slots, _by_row(slots), pose, q, columns, count, residual, by_step, by_number)
         call("readings", self.struct, *given, isa=self.isa)
         return residual, by_step, by_number
 
@@ -305,7 +310,8 @@ class Machine(CoreMachine):
         """
         n, limbs = len(pose), slots.shape[-2]
         drive, base, platform = np.empty((n, limbs)), *np.empty((2, n, limbs, 3))
-        call("limbs", self.struct, n, slots, pose, drive, base, platform, isa=self.isa)
+        given = (n, slots, _by_row(slots), pose, drive, base, platform)
+        call("limbs", self.struct, *given, isa=self.isa)
         return drive, base, platform
 
     def closure_cost(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
@@ -317,6 +323,11 @@ class Machine(CoreMachine):
         given = (self.struct, len(slots), slots, len(pose), pose, q)
         call("closure_cost", *given, cost, isa=self.isa)
         return cost
+
+
+def _by_row(slots: FloatArray) -> int:
+    """Stride of geometries: one for all rows (limbs, SLOTS), or one for each (N, limbs, SLOTS)."""
+    return int(slots[0].size) if slots.ndim == 3 else 0
 
 
 def with_errors(

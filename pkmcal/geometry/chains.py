@@ -10,96 +10,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Unit, furthest_axis
+from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.chains import ChainLayout
 from pkmcal.display import Table, fixed
-from pkmcal.geometry.laws import Law, LawNumber, gain_unit
+from pkmcal.geometry.chain_joints import (
+    BY_MAP,
+    ERRORS,
+    PARTS,
+    Joint,
+    Part,
+    ball_axes,
+    frame_of,
+)
+from pkmcal.geometry.laws import LawNumber, gain_unit
 from pkmcal.geometry.ties import LimbNumber
 from pkmcal.screw import from_pose
 
-ERRORS = ("dx", "dy", "dz", "dphi", "dtheta", "dpsi")  # as of serial arms
-BY_MAP: dict[str, tuple[str, ...]] = {  # what can be wrong in a group
-    "spatial": ERRORS,
-    "planar": ("dx", "dy", "dpsi"),
-    "spherical": ("dphi", "dtheta", "dpsi"),
-}
-PARTS = ("", "b", "c")
 _DEPENDENT = 1e-7  # of the largest singular value: the least is none
-JointKind = Literal["R", "P", "U", "S", "C"]
-KINDS: dict[str, str] = {
-    "R": "revolute", "P": "prismatic", "U": "universal", "S": "spherical", "C": "cylindrical",
-}  # fmt: skip
-
-
-@dataclass(frozen=True, eq=False)
-class Joint:
-    """A joint as the file lists it, the machine at home; mm and rad.
-
-    Attributes
-    ----------
-    kind : {"R", "P", "U", "S", "C"}
-        What it is.
-    at : ndarray (3,)
-        Its point, in the base frame.
-    axes : tuple of ndarray (3,)
-        Unit vectors: of R, P and C one, of U two, of S three, or none of a ball.
-    actuator : int or None
-        Which actuator moves it, counted from 0.
-    share : str or None
-        What limbs call it that have it in common.
-    home_value : float
-        What its actuator reads at home.
-    stroke : tuple of float or None
-        Limits of what it turns or slides: of an actuated joint the drive, else from home.
-    cone : float or None
-        How far U and S bend from home, rad.
-    soft : float
-        Compliance beside that of other joints.
-    law : Law or None
-        Of an actuated joint, what lies between the reading and the drive.
-    """
-
-    kind: JointKind
-    at: FloatArray
-    axes: tuple[FloatArray, ...]
-    actuator: int | None = None
-    share: str | None = None
-    home_value: float = 0.0
-    stroke: tuple[float, float] | None = None
-    cone: float | None = None
-    soft: float = 1.0
-    law: Law | None = None
-
-    @property
-    def ball(self) -> bool:
-        """Whether it is an S that has no axes of its own."""
-        return self.kind == "S" and not self.axes
-
-    @property
-    def parts(self) -> int:
-        """How many axes it has."""
-        return {"R": 1, "P": 1, "U": 2, "C": 2, "S": 3}[self.kind]
-
-    @property
-    def unit(self) -> Unit:
-        """Of what it turns or slides."""
-        return "mm" if self.kind == "P" else "rad"
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """One axis of a joint, once where limbs share it."""
-
-    name: str
-    slides: bool
-    axis: FloatArray
-    joint: Joint
-    limb: int
-    errors: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +119,7 @@ class Chains:
                 errors = BY_MAP[self.map]
                 axes = joint.axes
                 if joint.ball:
-                    axes, errors = _ball_axes(limb, k - 1), BY_MAP[self.map][:3]
+                    axes, errors = ball_axes(limb, k - 1), BY_MAP[self.map][:3]
                 if joint.kind == "C":
                     axes = axes * 2
                 for n, (suffix, axis) in enumerate(zip(PARTS, axes, strict=False)):
@@ -349,7 +279,7 @@ class Chains:
             actuator=ints([-1 if p.joint.actuator is None else p.joint.actuator for p in every]),
             coordinate=ints([coordinate.get(part.name, -1) for part in every]),
             place=ints([places[part.name] for part in every]),
-            axes=np.array([_frame(part.axis) for part in every]),
+            axes=np.array([frame_of(part.axis) for part in every]),
             point=np.array([part.joint.at for part in every]),
             soft=np.array([part.joint.soft for part in every]),
             drive_place=ints([places[f"drive{a + 1}"] for a in range(self.n_actuators)]),
@@ -378,33 +308,3 @@ def _closes(limb: tuple[Joint, ...], joint: Joint) -> bool:
 
 def _same_end(a: tuple[Joint, ...], b: tuple[Joint, ...]) -> bool:
     return a is b or (a[-1].share is not None and a[-1].share == b[-1].share)
-
-
-def across(direction: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Two unit vectors at right angles to a unit vector, and to each other."""
-    one = np.cross(direction, np.eye(3)[furthest_axis(direction)])
-    one /= np.linalg.norm(one)
-    return one, np.cross(direction, one)
-
-
-def towards(limb: tuple[Joint, ...], k: int) -> FloatArray | None:
-    """Unit vector from joint k to the next that is elsewhere, or from the last that was."""
-    at = limb[k].at
-    for other, sign in [(j, 1.0) for j in limb[k + 1 :]] + [(j, -1.0) for j in limb[:k][::-1]]:
-        way = sign * (other.at - at)
-        length = float(np.linalg.norm(way))
-        if length > 1e-9 * (1.0 + float(np.abs(at).max())):
-            return way / length
-    return None
-
-
-def _ball_axes(limb: tuple[Joint, ...], k: int) -> tuple[FloatArray, ...]:
-    """Of a ball that is not the last joint: along the limb and across it, never near its lock."""
-    way = towards(limb, k)
-    along = np.array([0.0, 0.0, 1.0]) if way is None else way
-    return (along, *across(along))
-
-
-def _frame(axis: FloatArray) -> FloatArray:
-    one, other = across(axis)
-    return np.column_stack([one, other, axis])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -90,6 +91,22 @@ class Limb:
     def platform_frame(self) -> FloatArray:
         """Frame of the platform axis; the identity where unused."""
         return self.frames.get("platform", np.eye(3))
+
+    def for_core(self) -> dict[str, Any]:
+        """The limb as `pkmcal.core.machine.Machine` takes it."""
+        kind = KINDS[self.kind]
+        rows = kind.all_rows(self.couple > 0)
+        return {
+            "driver": kind.driver,
+            "rows": rows,
+            "actuator": self.actuator,
+            "branch": self.branch,
+            "angle": kind.actuator_unit == "rad",
+            "near": np.nan if self.stroke is None else sum(self.stroke) / 2,
+            "frames": self.frames,
+            "lever": self.couple,
+            "weights": [1.0, *(self.weights or [1.0] * len(rows))],
+        }
 
 
 @dataclass(frozen=True, eq=False)

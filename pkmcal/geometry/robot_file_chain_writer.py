@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from pkmcal.geometry.chains import PARTS, Chains, Joint
+from pkmcal.geometry.chain_joints import PARTS, Joint
+from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import CHAIN
 from pkmcal.geometry.robot_file_laws import law_table
@@ -59,7 +60,8 @@ def _joint(joint: Joint, geometry: Geometry) -> dict[str, Any]:
     if joint.stroke is not None:
         data["stroke"] = list(joint.stroke)
     if joint.cone is not None:
-        data["cone"] = joint.cone
+        axis = joint.cone_axis
+        data["cone"] = joint.cone if axis is None else {"angle": joint.cone, "axis": axis.tolist()}
     if joint.soft != 1.0:
         data["soft"] = joint.soft
     return data

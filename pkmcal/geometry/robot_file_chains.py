@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +20,12 @@ from pkmcal.core.chains import (
 )
 from pkmcal.core.library import MAPS, MAX_LIMBS
 from pkmcal.files.toml_table import Table, shown
-from pkmcal.geometry.chains import ERRORS, KINDS, Chains, Joint, across, towards
+from pkmcal.geometry.chain_joints import ERRORS, KINDS, Joint, across, towards
+from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.laws import gain_unit
 from pkmcal.geometry.model import CHAIN, Limb
+from pkmcal.geometry.robot_file_chain_copies import Listed, copied
+from pkmcal.geometry.robot_file_kind_joints import joints_of_kind
 from pkmcal.geometry.robot_file_laws import read_law
 from pkmcal.geometry.robot_file_limbs import PARAMETER_NAME, Parameters
 
@@ -33,43 +35,37 @@ JOINT_KEYS = (
     "offset", "gain", "drive",
 )  # fmt: skip
 AXES = {"R": 1, "P": 1, "C": 1, "U": 2, "S": 3}
-_DRIVEN = re.compile(r"(offset|gain|drive)(\d+)((?:\..*)?)")  # numbers of actuators
 FORMS = {1: "one axis, `axis = [x, y, z]`", 2: "two `axes`", 3: "three `axes`, or none of a ball"}
-
-
-class _Limb(NamedTuple):
-    """A limb as it is listed, before it is copied."""
-
-    table: Table
-    joints: tuple[Joint, ...]
-    values: dict[str, float]
-    copies: int
-    group: str
-    turn: tuple[FloatArray, FloatArray]
 
 
 def read_chains(
     tables: Sequence[Table], parameters: Parameters, map: str, home: FloatArray
 ) -> tuple[Chains, dict[str, float]]:
     """Read every ``[[limb]]`` table of a machine of chains: its limbs, and its numbers by name."""
-    for table in tables:
-        if table.data.get("kind") != CHAIN:
-            table.fail("kind", "beside chains every limb is one: write it as its joints")
     if map not in GROUPS:
         known = ", ".join(GROUPS)
         tables[0].fail("kind", f"limbs that are chains go with the maps {known}, found {map}")
     known_joints: dict[str, Joint] = {}
-    listed = [_limb(table, parameters, map, known_joints) for table in tables]
-    limbs, numbers = _copied(listed)
+    listed = [
+        _limb(table, parameters, map, known_joints)
+        if table.data.get("kind") == CHAIN
+        else _of_kind(table, parameters, map, home)
+        for table in tables
+    ]
+    limbs, numbers = copied(listed)
     if len(limbs) > MAX_LIMBS:
         tables[-1].fail("", f"a robot has at most {MAX_LIMBS} limbs, with copies {len(limbs)}")
     chains = Chains(map, home, tuple(limbs))
     _check(tables, chains)
     values = {number.name: chains.blank.flat[number.place or 0] for number in chains.numbers}
+    stated: set[str] = set()
     for name, value, table in numbers:
         if name not in values:
             table.fail("errors", f"{name!r} is no error of this limb")
+        if name in stated and value != values[name]:
+            table.fail("", f"{name} is {value:g} here and {values[name]:g} in a limb before")
         values[name] = value
+        stated.add(name)
     return chains, {name: float(value) for name, value in values.items()}
 
 
@@ -84,7 +80,7 @@ def chain_limbs(chains: Chains) -> tuple[Limb, ...]:
     return tuple(made)
 
 
-def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint]) -> _Limb:
+def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint]) -> Listed:
     table.only(LIMB_KEYS, "a chain")
     listed = table.tables("joints", "a chain")
     joints: list[Joint] = []
@@ -96,7 +92,9 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
             continue
         joint, of_drive = _with_drive(each, _joint(each, parameters, map, joints))
         joints.append(joint)
-        values |= of_drive
+        for name, value in of_drive.items():
+            if values.setdefault(name, value) != value:
+                each.fail("", f"{name} is {value:g} here and {values[name]:g} in a joint before")
         if k + 1 > MAX_CHAIN:
             each.fail("", f"a chain has at most {MAX_CHAIN} axes")
     joints = [_with_axes(each, joints, k, map) for k, each in enumerate(listed)]
@@ -113,7 +111,13 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
     if copies < 1:
         table.fail("copies", f"must be 1 or more, found {copies}")
     group = table.text("group") if "group" in table else ""
-    return _Limb(table, tuple(joints), values, copies, group, _about(table))
+    return Listed(table, tuple(joints), values, copies, group, _about(table))
+
+
+def _of_kind(table: Table, parameters: Parameters, map: str, home: FloatArray) -> Listed:
+    """A limb of another kind, as the chain that it is."""
+    joints, values = joints_of_kind(table, parameters, map, home)
+    return Listed(table, joints, values, 1, "", _about(Table({}, table.source)))
 
 
 def _alike(a: Joint, b: Joint) -> bool:
@@ -149,7 +153,7 @@ def _joint(table: Table, parameters: Parameters, map: str, before: Sequence[Join
     for key in ("home_value", "offset", "gain", "drive"):
         if key in table and actuator is None:
             table.fail(key, "only an actuated joint has this")
-    stroke = cone = None
+    stroke = None
     if "stroke" in table:
         found = table.list_of("stroke", 2, "two numbers, the least and the greatest")
         low, high = (table.as_number("stroke", each, joint.unit) for each in found)
@@ -158,15 +162,30 @@ def _joint(table: Table, parameters: Parameters, map: str, before: Sequence[Join
         if AXES[kind] > 1 or kind == "C":
             table.fail("stroke", f"a joint {kind} has several axes: give it a cone")
         stroke = (low, high)
-    if "cone" in table:
-        cone = table.number("cone", "rad")
-        if kind not in "US" or not 0.0 < cone <= math.pi:
-            table.fail("cone", "is how far a U or an S bends: above 0, at most half a turn")
+    cone, cone_axis = _cone(table, kind)
     soft = table.number("soft", "1", 1.0)
     if not soft > 0.0:
         table.fail("soft", f"must be positive, found {shown(table['soft'])}")
     home_value = table.number("home_value", joint.unit, 0.0)
-    return replace(joint, stroke=stroke, cone=cone, soft=soft, home_value=home_value)
+    return replace(
+        joint, stroke=stroke, cone=cone, cone_axis=cone_axis, soft=soft, home_value=home_value
+    )
+
+
+def _cone(table: Table, kind: str) -> tuple[float | None, FloatArray | None]:
+    """How far a U or an S bends, rad, and from which direction; None: from home."""
+    if "cone" not in table:
+        return None, None
+    axis: FloatArray | None = None
+    if isinstance(table["cone"], Mapping):
+        cone = table.table("cone")
+        cone.only(("angle", "axis"), "a cone")
+        angle, axis = cone.number("angle", "rad"), np.array(cone.vector("axis"))
+    else:
+        angle = table.number("cone", "rad")
+    if kind not in "US" or not 0.0 < angle <= math.pi:
+        table.fail("cone", "is how far a U or an S bends: above 0, at most half a turn")
+    return angle, axis
 
 
 def _with_drive(table: Table, joint: Joint) -> tuple[Joint, dict[str, float]]:
@@ -250,91 +269,15 @@ def _about(table: Table) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def _copied(listed: Sequence[_Limb]) -> tuple[list[tuple[Joint, ...]], list[Any]]:
-    """Every limb with its copies, groups copied together; errors by their public names."""
-    limbs: list[tuple[Joint, ...]] = []
-    numbers: list[tuple[str, float, Table]] = []
-    done: set[int] = set()
-    for i, limb in enumerate(listed):
-        if i in done:
-            continue
-        mine = [
-            k
-            for k, other in enumerate(listed)
-            if k == i or (limb.group and other.group == limb.group)
-        ]
-        done.update(mine)
-        copies = max(listed[k].copies for k in mine)
-        for k in mine:
-            if listed[k].copies not in (1, copies):
-                listed[k].table.fail("copies", f"the group {limb.group!r} has {copies} copies")
-        used = sorted(
-            {j.actuator for k in mine for j in listed[k].joints if j.actuator is not None}
-        )
-        shared: dict[tuple[str, int], Joint] = {}
-        for copy in range(copies):
-            for k in mine:
-                made = tuple(
-                    _copy(joint, copy, copies, len(used), listed[mine[0]].turn, shared)
-                    for joint in listed[k].joints
-                )
-                limbs.append(made)
-                for name, value in listed[k].values.items():
-                    numbers.append(
-                        (
-                            _named(name, len(limbs), listed[k], copy, copies, len(used)),
-                            value,
-                            listed[k].table,
-                        )
-                    )
-    return limbs, numbers
-
-
-def _named(name: str, limb: int, of: _Limb, copy: int, copies: int, used: int) -> str:
-    if driven := _DRIVEN.fullmatch(name):
-        return f"{driven[1]}{int(driven[2]) + copy * used}{driven[3]}"
-    head, _, error = name.partition(".")
-    for k, joint in enumerate(of.joints, 1):
-        for suffix in ("", "b", "c"):
-            if head == f"joint{k}{suffix}" and joint.share:
-                return f"{_share_name(joint.share, copy, copies)}{suffix}.{error}"
-    return f"limb{limb}.{name}"
-
-
-def _share_name(share: str, copy: int, copies: int) -> str:
-    return share if copies == 1 else f"{share}{copy + 1}"
-
-
-def _copy(
-    joint: Joint,
-    copy: int,
-    copies: int,
-    used: int,
-    turn: tuple[FloatArray, FloatArray],
-    shared: dict[tuple[str, int], Joint],
-) -> Joint:
-    if joint.share and (joint.share, copy) in shared:
-        return shared[joint.share, copy]
-    found = joint
-    if copies > 1:
-        R = _turned(turn[0], 2.0 * math.pi * copy / copies) if copy else np.eye(3)
-        found = replace(
-            joint,
-            at=R @ (joint.at - turn[1]) + turn[1],
-            axes=tuple(R @ axis for axis in joint.axes),
-            actuator=None if joint.actuator is None else joint.actuator + copy * used,
-            share=_share_name(joint.share, copy, copies) if joint.share else None,
-        )
-    if joint.share:
-        shared[joint.share, copy] = found
-    return found
-
-
-def _turned(axis: FloatArray, angle: float) -> FloatArray:
-    x, y, z = axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    found: FloatArray = np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K)
-    return found
+def _check_alike(table: Table, number: int, one: Joint, other: Joint) -> None:
+    """Refuse two joints of one actuator that it would have to move differently."""
+    if one.unit != other.unit:
+        table.fail("joints", f"actuator {number} turns one joint and slides another")
+    if abs(one.home_value - other.home_value) > 1e-9 * (1.0 + abs(one.home_value)):
+        values = f"{one.home_value:g} in one limb and {other.home_value:g} in another"
+        table.fail("joints", f"actuator {number} reads at home {values}")
+    if one.law != other.law:
+        table.fail("joints", f"actuator {number} has two drive laws: one for all its joints")
 
 
 def _check(tables: Sequence[Table], chains: Chains) -> None:
@@ -343,16 +286,12 @@ def _check(tables: Sequence[Table], chains: Chains) -> None:
     if chains.n_actuators < 1:
         last.fail("joints", "no joint has an actuator")
     used = {joint.actuator for limb in chains.limbs for joint in limb if joint.actuator is not None}
-    units: dict[int, str] = {}
+    first: dict[int, Joint] = {}
     for limb in chains.limbs:
         for joint in limb:
-            if (
-                joint.actuator is not None
-                and units.setdefault(joint.actuator, joint.unit) != joint.unit
-            ):
-                last.fail(
-                    "joints", f"actuator {joint.actuator + 1} turns one joint and slides another"
-                )
+            if joint.actuator is not None:
+                one = first.setdefault(joint.actuator, joint)
+                _check_alike(last, joint.actuator + 1, one, joint)
     for a in range(chains.n_actuators):
         if a not in used:
             last.fail(

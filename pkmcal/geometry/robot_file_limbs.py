@@ -21,7 +21,7 @@ from pkmcal.geometry.ties import LimbNumber, Term, Tie
 
 PARAMETER_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 CHAIN_HELP = "chain of joints (docs/machines.md)"
-RIGHT_ANGLE = 1e-3  # how far a crank's zero direction may be from a right angle to its axis, rad
+RIGHT_ANGLE = 1e-3  # how far a zero direction may be from a right angle to its axis, rad
 UNIT_WORDS: dict[Unit, str] = {
     "mm": "a length",
     "rad": "an angle",
@@ -116,7 +116,7 @@ class Limbs(NamedTuple):
 
 def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
     """Read every ``[[limb]]`` table."""
-    read = [_read_limb(table, i, parameters) for i, table in enumerate(tables)]
+    read = [read_limb(table, i, parameters) for i, table in enumerate(tables)]
     limbs = [limb for limb, _, _ in read]
     width = len(SLOTS) + max(len(of_law) for _, _, of_law in read)
     numbers: list[LimbNumber] = []
@@ -140,9 +140,10 @@ def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
     return Limbs(tuple(limbs), numbers, {n: v for n, v in values.items() if n in free}, blank)
 
 
-def _read_limb(
+def read_limb(
     table: Table, i: int, parameters: Parameters
 ) -> tuple[Limb, dict[str, Entry], list[tuple[LawNumber, Entry]]]:
+    """Read one ``[[limb]]`` table, limb `i` counted from 0; its numbers by slot, and its law's."""
     name = table.text("kind")
     if name not in (known := (*KINDS, *ALIASES)):
         near = did_you_mean(name, known)
@@ -162,7 +163,7 @@ def _read_limb(
         for key in (kind.axes[axis], f"{kind.axes[axis]}_tilt"):
             if key in table:
                 table.fail(key, "only a limb with a couple length has this")
-    zero = "zero" if kind.driver == "crank" else None
+    zero = "zero" if kind.driver == "crank" or (kind.has_zero and "zero" in table) else None
     frames = {
         axis: _frame(table, key, zero if axis == "base" else None) for axis, key in axes.items()
     }
@@ -205,9 +206,9 @@ def _read_numbers(
     entries["gain"] = entry("gain", table.data.get("gain", 1.0), of_gain)
     if entries["gain"].value == 0.0:
         table.fail("gain", "must not be 0: the actuator would not move the limb")
-    for key in kind.lengths:
-        entries[key] = entry(key, table[key], "mm")
-        _positive(table, key, entries[key].value)
+    for key, slot in kind.lengths.items():
+        entries[slot] = entry(key, table[key], "mm")
+        _positive(table, key, entries[slot].value)
     for axis, name in kind.axes_of(couple).items():
         key = f"{name}_tilt"
         tilts = table.list_of(key, 2, "two angles") if key in table else (0.0, 0.0)

@@ -6,7 +6,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import ChainMachine
-from pkmcal.geometry.chains import PARTS, Chains, Joint, towards
+from pkmcal.geometry.chain_joints import PARTS, Joint, towards
+from pkmcal.geometry.chains import Chains
 from pkmcal.kinematics.limits import Feasibility, kept, margin_of
 from pkmcal.screw import from_pose
 
@@ -112,8 +113,16 @@ def bend_direction(limb: tuple[Joint, ...], k: int) -> FloatArray:
     return np.array([0.0, 0.0, 1.0]) if way is None else way
 
 
+def cone_axes(limb: tuple[Joint, ...], k: int) -> tuple[FloatArray, FloatArray]:
+    """What a cone of joint k compares, at home: a direction of the body before it, one behind."""
+    direction, middle = bend_direction(limb, k), limb[k].cone_axis
+    if middle is None:
+        return direction, direction
+    return (direction, middle) if k == len(limb) - 1 else (middle, direction)
+
+
 def _bend(limb: tuple[Joint, ...], k: int, before: FloatArray, after: FloatArray) -> FloatArray:
-    """How far a joint bends from home, rad."""
-    direction = bend_direction(limb, k)
-    a, b = before @ direction, after @ direction
+    """How far a joint bends from the middle of its cone, rad."""
+    one, other = cone_axes(limb, k)
+    a, b = before @ one, after @ other
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from pkmcal.arrays import FloatArray
@@ -11,8 +9,8 @@ from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.driven import CompiledMachine, DrivenMachine
 from pkmcal.core.library import MAPS, SLOTS
 from pkmcal.core.machine import Machine
-from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import Limb, Model
+from pkmcal.core.pulleys import PulleyMachine, has_pulleys
+from pkmcal.geometry.model import Model
 
 
 def machine_of(model: Model, slots: FloatArray, length: float) -> CompiledMachine:
@@ -41,7 +39,7 @@ def machine_of(model: Model, slots: FloatArray, length: float) -> CompiledMachin
 
 def _of_limbs(model: Model, slots: FloatArray, length: float) -> Machine:
     """A machine of limbs; one with drive laws has a drive of its own for each of them."""
-    limbs = [_limb(limb) for limb in model.limbs]
+    limbs = [limb.for_core() for limb in model.limbs]
     if model.driven:
         slots = np.ascontiguousarray(slots[:, : len(SLOTS)])
         slots[:, [SLOTS.index("offset"), SLOTS.index("gain")]] = 0.0, 1.0
@@ -50,20 +48,5 @@ def _of_limbs(model: Model, slots: FloatArray, length: float) -> Machine:
         for limb in limbs:  # nothing to weigh: all closures hold
             limb["weights"] = [1.0] * len(limb["weights"])
     home = np.ascontiguousarray(model.home, dtype=np.float64)
-    return Machine(model.map, limbs, length, slots, home, model.closure_tolerance)
-
-
-def _limb(limb: Limb) -> dict[str, Any]:
-    kind = KINDS[limb.kind]
-    rows = kind.all_rows(limb.couple > 0)
-    return {
-        "driver": kind.driver,
-        "rows": rows,
-        "actuator": limb.actuator,
-        "branch": limb.branch,
-        "angle": kind.actuator_unit == "rad",
-        "near": np.nan if limb.stroke is None else sum(limb.stroke) / 2,
-        "frames": limb.frames,
-        "lever": limb.couple,
-        "weights": [1.0, *(limb.weights or [1.0] * len(rows))],
-    }
+    made = PulleyMachine if has_pulleys(limbs) else Machine
+    return made(model.map, limbs, length, slots, home, model.closure_tolerance)

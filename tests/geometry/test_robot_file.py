@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import robot_file
-from pkmcal.geometry.chains import Chains, Joint
+from pkmcal.geometry.chain_joints import Joint
+from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.model import Cone, Limb, Model
 
 from ..workspaces import CHAINS

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -102,7 +103,7 @@ def test_parameters_of_places_are_values_and_no_numbers() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('kind = "chain"\ncopies', 'kind = "PUPS"\ncopies', "beside chains every limb is one"),
+        ('kind = "chain"\ncopies', 'kind = "PUPS"\ncopies', "'PUPS' is no kind.*chain of joints"),
         ('kind = "S"', 'kind = "Q"', "'Q' is no kind of joint"),
         ("actuator = 1, ", "", "0 actuators, 3 ways to move|no joint has an actuator"),
         ("actuator = 1", "actuator = 2", "no joint has actuator 1"),
@@ -116,6 +117,15 @@ def test_parameters_of_places_are_values_and_no_numbers() -> None:
         ("copies = 3", "copies = 0", "must be 1 or more"),
         ("copies = 3", "copies = 25", "at most 24 limbs"),
         ("copies = 3", 'copies = 3\nerrors = { "joint9.dx" = 1 }', "'limb1.joint9.dx' is no error"),
+        ("axis = [0, 0, 1],", "axis = [0, 0, 1], actuator = 1, home_value = 9.0,",
+         "actuator 1 reads at home 0 in one limb and 9 in another"),
+        ("axis = [0, 0, 1],", "axis = [0, 0, 1], actuator = 1, gain = 2.0 },"
+         ' { kind = "P", axis = [0, 1, 0], actuator = 1, gain = 3.0, at = [0, 0, 9],',
+         "gain1 is 3 here and 2"),
+        ("axis = [0, 0, 1],", "axis = [0, 0, 1], actuator = 1, drive = { quadratic = 1e-6 },",
+         "actuator 1 has two drive laws"),
+        ("axis = [0, 0, 1],", 'axis = [0, 0, 1], actuator = 1 }, { kind = "R", axis = [0, 1, 0],'
+         " actuator = 1, at = [0, 0, 9],", "actuator 1 turns one joint and slides another"),
         ('kind = "S"', 'actuator = 9, kind = "S"', "has several axes: list the actuated one"),
     ],
 )  # fmt: skip
@@ -134,3 +144,15 @@ def test_an_unknown_kind_of_limb_is_told_of_chains() -> None:
         FileError, match=r"any other limb is a chain of joints \(docs/machines.md\)"
     ):
         read(text)
+
+
+PAGE = (Path(__file__).parents[2] / "docs" / "machines.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("block", re.findall(r"```toml\n(name.*?)```", PAGE, re.S))
+def test_machines_on_the_page_are_as_it_says(block: str, tmp_path: Path) -> None:
+    (tmp_path / "robot.toml").write_text(block, encoding="utf-8")
+    robot = pk.load(tmp_path / "robot.toml")
+    found = robot.forward(robot.inverse(robot.home))
+    assert found.ok and np.abs(found.pose - robot.home).max() < 1e-9
+    assert "no problems found" in str(pk.check_geometry(robot))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.geometry.chains import ERRORS
+from pkmcal.geometry.chain_joints import ERRORS
 from pkmcal.screw import from_pose
 
 from ..chain_twin import rpy

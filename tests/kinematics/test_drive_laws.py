@@ -281,7 +281,7 @@ def test_a_turn_of_a_drive_is_one_whatever_its_law(name: str) -> None:
 def test_whatever_turn_is_asked_for_a_reading_is_given_that_leads_to_the_pose(
     name: str, seed: int
 ) -> None:
-    """Where a law ends before that turn, too, or limbs that share a crank agree at one turn."""
+    """Also where a law ends before that turn, or limbs that share a crank agree at one turn."""
     robot, at = driven(name, seed)
     if robot.machine.rows > robot.n_actuators:  # as the limbs that share an actuator stand
         at = robot.forward(robot.inverse(at), guess=at).pose
