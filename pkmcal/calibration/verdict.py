@@ -91,7 +91,7 @@ def judge(
         doubts.append(str(weak))
     if not grave and not doubts and _little_gained(found):
         doubts.append(f"little was gained, {_change(found)}: {_other_causes(found)}")
-    remarks = _remarks(found, robust, weak, drift)
+    remarks = _remarks(found, robust, drift, weak)
     reasons = tuple(printable(text, _LONGEST) for text in grave + doubts)
     if grave:
         return Verdict("not calibrated", reasons, remarks)
@@ -292,13 +292,13 @@ def _disagreement(found: Parts, robust: RobustCheck) -> str:
     return (
         f"{count} {rows} with the rest: {row_names(found.fit.equations.datasets, robust.rows)};"
         f" a robust fit leaves {_mm(robust.rms)} in the others, this one {_mm(found.rms)} in all:"
-        " leave them out with --drop-outliers (drop='outliers'), or fit with --loss cauchy"
-        " (loss='cauchy')"
+        f" leave {'it' if count == 1 else 'them'} out with --drop-outliers (drop='outliers'), or"
+        " fit with --loss cauchy (loss='cauchy')"
     )
 
 
 def _remarks(
-    found: Parts, robust: RobustCheck | None, weak: Weak | None, drift: Drift | None
+    found: Parts, robust: RobustCheck | None, drift: Drift | None, weak: Weak | None
 ) -> tuple[str, ...]:
     remarks = []
     if drift is not None and drift.found and not drift.large:
