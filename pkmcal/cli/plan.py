@@ -22,7 +22,7 @@ from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
 from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.box import Box
+from pkmcal.geometry.box import Box, in_box
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
@@ -122,6 +122,11 @@ def plan(
     box = _box(machine, within or [])
     if isinstance(machine, Robot):
         machine = machine.within(box)
+        if poses is None and not in_box(box, machine.home):
+            raise ArgumentError(
+                f"--within {','.join(within or [])}: leaves out the home of {machine.name}, around"
+                " which poses are drawn; give those to choose from with --poses"
+            )
     seen = as_machine(machine)
     chosen = free_names(seen, free)
     candidates = _drawn(machine, box, seed) if poses is None else _places(machine, read.file(poses))
