@@ -300,7 +300,7 @@ def _warnings(
     notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
     notes += shrunk(equations, fit.start, fit.end)
-    notes += unlike_noise(equations, fit.uncertainty.slips)
+    notes += unlike_noise(equations, fit.uncertainty.slips, bool(result.outliers))
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():

@@ -12,6 +12,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import FEW, Estimate, Estimator
 from pkmcal.statistics.distributions import chi2_tail
+from pkmcal.statistics.robust_scale import median_ratio
 
 _CHANCE = 0.01  # of residuals as far from what was stated, on either side
 _APART = 1.2  # ratio of deviations from which it matters
@@ -30,14 +31,18 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
     squares, freedom = (part[: len(ratios)] for part in estimate.shares[:2])
     unstated = estimator.unstated[: len(ratios)]
     common = 1.0 if unstated.any() else float(squares.sum() / max(freedom.sum(), 1e-9))
+    rows, set_of = equations.squares(estimate.residual), equations.set_of
     for i in np.flatnonzero(~unstated & (freedom >= FEW)):
         above = chi2_tail(float(squares[i]) / common, float(freedom[i]))
-        if min(above, 1.0 - above) < _CHANCE / 2.0:
+        components = equations.components[set_of == i]
+        median = median_ratio(rows[set_of == i], components) * components.sum() / freedom[i]
+        half = np.sqrt(median / common)  # of the rows: outliers are no slip
+        if min(above, 1.0 - above) < _CHANCE / 2.0 and max(half, 1.0 / half) > _APART:
             ratios[i] = np.sqrt(squares[i] / freedom[i])
     return ratios if ratios.max() > _APART * ratios.min() else np.ones_like(ratios)
 
 
-def unlike_noise(equations: Equations, ratios: FloatArray) -> list[str]:
+def unlike_noise(equations: Equations, ratios: FloatArray, with_outliers: bool) -> list[str]:
     """Name the sets whose sigma is wrong beside that of the others."""
     names = [
         "touch_distances" if m.kind == "touch-distance" else f"measurements {i + 1}"
@@ -50,4 +55,5 @@ def unlike_noise(equations: Equations, ratios: FloatArray) -> list[str]:
     return [
         f"the residuals of {parts} times what sigma says: the sets are weighted wrongly beside each"
         " other; state the true sigma, or none"
+        + (", or look at the outliers first" if with_outliers else "")
     ]
