@@ -8,7 +8,7 @@ import numpy as np
 
 from pkmcal._core import ffi, lib
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.core.core_machine import CoreMachine
+from pkmcal.core.core_machine import CoreMachine, known_rows
 from pkmcal.core.library import ISA, MAPS, call, pointer
 from pkmcal.core.machine import CLOSURE_TOLERANCE, Closure, Machine
 from pkmcal.core.path_differences import actuator_rates, platform_motion
@@ -165,7 +165,7 @@ class ChainMachine(CoreMachine):
         """
         q = np.empty((len(pose), self.actuators))
         call("chain_inverse", self.struct, len(pose), slots, 0, pose, q, isa=self.isa)
-        return self.nearest_turns(slots, q, near)
+        return known_rows(self.nearest_turns(slots, q, near))
 
     def turns(self, slots: FloatArray) -> FloatArray:
         """How far each actuator goes in a whole turn, (n,); infinite where it is no angle."""
