@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -267,9 +268,9 @@ def identify(
         dropped_names=row_names(given, dropped),
     )
     if slack == "keep" and result.outliers:
-        _, cells = taut(equations, commanded, start)
-    slack_ones = slack_cables(estimator.equations, estimate.evaluation, cells)
-    result = replace(result, slack=slack_ones)
+        with suppress(ArgumentError):  # a robust fit that does not come to an end says nothing
+            _, cells = taut(equations, commanded, start)
+    result = replace(result, slack=slack_cables(estimator.equations, estimate.evaluation, cells))
     notes = _warnings(result, estimator, estimate, datasets)
     if slack == "keep" and result.slack:
         notes.append(said_slack(result.slack))
