@@ -41,8 +41,9 @@ int CALL(error_jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *
  * (n, rows, m) and by q (n, rows, actuators); and the pose (n, 6) as the map has it, with its
  * derivatives by the free coordinates (n, 6, m). */
 int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                  const double *pose, const double *q, double *residual, double *by_step,
-                  double *by_free, double *by_q, double *on_map, double *pose_by_free);
+                  ptrdiff_t geometry_stride, const double *pose, const double *q, double *residual,
+                  double *by_step, double *by_free, double *by_q, double *on_map,
+                  double *pose_by_free);
 
 /* pose (n, 6), q (n, actuators) -> actuators as instruments, limb by limb: of the sphere row the
  * coordinate that the limb needs at the pose less the one read, nearest turn, of the other rows the
@@ -50,8 +51,9 @@ int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
  * columns; NULL: not wanted); columns are indices into limbs x SLOTS. Of a
  * limb out of reach, the closure at q over its slope there. */
 int CALL(readings)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                   const double *pose, const double *q, const int32_t *column, int columns,
-                   double *residual, double *by_step, double *by_number);
+                   ptrdiff_t geometry_stride, const double *pose, const double *q,
+                   const int32_t *column, int columns, double *residual, double *by_step,
+                   double *by_number);
 
 /* pose (n, 6), step of a pose map (n, m) [mm, rad] -> the pose moved by it (n, 6), and the twist
  * (omega, v) by a step at the pose (n, 6, m). */
@@ -65,19 +67,20 @@ int CALL(spheres)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
 
 /* pose (n, 6) as given -> of each limb its drive coordinate (n, limbs), NaN out of reach, and the
  * unit vector from its anchor to the platform joint in base and platform axes (n, limbs, 3). */
-int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry, const double *pose,
-                double *drive, double *on_base, double *on_platform);
+int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                ptrdiff_t geometry_stride, const double *pose, double *drive, double *on_base,
+                double *on_platform);
 
 /* motion (n, 3, 4, 4), the platform's homogeneous matrix with its first and second derivative by time
  * -> velocity and acceleration of the actuators, (n, actuators) each; NaN out of reach. */
 int CALL(rates)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                const double *motion, double *q1, double *q2);
+                ptrdiff_t geometry_stride, const double *motion, double *q1, double *q2);
 
 /* pose (n, 6), q and its first and second derivative by time (n, actuators) -> motion (n, 3, 4, 4) as
  * above, and the first and second derivative of the pose (n, 2, 6); NaN where singular. */
 int CALL(motion)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                 const double *pose, const double *q, const double *q1, const double *q2,
-                 double *motion, double *pose_rates);
+                 ptrdiff_t geometry_stride, const double *pose, const double *q,
+                 const double *q1, const double *q2, double *motion, double *pose_rates);
 
 /* Standard normal numbers (n), of one state the same bits with every isa. The state, any bits but
  * zeros alone, is 4 words of each of eight generators (4, 8) and moves on; what is left of the last

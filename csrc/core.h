@@ -12,5 +12,6 @@
 #include "chain_response.h"
 #include "laws.h"
 #include "measured.h"
+#include "pulleys.h"
 #include "tpr2tps.h"
 #include "row_loops.h"

@@ -33,7 +33,8 @@ INLINE void pose_rates_by_free(int map, const real *state, real out[36])
 
 /* The closure rows at poses and actuator coordinates, limb by limb. */
 INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                        const double *pose, const double *q, const closure_out *out)
+                        ptrdiff_t geometry_stride, const double *pose, const double *q,
+                        const closure_out *out)
 {
     const int m = map_m(map), actuators = machine->actuators;
     limb_numbers limb[PKM_MAX_LIMBS];
@@ -44,7 +45,8 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
         real on_map[6], by_free_of_pose[36];
         FN(limb_sphere) sphere[PKM_MAX_LIMBS];
         const int count = block_rows(first, n, row);
-        if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
+        if (first == 0 || geometry_stride)
+            prepare_limbs(machine, geometry, geometry_stride, row, limb);
         gather_row(pose, 6, 6, row, lane_pose);
         gather_row(q, actuators, actuators, row, lane_q);
         map_from_pose(map, lane_pose, state);
@@ -89,14 +91,17 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
 }
 
 int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                  const double *pose, const double *q, double *residual, double *by_step,
-                  double *by_free, double *by_q, double *on_map, double *pose_by_free)
+                  ptrdiff_t geometry_stride, const double *pose, const double *q, double *residual,
+                  double *by_step, double *by_free, double *by_q, double *on_map,
+                  double *pose_by_free)
 {
     const closure_out out = {residual, by_step, by_free, by_q, on_map, pose_by_free};
     if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
 #define CASE(NAME, name, ...)                                                                       \
-    case MAP_##NAME: closure_map(MAP_##NAME, machine, n, geometry, pose, q, &out); break;
+    case MAP_##NAME:                                                                              \
+        closure_map(MAP_##NAME, machine, n, geometry, geometry_stride, pose, q, &out);            \
+        break;
         EACH_MAP(CASE)
 #undef CASE
     }
@@ -105,8 +110,9 @@ int CALL(closure)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
 
 /* Of each limb at a pose as given: q̃ (NaN out of reach), and the unit vector from its anchor to the
  * platform joint in base and in platform axes. */
-int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry, const double *pose,
-                double *drive, double *on_base, double *on_platform)
+int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                ptrdiff_t geometry_stride, const double *pose, double *drive, double *on_base,
+                double *on_platform)
 {
     if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     const int limbs = machine->limbs;
@@ -115,7 +121,8 @@ int CALL(limbs)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
         ptrdiff_t row[LANES];
         real lane_pose[6], R[9], p[3];
         const int count = block_rows(first, n, row);
-        if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
+        if (first == 0 || geometry_stride)
+            prepare_limbs(machine, geometry, geometry_stride, row, limb);
         gather_row(pose, 6, 6, row, lane_pose);
         FN(pose_frame)(lane_pose, R, p);
         for (int i = 0; i < limbs; i++) {

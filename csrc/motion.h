@@ -41,7 +41,7 @@ INLINE void limb_rates(const pkm_machine *machine, int i, const limb_numbers *li
 
 /* Limbs that share an actuator are averaged, as by the inverse. */
 int CALL(rates)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                const double *motion, double *q1, double *q2)
+                ptrdiff_t geometry_stride, const double *motion, double *q1, double *q2)
 {
     if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     const int actuators = machine->actuators;
@@ -50,7 +50,8 @@ int CALL(rates)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
         ptrdiff_t row[LANES];
         real T[3][12], rate[PKM_MAX_LIMBS], bend[PKM_MAX_LIMBS];
         const int count = block_rows(first, n, row);
-        if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
+        if (first == 0 || geometry_stride)
+            prepare_limbs(machine, geometry, geometry_stride, row, limb);
         for (int k = 0; k < 3; k++) gather_row(motion + 16 * k, 48, 12, row, T[k]);
         for (int a = 0; a < actuators; a++) rate[a] = bend[a] = fill(0.0);
         for (int i = 0; i < machine->limbs; i++) {
@@ -186,8 +187,8 @@ INLINE void motion_at(int map, const pkm_machine *machine, const limb_numbers *l
 }
 
 INLINE void motion_map(int map, const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                       const double *pose, const double *q, const double *q1, const double *q2,
-                       double *motion, double *pose_rates)
+                       ptrdiff_t geometry_stride, const double *pose, const double *q,
+                       const double *q1, const double *q2, double *motion, double *pose_rates)
 {
     const int actuators = machine->actuators;
     limb_numbers limb[PKM_MAX_LIMBS];
@@ -195,7 +196,8 @@ INLINE void motion_map(int map, const pkm_machine *machine, ptrdiff_t n, const d
         ptrdiff_t row[LANES];
         real lane_pose[6], lane_q[3][PKM_MAX_LIMBS], T[3][12], rates[12];
         const int count = block_rows(first, n, row);
-        if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
+        if (first == 0 || geometry_stride)
+            prepare_limbs(machine, geometry, geometry_stride, row, limb);
         gather_row(pose, 6, 6, row, lane_pose);
         gather_row(q, actuators, actuators, row, lane_q[0]);
         gather_row(q1, actuators, actuators, row, lane_q[1]);
@@ -211,14 +213,15 @@ INLINE void motion_map(int map, const pkm_machine *machine, ptrdiff_t n, const d
 }
 
 int CALL(motion)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                 const double *pose, const double *q, const double *q1, const double *q2,
-                 double *motion, double *pose_rates)
+                 ptrdiff_t geometry_stride, const double *pose, const double *q,
+                 const double *q1, const double *q2, double *motion, double *pose_rates)
 {
     if (!pkm_prepared(machine)) return PKM_BAD_MACHINE;
     switch (machine->map) {
 #define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME:                                                                              \
-        motion_map(MAP_##NAME, machine, n, geometry, pose, q, q1, q2, motion, pose_rates);        \
+        motion_map(MAP_##NAME, machine, n, geometry, geometry_stride, pose, q, q1, q2, motion,    \
+                   pose_rates);                                                                   \
         break;
         EACH_MAP(CASE)
 #undef CASE

@@ -35,8 +35,8 @@ INLINE real actuator_row(int map, const pkm_machine *machine, int i, const limb_
 }
 
 INLINE void readings_map(int map, const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                         const double *pose, const double *q, const int32_t *column, int columns,
-                         const readings_out *out)
+                         ptrdiff_t geometry_stride, const double *pose, const double *q,
+                         const int32_t *column, int columns, const readings_out *out)
 {
     const int m = map_m(map), actuators = machine->actuators, rows = pkm_closure_count(machine);
     limb_numbers limb[PKM_MAX_LIMBS];
@@ -45,7 +45,8 @@ INLINE void readings_map(int map, const pkm_machine *machine, ptrdiff_t n, const
         real lane_pose[6], lane_q[PKM_MAX_LIMBS], state[MAX_STATE], R[9], p[3];
         FN(limb_sphere) sphere[PKM_MAX_LIMBS];
         const int count = block_rows(first, n, row);
-        if (first == 0) prepare_limbs(machine, geometry, 0, row, limb);
+        if (first == 0 || geometry_stride)
+            prepare_limbs(machine, geometry, geometry_stride, row, limb);
         gather_row(pose, 6, 6, row, lane_pose);
         gather_row(q, actuators, actuators, row, lane_q);
         map_from_pose(map, lane_pose, state);
@@ -88,8 +89,9 @@ INLINE void readings_map(int map, const pkm_machine *machine, ptrdiff_t n, const
 }
 
 int CALL(readings)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
-                   const double *pose, const double *q, const int32_t *column, int columns,
-                   double *residual, double *by_step, double *by_number)
+                   ptrdiff_t geometry_stride, const double *pose, const double *q,
+                   const int32_t *column, int columns, double *residual, double *by_step,
+                   double *by_number)
 {
     const readings_out out = {residual, by_step, by_number};
     if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
@@ -99,7 +101,8 @@ int CALL(readings)(const pkm_machine *machine, ptrdiff_t n, const double *geomet
     switch (machine->map) {
 #define CASE(NAME, name, ...)                                                                       \
     case MAP_##NAME:                                                                              \
-        readings_map(MAP_##NAME, machine, n, geometry, pose, q, column, columns, &out);           \
+        readings_map(MAP_##NAME, machine, n, geometry, geometry_stride, pose, q, column, columns, \
+                     &out);                                                                       \
         break;
         EACH_MAP(CASE)
 #undef CASE

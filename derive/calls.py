@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import prod
 from typing import Literal
 
-from . import frames, laws, measured, tpr2tps
+from . import frames, laws, measured, pulleys, tpr2tps
 from .emit import Function
 
 Given = Literal["each", "either", "shared"]
@@ -183,6 +183,10 @@ def calls() -> list[Call]:
                 " twice by q", laws.harmonic, "x error by_x bend", ((), (3,), ())),
         formula("law_segment", "corrections of a table, with their derivatives by q and by the two"
                 " numbers beside", laws.segment, "x error by_x", ((), (3,))),
+        formula("pulley", "cables over swivelling pulleys: their lengths, by the end and by radius"
+                " and tilts, twice by the end; and the swivel angles, by the same", pulleys.pulley,
+                "own frame joint length by_joint by_own bend swivel swivel_by_joint swivel_by_own",
+                ((), (3,), (3,), (3, 3), (), (3,), (3,)), {"own": "either", "frame": "either"}),
         formula("tpr2tps_lengths", "2TPR&2TPS: eq. 8", tpr2tps.lengths, "size free lengths",
                 ((4,),), {"size": "shared"}),
         formula("tpr2tps_jacobian", "2TPR&2TPS: eq. 12", tpr2tps.by_free, "size free jacobian",

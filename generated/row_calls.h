@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 77b432096792458a
+ * derivation 57e2750a27144f00
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* a (n, 6) or (6), b (n, 6) or (6) -> out (n, 6): A followed by B. */
@@ -72,6 +72,15 @@ int CALL(law_harmonic)(ptrdiff_t n, const double *x, double *error, double *by_x
 /* x (n, 5) -> error (n), by_x (n, 3): corrections of a table, with their derivatives by q and
  * by the two numbers beside. */
 int CALL(law_segment)(ptrdiff_t n, const double *x, double *error, double *by_x);
+
+/* own (n, 3) or (3), frame (n, 9) or (9), joint (n, 3) -> length (n), by_joint (n, 3), by_own
+ * (n, 3), bend (n, 3, 3), swivel (n), swivel_by_joint (n, 3), swivel_by_own (n, 3): cables over
+ * swivelling pulleys: their lengths, by the end and by radius and tilts, twice by the end; and
+ * the swivel angles, by the same. */
+int CALL(pulley)(ptrdiff_t n, const double *own, ptrdiff_t own_stride, const double *frame,
+                 ptrdiff_t frame_stride, const double *joint, double *length, double *by_joint,
+                 double *by_own, double *bend, double *swivel, double *swivel_by_joint,
+                 double *swivel_by_own);
 
 /* size (6), free (n, 4) -> lengths (n, 4): 2TPR&2TPS: eq. 8. */
 int CALL(tpr2tps_lengths)(ptrdiff_t n, const double *size, const double *free, double *lengths);

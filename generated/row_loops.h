@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 77b432096792458a
+ * derivation 57e2750a27144f00
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
@@ -240,6 +240,33 @@ int CALL(law_segment)(ptrdiff_t n, const double *x, double *error, double *by_x)
         FN(law_segment)(lane_x, lane_error, lane_by_x);
         scatter_row(lane_error, 1, error, 1, row, count);
         scatter_row(lane_by_x, 3, by_x, 3, row, count);
+    }
+    return 0;
+}
+
+int CALL(pulley)(ptrdiff_t n, const double *own, ptrdiff_t own_stride, const double *frame,
+                 ptrdiff_t frame_stride, const double *joint, double *length, double *by_joint,
+                 double *by_own, double *bend, double *swivel, double *swivel_by_joint,
+                 double *swivel_by_own)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_own[3], lane_frame[9], lane_joint[3], lane_length[1], lane_by_joint[3],
+             lane_by_own[3], lane_bend[9], lane_swivel[1], lane_swivel_by_joint[3],
+             lane_swivel_by_own[3];
+        const int count = block_rows(first, n, row);
+        gather_row(own, own_stride, 3, row, lane_own);
+        gather_row(frame, frame_stride, 9, row, lane_frame);
+        gather_row(joint, 3, 3, row, lane_joint);
+        FN(pulley)(lane_own, lane_frame, lane_joint, lane_length, lane_by_joint, lane_by_own,
+                   lane_bend, lane_swivel, lane_swivel_by_joint, lane_swivel_by_own);
+        scatter_row(lane_length, 1, length, 1, row, count);
+        scatter_row(lane_by_joint, 3, by_joint, 3, row, count);
+        scatter_row(lane_by_own, 3, by_own, 3, row, count);
+        scatter_row(lane_bend, 9, bend, 9, row, count);
+        scatter_row(lane_swivel, 1, swivel, 1, row, count);
+        scatter_row(lane_swivel_by_joint, 3, swivel_by_joint, 3, row, count);
+        scatter_row(lane_swivel_by_own, 3, swivel_by_own, 3, row, count);
     }
     return 0;
 }

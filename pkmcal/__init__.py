@@ -23,12 +23,14 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
     from pkmcal.calibration.datum import Datum as Datum
     from pkmcal.calibration.distances import Distances as Distances
+    from pkmcal.calibration.drift import Drift as Drift
     from pkmcal.calibration.identification import Identification as Identification
     from pkmcal.calibration.identify import identify as identify
     from pkmcal.calibration.law_tests import LawTest as LawTest
     from pkmcal.calibration.moved import Moved as Moved
     from pkmcal.calibration.plan_poses import Plan as Plan
     from pkmcal.calibration.plan_poses import plan_poses as plan_poses
+    from pkmcal.calibration.slack import SlackCable as SlackCable
     from pkmcal.calibration.verdict import Verdict as Verdict
     from pkmcal.checks.check_geometry import GeometryCheck as GeometryCheck
     from pkmcal.checks.check_geometry import check_geometry as check_geometry
@@ -65,6 +67,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.kinematics.limb_residual import LimbResidual as LimbResidual
     from pkmcal.kinematics.limits import Feasibility as Feasibility
     from pkmcal.kinematics.robot import Robot as Robot
+    from pkmcal.kinematics.tensions import Tensions as Tensions
+    from pkmcal.kinematics.tensions import tensions as tensions
     from pkmcal.kinematics.workspace import Workspace as Workspace
     from pkmcal.kinematics.workspace import sample_poses as sample_poses
     from pkmcal.kinematics.workspace import workspace as workspace
@@ -92,11 +96,13 @@ _HOMES = {
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
     "calibration.datum": ("Datum",),
     "calibration.distances": ("Distances",),
+    "calibration.drift": ("Drift",),
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),
     "calibration.law_tests": ("LawTest",),
     "calibration.moved": ("Moved",),
     "calibration.plan_poses": ("Plan", "plan_poses"),
+    "calibration.slack": ("SlackCable",),
     "calibration.verdict": ("Verdict",),
     "checks.check_geometry": ("GeometryCheck", "check_geometry"),
     "checks.finding": ("Finding",),
@@ -123,6 +129,7 @@ _HOMES = {
     "kinematics.limb_residual": ("LimbResidual",),
     "kinematics.limits": ("Feasibility",),
     "kinematics.robot": ("Robot",),
+    "kinematics.tensions": ("Tensions", "tensions"),
     "kinematics.workspace": ("Workspace", "sample_poses", "workspace"),
     "loading": ("load", "machines"),
     "measurements.circular_test": ("CircularTest", "circular_test"),

@@ -3,6 +3,7 @@
 from pkmcal.controllers.arm_dh import dh, universal_robots
 from pkmcal.controllers.c_header import c_header
 from pkmcal.controllers.delta_gcode import marlin, reprap
+from pkmcal.controllers.fmu import fmu
 from pkmcal.controllers.hangprinter import hangprinter
 from pkmcal.controllers.import_printer import Printer
 from pkmcal.controllers.klipper import klipper
@@ -10,6 +11,7 @@ from pkmcal.controllers.linuxcnc import linuxcnc
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.maslow import maslow
 from pkmcal.controllers.mjcf import mjcf
+from pkmcal.controllers.sdf import sdf
 from pkmcal.controllers.urdf import urdf
 
 __all__ = [
@@ -17,6 +19,7 @@ __all__ = [
     "Printer",
     "c_header",
     "dh",
+    "fmu",
     "hangprinter",
     "klipper",
     "linuxcnc",
@@ -24,6 +27,7 @@ __all__ = [
     "maslow",
     "mjcf",
     "reprap",
+    "sdf",
     "universal_robots",
     "urdf",
 ]

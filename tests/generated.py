@@ -13,6 +13,7 @@ import numpy as np
 
 import pkmcal as pk
 
+from .driven import content, parsed
 from .robots import made
 from .twin import rotation
 
@@ -63,6 +64,29 @@ def poses(kind: str, robot: pk.Robot, count: int, rng: np.random.Generator) -> n
         off = 10.0 ** -rng.uniform(1, 18, near.sum())
         at[near, 4] = robot.own_home[4] + rng.choice([-1, 1], near.sum()) * off
     return at
+
+
+def written_in(robot: pk.Robot, turn: np.ndarray, shift: np.ndarray) -> pk.Robot:
+    """The same machine described in a frame turned (3, 3) and shifted; its base frame undoes it."""
+    data = content(robot)
+    for limb in data["limb"]:
+        limb["base"] = (turn @ limb["base"] + shift).tolist()
+        for axis in {"slider", "axis", "zero", "normal"} & set(limb):
+            limb[axis] = (turn @ limb[axis]).tolist()
+    own = np.eye(4)
+    own[:3, :3], own[:3, 3] = turn, shift
+    frames = data.get("frames", {})
+    base, home = (
+        pk.screw.from_pose([place.get(name, 0.0) for name in COORDINATES])
+        for place in (frames.get("base", {}), data["pose"]["home"])
+    )
+
+    def stated(motion: np.ndarray) -> dict[str, float]:
+        return dict(zip(COORDINATES, pk.screw.to_pose(motion).tolist(), strict=True))
+
+    data["frames"] = frames | {"base": stated(base @ np.linalg.inv(own))}
+    data["pose"]["home"] = stated(own @ home)
+    return parsed(data)
 
 
 def references(robot: pk.Robot) -> np.ndarray:

@@ -62,6 +62,9 @@ def judged(kind: str, seed: int, rows: int) -> Counter[str]:
         off[:, 3:] = (off[:, 3:] + np.pi) % (2 * np.pi) - np.pi
         not_kept = np.abs(off)[known][:, kept].max(axis=1, initial=0.0) > 1e-6
         found["wrong: not kept"] += int(not_kept.sum())
+        # no limb is on its other branch: at the pose its inverse is what was commanded
+        other = robot.violation(at[known]) > 1e-3
+        found["wrong: working mode"] += int(other.sum())
         own = robot.frames.inward(at)
     else:
         q = robot.inverse(out(own))

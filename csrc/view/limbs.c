@@ -48,7 +48,7 @@ EXPORT int forward(void)
 EXPORT int closure(void)
 {
     const closure_out out = {phi, by_step, by_free, by_q, on_map, pose_by_free};
-    closure_map(machine->map, machine, 1, geometry, pose, q, &out);
+    closure_map(machine->map, machine, 1, geometry, 0, pose, q, &out);
     return 0;
 }
 
@@ -56,7 +56,7 @@ EXPORT int closure(void)
 EXPORT int places(void)
 {
     CALL(spheres)(machine, 1, geometry, q, sphere);
-    return CALL(limbs)(machine, 1, geometry, pose, drive, on_base, on_platform);
+    return CALL(limbs)(machine, 1, geometry, 0, pose, drive, on_base, on_platform);
 }
 
 /* a, b -> found: A followed by B */

@@ -211,9 +211,9 @@ class Replicate:
         centre[stated] += random.standard_normal(int(stated.sum())) * prior[stated]
         signs = np.where(random.integers(0, 2, int(self._pose.max()) + 1), 1.0, -1.0)
         left = signs[self._pose] * self._left
-        bent = equations.parameters.bends(at.theta)
-        bent = bent + random.standard_normal(len(bent))
-        return self._solved(*equations.redrawn(at, self._estimate.state.noise, left, centre, bent))
+        drawn, _ = equations.parameters.off_functions(at.theta)
+        drawn = drawn + random.standard_normal(len(drawn))
+        return self._solved(*equations.redrawn(at, self._estimate.state.noise, left, centre, drawn))
 
     def _solved(self, equations: Equations, at: Evaluation) -> FloatArray:
         state = self._estimate.state

@@ -75,6 +75,7 @@ class Closures(Protocol):
 
     unknowns: int
     equations: int
+    actuators: tuple[int, ...]
     sigma: FloatArray | None
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
@@ -108,6 +109,7 @@ class Commanded:
     """Poses that follow from what the actuators read."""
 
     unknowns = equations = 0
+    actuators: tuple[int, ...] = ()
 
     def __init__(self, read: FloatArray) -> None:
         self.read = read
@@ -167,6 +169,7 @@ class NoisyActuators:
         self._white = 1.0 / self.sigma
         self._shift: FloatArray | float = 0.0
         self.unknowns = self.equations = len(self._free)
+        self.actuators: tuple[int, ...] = tuple(self._free.tolist())
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
         """Solve the forward kinematics where the actuators are."""
@@ -231,23 +234,24 @@ class FreePoses:
         roles = pose_steps.row_roles(robot)
         exact = np.flatnonzero(~sigma.any(axis=0))
         rows = np.setdiff1d(np.arange(len(roles.read)), exact)  # the first are of the actuators
-        self._read, self._actuator = roles.read[rows], [roles.actuator[row] for row in rows]
+        self._read = roles.read[rows]
+        self.actuators: tuple[int, ...] = tuple(roles.actuator[row] for row in rows)
         self._held = np.concatenate([roles.held, roles.read[exact]])
         self._mixed = not np.array_equal(self._read, np.eye(robot.machine.rows))
         self._arcs = 1.0 / mm_per_unit(pose_steps.step_units(robot), robot.length)
         self.unknowns = robot.machine.m - len(self._held)
         self.equations = len(rows)
-        if self.unknowns < 1 or not sigma[:, np.setdiff1d(self._actuator, -1)].all():
+        if self.unknowns < 1 or not sigma[:, np.setdiff1d(self.actuators, -1)].all():
             raise ArgumentError(
                 f"measurements: {robot.name} has more actuators than ways to move, which cannot"
                 " be met without noise: actuator_sigma must be positive, or None; 0 at all rows for"
                 f" at most {robot.machine.m - len(roles.held) - 1} actuators that are never wrong"
             )
         self.sigma: FloatArray | None = sigma
-        if self._actuator != list(range(sigma.shape[1])):
+        if self.actuators != tuple(range(sigma.shape[1])):
             # passive rows that give way are as sure as the file weighs them against the actuators
             common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
-            each = [sigma[:, a] if a >= 0 else common for a in self._actuator]
+            each = [sigma[:, a] if a >= 0 else common for a in self.actuators]
             self.sigma = np.stack(each, axis=1)
         self._white = 1.0 / self.sigma
         self._shift: FloatArray | float = 0.0
@@ -284,7 +288,7 @@ class FreePoses:
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units; the other rows are in mm."""
         of_actuators = mm_per_unit(robot.actuator_units, robot.length)
-        return np.array([of_actuators[a] if a >= 0 else 1.0 for a in self._actuator])
+        return np.array([of_actuators[a] if a >= 0 else 1.0 for a in self.actuators])
 
     def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
         """Twists by steps of the pose."""

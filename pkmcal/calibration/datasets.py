@@ -10,6 +10,7 @@ import numpy as np
 
 from pkmcal.arguments import instance, word
 from pkmcal.calibration.closures import has_equations
+from pkmcal.calibration.expansion import Expansion
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.parameters import KNOWN, Known
 from pkmcal.calibration.sessions import in_sessions, set_names
@@ -27,6 +28,7 @@ def as_fit_data(
     measurements: Measurements | Sequence[Measurements],
     said: Said,
     sessions: bool,
+    expansion: Expansion | None = None,
 ) -> list[FitData]:
     """The sets of measurements with what is unknown of each.
 
@@ -40,6 +42,8 @@ def as_fit_data(
         What `identify` was told of "frame", "target" and "attachment".
     sessions : bool
         Whether every row is to have a session.
+    expansion : Expansion, optional
+        How the machine grows with its temperature.
     """
     sets = list(measurements) if isinstance(measurements, Iterable) else [measurements]
     for measured in sets:
@@ -53,7 +57,9 @@ def as_fit_data(
     for measured, flags, name in zip(sets, unknown, set_names(sets), strict=True):
         of_frame, of_target, of_attachment = flags
         rows = np.arange(first, first + len(measured))
-        datasets.append(FitData(measured, rows, of_frame, of_target, of_attachment, name))
+        datasets.append(
+            FitData(measured, rows, of_frame, of_target, of_attachment, name, expansion=expansion)
+        )
         first += len(measured)
     known = [data.measured.actuator_sigma is not None for data in datasets]
     if any(known) and not all(known):

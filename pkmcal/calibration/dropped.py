@@ -76,7 +76,7 @@ def outlying(estimator: Estimator, estimate: Estimate) -> BoolArray:
         estimate.jacobian @ fitted,
         equations.components,
         estimate.weights,
-        estimator.prior @ fitted,
+        estimate.prior @ fitted,
     )
     return np.isin(equations.unit_of_row, odd)
 

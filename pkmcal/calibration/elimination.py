@@ -139,6 +139,21 @@ class Blocks:
                 _reflect(mirror, rest)
             yield each.equations, rest
 
+    def redundancy(
+        self, by_unknown: FloatArray, weights: FloatArray, taken: FloatArray
+    ) -> FloatArray:
+        """Degrees of freedom (E,) of the original equations, as `by_groups` adds them up."""
+        found = np.zeros(len(self.pose_of))
+        unit = first = 0
+        for equations, rest in self._bases(by_unknown):
+            count, _, left = rest.shape
+            last = first + count * left
+            leverage = rest @ taken[first:last].reshape(count, left, -1)
+            weight = weights[unit : unit + count, None]
+            found[equations] = weight * (rest**2).sum(axis=2) - (leverage**2).sum(axis=2)
+            unit, first = unit + count, last
+        return found
+
     def by_groups(
         self,
         by_unknown: FloatArray,

@@ -15,6 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
+from pkmcal.calibration import joint_angles
 from pkmcal.calibration.closures import RowStates
 from pkmcal.calibration.elimination import Blocks, Shares
 from pkmcal.calibration.evaluation import Evaluation
@@ -88,14 +89,22 @@ class Equations(Readings):
         machines = range(len(self.machine_columns))
         self._own = tuple(np.flatnonzero(self.machine_of_pose == s) for s in machines)
         closures = closures_of_sessions(parameters.robot, self._own, self.actuators, sigma)
+        self._slack = np.zeros((len(guess), closures.equations), dtype=bool)
+        self._if_taut = self.actuators
         self._take(closures, sigma is None)
 
     def _take(self, closures: SessionClosures, estimated: bool) -> None:
         """Build the units for these closures; `estimated`: their deviations are not known."""
         self.closures = closures
         if closures.unknowns:
+            if any(growth is not None for growth in self._growth):
+                raise ArgumentError(
+                    "expansion: needs poses that follow from the actuators: no actuator_sigma, and"
+                    " no surplus actuators; found others"
+                )
             for m in self.sets:
-                if m.kind in ("between", "angle"):
+                follows = m.joint and joint_angles.follows_pose(self.parameters.robot, m.joint)
+                if m.kind in ("between", "angle") and not follows:
                     raise ArgumentError(
                         f"measurements: readings of kind {m.kind!r} need poses that follow from the"
                         " actuators: no actuator_sigma, and no surplus actuators"
@@ -111,7 +120,7 @@ class Equations(Readings):
             return
         self.unstated = np.append(self._no_sigma, estimated)
         poses = len(self.actuators)
-        own = np.repeat(np.arange(poses), closures.equations)
+        own = np.nonzero(~self._slack)[0]
         pose_of_equation = np.concatenate([own, np.repeat(pose_of_row, of_row)])
         self._group_of_equation = np.concatenate([
             np.full(len(own), len(self.sets)),
@@ -130,7 +139,8 @@ class Equations(Readings):
         if not self.closures.unknowns:
             return self
         other = copy.copy(self)
-        other._take(commanded_closures(self._own, self.actuators), estimated=False)
+        other._slack = self._slack[:, :0]
+        other._take(commanded_closures(self._own, self._if_taut), estimated=False)
         return other
 
     def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
@@ -187,7 +197,7 @@ class Equations(Readings):
         off, by_unknown = self.closures.residual(machines, states)
         off /= noise[-1]
         by_unknown /= noise[-1]
-        equation, by_unknown = off.reshape(-1), by_unknown.reshape(-1, self.closures.unknowns)
+        equation, by_unknown = self._told(off), self._told(by_unknown)
         if not self.count.any():
             return equation, by_unknown
         twists = self.closures.twists(machines, states)
@@ -230,10 +240,55 @@ class Equations(Readings):
             evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
         )
         of_closures /= noise[-1]
-        by_all = of_closures.reshape(-1, len(p))
+        by_all = self._told(of_closures)
         if len(readings):
             by_all = np.concatenate([by_all, readings])
         return self._blocks.left(by_unknown, by_all)
+
+    @property
+    def slack_cells(self) -> list[tuple[int, int]]:
+        """Closures that are left out, of slack cables: their poses and numbers."""
+        pose, closure = np.nonzero(self._slack)
+        return list(zip(pose.tolist(), closure.tolist(), strict=True))
+
+    def _told(self, part: FloatArray) -> FloatArray:
+        """Equations of closures (K, equations, ...) that count, one after another."""
+        whole = part.reshape(-1, *part.shape[2:])
+        return whole[~self._slack.reshape(-1)] if self._slack.any() else whole
+
+    def closure_residuals(
+        self, evaluation: Evaluation, noise: FloatArray, weights: FloatArray, taken: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Closures read less needed (K, equations), whitened, and their degrees of freedom.
+
+        None of those that do not count. Arguments are those of `by_groups`.
+        """
+        off, by_unknown = self._at(evaluation, noise)
+        own = int((~self._slack).sum())
+        longer, freedom = np.zeros((2, *self._slack.shape))
+        longer[~self._slack] = -off[:own]
+        freedom[~self._slack] = self._blocks.redundancy(by_unknown, weights, taken)[:own]
+        if self._slack.any():
+            whole, _ = self.closures.residual(evaluation.machines, evaluation.states)
+            longer[self._slack] = -whole[self._slack] / noise[-1]
+        return longer, freedom
+
+    def without_closures(
+        self, cells: Sequence[tuple[int, int]], evaluation: Evaluation
+    ) -> Equations:
+        """The same without some closures, by pose and number: of cables that are slack.
+
+        Where poses are to follow from the actuators these read what they would at `evaluation`.
+        """
+        other = copy.copy(self)
+        other._slack = np.zeros_like(self._slack)
+        other._slack[tuple(np.array(cells, dtype=np.intp).reshape(-1, 2).T)] = True
+        needed = self.closures_off(evaluation) / self.closures.lengths(evaluation.machines)
+        other._if_taut = self.actuators.copy()
+        for pose, cell in zip(*np.nonzero(other._slack), strict=True):
+            other._if_taut[pose, self.closures.actuators[cell]] += needed[pose, cell]
+        other._take(self.closures, bool(self.unstated[-1]))
+        return other
 
     def start_from(self, rows: IntArray, poses: FloatArray) -> None:
         """Start the forward kinematics of some distinct rows of actuators from poses (s, 6)."""
@@ -247,7 +302,7 @@ class Equations(Readings):
         noise: FloatArray,
         left: FloatArray,
         prior_centre: FloatArray,
-        bent: FloatArray | None = None,
+        drawn: FloatArray | None = None,
     ) -> tuple[Equations, Evaluation]:
         """The same with other readings, and evaluated where these have been drawn.
 
@@ -259,7 +314,7 @@ class Equations(Readings):
             See `whitened`.
         left : ndarray (M,)
             What its readings leave there, as `residual`.
-        bent : ndarray (s,), optional
+        drawn : ndarray (s,), optional
             That of `Parameters`.
         prior_centre : ndarray (n,)
             Another centre of the prior.
@@ -268,16 +323,16 @@ class Equations(Readings):
         if unknowns:
             off, by_unknown = self._at(at, noise)
             errors = self._blocks.spread(by_unknown, left)
-            own = len(self.actuators) * self.closures.equations
-            change = -noise[-1] * (errors + off)[:own]
-            other.closures = self.closures.shifted(change.reshape(len(self.actuators), -1))
+            change, own = np.zeros(self._slack.shape), int((~self._slack).sum())
+            change[~self._slack] = -noise[-1] * (errors + off)[:own]
+            other.closures = self.closures.shifted(change)
             errors = errors[own:]
         residuals = tuple(self.unwhiten(errors, noise[: len(self.sets)]))
         other.sets = tuple(
             replace(m, values=corrected(m.kind, seen.values, residual).reshape(m.values.shape))
             for m, seen, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
-        other.parameters = replace(self.parameters, start=prior_centre, bent=bent)
+        other.parameters = replace(self.parameters, start=prior_centre, drawn=drawn)
         other.warm_start(at)
         if unknowns:
             return other, other.at(at.theta, noise)
@@ -408,14 +463,17 @@ class Equations(Readings):
 
     def closure_rms(self, evaluation: Evaluation) -> float:
         """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
-        return rms(self._closures_off(evaluation)[evaluation.status == 0])
+        found = self.closures_off(evaluation)[evaluation.status == 0]
+        return rms(found[~self._slack[evaluation.status == 0]])
 
     def worst_closures(self, evaluation: Evaluation) -> FloatArray:
         """The largest of them at each pose (K,); NaN where they hold."""
-        off = np.abs(self._closures_off(evaluation))
+        off = np.abs(self.closures_off(evaluation))
+        off[self._slack] = 0.0
         return off.max(axis=1) if off.shape[1] else np.full(len(off), np.nan)
 
-    def _closures_off(self, evaluation: Evaluation) -> FloatArray:
+    def closures_off(self, evaluation: Evaluation) -> FloatArray:
+        """What actuators would read at the poses less what they read (K, equations), mm."""
         sigma, machines = self.closures.sigma, evaluation.machines
         off, _ = self.closures.residual(machines, evaluation.states)
         return off if sigma is None else off * sigma * self.closures.lengths(machines)

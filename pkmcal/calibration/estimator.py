@@ -76,6 +76,8 @@ class Estimate:
         Scaled and whitened.
     weights : ndarray (U,)
         Of each unit (`Equations.components`); 1 unless the loss is robust.
+    prior : ndarray (p, n)
+        A row for each prior, scaled, in units of its deviation.
     covariance : ndarray (n, n)
         Scaled; nothing along combinations that are not determined.
     shares : Shares
@@ -87,6 +89,7 @@ class Estimate:
     residual: FloatArray
     jacobian: FloatArray
     weights: FloatArray
+    prior: FloatArray
     covariance: FloatArray
     shares: Shares
 
@@ -112,7 +115,8 @@ class Estimator:
     def __init__(self, equations: Equations, start: Evaluation, loss: LossName) -> None:
         self.equations, self.start, self.loss = equations, start, loss
         self.search = Search(equations, start)
-        self.scale, self.prior = self.search.scale, self.search.prior
+        self.scale = self.search.scale
+        self._priors = len(self.search.prior(start.theta))
         self.unstated = equations.unstated
         self._at_first: FloatArray | None = None
         self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
@@ -174,7 +178,7 @@ class Estimator:
         Noise and prior could else excuse each other: much of one leaves little of the other.
         """
         ones = np.ones(len(self.unstated))
-        if not len(self.prior) or self.loss != "linear":
+        if not self._priors or self.loss != "linear":
             return ones
         jacobian = self.search.jacobian(self.start, ones)
         residual = self.equations.residual(self.start, ones)
@@ -228,23 +232,24 @@ class Estimator:
         noise_known = evaluation is not None or not self.unstated.any()
         worst = size if noise_known else np.inf
         if self._first is None or (noise != self._first[0]).any():
-            self._first = noise, self._decomposed(self.search.jacobian(self.start, noise))
+            self._first = noise, self._decomposed(self.start, noise)
         _, first = self._first
-        now = (
-            (None, None)
-            if evaluation is None
-            else self._decomposed(self.search.jacobian(evaluation, noise))
-        )
+        now = (None, None) if evaluation is None else self._decomposed(evaluation, noise)
         measured = directions(first[0], now[0], size)
         determined = directions(first[1], now[1], size)
         return IterationState(
             noise, loss, measured, determined, directions(first[1], now[1], size, worst)
         )
 
-    def _decomposed(self, jacobian: FloatArray) -> tuple[Decomposed, Decomposed]:
+    def _decomposed(
+        self, evaluation: Evaluation, noise: FloatArray
+    ) -> tuple[Decomposed, Decomposed]:
         """Decompose without and with the prior."""
+        jacobian = self.search.jacobian(evaluation, noise)
         data = decompose(jacobian)
-        return data, decompose(np.vstack([jacobian, self.prior])) if len(self.prior) else data
+        if not self._priors:
+            return data, data
+        return data, decompose(np.vstack([jacobian, self.search.prior(evaluation.theta)]))
 
     def _revised(self, estimate: Estimate) -> IterationState:
         """Estimate unstated noise and limits of the loss, and split the directions anew."""
@@ -262,7 +267,7 @@ class Estimator:
         if self.loss != "linear":
             return self._scored(estimate.shares, self._medians(estimate.residual))
         alone = None
-        if len(self.prior):
+        if self._priors:
             alone = self._alone(
                 estimate.evaluation, estimate.state.noise, estimate.jacobian, estimate.residual
             )
@@ -305,7 +310,7 @@ class Estimator:
     def _settled(self, old: IterationState, new: IterationState) -> bool:
         if old.fitted.rank != new.fitted.rank:
             return False
-        if self.loss == "linear" and not len(self.prior) and len(self.unstated) == 1:
+        if self.loss == "linear" and not self._priors and len(self.unstated) == 1:
             return True  # the noise does not move the solution
         if not np.allclose(old.noise, new.noise, rtol=1e-3, atol=_LEAST_NOISE):
             return False
@@ -334,11 +339,13 @@ class Estimator:
         weights = state.loss.weights(residual)
         root = np.sqrt(np.repeat(weights, self.equations.components))
         weighted = root[:, None] * jacobian
-        basis = state.determined.identifiable
+        basis, prior = state.determined.identifiable, self.search.prior(evaluation.theta)
         _, singular, rows = np.linalg.svd(
-            triangle(np.vstack([weighted, self.prior])) @ basis, full_matrices=False
+            triangle(np.vstack([weighted, prior])) @ basis, full_matrices=False
         )
         half = basis @ (rows.T / singular)
         taken = weighted @ half[:, : state.fitted.rank]
         shares = self.equations.by_groups(evaluation, state.noise, weights, root * residual, taken)
-        return Estimate(evaluation, state, residual, jacobian, weights, half @ half.T, shares)
+        return Estimate(
+            evaluation, state, residual, jacobian, weights, prior, half @ half.T, shares
+        )

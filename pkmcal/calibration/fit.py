@@ -14,6 +14,8 @@ from pkmcal.calibration.identifiability import decompose
 from pkmcal.calibration.parameters import Parameters
 from pkmcal.calibration.uncertainty import Uncertainty
 
+_LEAST = 1e-6  # share of a combination that is more than rounding
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -57,5 +59,14 @@ class Fit:
 
         `Estimate.state` has them at the nominal machine; they turn with its errors.
         """
-        _, basis = decompose(np.vstack([self.estimate.jacobian, self.parameters.prior_rows]))
+        _, basis = decompose(np.vstack([self.estimate.jacobian, self.estimate.prior]))
         return basis[:, self.estimate.state.determined.rank :]
+
+    def machine_combinations(self) -> int:
+        """How many combinations are determined that frames and points found along do not explain.
+
+        Of the measurements alone, whatever a prior says.
+        """
+        basis = self.estimate.state.measured.identifiable
+        along = np.linalg.svd(basis[self.parameters.geometry.stop :], compute_uv=False)
+        return int(basis.shape[1] - np.count_nonzero(along > _LEAST))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, Unit
+from pkmcal.calibration.expansion import Expansion
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
@@ -99,6 +100,8 @@ class FitData:
         Of the set, where it has a frame or points of its own.
     starts : mapping of (str, str) to Start
         Of all that is always found along, by role and name.
+    expansion : Expansion or None
+        How the machine grows with its temperature.
     """
 
     measured: Measurements
@@ -108,6 +111,7 @@ class FitData:
     unknown_attachment: bool = False
     set_name: str = ""
     starts: Mapping[tuple[str, str], Start] = field(default_factory=dict)
+    expansion: Expansion | None = None
 
     def select(self, chosen: IntArray | BoolArray) -> FitData:
         """Some of the rows."""

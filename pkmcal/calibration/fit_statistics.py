@@ -108,7 +108,7 @@ def parameter_table(
     along = rates @ estimate.state.determined.unidentifiable
     unknown = np.linalg.norm(along, axis=1) > _INVOLVED * chosen.scale
     unknown |= uncertainty.freedom <= 0  # nothing shows the deviation
-    after, rank = np.vstack([estimate.jacobian, estimator.prior]), estimate.state.determined.rank
+    after, rank = np.vstack([estimate.jacobian, estimate.prior]), estimate.state.determined.rank
     held = rates @ held_errors(after, rank, chosen.robot.length)
     shown = uncertainty.matrix + held @ held.T
     shown[unknown] = shown[:, unknown] = np.nan
@@ -150,6 +150,9 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
     named_freedoms = Gauges((), measured.unidentifiable)
     if equations.closures.unknowns:
         named_freedoms = gauges(equations.parameters, measured.unidentifiable)
+        if len(estimate.prior):  # a tape on two anchors ends the scale, say
+            left_open = gauges(equations.parameters, estimate.state.determined.unidentifiable)
+            named_freedoms = replace(named_freedoms, texts=left_open.texts)
     if mirror_fits(equations, estimate.evaluation, estimate.state.noise):
         named_freedoms = replace(named_freedoms, texts=(*named_freedoms.texts, MIRROR))
     open_ones = sparse_basis(named_freedoms.rest, names).T
@@ -223,7 +226,7 @@ def tested_prior(estimator: Estimator, estimate: Estimate) -> PriorTest | None:
     A robust fit's prior is not tested.
     """
     chosen = estimator.equations.parameters
-    rows = estimator.prior
+    rows = estimate.prior
     if not len(rows) or np.linalg.matrix_rank(rows) < len(rows) or estimator.loss != "linear":
         return None
     # parameters as what the prior says of them, in its deviations, and the rest

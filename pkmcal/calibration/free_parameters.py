@@ -14,6 +14,7 @@ from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.fit_data import PLACE, FitData, Numbers
 from pkmcal.calibration.parameters import Asked, Bounds, Parameters, Prior
+from pkmcal.calibration.prior_functions import is_function, prior_functions
 from pkmcal.calibration.sessions import Scope, label, matches, scopes
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import Calibratable
@@ -82,7 +83,13 @@ def parameters(
         robot=robot,
         asked=asked,
     )
-    return replace(made, origin={first: np.zeros(6) for first in made.motions})
+    made = replace(made, origin={first: np.zeros(6) for first in made.motions})
+    if not isinstance(asked.prior, Mapping):
+        return made
+    start = dict(zip(names, zip(values.tolist(), units, strict=True), strict=True))
+    columns = {session: made.geometry_of(session) for session in made.sessions or ("",)}
+    given = (asked.prior, robot, start, row.places, columns)
+    return replace(made, functions=prior_functions(*given, strict=like is None))
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,6 +219,8 @@ def _prior(
         return sigma
     if isinstance(prior, Mapping):
         for pattern, value in prior.items():
+            if is_function(pattern, value):
+                continue
             hits = _matching("prior", pattern, names, strict)
             sigma[hits] = _positive(f"prior of {pattern}", value)
     else:

@@ -143,7 +143,7 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
         return False
     if any(name.startswith("base") and "@" in name for name in parameters.names):
         return False  # anchors of each session: not looked at
-    cost = float((equations.residual(evaluation, noise) ** 2).sum())
+    cost = _cost(equations, evaluation, noise)
     for k, axis in enumerate(robot.coordinates):
         names = [f"base{i + 1}.{axis}" for i in range(len(robot.slots))]
         own = [parameters.names.index(n) if n in parameters.names else -1 for n in names]
@@ -158,6 +158,11 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
         image = copy.copy(equations)
         image.start_from(np.arange(len(pose)), pose)
         there = image.at(theta, noise)
-        if there.ok and (image.residual(there, noise) ** 2).sum() <= (1.0 + _ALIKE) * cost:
+        if there.ok and _cost(image, there, noise) <= (1.0 + _ALIKE) * cost:
             return True
     return False
+
+
+def _cost(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> float:
+    prior = equations.parameters.prior_left(evaluation.theta)
+    return float((equations.residual(evaluation, noise) ** 2).sum() + prior @ prior)

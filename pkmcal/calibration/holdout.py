@@ -18,16 +18,17 @@ from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.labels import Labels, labels
 from pkmcal.calibration.later import Later, OwnNumbers, compared, later
-from pkmcal.calibration.uncertainty import Uncertainty, stated_variances
+from pkmcal.calibration.uncertainty import FEW, Uncertainty, stated_variances
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.statistics.distributions import chi2_tail
+from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.holdout_test import HoldoutTest, Lengths, holdout_test
 from pkmcal.statistics.linear_fit import numbered
 from pkmcal.statistics.noise import Noise, noise
 
 _LOOSE = 1e-6  # share of a number in combinations that its session's rows do not show
 _NOTHING = 1e-6  # share of a variance below which nothing is left of a reading
+_HUGE = 1e300
 _ODD = 0.01  # chance of naming any held-out row that is as far off as expected
 
 
@@ -61,6 +62,11 @@ class HeldOut:
         These parameters, of sessions that were not fitted: value and standard deviation.
     spare : float
         Lengths that are left to compare when these parameters have taken theirs.
+    dropped : tuple of int
+        Rows of other measurements that were left out as outliers; of those that were drawn, see
+        `Identification.dropped`.
+    dropped_names : str
+        The same by lines of files, poses and targets.
     drawn : bool
         Whether they are of the same measurements as the fitted points, drawn at random.
     """
@@ -80,6 +86,8 @@ class HeldOut:
     end: Evaluation | None = None
     own: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     spare: float = float("nan")
+    dropped: tuple[int, ...] = ()
+    dropped_names: str = ""
     drawn: bool = False
 
     @property
@@ -145,12 +153,10 @@ def evaluate(
     off_before, off = equations.distances(before), equations.distances(after)
     good = np.isfinite(off)
     expected = np.bincount(row, points.own + points.by_fit(uncertainty), count)
-    odd = np.array([
-        chi2_tail(k * d**2 / e, k) < _ODD / count if np.isfinite(d) and e > 0 else False
-        for d, e, k in zip(off, expected, np.bincount(row, minlength=count), strict=True)
-    ])  # fmt: skip
     spare = float((1.0 - points.taken[good[row]]).sum()) if good.any() else float("nan")
     usable = uncertainty.known and spare >= LEAST_FREEDOM
+    test = _test(points, named, good[row], uncertainty) if usable else None
+    odd = good & _odd(points, row, count, uncertainty, test)
     return HeldOut(
         rms_before=equations.rms(before),
         rms=equations.rms(after),
@@ -162,7 +168,7 @@ def evaluate(
         odd=tuple(equations.rows[odd].tolist()),
         before=distances(off_before, odd),
         after=distances(off, odd),
-        test=_test(points, named, good[row], uncertainty) if usable else None,
+        test=test,
         later=rows,
         end=after,
         own=_of_own(rows, after, own, uncertainty),
@@ -249,6 +255,37 @@ def _points(
         taken=taken,
         like=np.array(like)[named.set_of[named.length]],
     )
+
+
+def _odd(
+    points: _Points,
+    row: IntArray,
+    count: int,
+    uncertainty: Uncertainty,
+    test: HoldoutTest | None,
+) -> BoolArray:
+    """Which rows (N,) are further off than noise and covariance explain.
+
+    The noise is an estimate itself, as good as that of the fitted rows.
+    """
+    odd = np.zeros(count, dtype=bool)
+    if not uncertainty.known or not len(row):
+        return odd
+    freedom = np.inf if test is None or uncertainty.fit.freedom < FEW else test.freedom[1]
+    own = np.maximum(points.own, _NOTHING * float(np.median(points.own)))
+    order, lengths = np.argsort(row, kind="stable"), np.bincount(row, minlength=count)
+    first = np.cumsum(lengths) - lengths
+    for k in np.unique(lengths[lengths > 0]).tolist():
+        alike = np.flatnonzero(lengths == k)
+        mine = order[first[alike, None] + np.arange(k)]
+        design, residual = points.design[mine], points.residual[mine]
+        variance = design @ uncertainty.by_cluster @ design.transpose(0, 2, 1)
+        variance += np.eye(k) * own[mine][:, :, None]
+        along = np.linalg.solve(variance, residual[:, :, None])[:, :, 0]
+        squares = np.nan_to_num((residual * along).sum(axis=1), posinf=_HUGE)
+        chances = [f_tail(min(each / k, _HUGE), k, freedom) for each in squares.tolist()]
+        odd[alike] = np.array(chances) < _ODD / count
+    return odd
 
 
 def _of_own(

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +15,8 @@ from pkmcal import arguments
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
+from pkmcal.calibration.drift import Drift, drift
+from pkmcal.calibration.expansion import in_words
 from pkmcal.calibration.law_tests import LawTest, law_tests
 from pkmcal.calibration.moved import Moved, moved
 from pkmcal.calibration.parts import Parts
@@ -27,6 +29,9 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.observation import predict
 from pkmcal.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _STRONG = 0.95  # correlation worth a word
 _ALIKE = 9  # decimals to which correlations differ that are not equal
@@ -47,7 +52,7 @@ class Identification(Parts, Result):
         looked for where held-out points contradict the fit.
         """
         robust = robust_check(self.fit) if self.loss == "linear" else None
-        return judge(self, robust, self.moved)
+        return judge(self, robust, self.moved, self.drift)
 
     @cached_property
     def moved(self) -> tuple[Moved, ...]:
@@ -61,6 +66,11 @@ class Identification(Parts, Result):
         return moved(self.fit, later, end)
 
     @cached_property
+    def drift(self) -> Drift | None:
+        """Whether repeated poses moved with time; None where too few were repeated to say."""
+        return drift(self.fit, self.holdout, {*self.outliers, *self.holdout.odd})
+
+    @cached_property
     def law_tests(self) -> tuple[LawTest, ...]:
         """Whether the free numbers of drive laws are needed: an F test of each kind against 0.
 
@@ -68,9 +78,8 @@ class Identification(Parts, Result):
         """
         if isinstance(self.robot, SerialArm):
             return ()
-        prior = np.asarray(self.fit.parameters.prior_rows.any(axis=0))
-        given = (self.robot.geometry, self.table, self.covariance, prior, self.covariance_rule)
-        return law_tests(*given)
+        prior = np.asarray(self.fit.estimate.prior.any(axis=0))
+        return law_tests(self.robot.geometry, self.table, self.fit.uncertainty, prior)
 
     @property
     def loss(self) -> str:
@@ -179,13 +188,18 @@ class Identification(Parts, Result):
         moved = np.linalg.norm(by_geometry @ undetermined[own], axis=(1, 2))
         return np.where(moved < _UNIDENTIFIABLE, deviation, np.inf).reshape(shape)
 
-    def plot(self, path: str | PathLike[str]) -> None:
+    def plot(self, path: str | PathLike[str] | None = None) -> Figure:
         """Draw the residuals by row, over the workspace and as quantiles.
 
         Parameters
         ----------
-        path : str or path
-            A file that ends in ``.png`` or ``.svg``.
+        path : str or path, optional
+            A file that ends in ``.png`` or ``.svg``, to be written.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            The figure, which notebooks show.
 
         Raises
         ------
@@ -194,7 +208,11 @@ class Identification(Parts, Result):
         """
         from pkmcal.report import drawing, residual_figure
 
-        drawing.write(residual_figure.residuals(self), arguments.path("path", path))
+        figure = residual_figure.residuals(self)
+        figure.set_facecolor("white")  # a notebook may be dark, and the texts are
+        if path is not None:
+            drawing.write(figure, arguments.path("path", path))
+        return figure
 
     def report(
         self,
@@ -254,6 +272,8 @@ class Identification(Parts, Result):
         )
         if self.sessions:
             yield summary.sessions(self.sessions)
+        if heat := in_words(self.fit.equations.sets, self.expansion):
+            yield summary.filled("", heat)
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)
         datasets, chosen = self.fit.equations.datasets, self.fit.parameters

@@ -25,6 +25,7 @@ from pkmcal.calibration.dropped import (
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
 from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.expansion import Coefficients, expansion_of
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.fit_statistics import (
@@ -38,6 +39,7 @@ from pkmcal.calibration.fit_statistics import (
 from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.linearity import beyond_linear
 from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.mode_slips import in_other_modes
 from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior
@@ -50,8 +52,10 @@ from pkmcal.calibration.plausibility import (
     likely_unit_errors,
     shrunk,
 )
-from pkmcal.calibration.row_errors import likely_row_errors
+from pkmcal.calibration.row_errors import likely_mistakes
 from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.set_noise import unlike_noise
+from pkmcal.calibration.slack import SLACK, Cell, Slack, said_slack, slack_cables, taut
 from pkmcal.calibration.starts import known_distances
 from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
@@ -81,6 +85,8 @@ def identify(
     fix: str | Sequence[str] = (),
     datum: DatumRule = "none",
     drop: Drop = None,
+    expansion: Coefficients = None,
+    slack: Slack = "keep",
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -96,11 +102,13 @@ def identify(
         Of any kinds.
     free : str or sequence of str, optional
         Names of numbers to find, or wildcards (``"base*.x"``). None: the robot's own default set.
-    prior : float or mapping of str to float, optional
+    prior : float or mapping of str to float or (float, float), optional
         Standard deviation around the present value. A number, in mm, holds for all free numbers
         of the geometry (an angle as its arc at the machine's characteristic length); a mapping
-        gives it by name or wildcard in mm and rad, later entries before earlier ones. None: no
-        prior; unidentifiable combinations then move as little as possible.
+        gives it by name or wildcard in mm and rad, later entries before earlier ones. A key may
+        also be a function of numbers: a sum, ``"gain1 - gain2"``, or the length of a sum of points,
+        ``"|base1 - base2|"``; a pair is a value that was measured otherwise, and its deviation.
+        None: no prior; unidentifiable combinations then move as little as possible.
     loss : {"linear", "huber", "cauchy"}
         Weight of rows with large residuals, by the length of the whole measured vector.
     frame : {"known", "unknown"} or a sequence of them
@@ -145,7 +153,16 @@ def identify(
     drop : sequence of int or "outliers", optional
         Rows that are left out, fitted or drawn to be held out: by their numbers, counted from 0
         through all sets, or those that the others contradict in a robust fit. They are
-        `Identification.dropped`.
+        `Identification.dropped`. Of other measurements that are held out the "outliers" are
+        `Identification.holdout_dropped`; where most rows contradict the fit none is left out.
+    expansion : float or mapping of str to float, optional
+        Coefficients of thermal expansion in 1/K, of steel 11.5e-6: one for all, or of "base",
+        "platform" (with the targets on it), "limbs" or single ones, "limb3"; parts that are not
+        named do not grow. With `Measurements.temperature` the numbers are those at 20 °C.
+    slack : {"keep", "drop"}
+        What becomes of readings of cables that the others show to be slack, on a machine with more
+        cables than needed: "keep" says so in a warning, "drop" leaves these readings out and keeps
+        the rest of their rows. They are `Identification.slack`.
 
     Returns
     -------
@@ -181,7 +198,8 @@ def identify(
     unknown = {"frame": frame, "target": target, "attachment": attachment}
     anew = words("per_session", per_session)
     asked = Asked(free, prior, bounds, anew, by_set(unknown), words("fix", fix))
-    given = as_fit_data(machine, measurements, unknown, sessions=bool(anew))
+    grows = expansion_of(machine, expansion)
+    given = as_fit_data(machine, measurements, unknown, bool(anew), grows)
     dropped = named_rows(drop, sum(len(data.rows) for data in given))
     datasets, unread = informative(machine, given)
     held: list[tuple[FitData, int]] = []
@@ -196,13 +214,18 @@ def identify(
     word("loss", loss, LIMITS)
     word("covariance", covariance, RULES)
     word("datum", datum, DATUMS)
+    word("slack", slack, SLACK)
     equations, commanded, start = begun(datasets, chosen, unread)
+    cells: tuple[Cell, ...] = ()
     held_numbers = NO_DATUM
     try:
         if drop == OUTLIERS:
             dropped = robust_outliers(equations, commanded, start)
             datasets = without(datasets, dropped)
             equations, commanded, start = begun(datasets, chosen, unread)
+        if slack == "drop":
+            equations, cells = taut(equations, commanded, start)
+            commanded = equations.commanded() if cells else commanded
         estimator = estimator_at(equations, commanded, start, loss)
         estimate = estimator.solve()
         if datum == "auto":
@@ -210,10 +233,14 @@ def identify(
         if held_numbers.names:
             chosen = parameters(machine, datasets, held_numbers.asked(asked))
             equations, commanded, start = begun(datasets, chosen, unread)
+            if cells:
+                keys = [(cell.pose, cell.closures[0]) for cell in cells]
+                equations = equations.without_closures(keys, estimate.evaluation)
+                commanded = equations.commanded()
             estimator = estimator_at(equations, commanded, start, loss)
             estimate = estimator.solve()
     except ValueError as error:
-        hint = likely_unit_errors(datasets, chosen, start) or likely_row_errors(datasets, chosen)
+        hint = likely_mistakes(datasets, chosen, start)
         if not hint and not start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
@@ -226,9 +253,13 @@ def identify(
     drawn = not isinstance(holdout, Measurements)
     held = held_without(held, dropped) if drawn else held
     outside = evaluate(held, estimator, estimate, sure)
-    if drop == OUTLIERS and drawn and outside.odd:
-        dropped = tuple(sorted({*dropped, *outside.odd}))
-        outside = evaluate(held_without(held, dropped), estimator, estimate, sure)
+    if drop == OUTLIERS and outside.odd and not outside.contradicts:
+        odd, names = outside.odd, row_names(outside.data, outside.odd)
+        outside = evaluate(held_without(held, odd), estimator, estimate, sure)
+        if drawn:
+            dropped = tuple(sorted({*dropped, *odd}))
+        else:
+            outside = replace(outside, dropped=odd, dropped_names=names)
     result = _result(estimator, estimate, commanded, start, replace(outside, drawn=drawn), sure)
     result = replace(
         result,
@@ -236,7 +267,13 @@ def identify(
         dropped=dropped,
         dropped_names=row_names(given, dropped),
     )
+    if slack == "keep" and result.outliers:
+        _, cells = taut(equations, commanded, start)
+    slack_ones = slack_cables(estimator.equations, estimate.evaluation, cells)
+    result = replace(result, slack=slack_ones)
     notes = _warnings(result, estimator, estimate, datasets)
+    if slack == "keep" and result.slack:
+        notes.append(said_slack(result.slack))
     for text in notes:
         warnings.warn(text, CalibrationWarning, stacklevel=2)
     return replace(result, warnings=tuple(notes))
@@ -252,7 +289,7 @@ def _warnings(
     if notes or result.rms > _POOR * result.rms_before or result.chi2_per_dof > _NOISY:
         notes = likely_unit_errors(datasets, equations.parameters, fit.start) or notes
     notes += insufficient_data(
-        estimator.equations, result.rank, result.dof, bool(len(estimator.prior))
+        estimator.equations, result.rank, result.dof, bool(len(estimate.prior))
     )
     if result.chi2_per_dof > _NOISY:
         notes.append(
@@ -263,6 +300,8 @@ def _warnings(
     notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
     notes += shrunk(equations, fit.start, fit.end)
+    notes += beyond_linear(estimate, fit.uncertainty)
+    notes += unlike_noise(fit.uncertainty.slips)
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():
@@ -299,7 +338,7 @@ def _remedy(result: Identification) -> str:
     if not np.isfinite(scatter):
         cure += ", or state the true sigma"
     if result.outliers:
-        cure = "look at the outliers, fit with loss='cauchy', or " + cure
+        cure = "look at the outliers, fit with --loss cauchy (loss='cauchy'), or " + cure
     return cure
 
 

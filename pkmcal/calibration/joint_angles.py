@@ -1,7 +1,8 @@
 """Angles of passive joints: what a machine's own sensors of them read, and by which numbers.
 
-Where the machine goes at its actuators, not at any pose: a passive joint closes its chain there
-alone. Rates are central differences of the forward kinematics, which are exact to 1e-13 of the
+The swivel of a pulley follows from the pose and its limb's numbers, in closed form. A joint of a
+chain is known where the machine goes at its actuators, not at any pose: it closes its chain there
+alone. Its rates are central differences of the forward kinematics, which are exact to 1e-13 of the
 machine's size; a step goes 1e-5 of it, and the rates are good to 1e-8 of theirs.
 """
 
@@ -13,6 +14,8 @@ import numpy as np
 
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, IntArray, wrapped
+from pkmcal.core.library import SLOTS
+from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
@@ -34,6 +37,31 @@ def place_of(machine: Calibratable, joint: str) -> int:
             f"joint: {machine.name} has no passive joint {joint!r}{did_you_mean(joint, names)}"
         )
     return names.index(joint)
+
+
+def follows_pose(machine: Calibratable, joint: str) -> bool:
+    """Whether the angle of a joint follows from the pose: of a pulley's swivel it does."""
+    return isinstance(machine, Robot) and machine.model.chains is None
+
+
+def swivels(
+    machine: Calibratable, pose: FloatArray, joint: str, places: IntArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Angles (N,) of a pulley at poses (N, 6), by the platform's twist (N, 6) and by numbers.
+
+    Those of the geometry at `places` (p,), the pose held: (N, p).
+    """
+    robot, which = cast(Robot, machine), place_of(machine, joint)
+    core, slots, _ = robot.machine.bare(robot.slots, np.zeros((1, robot.n_actuators)))
+    assert isinstance(core, PulleyMachine)
+    own = np.ascontiguousarray(robot.frames.inward(pose))
+    angle, by_own, by_limb = (part[:, which] for part in core.swivels(slots, own))
+    outward = robot.frames.twists_outward(own, np.tile(np.eye(6), (len(own), 1, 1)))
+    by_twist = np.linalg.solve(outward.transpose(0, 2, 1), by_own[:, :, None])[:, :, 0]
+    limb, width = int(joint.removeprefix("swivel")) - 1, robot.slots.shape[1]
+    at = robot.geometry.slot_index - limb * width
+    mine = np.flatnonzero((at >= 0) & (at < len(SLOTS)))
+    return angle, by_twist, by_limb[:, at[mine]] @ robot.geometry.chain[mine][:, places]
 
 
 def angles(

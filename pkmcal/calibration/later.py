@@ -156,7 +156,9 @@ def _own_numbers(
         none = np.zeros((0, len(columns)))
         found = search.at(search.best(np.zeros(len(columns)), noise, same, none), noise)
         jacobian = search.jacobian(found, noise)
-    left, singular, right = np.linalg.svd(np.vstack([jacobian, search.prior]), full_matrices=False)
+    left, singular, right = np.linalg.svd(
+        np.vstack([jacobian, search.prior(found.theta)]), full_matrices=False
+    )
     kept = singular > ROUNDING * singular.max(initial=0.0)
     half, taken = right[kept].T / singular[kept], left[: len(jacobian), kept]
     by_all = equations.by_parameters(found, noise) * equations.parameters.scale

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.arrays import BoolArray
 from pkmcal.calibration.fit_statistics import ParameterTable
+from pkmcal.calibration.uncertainty import Uncertainty
 from pkmcal.display import chance_text
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.statistics.distributions import f_tail
@@ -56,7 +57,7 @@ class LawTest:
 
 
 def law_tests(
-    geometry: Geometry, table: ParameterTable, covariance: FloatArray, prior: BoolArray, rule: str
+    geometry: Geometry, table: ParameterTable, uncertainty: Uncertainty, prior: BoolArray
 ) -> tuple[LawTest, ...]:
     """Test the free numbers of drive laws, each kind of all limbs together.
 
@@ -66,20 +67,18 @@ def law_tests(
         Of the machine.
     table : ParameterTable
         The parameters.
-    covariance : ndarray (n, n)
-        Of them.
+    uncertainty : Uncertainty
+        Of them. A sandwich of few poses is no sure measure of many numbers, as Hotelling's T² has
+        it.
     prior : ndarray of bool (n,)
         Of which something was known before: the measurements alone do not decide, and nothing is
         said.
-    rule : str
-        By which the covariance was made; a sandwich of few poses is no sure measure of many
-        numbers, as Hotelling's T² has it.
     """
     found = []
     for names in _groups(geometry, table.free):
         columns = [table.free.index(name) for name in names]
         known = prior[columns].any()
-        own = covariance[np.ix_(columns, columns)]
+        own = table.covariance[np.ix_(columns, columns)]
         if known or not np.isfinite(own).all():
             continue
         values = table.values[columns]
@@ -92,8 +91,9 @@ def law_tests(
         squares = float(((axes.T @ (values / scale)) ** 2 / size).sum())
         count, freedom = float(len(columns)), float(table.dof[columns].min())
         ratio = squares / count
-        if rule == "cluster" and np.isfinite(freedom):
-            ratio *= (freedom - count + 1.0) / freedom
+        if table.rule == "cluster":
+            freedom = uncertainty.covariance.sandwich.joint_freedom(uncertainty.reported[columns])
+            ratio *= (freedom - count + 1.0) / max(freedom, 1.0)
             freedom -= count - 1.0
         if freedom > 0.0:
             chance = f_tail(ratio, count, freedom)

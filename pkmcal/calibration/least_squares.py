@@ -31,8 +31,6 @@ class Search:
     ----------
     scale : ndarray (n,)
         That of `Parameters`.
-    prior : ndarray (p, n)
-        A row for each parameter with a prior, in units of its deviation.
     evaluations : int
         How often the machine was solved for all rows.
     converged : bool
@@ -49,10 +47,7 @@ class Search:
         self._found: IntArray | slice = slice(None) if columns is None else columns
         self.equations, self.start = equations, start
         self.scale = parameters.scale[self._found]
-        rows = parameters.prior_rows[:, self._found]
-        held = rows.any(axis=1)
-        self.prior = rows[held]
-        self._centre = parameters.prior_left(start.theta)[held]
+        self._stated = parameters.prior_rows(start.theta)[:, self._found].any(axis=1)
         lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
@@ -70,12 +65,21 @@ class Search:
         """The equations at scaled parameters (n,), poses found with this noise (G,)."""
         same = not self.equations.closures.unknowns or np.array_equal(noise, self._last[1])
         if not (same and np.array_equal(u, self._last[0])):
-            theta = self.start.theta.copy()
-            theta[self._found] += self.scale * u
-            there = self.equations.at(theta, noise)
+            there = self.equations.at(self._theta(u), noise)
             self._last = (u.copy(), noise, there)
             self.evaluations += 1
         return self._last[2]
+
+    def prior(self, theta: FloatArray) -> FloatArray:
+        """A row (p, n) for each prior at all parameters `theta`, in units of its deviation."""
+        rows: FloatArray = self.equations.parameters.prior_rows(theta)[self._stated]
+        found: FloatArray = rows[:, self._found]
+        return found
+
+    def _theta(self, u: FloatArray) -> FloatArray:
+        theta: FloatArray = self.start.theta.copy()
+        theta[self._found] += self.scale * u
+        return theta
 
     def jacobian(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Derivative (M, n) of the predicted values, scaled and whitened.
@@ -142,8 +146,7 @@ class Search:
         from scipy.optimize import least_squares
 
         equations = self.equations
-        extra = np.vstack([self.prior, pins])
-        offset = np.concatenate([self._centre, np.zeros(len(pins))])
+        parameters = equations.parameters
         without = np.repeat(aside, equations.components)
 
         last: tuple[Evaluation, FloatArray] | None = None
@@ -163,7 +166,8 @@ class Search:
 
         def residual(u: FloatArray) -> FloatArray:
             evaluation = self.at(u, noise)
-            held = extra @ u - offset
+            pulled = parameters.prior_left(evaluation.theta)[self._stated]
+            held = np.concatenate([-pulled, pins @ u])
             missed = (evaluation.status[equations.pose_of_unit] != 0) & ~aside
             if missed.any():  # worse than any step that is taken
                 self._refused |= missed
@@ -178,7 +182,7 @@ class Search:
             if aside.any():
                 by_u = np.where(without[:, None], 0.0, by_u)
             by_u = loss.jacobian(data(evaluation), _finite(by_u))
-            return np.vstack([by_u, extra, np.zeros(len(u))])
+            return np.vstack([by_u, self.prior(evaluation.theta), pins, np.zeros(len(u))])
 
         found = least_squares(
             residual,

@@ -159,7 +159,7 @@ def _later_session(
 def _first_session(fit: Fit) -> tuple[FloatArray, FloatArray, np.ndarray]:
     """Jacobian, residuals and clusters of the fitted rows and of the prior."""
     chosen, sure = fit.parameters, fit.uncertainty
-    rows = chosen.prior_rows
+    rows = chosen.prior_rows(fit.end.theta)
     pulled = chosen.prior_left(fit.end.theta)
     own = np.arange(len(rows)) + sure.fit.clusters
     return (

@@ -11,7 +11,7 @@ starts more than once and keeps the best.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Literal
 
 import numpy as np
@@ -48,6 +48,8 @@ class Design:
         One of `CRITERIA`.
     worst : float
         Scaled deviation from which a combination counts as unidentifiable while poses are chosen.
+    sort : ndarray of int (N,), optional
+        Of which sort each candidate is, from 0; a choice has so many of each.
 
     Attributes
     ----------
@@ -62,7 +64,9 @@ class Design:
         aims: FloatArray,
         criterion: Criterion,
         worst: float,
+        sort: IntArray | None = None,
     ) -> None:
+        self._sort = np.zeros(len(blocks), dtype=np.intp) if sort is None else sort
         n = blocks.shape[2]
         singular, basis = decompose(np.vstack([blocks.reshape(-1, n), prior]))
         rank = int(np.count_nonzero(singular > ROUNDING * singular[0]))
@@ -90,17 +94,21 @@ class Design:
             return float("inf")
         return float(np.sqrt((errors[known] / information[known]).sum()))
 
-    def at_random(self, count: int, draws: int) -> float:
-        """Median of `predicted` over choices of `count` candidates at random."""
+    def at_random(self, chosen: IntArray, draws: int) -> float:
+        """Median of `predicted` over choices at random, of as many of each sort."""
         random = np.random.default_rng(0)
-        every = len(self._blocks)
-        return float(
-            np.median([self.predicted(random.permutation(every)[:count]) for _ in range(draws)])
-        )
+        counts = np.bincount(self._sort[chosen])
+        drawn = []
+        for _ in range(draws):
+            order = random.permutation(len(self._blocks))
+            each = [order[self._sort[order] == s][:count] for s, count in enumerate(counts)]
+            drawn.append(self.predicted(np.concatenate(each)))
+        return float(np.median(drawn))
 
-    def grown(self, count: int) -> IntArray:
-        """The best `count` candidates that exchanges find, in order."""
-        grown = [list(itertools.islice(self._growing(worth), count)) for worth in _STARTS]
+    def grown(self, *counts: int) -> IntArray:
+        """The best candidates that exchanges find, in order: so many of each sort."""
+        total = sum(counts)
+        grown = [list(itertools.islice(self._growing(worth, counts), total)) for worth in _STARTS]
         ridge = self._lacking(grown[0])
         found = [self._exchanged(chosen, ridge) for chosen in grown]
         costs = np.array([self._log_cost(chosen, ridge) for chosen in found])
@@ -133,11 +141,18 @@ class Design:
             return np.asarray(self._ridge + self._worth(min(_STARTS)))
         return np.asarray(self._ridge)
 
-    def _growing(self, worth: float) -> Iterator[int]:
-        """Candidates one by one, always the one that helps most those that entered before."""
+    def _growing(self, worth: float, counts: Sequence[int] = ()) -> Iterator[int]:
+        """Candidates one by one, always the one that helps most those that entered before.
+
+        At most `counts` of each sort.
+        """
         ridge, chosen = self._ridge + self._worth(worth), list[int]()
-        while len(chosen) < len(self._blocks):
+        most = sum(counts) if counts else len(self._blocks)
+        while len(chosen) < most:
             gains = self._gains(chosen, ridge)
+            if counts:
+                entered = np.bincount(self._sort[chosen], minlength=len(counts))
+                gains[(entered >= counts)[self._sort]] = -np.inf
             chosen.append(first_largest(gains, _ALIKE * gains.max()))
             yield chosen[-1]
 
@@ -161,6 +176,7 @@ class Design:
             for i in self._least(chosen, ridge):
                 others = [j for j in chosen if j != i]
                 gains = self._gains(others, ridge)
+                gains[self._sort != self._sort[i]] = -np.inf
                 best = first_largest(gains, _ALIKE * gains.max())
                 if gains[best] > (1.0 + _ALIKE) * gains[i]:
                     chosen, exchanged = [*others, best], True

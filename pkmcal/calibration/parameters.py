@@ -15,12 +15,13 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.calibration.fit_data import Dependence, FitData
+from pkmcal.calibration.prior_functions import PriorFunction
 from pkmcal.calibration.sessions import NONE, Scope, Spread, label
 from pkmcal.calibration.smoothness import smoothness_rows
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.measurements.calibratable import Calibratable
 
-Prior = float | Mapping[str, float] | None
+Prior = float | Mapping[str, float | tuple[float, float]] | None
 Known = Literal["known", "unknown"]
 KNOWN: tuple[Known, ...] = ("known", "unknown")
 Bounds = Mapping[str, tuple[float, float]] | None
@@ -92,8 +93,11 @@ class Parameters:
         The machine they belong to.
     asked : Asked
         What they were made of.
-    bent : ndarray (s,) or None
-        By how much tables of drive laws bend, in standard deviations, where that is not 0.
+    functions : tuple of PriorFunction
+        What is known of functions of numbers.
+    drawn : ndarray (s,) or None
+        By how much functions of numbers and bends of tables of drive laws are off what is stated of
+        them, in standard deviations, where that is not 0: in replicates of the bootstrap.
     """
 
     names: tuple[str, ...]
@@ -113,7 +117,8 @@ class Parameters:
     origin: Mapping[int, FloatArray]
     robot: Calibratable
     asked: Asked
-    bent: FloatArray | None = None
+    functions: tuple[PriorFunction, ...] = ()
+    drawn: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.names)
@@ -123,25 +128,48 @@ class Parameters:
         """Lower and upper bounds."""
         return self.lower, self.upper
 
-    @property
-    def prior_rows(self) -> FloatArray:
-        """A row (p, n) for each parameter with a prior: one over its scaled deviation."""
-        sigma = self.prior / self.scale
-        stated = np.flatnonzero(np.isfinite(sigma))
-        rows: FloatArray = np.eye(len(sigma))[stated] / sigma[stated, None]
-        return np.vstack([rows, self._smooth[0] * self.scale])
+    def prior_rows(self, theta: FloatArray) -> FloatArray:
+        """A row (p, n) for each prior at `theta`: its scaled derivative over its deviation.
+
+        First of parameters, then of functions, then of bends of tables.
+        """
+        return np.vstack([self._of_parameters, self.off_functions(theta)[1] * self.scale])
 
     def prior_left(self, theta: FloatArray) -> FloatArray:
         """What the prior misses (p,) at `theta`, in standard deviations."""
-        own = len(self.prior_rows) - len(self._smooth[1])
-        left: FloatArray = self.prior_rows[:own] @ ((self.start - theta) / self.scale)
-        return np.concatenate([left, (0.0 if self.bent is None else self.bent) - self.bends(theta)])
+        left: FloatArray = self._of_parameters @ ((self.start - theta) / self.scale)
+        drawn = 0.0 if self.drawn is None else self.drawn
+        return np.concatenate([left, drawn - self.off_functions(theta)[0]])
 
-    def bends(self, theta: FloatArray) -> FloatArray:
-        """How far tables of drive laws bend (s,), in standard deviations."""
+    def off_functions(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """How far functions and bends are off what is stated (s,), in deviations; by θ (s, n)."""
         rows, constant = self._smooth
-        found: FloatArray = rows @ theta + constant
-        return found
+        off: FloatArray = rows @ theta + constant
+        if not self.functions:
+            return off, rows
+        found = [each.at(theta, self.robot, self.places) for each in self.functions]
+        sigma = np.array([each.sigma for each in self.functions])
+        stated = np.array([each.value for each in self.functions])
+        own = (np.array([value for value, _ in found]) - stated) / sigma
+        by_theta = np.array([slope for _, slope in found]) / sigma[:, None]
+        return np.concatenate([own, off]), np.vstack([by_theta, rows])
+
+    @property
+    def prior_names(self) -> list[str]:
+        """What each of `prior_rows` is of."""
+        stated = [n for n, s in zip(self.names, self.prior, strict=True) if np.isfinite(s)]
+        stated += [each.name for each in self.functions]
+        return stated + [
+            f"the smoothness at {self.names[np.abs(row).argmax()]}"
+            for row in self._smooth[0] * self.scale
+        ]
+
+    @cached_property
+    def _of_parameters(self) -> FloatArray:
+        sigma = self.prior / self.scale
+        stated = np.flatnonzero(np.isfinite(sigma))
+        rows: FloatArray = np.eye(len(sigma))[stated] / sigma[stated, None]
+        return rows
 
     @cached_property
     def _smooth(self) -> tuple[FloatArray, FloatArray]:

@@ -19,6 +19,7 @@ from pkmcal.calibration.fit_statistics import (
 )
 from pkmcal.calibration.holdout import HeldOut
 from pkmcal.calibration.misfit_names import MisfitNames
+from pkmcal.calibration.slack import SlackCable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.prior_test import PriorTest
 
@@ -37,6 +38,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "rank",
     "gap",
     "datum",
+    "expansion",
     "unidentifiable",
     "gauges",
     "rms",
@@ -69,6 +71,8 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "rows",
     "outliers",
     "dropped",
+    "holdout_dropped",
+    "slack",
     "distances_before",
     "distances",
     "holdout_distances_before",
@@ -82,6 +86,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "robots",
     "holdout_parameters",
     "law_tests",
+    "drift",
     "warnings",
 )
 
@@ -120,6 +125,9 @@ class Parts(MisfitNames):
         Rows that were left out, by their numbers.
     dropped_names : str
         The same by lines of files, poses and targets.
+    slack : tuple of SlackCable
+        Readings of cables that the others show to be slack, the longest first: left out, or with
+        ``slack="keep"`` fitted.
     """
 
     robot: Robot | SerialArm
@@ -136,11 +144,31 @@ class Parts(MisfitNames):
     datum: Datum = NO_DATUM
     dropped: tuple[int, ...] = ()
     dropped_names: str = ""
+    slack: tuple[SlackCable, ...] = ()
 
     @property
     def sessions(self) -> tuple[str, ...]:
         """The fitted sessions, in the order of their first rows; empty without `per_session`."""
         return self.fit.parameters.sessions
+
+    @property
+    def expansion(self) -> dict[str, float]:
+        """Coefficients of thermal expansion, 1/K, by part; empty where none were stated."""
+        grows = self.fit.equations.datasets[0].expansion
+        return {} if grows is None else dict(grows.given)
+
+    @property
+    def holdout_dropped(self) -> tuple[int, ...]:
+        """Rows of measurements that were held out as a whole, left out as outliers."""
+        return self.holdout.dropped
+
+    @property
+    def left_out(self) -> str:
+        """Which rows were left out as asked, in words; "" where none were."""
+        count = len(self.dropped) + len(self.holdout_dropped)
+        names = ", ".join(filter(None, (self.dropped_names, self.holdout.dropped_names)))
+        many = f"{count} rows were" if count > 1 else "1 row was"
+        return f"{many} left out, as asked: {names}" if count else ""
 
     @property
     def holdout_parameters(self) -> dict[str, dict[str, float]]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +14,14 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows, mm_per_unit
 from pkmcal.calibration.optimal_design import CRITERIA, Criterion
 from pkmcal.calibration.parameters import Parameters, Prior
-from pkmcal.calibration.planned import Unknown, design_of, equations_of, information, planned
+from pkmcal.calibration.planned import (
+    Unknown,
+    design_of,
+    equations_of,
+    information,
+    planned,
+    together,
+)
 from pkmcal.calibration.tour import short_tour
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
@@ -65,6 +73,8 @@ class Plan(Result):
     own_frame : bool
         Whether predicted errors are those in the machine's own frame, because nothing that is read
         says where it stands.
+    kinds : tuple of str, count
+        What to measure at each pose.
     """
 
     robot: Robot | SerialArm
@@ -78,6 +88,7 @@ class Plan(Result):
     parameters: tuple[str, ...]
     travel: float = float("nan")
     own_frame: bool = False
+    kinds: tuple[Kind, ...] = ()
 
     def __len__(self) -> int:
         return len(self.indices)
@@ -99,6 +110,10 @@ class Plan(Result):
             )
         ]
         count = _poses(len(self))
+        several = len(set(self.kinds)) > 1
+        if several:
+            heads.append("measure")
+            rows = [[*row, kind] for row, kind in zip(rows, self.kinds, strict=True)]
         yield f"{self.robot.name}: measure {count} for {len(self.parameters)} parameters{left_out}"
         yield (
             f"predicted error {self.predicted:.3g} mm rms; {count} at random"
@@ -120,9 +135,9 @@ def plan_poses(
     accuracy: float | None = None,
     targets: ArrayLike | None = None,
     criterion: Criterion = "prediction",
-    kind: Kind = "position",
-    target: ArrayLike | None = None,
-    noise: float | Tracker = 0.02,
+    kind: Kind | Mapping[Kind, int] = "position",
+    target: ArrayLike | Mapping[Kind, ArrayLike] | None = None,
+    noise: float | Tracker | Mapping[Kind, float | Tracker] = 0.02,
     free: str | Sequence[str] | None = None,
     prior: Prior = None,
     unknown: Unknown | Sequence[Unknown] = (),
@@ -155,11 +170,12 @@ def plan_poses(
         to mm at the machine.
     kind : {"position", "pose", "height", "distance", "orientation", "closure"}
         What will be measured; see `Measurements`. "closure" is nothing but the actuators, of a
-        machine that has more of them than ways to move.
-    target : array_like (3,) or (k, 3), optional
+        machine that has more of them than ways to move. Of several kinds how many poses of each,
+        instead of `count`: ``{"position": 20, "distance": 10}``.
+    target : array_like (3,) or (k, 3), or a mapping of kinds to them, optional
         The measured point of the platform, mm, or several that are measured at every pose. For
         distances the fixed points of the base.
-    noise : float or Tracker
+    noise : float or Tracker, or a mapping of kinds to them
         Of the instrument, as `VirtualMachine` takes it.
     free, prior
         As `identify` takes them.
@@ -194,42 +210,81 @@ def plan_poses(
     (20, True)
     """
     word("criterion", criterion, CRITERIA)
-    word("kind", kind, PLANNED)
-    if (count is None) == (accuracy is None):
-        raise ArgumentError(
-            "give either count, how many poses, or accuracy, the error wanted in mm"
-        )
+    counts = _counts(kind, count, accuracy)
+    kinds = list(counts)
     machine = as_machine(robot)
     poses, q, inside, offered = _within_limits(machine, candidates)
     aims = (poses, q) if targets is None else _aims(machine, targets)
     distinct, place = np.unique(q, axis=0, return_inverse=True)
-    measured = planned(machine, distinct, kind, target, noise, actuator_noise)
-    equations = equations_of(machine, measured, free, prior, unknown)
-    safe = _safe(equations.parameters, poses, q)
-    blocks = information(equations, len(distinct))[place.reshape(-1)[safe]]
-    design, own_frame = design_of(equations.parameters, blocks, *aims, criterion)
+    sets = [
+        planned(machine, distinct, each, _of("target", target, each, kinds),
+                _of("noise", noise, each, kinds), actuator_noise)
+        for each in kinds
+    ]  # fmt: skip
+    equations = equations_of(machine, sets, free, prior, unknown)
+    parameters = equations[0].parameters
+    safe = _safe(parameters, poses, q)
+    rows = place.reshape(-1)[safe]
+    blocks = together([information(each, len(distinct))[rows] for each in equations])
+    sort = np.repeat(np.arange(len(kinds)), len(rows))
+    design, own_frame = design_of(parameters, blocks, sort, *aims, criterion)
     poses, q, inside = poses[safe], q[safe], inside[safe]
-    everything = design.predicted(np.arange(len(q)))
-    if count is not None:
-        chosen = design.grown(whole("count", count, 1, len(q), ", the candidates"))
+    everything = design.predicted(np.arange(len(blocks)))
+    if accuracy is None:
+        of = "kind" if isinstance(kind, Mapping) else "count"
+        each = [whole(of, n, 1, len(q), ", the candidates") for n in counts.values()]
+        found = design.grown(*each)
     else:
-        chosen = design.reaching(_accuracy(accuracy, everything, len(q)))
+        found = design.reaching(_accuracy(accuracy, everything, len(q)))
+    chosen = found % len(q)
     arcs = mm_per_unit(machine.actuator_units, machine.length)
     order, travel = short_tour(q[chosen] * arcs, _at_home(machine) * arcs)
-    chosen = chosen[order]
+    found, chosen = found[order], chosen[order]
     return Plan(
         robot=robot,
         indices=inside[chosen],
         poses=poses[chosen],
         actuators=q[chosen],
-        predicted=design.predicted(chosen),
-        at_random=design.at_random(len(chosen), _DRAWS),
+        predicted=design.predicted(found),
+        at_random=design.at_random(found, _DRAWS),
         all_candidates=everything,
         left_out=offered - len(inside),
-        parameters=equations.parameters.names,
+        parameters=parameters.names,
         travel=travel,
         own_frame=own_frame,
+        kinds=tuple(kinds[sort[i]] for i in found),
     )
+
+
+def _counts(
+    kind: Kind | Mapping[Kind, int], count: object, accuracy: object
+) -> dict[Kind, int | None]:
+    """How many poses of each kind; None where an accuracy decides."""
+    if isinstance(kind, Mapping):
+        if not kind or count is not None or accuracy is not None:
+            raise ArgumentError(
+                "kind: a mapping says how many poses of each kind, and goes without count and"
+                f" accuracy; found {kind!r}"
+            )
+        return {word("kind", each, PLANNED): n for each, n in kind.items()}
+    word("kind", kind, PLANNED)
+    if (count is None) == (accuracy is None):
+        raise ArgumentError(
+            "give either count, how many poses, or accuracy, the error wanted in mm"
+        )
+    return {kind: count}  # type: ignore[dict-item]
+
+
+def _of(name: str, given: Any, kind: Kind, kinds: Sequence[Kind]) -> Any:
+    """What was given of one kind: one for all, or by kind."""
+    if not isinstance(given, Mapping):
+        return given
+    for each in given:
+        if each not in kinds:
+            raise ArgumentError(f"{name}: the plan has {', '.join(kinds)}; found {each!r}")
+    if not given or (kind not in given and name == "noise"):
+        raise ArgumentError(f"{name}: of {kind} not stated; found {given!r}")
+    return given.get(kind)
 
 
 def _at_home(robot: Calibratable) -> FloatArray:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import word, words
-from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.arrays import FloatArray, IntArray, as_rows
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.free_parameters import parameters
@@ -75,17 +75,21 @@ def planned(
 
 def equations_of(
     robot: Calibratable,
-    measured: Measurements,
+    sets: Sequence[Measurements],
     free: str | Sequence[str] | None,
     prior: Prior,
     unknown: str | Sequence[str],
-) -> Equations:
-    """The equations of the calibration to come."""
+) -> list[Equations]:
+    """The equations that each set has in the calibration to come of all."""
     sought = words("unknown", unknown)
     for each in sought:
         word("unknown", each, UNKNOWN)
-    data = FitData(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
-    return Equations([data], parameters(robot, [data], Asked(free, prior)))
+    datasets = [
+        FitData(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
+        for measured in sets
+    ]
+    chosen = parameters(robot, datasets, Asked(free, prior))
+    return [Equations([data], chosen) for data in datasets]
 
 
 def information(equations: Equations, poses: int) -> FloatArray:
@@ -101,9 +105,17 @@ def information(equations: Equations, poses: int) -> FloatArray:
     return units[equations.unit_of_row[first]]
 
 
+def together(parts: Sequence[FloatArray]) -> FloatArray:
+    """Blocks (N, k, n) of several sets as one, with rows of zeros where one has fewer equations."""
+    most = max(part.shape[1] for part in parts)
+    padded = [np.pad(part, ((0, 0), (0, most - part.shape[1]), (0, 0))) for part in parts]
+    return np.concatenate(padded)
+
+
 def design_of(
     chosen: Parameters,
     blocks: FloatArray,
+    sort: IntArray,
     aims: FloatArray,
     aims_at: FloatArray,
     criterion: Criterion,
@@ -119,7 +131,8 @@ def design_of(
         )
 
     def design(aimed: FloatArray) -> Design:
-        return Design(blocks, chosen.prior_rows, aimed, criterion, chosen.robot.length)
+        rows = chosen.prior_rows(chosen.start)
+        return Design(blocks, rows, aimed, criterion, chosen.robot.length, sort)
 
     made = design(aimed)
     moved = aimed.reshape(-1, len(chosen)) @ made.unidentifiable

@@ -20,7 +20,7 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.prior_test import PriorTest
 
-_GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
+GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
 FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
 _BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
 _LEAST_FREEDOM = 0.5  # degrees of freedom from which residuals show how good a fit is
@@ -55,7 +55,7 @@ def likely_unit_errors(
             continue
         residual = np.where(read, evaluation.residuals[i], 0.0)
         present = _misfit(residual, data.measured.units, size)
-        if present <= _GROSS * size:
+        if present <= GROSS * size:
             continue
         trials = {
             words: _misfit(
@@ -63,7 +63,7 @@ def likely_unit_errors(
                 other.units,
                 size,
             )
-            for words, other in _readings(data.measured, parameters.robot.actuator_units)
+            for words, other in other_readings(data.measured, parameters.robot.actuator_units)
         }
         # exchanges that are equivalent on a symmetric machine misfit alike
         least = min(trials.values())
@@ -88,7 +88,7 @@ def _misfit(residual: FloatArray, units: Sequence[str], size: float) -> float:
     return rms(off) if np.isfinite(off).all() else float("inf")
 
 
-def _readings(
+def other_readings(
     measured: Measurements, actuator_units: Sequence[str]
 ) -> Iterator[tuple[str, Measurements]]:
     """Read measurements in other units, with other signs and with columns exchanged."""
@@ -98,12 +98,7 @@ def _readings(
             q = np.where(mine, measured.actuators * factor, measured.actuators)
             yield f"the actuators are in {name}", replace(measured, actuators=q)
     yield "the actuators count the other way", replace(measured, actuators=-measured.actuators)
-    columns = np.arange(measured.actuators.shape[1])
-    for a, b in itertools.combinations(columns, 2):
-        order = columns.copy()
-        order[[a, b]] = b, a
-        swapped = replace(measured, actuators=measured.actuators[:, order])
-        yield f"q{a + 1} and q{b + 1} are exchanged", swapped
+    yield from exchanges(measured)
     for unit in dict.fromkeys(measured.units):
         mine = np.array([unit == other for other in measured.units])
         what = "angles" if unit == "rad" else "measured lengths"
@@ -117,6 +112,16 @@ def _readings(
         values = measured.values.copy()
         values[:, [one, other]] = values[:, [other, one]]
         yield f"{names[one]} and {names[other]} are exchanged", replace(measured, values=values)
+
+
+def exchanges(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+    """Read measurements with two actuators exchanged."""
+    columns = np.arange(measured.actuators.shape[1])
+    for a, b in itertools.combinations(columns, 2):
+        order = columns.copy()
+        order[[a, b]] = b, a
+        swapped = replace(measured, actuators=measured.actuators[:, order])
+        yield f"q{a + 1} and q{b + 1} are exchanged", swapped
 
 
 def beyond_strokes(equations: Equations, start: Evaluation, end: Evaluation) -> list[str]:
@@ -245,9 +250,7 @@ def contradicted_prior(
     if test is None or not test.contradicted:
         return []
     pulls = np.nan_to_num(test.pulls)
-    stated = [n for n, s in zip(parameters.names, parameters.prior, strict=True) if np.isfinite(s)]
-    bends = parameters.prior_rows[len(stated) :]
-    stated += [f"the smoothness at {parameters.names[np.abs(row).argmax()]}" for row in bends]
+    stated = parameters.prior_names
     worst = [k for k in largest_first(np.abs(pulls), _ALIKE)[:3] if abs(pulls[k]) > _PULLED]
     shown = ", ".join(f"{stated[k]} {abs(pulls[k]):.1f}" for k in worst)
     pulled = f" and pull {shown} times as far as prior and noise let expect" if worst else ""

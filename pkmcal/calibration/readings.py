@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,7 +17,14 @@ from pkmcal.measurements import orientation
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import Predicted, difference, joined, predict, read_angles
+from pkmcal.measurements.observation import (
+    Predicted,
+    corrected,
+    difference,
+    joined,
+    predict,
+    read_angles,
+)
 
 ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
 
@@ -90,6 +98,10 @@ class Readings:
             for of_set, part in zip(self._numbers, self.spread.part_of, strict=True)
         ]
         self._along = [data.along for data in datasets]
+        self._growth = [
+            None if data.expansion is None else data.expansion.growth(data.measured)
+            for data in datasets
+        ]
         # several targets or repeats at the same actuators are one pose
         double = [i for i, m in enumerate(self.sets) if m.other is not None]
         actuators = np.concatenate([
@@ -185,14 +197,40 @@ class Readings:
 
     def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Readings of each set at poses (K, 6)."""
-        return tuple(self._predicted_of(i, pose, theta) for i in range(len(self.sets)))
+        return tuple(
+            self._grown(i, self._predicted_of(i, pose, theta), pose, theta)
+            for i in range(len(self.sets))
+        )
+
+    def _grown(self, i: int, seen: Predicted, pose: FloatArray, theta: FloatArray) -> Predicted:
+        """What is read of set `i` where the machine has grown with its temperature."""
+        growth = self._growth[i]
+        if growth is None:
+            return seen
+        by_number, of_platform = growth
+        places = [(self.pose_of[i], seen.by_twist)]
+        if seen.by_other is not None and (there := self.other_of[i]) is not None:
+            places.append((there, seen.by_other))
+        moved = np.zeros(seen.values.shape)
+        for machine, rows in self._machines(i, theta):
+            grown = machine.geometry.values[: by_number.shape[1]] * by_number[rows]
+            for place, by_twist in places:
+                at = place[rows]
+                twists = machine.error_twists(pose[at], self.actuators[at])[..., : grown.shape[1]]
+                twist = np.einsum("nij,nj->ni", twists, grown)
+                moved[rows] += np.einsum("nki,ni->nk", by_twist[rows], twist)
+        target = self.arguments_of(i, theta).get("target")
+        if target is not None and "target" in seen.by:
+            moved += np.einsum("nki,ni->nk", seen.by["target"], target * of_platform[:, None])
+        values = corrected(self.sets[i].kind, seen.values, moved)
+        return replace(seen, values=values)
 
     def _predicted_of(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
         places, measured = self.arguments_of(i, theta), self.sets[i]
         kind, mine, there = measured.kind, pose[self.pose_of[i]], self.other_of[i]
         touching = (measured.artefact, self._along[i])
         if measured.joint is not None:
-            return read_angles(self._angles(i, pose, theta), **places)
+            return read_angles(*self._angles(i, pose, theta), **places)
         if not self._frames[i]:
             return predict(
                 kind,
@@ -214,15 +252,22 @@ class Readings:
         ]
         return joined(parts, [rows for _, rows in self._frames[i]])
 
-    def _angles(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray:
-        """Angles (N,) of the passive joint that set `i` reads."""
+    def _angles(
+        self, i: int, pose: FloatArray, theta: FloatArray
+    ) -> tuple[FloatArray, FloatArray | None]:
+        """Angles (N,) of the passive joint that set `i` reads, and by the twist (N, 6), or None."""
         measured, joint = self.sets[i], str(self.sets[i].joint)
-        found = np.empty(len(measured))
+        found, by_twist = np.empty(len(measured)), np.empty((len(measured), 6))
+        if joint_angles.follows_pose(self.parameters.robot, joint):
+            for machine, rows in self._machines(i, theta):
+                at, none = pose[self.pose_of[i][rows]], np.empty(0, dtype=np.intp)
+                found[rows], by_twist[rows], _ = joint_angles.swivels(machine, at, joint, none)
+            return found, by_twist
         for machine, rows in self._machines(i, theta):
             q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
             approach = None if measured.approach is None else measured.approach[rows]
             found[rows] = joint_angles.angles(machine, q, at, joint, approach)
-        return found
+        return found, None
 
     def by_numbers(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray | None:
         """How readings of set `i` follow the geometry not by the pose alone, (N, k, g)."""
@@ -232,6 +277,9 @@ class Readings:
         found = np.empty((len(measured), 1, len(places)))
         for machine, rows in self._machines(i, theta):
             q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
+            if joint_angles.follows_pose(machine, measured.joint):
+                found[rows, 0] = joint_angles.swivels(machine, at, measured.joint, places)[2]
+                continue
             approach = None if measured.approach is None else measured.approach[rows]
             found[rows, 0] = joint_angles.rates(machine, q, at, measured.joint, places, approach)
         return found

@@ -12,9 +12,10 @@ from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimator
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_data import FitData
-from pkmcal.statistics.robust_scale import median_ratio, robust_ratio
+from pkmcal.statistics.robust_scale import median_ratio, ratio_by_chance, robust_ratio
 
 _SUSPECT = 1.25  # ratio of the linear model's noises from which the robust fit is made
+DISAGREES, CARRIED = 1.5, 5.0  # ratio that is said, and that decides
 _MOST = 500  # poses of which it is made, drawn at random
 
 
@@ -26,6 +27,8 @@ class RobustCheck:
     ----------
     ratio : float
         Noise of the least-squares fit over that of the robust one.
+    by_chance : float
+        The same that good rows hardly ever exceed; 1 where they are many.
     rows : tuple of int
         Rows that disagree with the rest there.
     rms : float
@@ -33,8 +36,19 @@ class RobustCheck:
     """
 
     ratio: float
+    by_chance: float
     rows: tuple[int, ...]
     rms: float
+
+    @property
+    def disagrees(self) -> bool:
+        """Whether some rows disagree with the rest, more than by chance."""
+        return self.ratio > max(DISAGREES, self.by_chance)
+
+    @property
+    def carried(self) -> bool:
+        """Whether they carry the least-squares fit off."""
+        return self.ratio > CARRIED * max(self.by_chance / DISAGREES, 1.0)
 
 
 def robust_check(fit: Fit) -> RobustCheck | None:
@@ -72,8 +86,11 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     off = few.distances(commanded.at(robust.evaluation.theta))[~named]
     if not scale > 0:
         return None
+    ratio = float(np.sqrt(plain @ plain / (own - p) / scale))
+    by_chance = ratio_by_chance(linear.design, equations.components) if ratio > DISAGREES else 1.0
     return RobustCheck(
-        ratio=float(np.sqrt(plain @ plain / (own - p) / scale)),
+        ratio=ratio,
+        by_chance=by_chance,
         rows=tuple(few.rows[named].tolist()),
         rms=rms(off[np.isfinite(off)]),
     )

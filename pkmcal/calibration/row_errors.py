@@ -1,4 +1,4 @@
-"""Whether readings stand beside the wrong rows, or targets are exchanged: found by trying."""
+"""What would make measurements fit that do not: units, columns, rows, targets; found by trying."""
 
 from __future__ import annotations
 
@@ -9,9 +9,16 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.parameters import Parameters
-from pkmcal.calibration.plausibility import MISFIT_RATIO
+from pkmcal.calibration.plausibility import (
+    GROSS,
+    MISFIT_RATIO,
+    exchanges,
+    likely_unit_errors,
+    other_readings,
+)
 from pkmcal.calibration.readings import of_read
 from pkmcal.display import printable
 from pkmcal.measurements.measurements import Measurements
@@ -19,6 +26,39 @@ from pkmcal.measurements.measurements import Measurements
 _SHIFTS = (1, -1, 2, -2)  # rows by which readings are tried
 _LEAST_ROWS = 6
 _MOST_TARGETS = 4  # whose orders are tried
+
+
+def likely_mistakes(
+    datasets: Sequence[FitData], parameters: Parameters, evaluation: Evaluation
+) -> list[str]:
+    """Suspect units and columns, else rows and targets; two of them where one explains too little.
+
+    Readings of data that fit far better are named.
+    """
+    found = likely_unit_errors(datasets, parameters, evaluation)
+    found = found or likely_row_errors(datasets, parameters)
+    size = GROSS * parameters.robot.length
+    both = []
+    for i, data in enumerate(datasets):
+        if not data.measured.components or len(data.measured) < _LEAST_ROWS:
+            continue
+        present = _median(data, parameters)
+        units = parameters.robot.actuator_units
+        single = [*other_readings(data.measured, units), *_readings(data.measured)]
+        alone = min(_median(replace(data, measured=m), parameters) for _, m in single)
+        if present <= size or alone <= size:
+            continue
+        trials = {
+            f"{first} and {second}": _median(replace(data, measured=other), parameters)
+            for first, exchanged in exchanges(data.measured)
+            for second, other in _shifted(exchanged)
+        }
+        words = min(trials, key=lambda text: trials[text], default="")
+        if words and trials[words] < MISFIT_RATIO * min(alone, present):
+            which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
+            both.append(f"{which}off by {_off(present)} as given, but by {_off(trials[words])} if"
+                        f" {words}")  # fmt: skip
+    return both or found
 
 
 def likely_row_errors(datasets: Sequence[FitData], parameters: Parameters) -> list[str]:
@@ -46,7 +86,7 @@ def likely_row_errors(datasets: Sequence[FitData], parameters: Parameters) -> li
 
 
 def _off(value: float) -> str:
-    return f"{value:.3g} mm" if np.isfinite(value) else "more than the machine reaches"
+    return f"{value:.4g} mm" if np.isfinite(value) else "more than the machine reaches"
 
 
 def _median(data: FitData, parameters: Parameters) -> float:
@@ -60,8 +100,8 @@ def _median(data: FitData, parameters: Parameters) -> float:
     return float(np.median(np.where(np.isfinite(off), off, np.inf))) if read.any() else np.inf
 
 
-def _readings(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
-    """Read measurements with values moved along the rows and with targets exchanged."""
+def _shifted(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+    """Read measurements with values moved along the rows."""
     names = measured.target_names or ("1",)
     step, count = len(names), len(measured)
     what = "row" if step == 1 else "pose"
@@ -84,6 +124,13 @@ def _readings(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
             f"each reading belongs to the {what} {abs(shift)} {where} it",
             replace(measured.select(kept), values=values, sigma=sigma),
         )
+
+
+def _readings(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+    """Read measurements with values moved along the rows and with targets exchanged."""
+    yield from _shifted(measured)
+    names = measured.target_names or ("1",)
+    step = len(names)
     if measured.target is None or measured.target_index is None or step > _MOST_TARGETS:
         return
     for order in itertools.permutations(range(step)):

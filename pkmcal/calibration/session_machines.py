@@ -79,6 +79,8 @@ class SessionClosures:
     ----------
     unknowns, equations : int
         Of each pose, the same in all sessions.
+    actuators : tuple of int, equations
+        Whose reading each equation is of; -1 of none.
     sigma : ndarray (K, equations) or None
         Standard deviations of the equations.
     """
@@ -90,6 +92,7 @@ class SessionClosures:
             raise ArgumentError(
                 "measurements: state actuator_sigma of the same actuators in all sessions"
             )
+        self.actuators = parts[0].actuators
         stated = [part.sigma for part in parts if part.sigma is not None]
         self.sigma = _joined(stated, self._rows) if stated else None
 

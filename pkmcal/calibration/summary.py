@@ -135,7 +135,9 @@ def limits(
         yield filled("correlated: ", shown + more)
     if outliers:
         where = "" if odd.startswith("row ") else f": {odd}"
-        yield filled("outliers: ", f"rows {first_rows(outliers, 10)}{where}")
+        yield filled(
+            "outliers: ", f"row{'s' * (len(outliers) > 1)} {first_rows(outliers, 10)}{where}"
+        )
 
 
 def sessions(names: Sequence[str]) -> str:

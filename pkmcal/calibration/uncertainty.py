@@ -11,6 +11,7 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.calibration.equations import Equations
 from pkmcal.calibration.estimator import Estimate, Estimator
 from pkmcal.calibration.labels import Labels, labels, poses_of_rows
+from pkmcal.calibration.set_noise import slipped
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.clusters import shared_error_score
 from pkmcal.statistics.covariance import SHARED, Covariance, CovarianceRule, covariance
@@ -57,6 +58,8 @@ class Uncertainty:
         What was fitted.
     factors : ndarray (G,)
         `IterationState.noise`.
+    slips : ndarray
+        Of each set, `slipped`.
     """
 
     labels: Labels
@@ -67,6 +70,7 @@ class Uncertainty:
     unknown: BoolArray
     equations: Equations
     factors: FloatArray
+    slips: FloatArray
 
     @property
     def known(self) -> bool:
@@ -198,6 +202,9 @@ def uncertainty(
     rates = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
     if rule == "auto" and equations.closures.unknowns and fit.clusters < len(equations.components):
         rule = "cluster"  # no two mixtures can be compared to see whether they share an error
+    slips = slipped(estimator, estimate)
+    if rule == "auto" and (slips != 1.0).any():
+        rule = "cluster"  # which holds whatever the weights
     apart = None
     if classes is not None:
         apart = variance_components(fit, classes, _prior_residual(estimator, estimate))
@@ -216,6 +223,7 @@ def uncertainty(
         unknown=estimator.unknown_noise(estimate),
         equations=equations,
         factors=state.noise,
+        slips=slips,
     )
 
 
@@ -235,7 +243,7 @@ def _linear_fit(
     fit = linear_fit(
         estimate.jacobian,
         pseudo.residual,
-        estimator.prior,
+        estimate.prior,
         state.determined.identifiable,
         named.pose,
         named.component,

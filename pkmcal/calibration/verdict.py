@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from pkmcal.calibration.drift import Drift
 from pkmcal.calibration.estimator import LEAST_FREEDOM
 from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.moved import Moved
@@ -14,16 +15,19 @@ from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import RobustCheck
 from pkmcal.calibration.row_errors import likely_row_errors
 from pkmcal.calibration.row_names import row_names
+from pkmcal.calibration.slack import listed_slack
 from pkmcal.calibration.uncertainty import FEW
 from pkmcal.display import chance_text, decimals, displayed, fixed, printable
-from pkmcal.statistics.distributions import deviation_interval
-from pkmcal.statistics.holdout_test import RATIO
+from pkmcal.statistics.covariance import spare
+from pkmcal.statistics.distributions import chi2_tail, deviation_interval
+from pkmcal.statistics.holdout_test import CHANCE, RATIO
+from pkmcal.statistics.noise import SIGNIFICANT
 
 State = Literal["calibrated", "doubtful", "not calibrated"]
 
 _GAIN = 0.9  # of the misfit that must not be left for a calibration to be worth it
 _ABSURD = 0.02  # share of the spread of the commanded positions that no sound fit leaves
-_DISAGREES, _CARRIED = 1.5, 5.0  # ratio to the robust fit that is said, and that decides
+_SMALL = 0.5  # times sigma, below which residuals are worth a word
 _LONGEST = 1000  # letters of a reason: names of others may be in it
 
 
@@ -54,7 +58,9 @@ class Verdict:
         return f"{self.state.capitalize()}: {self.reasons[0]}"
 
 
-def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) -> Verdict:
+def judge(
+    found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...], drift: Drift | None = None
+) -> Verdict:
     """Judge a calibration.
 
     Parameters
@@ -65,6 +71,8 @@ def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) ->
         A robust fit beside it, where there is one.
     moved : tuple of Moved
         What moved between the fitted points and those held out.
+    drift : Drift or None
+        Whether repeated poses moved with time, where any were.
     """
     grave = _grave(found, robust)
     doubts = [*_contradicted(found, moved), *_few(found)]
@@ -73,10 +81,12 @@ def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) ->
             f"{listed(found.at_bounds)} ended at a bound: the fit would go further; widen the"
             " bound, or see what else is wrong"
         )
+    if drift is not None and drift.large:
+        doubts.append(str(drift))
     doubts += found.warnings
     if not grave and not doubts and _little_gained(found):
-        doubts.append(f"little was gained, {_change(found)}")
-    remarks = _remarks(found, robust)
+        doubts.append(f"little was gained, {_change(found)}: {_other_causes(found)}")
+    remarks = _remarks(found, robust, drift)
     reasons = tuple(printable(text, _LONGEST) for text in grave + doubts)
     if grave:
         return Verdict("not calibrated", reasons, remarks)
@@ -88,9 +98,11 @@ def judge(found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...]) ->
 def _grave(found: Parts, robust: RobustCheck | None) -> list[str]:
     """What makes a result no calibration."""
     reasons = []
+    if not found.fit.machine_combinations() and len(found.fit.parameters.places):
+        reasons.append("these measurements determine no number of the machine, which is unchanged")
     if not found.converged:
         reasons.append("the least squares did not converge")
-    if robust is not None and robust.ratio > _CARRIED:
+    if robust is not None and robust.carried:
         reasons.append(_disagreement(found, robust))
     spread = _commanded_spread(found)
     left = np.nanmax([found.distances.rms_without_outliers, found.closure_rms, 0.0])
@@ -147,11 +159,13 @@ def _moved_text(moved: tuple[Moved, ...]) -> str:
         sizes = ", ".join(map(_size, each.shift, each.stderr, each.units))
         also = f" (or as well {', '.join(each.also)})" if each.also else ""
         parts.append(f"{each} by {sizes}{also}")
-    anew = ", ".join(repr(each) for each in dict.fromkeys(each.per_session for each in moved))
+    several = [repr(each) for each in dict.fromkeys(each.per_session for each in moved)]
+    anew = several[0] if len(several) == 1 else f"[{', '.join(several)}]"
+    options = " ".join(f"--per-session {each}" for each in several)
     return (
         "between the fitted and the held-out points moved, or the model is wrong there:"
-        f" {'; '.join(parts)}; per_session={anew if ',' not in anew else f'[{anew}]'} finds such"
-        " numbers anew in each session"
+        f" {'; '.join(parts)}; {options} (per_session={anew}) finds such numbers anew in each"
+        " session"
     )
 
 
@@ -195,10 +209,25 @@ def _few(found: Parts) -> list[str]:
 
 
 def _little_gained(found: Parts) -> bool:
-    if np.isfinite(found.chi2_per_dof):
+    sure = found.fit.uncertainty
+    if not sure.equations.unstated.any() and sure.covariance.scale <= RATIO:
         return False  # the residuals are what sigma says
+    if found.lack_of_fit_chance > SIGNIFICANT:
+        return False  # they are what repeats scatter
     before, after, _ = _misfit(found)
     return after > _GAIN * before
+
+
+def _other_causes(found: Parts) -> str:
+    """What else the misfit may come of where the calibration hardly lowered it."""
+    if not found.fit.uncertainty.equations.unstated.any():
+        return "numbers that are not free are wrong, or sigma is too small"
+    if np.isfinite(found.lack_of_fit_chance):
+        return "repeats scatter less, so numbers that are not free are wrong"
+    return (
+        "it is the noise of a machine that was good already, or comes of numbers that are not free;"
+        " sigma, or every pose read again, would tell"
+    )
 
 
 def _misfit(found: Parts) -> tuple[float, float, str]:
@@ -242,22 +271,27 @@ def _disagreement(found: Parts, robust: RobustCheck) -> str:
     if not count:
         return (
             f"a robust fit has {robust.ratio:.2g} times less noise: many rows disagree with the"
-            " rest; fit with loss='cauchy' and look at the residuals"
+            " rest; fit with --loss cauchy (loss='cauchy') and look at the residuals"
         )
     rows = "row disagrees" if count == 1 else "rows disagree"
     return (
         f"{count} {rows} with the rest: {row_names(found.fit.equations.datasets, robust.rows)};"
         f" a robust fit leaves {_mm(robust.rms)} in the others, this one {_mm(found.rms)} in all:"
-        " fit with loss='cauchy'"
+        " leave them out with --drop-outliers (drop='outliers'), or fit with --loss cauchy"
+        " (loss='cauchy')"
     )
 
 
-def _remarks(found: Parts, robust: RobustCheck | None) -> tuple[str, ...]:
+def _remarks(found: Parts, robust: RobustCheck | None, drift: Drift | None) -> tuple[str, ...]:
     remarks = []
-    if found.dropped:
-        many = f"{len(found.dropped)} rows were" if len(found.dropped) > 1 else "1 row was"
-        remarks.append(f"{many} left out, as asked: {found.dropped_names}")
-    if robust is not None and _DISAGREES < robust.ratio <= _CARRIED:
+    if drift is not None and drift.found and not drift.large:
+        remarks.append(str(drift))
+    if found.left_out:
+        remarks.append(found.left_out)
+    if found.slack and found.fit.uncertainty.equations.slack_cells:
+        many = f"{len(found.slack)} readings" if len(found.slack) > 1 else "1 reading"
+        remarks.append(f"{many} of slack cables left out, as asked: {listed_slack(found.slack)}")
+    if robust is not None and robust.disagrees and not robust.carried:
         remarks.append(_disagreement(found, robust))
     if found.holdout_outliers and not found.holdout_contradicts:
         remarks.append(_few_off(found))
@@ -268,12 +302,25 @@ def _remarks(found: Parts, robust: RobustCheck | None) -> tuple[str, ...]:
             f"± are {scale:.2g} times as wide as sigma alone would make them, since the residuals"
             " are so much larger"
         )
+    if stated and found.fit.estimate.state.loss.name == "linear" and _larger_sigma(found) < _SMALL:
+        remarks.append(
+            f"the residuals are only {_larger_sigma(found):.2g} times what sigma says: if it is the"
+            " noise it is too large, and so are ±"
+        )
     if found.idle:
         say = "poses say" if found.idle > 1 else "pose says"
         remarks.append(
             f"{found.idle} {say} nothing: what was read there determines the pose at most"
         )
     return tuple(printable(text, _LONGEST) for text in remarks)
+
+
+def _larger_sigma(found: Parts) -> float:
+    """Deviation of the residuals in units of sigma where that is clearly larger, else 1."""
+    squares, freedom = spare(found.fit.uncertainty.fit)
+    if not chi2_tail(squares, freedom) > 1.0 - CHANCE:
+        return 1.0
+    return float(np.sqrt(squares / freedom))
 
 
 def _mm(value: float) -> str:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from pkmcal.arguments import instance
 from pkmcal.arms.arm import SerialArm
 from pkmcal.checks.arm import ARM_CHECKS
+from pkmcal.checks.cables import not_pulled, on_cables, said_of_cables
 from pkmcal.checks.chains import CHAIN_CHECKS, surplus
 from pkmcal.checks.finding import Finding
 from pkmcal.checks.function import (
@@ -46,6 +47,11 @@ CHECKS = (
     unreachable,
     singular,
     contradicted,
+)
+# Anchors of cables stand where there is room for them, and platforms hang between crossed ones.
+CABLE_CHECKS = (
+    *(check for check in CHECKS if check not in (off_circle, unlike, opposite_order)),
+    not_pulled,
 )
 
 
@@ -115,6 +121,7 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
         stroke    home, or a stroke's ends, that the inverse kinematics cannot use
         singular  home, or every pose, is singular; affinely similar base and platform
         drive     drive laws that may turn back within their stroke: they have no inverse
+        tension   a home at which not all cables can pull
         stated    numbers that contradict what the robot file states
         ========  ==========================================================================
 
@@ -129,6 +136,9 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
     errors of manufacture, raises no alarm; a slip smaller than that is not seen. A machine below
     10 mm or above 100 m is no finding, for there are such; where nothing else is found ``print``
     remarks on its size, since all of its lengths may be in another unit.
+
+    Of a machine on cables alone joints may lie anywhere: circle, order and alike are not looked at.
+    ``print`` says what its cables need to pull at home, and whether it can calibrate itself.
 
     Of a machine of chains it is checked that the platform stands still while its actuators do
     (mobility: what it can still do is named), that home values are the distances they seem to be
@@ -151,10 +161,17 @@ def check_geometry(robot: Robot | SerialArm) -> GeometryCheck:
         found = [finding for check in ARM_CHECKS for finding in check(robot)]
     else:
         instance("robot", robot, Robot, " or SerialArm")
-        checks = CHECKS if robot.model.chains is None else CHAIN_CHECKS
+        checks: Sequence[Callable[[Robot], Iterator[Finding]]] = CHECKS
+        if robot.model.chains is not None:
+            checks = CHAIN_CHECKS
+        elif on_cables(robot):
+            checks = CABLE_CHECKS
         found = [finding for check in checks for finding in check(robot)]
     return GeometryCheck(robot, tuple(found))
 
 
 def _remark(robot: Robot) -> str:
-    return unusual_size(robot) if robot.model.chains is None else surplus(robot)
+    if robot.model.chains is not None:
+        return surplus(robot)
+    remarks = [unusual_size(robot), said_of_cables(robot) if on_cables(robot) else ""]
+    return "; ".join(filter(None, remarks))

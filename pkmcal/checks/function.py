@@ -111,6 +111,7 @@ def _sizes(robot: Robot) -> dict[str, float]:
     """The lengths of a machine that say how large it is, mm; those that are 0 are left out."""
     base, platform = joints(robot)
     slots = robot.geometry.slots
+    cranks = [KINDS[limb.kind].driver == "crank" for limb in robot.model.limbs]
     ends = [
         max(map(abs, limb.stroke))
         for limb in robot.model.limbs
@@ -121,7 +122,7 @@ def _sizes(robot: Robot) -> dict[str, float]:
         "platform joints": float(np.linalg.norm(platform.points, axis=1).max()),
         "home": float(np.linalg.norm(robot.own_home[:3])),
         "rods": float(slots[:, SLOTS.index("rod")].max()),
-        "cranks": float(slots[:, SLOTS.index("crank")].max()),
+        "cranks": float(slots[cranks, SLOTS.index("crank")].max(initial=0.0)),
         "strokes": max(ends, default=0.0),
     }
     least = _NOISE * max(sizes.values())

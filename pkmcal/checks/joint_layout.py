@@ -9,7 +9,7 @@ import numpy as np
 
 from pkmcal import screw
 from pkmcal.arrays import BoolArray, FloatArray, wrapped
-from pkmcal.core.library import DRIVERS, SLOTS
+from pkmcal.core.library import SLOTS
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 
@@ -218,13 +218,10 @@ def traits(robot: Robot) -> list[Trait]:
     drive = robot.feasible(robot.home).drive
     ends = np.array([limb.stroke or (np.nan, np.nan) for limb in limbs])
     slot = dict(zip(SLOTS, robot.geometry.slots.T[: len(SLOTS)], strict=True))
-    for driver in DRIVERS:
+    for driver in dict.fromkeys(KINDS[limb.kind].driver for limb in limbs):
         mine = [KINDS[limb.kind].driver == driver for limb in limbs]
-        if not any(mine):
-            continue
-        rods = [] if driver == "length" else [Trait("rod", "mm", slot["rod"], 1.0)]
-        if driver == "crank":
-            rods.append(Trait("crank", "mm", slot["crank"], 1.0))
+        fixed = KINDS[limbs[mine.index(True)].kind].lengths
+        rods = [Trait(key, "mm", slot[name], 1.0) for key, name in fixed.items()]
         unit, shown, scale = ("deg", 180 / np.pi, degree) if driver == "crank" else ("mm", 1.0, 1.0)
         # from one side or the other a rail's carriage drives, and stands elsewhere
         at_home = np.full(len(limbs), np.nan) if rails else drive * shown

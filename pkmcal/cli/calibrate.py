@@ -16,7 +16,12 @@ from pkmcal.arguments import word
 from pkmcal.calibration.datum import DATUMS
 from pkmcal.calibration.loss import LIMITS
 from pkmcal.calibration.parameters import KNOWN, Known
-from pkmcal.cli.geometry_options import free_names, matching, read_deviations
+from pkmcal.cli.geometry_options import (
+    free_names,
+    matching,
+    read_coefficients,
+    read_prior,
+)
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.measured import (
     Columns,
@@ -29,6 +34,7 @@ from pkmcal.cli.measured import (
     Rotation,
     Units,
     rows_to_drop,
+    without_lines,
 )
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm
 from pkmcal.cli.output import Output, say
@@ -122,6 +128,15 @@ def calibrate(
             " finite ±. none: hold none.",
         ),
     ] = "none",
+    expansion: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[PART=]NUMBER",
+            help="How the machine expands, in 1/K, of steel 11.5e-6: all of it, or base, platform,"
+            " limbs, limb3. With a column temperature the numbers are those at 20 °C. Repeat it for"
+            " other parts, or separate them with commas.",
+        ),
+    ] = None,
     drop: Annotated[
         list[str] | None,
         typer.Option(
@@ -133,6 +148,14 @@ def calibrate(
     drop_outliers: Annotated[
         bool,
         typer.Option("--drop-outliers", help="Leave out the rows that the others contradict."),
+    ] = False,
+    drop_slack: Annotated[
+        bool,
+        typer.Option(
+            "--drop-slack",
+            help="Leave out readings of cables that the others show to be slack, and keep the rest"
+            " of their rows.",
+        ),
     ] = False,
     controller: Controller = None,
     join: JoinBy = "auto",
@@ -204,9 +227,12 @@ def calibrate(
     if tracker is not None:
         seen = read_tracker(tracker)
         measured = [_seen_by(seen, each) for each in measured]
-    dropped = rows_to_drop(drop or [], measured)
-    if dropped and drop_outliers:
+    if drop and drop_outliers:
         raise ArgumentError("--drop names rows, --drop-outliers finds them: one of the two")
+    named = drop or []
+    if isinstance(held, Measurements):
+        named, held = without_lines(named, held, measured)
+    dropped = rows_to_drop(named, measured)
     fixed = matching("--fix", machine, fix or [])
     chosen = [name for name in free_names(machine, free) if name not in fixed]
     if fixed and not chosen:
@@ -217,7 +243,7 @@ def calibrate(
             given,
             measured[0] if len(measured) == 1 else measured,
             free=chosen or None,
-            prior=read_deviations("--prior", prior or [], machine, chosen),
+            prior=read_prior(prior or [], machine, chosen),
             loss=word("--loss", loss, LIMITS),
             frame=_known("--frame", frame, measured),
             target=_known("--target", target, measured),
@@ -228,6 +254,8 @@ def calibrate(
             fix=fixed,
             datum=word("--datum", datum, DATUMS),
             drop="outliers" if drop_outliers else dropped,
+            expansion=read_coefficients("--expansion", expansion or []),
+            slack="drop" if drop_slack else "keep",
         )
     if output is not None:
         with progress("picture"), output.draft() as draft:

@@ -18,15 +18,10 @@ from pkmcal.files.reading import Input
 from pkmcal.loading import load_parallel
 from pkmcal.report.as_json import as_json
 
-_OF_ARMS = ("urdf", "dh", "dh-modified", "ur")
+_OF_ARMS = ("urdf", "sdf", "dh", "dh-modified", "ur")
 _FIRMWARE = ("klipper", "reprap", "marlin", "hangprinter", "maslow")
-TARGETS = ("c", *_FIRMWARE, "linuxcnc", "mjcf", *_OF_ARMS)
-_LINES = {
-    "reprap": pk.export.reprap,
-    "marlin": pk.export.marlin,
-    "hangprinter": pk.export.hangprinter,
-}
-_IN_A_FILE = {"klipper": pk.export.klipper, "maslow": pk.export.maslow}  # of the user's
+TARGETS = ("c", *_FIRMWARE, "linuxcnc", "mjcf", "fmu", *_OF_ARMS)
+_IN_A_FILE = ("klipper", "maslow", "reprap", "hangprinter")  # of the user's
 
 
 def export(
@@ -45,8 +40,8 @@ def export(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Of Klipper or a Maslow: your printer.cfg or maslow.yaml, written with the changed"
-            " numbers and otherwise as it is; by default the lines alone.",
+            help="Of Klipper, RepRapFirmware, a Maslow: your printer.cfg, config.g or maslow.yaml,"
+            " written with the changed numbers and otherwise as it is; by default the lines alone.",
         ),
     ] = None,
     project: Annotated[
@@ -62,10 +57,10 @@ def export(
 
     c: a C99 header with its inverse and forward kinematics and Jacobian. klipper: the numbers of a
     linear or rotary delta for Klipper or Kalico; reprap, marlin: its M665 and M666, or M669;
-    hangprinter: M669. maslow: the anchors of a maslow.yaml. linuxcnc: a kinematics component, and
-    a simulation that runs it. mjcf: a model for MuJoCo. Of serial arms: urdf, a tree of links; dh
-    and dh-modified, a table of Denavit-Hartenberg numbers; ur, the lists of a calibration.conf of
-    Universal Robots.
+    hangprinter: M669 and M666. maslow: the anchors of a maslow.yaml. linuxcnc: a kinematics
+    component, and a simulation that runs it. mjcf: a model for MuJoCo. fmu: an FMU for
+    co-simulation. Of serial arms: urdf and sdf, a tree of links; dh and dh-modified, a table of
+    Denavit-Hartenberg numbers; ur, the lists of a calibration.conf of Universal Robots.
 
     What a controller cannot hold is refused with the reason, and nothing is written.
 
@@ -73,7 +68,7 @@ def export(
     """
     word("--as", target, TARGETS)
     _only(target, ("c",), number=number)
-    _only(target, tuple(_IN_A_FILE), config=config)
+    _only(target, _IN_A_FILE, config=config)
     _only(target, _FIRMWARE, project=project or None)
     read = Inputs()
     if target in _OF_ARMS:
@@ -112,6 +107,8 @@ def _export_arm(
     with Output(out.parent, [out.name], read, force).draft() as draft:
         if target == "urdf":
             pk.export.urdf(arm, draft / out.name)
+        elif target == "sdf":
+            pk.export.sdf(arm, draft / out.name)
         elif target == "ur":
             pk.export.universal_robots(arm, draft / out.name)
         else:
@@ -136,14 +133,23 @@ def _write(
     project: bool,
 ) -> pk.export.Loss | None:
     """Write one file, and say what is lost."""
-    if target == "c":
-        pk.export.c_header(machine, path, _number(number))
-    elif target == "mjcf":
-        pk.export.mjcf(machine, path)
-    elif target in _IN_A_FILE:
-        return _IN_A_FILE[target](machine, path, config, project)
-    else:
-        return _LINES[target](machine, path, project)
+    match target:
+        case "c":
+            pk.export.c_header(machine, path, _number(number))
+        case "mjcf":
+            pk.export.mjcf(machine, path)
+        case "fmu":
+            pk.export.fmu(machine, path)
+        case "klipper":
+            return pk.export.klipper(machine, path, config, project)
+        case "maslow":
+            return pk.export.maslow(machine, path, config, project)
+        case "reprap":
+            return pk.export.reprap(machine, path, project, config)
+        case "marlin":
+            return pk.export.marlin(machine, path, project)
+        case "hangprinter":
+            return pk.export.hangprinter(machine, path, project, config)
     return None
 
 

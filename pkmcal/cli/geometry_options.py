@@ -6,12 +6,14 @@ import re
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
+from pkmcal.calibration.prior_functions import terms
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.units import UNITS
 from pkmcal.measurements.calibratable import Calibratable
 
 _FRAME = dict(zip(POSE, ("mm", "mm", "mm", "rad", "rad", "rad"), strict=True))
+_PAIR = re.compile(r"(?P<name>[^=]+)=\s*(?P<value>[^=±]*?)\s*(?:±|\+-)\s*(?P<sigma>.*)")
 _DEVIATION = re.compile(
     r"(?:(?P<name>[^=]+)=)?\s*"
     r"(?P<number>[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)\s*(?P<unit>\D*)"
@@ -78,6 +80,72 @@ def read_deviations(
             return sigma
         sigmas[name] = sigma
     return sigmas or None
+
+
+def read_coefficients(option: str, given: Sequence[str]) -> float | Mapping[str, float] | None:
+    """Coefficients from the command line: "NUMBER" for all, or "PART=NUMBER"; None without.
+
+    Raises
+    ------
+    ValueError
+        No number, a part twice, a number for all beside others.
+    """
+    found: dict[str, float] = {}
+    for text in [part.strip() for each in given for part in each.split(",")]:
+        match = _DEVIATION.fullmatch(text)
+        name = "" if match is None else (match["name"] or "").strip()
+        if match is None or match["unit"] or name in found:
+            raise ArgumentError(f"{option} {text}: expected PART=NUMBER, such as base=11.5e-6")
+        found[name] = float(match["number"])
+    if "" in found and len(found) > 1:
+        raise ArgumentError(f"{option}: a number without a part stands alone, for all")
+    return found.get("", found or None)
+
+
+def read_prior(
+    given: Sequence[str], robot: Calibratable, names: Sequence[str]
+) -> float | Mapping[str, float | tuple[float, float]] | None:
+    """What ``--prior`` states: deviations, and functions of numbers as "|base1 - base2|=3000±1".
+
+    Raises
+    ------
+    ValueError
+        As `read_deviations`.
+    """
+    plain = [text for text in given if "±" not in text and "+-" not in text]
+    found = read_deviations("--prior", plain, robot, names)
+    if len(plain) == len(given):
+        return found
+    if isinstance(found, float):
+        raise ArgumentError(f"--prior {plain[0]}: a number without a name stands alone, for all")
+    stated: dict[str, float | tuple[float, float]] = dict(found or {})
+    for text in given:
+        if text not in plain:
+            pair = _PAIR.fullmatch(text)
+            try:
+                name, value, sigma = _pair(pair, robot)
+            except ValueError as error:
+                raise ArgumentError(f"--prior {text}: {error}") from None
+            stated[name] = value, sigma
+    return stated
+
+
+def _pair(pair: re.Match[str] | None, robot: Calibratable) -> tuple[str, float, float]:
+    """Name or function, value and σ in mm, rad or 1; a value without a unit has that of σ."""
+    parts = [_DEVIATION.fullmatch(pair[key].strip()) for key in ("value", "sigma")] if pair else []
+    if pair is None or None in parts:
+        raise ArgumentError("expected NAME=VALUE±σ, such as '|base1 - base2|=3000±1'")
+    name = pair["name"].strip()
+    first = "" if name.startswith("|") else next(iter(terms(name, name)))[1]
+    unit = _unit_of(first, robot, robot.geometry.names)
+    (value, of_value), (sigma, of_sigma) = (
+        (float(part["number"]), part["unit"].strip()) for part in parts if part
+    )
+    return (
+        name,
+        _in_unit(value, of_value or of_sigma, unit, name),
+        _in_unit(sigma, of_sigma, unit, name),
+    )
 
 
 def _deviation(text: str, robot: Calibratable, names: Sequence[str]) -> tuple[str, float]:

@@ -31,8 +31,8 @@ def import_file(
     """Make a robot file and measurements out of a printer's configuration.
 
     Of a linear or rotary delta with Klipper or Kalico, of a linear one with the M665 and M666 of
-    RepRapFirmware or Marlin, of a Hangprinter with M669, or of a Maslow with its maslow.yaml or
-    the log of its calibration.
+    RepRapFirmware or Marlin, of a Hangprinter with M669 and M666, or of a Maslow with its
+    maslow.yaml or the log of its calibration.
     robot.toml has the firmware's numbers; probe.csv the heights that a DELTA_CALIBRATE stored, if
     there are any; belts.csv the belts of a Maslow's log.
 
@@ -53,7 +53,9 @@ def import_file(
         places = rows if table == "belts.csv" else 0
         counts = {"heights": rows - places, "distances": printer.distances, "places": places}
         files = [str(path) for path in output.paths]
-        say(as_json({"robot": printer.robot.name, "files": files, **counts}, schema="import"))
+        notes = list(printer.notes)
+        found = {"robot": printer.robot.name, "files": files, **counts, "notes": notes}
+        say(as_json(found, schema="import"))
     else:
         say(printer)
         say("written: " + ", ".join(map(str, output.paths)))

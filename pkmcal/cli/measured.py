@@ -131,6 +131,31 @@ def rows_to_drop(given: Sequence[str], measured: Sequence[Measurements]) -> list
     return rows
 
 
+def without_lines(
+    given: Sequence[str], held: Measurements, rest: Sequence[Measurements]
+) -> tuple[list[str], Measurements]:
+    """Take lines of the file that is held out out of it; what of ``--drop`` is left for the others.
+
+    A file that is fitted, too, loses its lines there.
+    """
+    names = {Path(each.file).name for each in rest}
+    others, lines = [], set[int]()
+    for text in (part.strip() for each in given for part in each.split(",")):
+        file, _, line = text.rpartition(":")
+        own = Path(file).name == Path(held.file).name and Path(file).name not in names
+        if own and line.isdecimal() and held.lines is not None and int(line) in held.lines:
+            lines.add(int(line))
+        else:
+            others.append(text)
+    if lines:
+        assert held.lines is not None
+        held = held.select(~np.isin(held.lines, list(lines)))
+        shown = ", ".join(map(str, sorted(lines)))
+        many = "lines" if len(lines) > 1 else "line"
+        say(f"pkmcal: {held.file}: {many} {shown} left out of the hold-out, as asked", err=True)
+    return others, held
+
+
 def _offset(text: str) -> list[float]:
     try:
         numbers = [float(part) for part in text.split(",")]

@@ -46,7 +46,8 @@ Prior = Annotated[
     typer.Option(
         metavar="[NAME=]σ",
         help="Standard deviation of a number before anything is measured: 'base*=0.5',"
-        " 'angle1=0.1deg'. Without a name, in mm, of all.",
+        " 'angle1=0.1deg'. Without a name, in mm, of all. What a tape says of a length:"
+        " '|base1 - base2|=3000±1'.",
     ),
 ]
 Poses = Annotated[

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -15,7 +15,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.calibration.optimal_design import CRITERIA
 from pkmcal.calibration.plan_poses import PLANNED, Plan, plan_poses
 from pkmcal.calibration.planned import UNKNOWN
-from pkmcal.cli.geometry_options import free_names, read_deviations
+from pkmcal.cli.geometry_options import free_names, read_prior
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
 from pkmcal.cli.output import Output, say
@@ -28,6 +28,7 @@ from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.command_csv import read_commands, write_commands
+from pkmcal.measurements.components import Kind
 from pkmcal.measurements.pose_csv import read_poses, write_poses
 from pkmcal.report.as_json import as_json
 
@@ -60,11 +61,28 @@ def plan(
     ] = "prediction",
     kind: Annotated[
         str,
-        typer.Option(metavar="KIND", help="What is measured: position, pose, height or closure."),
+        typer.Option(
+            metavar="KIND",
+            help="What is measured: position, pose, height, distance, orientation or closure. Of"
+            " several how many poses of each: position=20,distance=10.",
+        ),
     ] = "position",
+    target: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[KIND=]X,Y,Z",
+            help="The measured point of the platform, mm; of distances the fixed point of the base."
+            " Repeat it for several points.",
+        ),
+    ] = None,
     noise: Annotated[
-        float, typer.Option(metavar="MM", help="Of the instrument, one standard deviation.")
-    ] = 0.02,
+        str,
+        typer.Option(
+            metavar="MM",
+            help="Of the instrument, one standard deviation; of several kinds also"
+            " position=0.02,distance=0.005.",
+        ),
+    ] = "0.02",
     actuator_noise: Annotated[
         float | None,
         typer.Option(metavar="X", help="Of the actuators, mm or rad; closure needs it."),
@@ -108,21 +126,27 @@ def plan(
     chosen = free_names(seen, free)
     candidates = _drawn(machine, box, seed) if poses is None else _places(machine, read.file(poses))
     used = None if targets is None else _places(machine, read.file(targets))
-    names = ["poses.csv", "commands.csv"]
+    kinds = _kinds(kind)
+    several = isinstance(kinds, dict)
+    if several and (count is not None or accuracy is not None):
+        raise ArgumentError(f"--kind {kind}: says how many poses, without --count and --accuracy")
+    commands = [f"commands-{each}.csv" for each in kinds] if several else ["commands.csv"]
+    names = ["poses.csv", *commands]
     output = None if out is None else Output(out, names, read, force)
     with progress("choosing poses"):
         made = plan_poses(
             machine,
             candidates,
-            count=30 if count is None and accuracy is None else count,
+            count=30 if count is None and accuracy is None and not several else count,
             accuracy=accuracy,
             targets=used,
             criterion=word("--criterion", criterion, CRITERIA),
-            kind=word("--kind", kind, PLANNED),
-            noise=noise,
+            kind=kinds,
+            target=_points(target or [], kinds),
+            noise=_noise(noise, kinds),
             actuator_noise=actuator_noise,
             free=chosen or None,
-            prior=read_deviations("--prior", prior or [], seen, chosen),
+            prior=read_prior(prior or [], seen, chosen),
             unknown=[word("--unknown", each, UNKNOWN) for each in unknown or ()],
         )
     written: list[Path] = []
@@ -135,6 +159,63 @@ def plan(
     else:
         say("\n".join([str(made), *([""] if written else []), *map(str, written)]))
     return 0 if np.isfinite(made.predicted) else 1
+
+
+def _kinds(text: str) -> Kind | dict[Kind, int]:
+    """One kind, or how many poses of each of several."""
+    if "=" not in text:
+        return word("--kind", text, PLANNED)
+    found: dict[Kind, int] = {}
+    for part in text.split(","):
+        name, _, number = (each.strip() for each in part.partition("="))
+        if not number.isdecimal():
+            raise ArgumentError(f"--kind {text}: expected KIND=N, such as position=20,distance=10")
+        found[word("--kind", name, PLANNED)] = int(number)
+    return found
+
+
+def _points(given: list[str], kinds: Kind | dict[Kind, int]) -> Any:
+    """Points (k, 3) of all kinds, or by kind; None where none are given."""
+    found: dict[str, list[list[float]]] = {}
+    for text in given:
+        name, equals, numbers = text.partition("=")
+        try:
+            point = [float(each) for each in (numbers if equals else name).split(",")]
+        except ValueError:
+            point = []
+        if len(point) != 3:
+            raise ArgumentError(f"--target {text}: expected X,Y,Z in mm, or KIND=X,Y,Z")
+        found.setdefault(
+            _of_plan("--target", text, name.strip(), kinds) if equals else "", []
+        ).append(point)
+    return _by_kind("--target", found)
+
+
+def _noise(text: str, kinds: Kind | dict[Kind, int]) -> Any:
+    """Deviations of all kinds, or by kind."""
+    found: dict[str, float] = {}
+    for part in text.split(","):
+        name, equals, number = (each.strip() for each in part.partition("="))
+        try:
+            value = float(number if equals else name)
+        except ValueError:
+            raise ArgumentError(f"--noise {text}: expected a number, or KIND=NUMBER") from None
+        found[_of_plan("--noise", text, name, kinds) if equals else ""] = value
+    return _by_kind("--noise", found)
+
+
+def _of_plan(option: str, text: str, name: str, kinds: Kind | dict[Kind, int]) -> str:
+    known = [*kinds] if isinstance(kinds, dict) else [kinds]
+    if name not in known:
+        raise ArgumentError(f"{option} {text}: the plan has {', '.join(known)}; found {name!r}")
+    return name
+
+
+def _by_kind(option: str, found: dict[str, Any]) -> Any:
+    """What is for all, or a mapping of kinds to what is theirs; None of nothing."""
+    if "" in found and len(found) > 1:
+        raise ArgumentError(f"{option}: one without a kind stands alone, for all")
+    return found.get("", found or None)
 
 
 def _box(machine: Robot | SerialArm, given: list[str]) -> Box:
@@ -192,6 +273,11 @@ def _places(machine: Robot | SerialArm, path: PathLike[str]) -> FloatArray:
 
 
 def _write(made: Plan, out: Path, head: str) -> None:
-    units = made.robot.actuator_units
+    units, kinds = made.robot.actuator_units, np.array(made.kinds)
     write_poses(out / "poses.csv", made.poses, comment=head)
-    write_commands(out / "commands.csv", units, made.actuators, comment=head)
+    if len(set(made.kinds)) == 1:
+        write_commands(out / "commands.csv", units, made.actuators, comment=head)
+        return
+    for kind in set(made.kinds):
+        mine = made.actuators[kinds == kind]
+        write_commands(out / f"commands-{kind}.csv", units, mine, comment=head)

@@ -15,11 +15,18 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import FileError
+from pkmcal.files.text_lines import MARK, lines_of
 
 _WORD = re.compile(r"([A-Za-z])[ \t]*([-+]?(?:\d+\.?\d*|\.\d+))")
 _REMARK = re.compile(r"\([^)]*\)|;.*")
 _PLAIN = re.compile(rf"\s*(?:{_WORD.pattern}\s*)*")
-_SETTING = re.compile(r"\s*(?:N\s*\d+\s*)?M\s*\d\d", re.IGNORECASE)  # its X, Y, Z are no axes
+_NUMBERED = r"\s*(?:N\s*\d+\s*)?"
+_SETTING = re.compile(_NUMBERED + r"M\s*\d\d", re.IGNORECASE)  # its X, Y, Z are no axes
+_MESSAGE = re.compile(_NUMBERED + r"M\s*(?:0*23|28|30|32|36|117|118|291|928)\b.*", re.IGNORECASE)
+_OFFSET = re.compile(_NUMBERED + r"(M\s*(?:206|428)\b|SET_GCODE_OFFSET\b)", re.IGNORECASE)
+_GEOMETRY = re.compile(_NUMBERED + r"(M\s*66[569])\b(?=.*[A-Z])", re.IGNORECASE)
+_HOMED = re.compile(_NUMBERED + r"G\s*28(?:\s*[A-Z])*\s*", re.IGNORECASE)  # axes without numbers
+_CHECKSUM = re.compile(r".*\*\s*\d+\s*")
 _NAMED = re.compile(r"\s*[A-Za-z_]{2,}")  # a macro, such as PRINT_START BED=60
 _INCH = 25.4
 _LOST = {28.0, 28.1, 29.0, 30.0, 30.1, 32.0}  # homing and probing: the machine is elsewhere then
@@ -131,7 +138,7 @@ class Program:
     def __init__(
         self, text: str, letters: Sequence[str], start: FloatArray, stated: bool, place: str
     ) -> None:
-        self.lines = text.splitlines(keepends=True)
+        self.lines = lines_of(text)
         self.moves: list[Move] = []
         self._letters = letters
         self._start = start
@@ -148,6 +155,16 @@ class Program:
 
     def _read(self, i: int, line: str, state: _State) -> None:
         code = _REMARK.sub(lambda found: " " * len(found[0]), line.rstrip("\r\n"))
+        code = code.replace(MARK, " ", 1) if i == 0 else code
+        if _MESSAGE.match(code):
+            return
+        if offset := _OFFSET.match(code):
+            raise self.wrong(i, f"{offset[1]} moves the origin, which cannot be followed")
+        if geometry := _GEOMETRY.match(code):
+            raise self.wrong(i, f"{geometry[1]} gives the controller other numbers than ROBOT has")
+        if _HOMED.fullmatch(code):
+            code = ""
+            self._lose(state)
         if _NAMED.match(code) or not code.strip() or code.strip() == "%":
             return
         plain = _PLAIN.fullmatch(code)
@@ -156,6 +173,8 @@ class Program:
             words = self._words(code)
             self._modes(words, state)
             return
+        if _CHECKSUM.fullmatch(code):
+            raise self.wrong(i, "the checksum would no longer be right: take checksums out")
         if not plain:
             raise self.wrong(i, f"{line.strip()!r:.40} is no plain G-code: words and numbers alone")
         words = self._words(code)
@@ -165,9 +184,13 @@ class Program:
             self._code(i, value, axes, words, state)
         self._modes(words, state)
         if any(value in _LOST for value in codes):
-            state.at, state.fresh, state.named = self._start.copy(), True, set()
+            self._lose(state)
         elif 92.0 not in codes and 4.0 not in codes:
             self._move(i, axes, words, state)
+
+    def _lose(self, state: _State) -> None:
+        """The machine was homed or probed."""
+        state.at, state.fresh, state.named = self._start.copy(), True, set()
 
     @staticmethod
     def _words(code: str) -> list[tuple[str, Word]]:
@@ -205,7 +228,7 @@ class Program:
             state.extruded = next(word.value for letter, word in words if letter == "E")
         elif value not in _PASSED | _LOST:
             raise self.wrong(i, f"G{value:g} cannot be followed: lines and rapid moves alone are")
-        elif value == 10.0 and letters & {"L", "P", *axes}:
+        elif value == 10.0 and letters & {"L", *axes}:
             raise self.wrong(i, "G10 sets offsets, which cannot be followed")
         elif value == 80.0:
             state.motion = None

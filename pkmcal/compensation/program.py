@@ -17,6 +17,7 @@ from pkmcal.compensation.gcode import Move, Program, number
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import MOST_TEXT, content
+from pkmcal.kinematics.complete import written_as
 from pkmcal.kinematics.robot import Robot, determines_others, require_parallel
 from pkmcal.result import Result
 
@@ -161,6 +162,13 @@ class _Machine:
         found: FloatArray = pose[..., self._places]
         return np.where(self._turns, np.degrees(found), found)
 
+    def _near(self, pose: FloatArray, coordinates: FloatArray) -> FloatArray:
+        """`shown`, of poses (N, 6) with rotations as coordinates (N, axes) write theirs."""
+        if self._controller.machine.turns_freely:
+            wanted = np.where(self._turns, np.radians(coordinates), coordinates)
+            pose = written_as(pose, self._places, wanted)
+        return self.shown(pose)
+
     def _poses(self, coordinates: FloatArray, robot: Robot) -> FloatArray:
         poses = np.tile(robot.home, (len(coordinates), 1))
         poses[:, self._places] = np.where(self._turns, np.radians(coordinates), coordinates)
@@ -176,7 +184,7 @@ class _Machine:
         if self.joints:
             found: FloatArray = q * self._degrees
             return found
-        found = self.shown(self._controller.forward(q, guess=poses).pose)
+        found = self._near(self._controller.forward(q, guess=poses).pose, coordinates)
         turned: FloatArray = coordinates + np.degrees(wrapped(np.radians(found - coordinates)))
         return np.where(self._turns, turned, found)
 
@@ -198,7 +206,7 @@ class _Machine:
         else:
             own = self._poses(command, self._controller)
             q = self._controller.inverse(own, match=self._match)
-        return self.shown(self._calibrated.forward(q, guess=poses).pose)
+        return self._near(self._calibrated.forward(q, guess=poses).pose, near)
 
     def distance(self, one: FloatArray, other: FloatArray) -> FloatArray:
         """Between coordinates, mm; angles as arcs."""

@@ -90,7 +90,8 @@ def universal_robots(arm: SerialArm, path: str | PathLike[str]) -> DHTable:
     if np.abs(nominal.theta).max() > _MOVED:
         raise ArgumentError(
             f"{arm.name}: the offsets theta of these robots are 0, found"
-            f" {np.degrees(nominal.theta).round(4).tolist()} deg"
+            f" {np.degrees(nominal.theta).round(4).tolist()} deg: export the calibrated robot.toml,"
+            " which has the nominal numbers and the errors apart"
         )
     lists = {
         "delta_theta": _turned(real.theta - nominal.theta),

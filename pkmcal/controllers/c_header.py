@@ -14,8 +14,10 @@ from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import c_source
 from pkmcal.controllers.c_source import Number
-from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.laws import require_no_pulleys
 from pkmcal.controllers.rendering import rendered
+from pkmcal.core.driven import DrivenMachine
+from pkmcal.core.laws import MOST_STEPS, ROUNDING, LawNumbers
 from pkmcal.core.library import AXES, DRIVERS, MAPS, ROWS, SLOTS
 from pkmcal.core.poses import invert
 from pkmcal.exceptions import ArgumentError
@@ -29,6 +31,7 @@ _MEASURED = (
     " * float 3.7 kB, 780 and 8 100"
 )
 _ENUMERATORS = tuple(slot.upper().replace(".", "_") for slot in SLOTS)
+_GAIN = SLOTS.index("gain")
 _UNUSED_FRAME = np.zeros(9)
 
 
@@ -74,7 +77,7 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
     """The header whose names begin with `prefix`."""
     word("number", number, ("double", "float"))
     machine = robot.machine
-    require_no_laws(robot, "a header")
+    require_no_pulleys(robot, "a header")
     if robot.model.chains is not None:
         raise ArgumentError(f"robot: {robot.name} has chains of joints; a header holds other limbs")
     if machine.rows != machine.m:
@@ -82,7 +85,23 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"
             " a header holds machines with as many of both"
         )
+    _require_turns(robot)
     return rendered("robot.h.jinja", _contents(robot, prefix, number))
+
+
+def _require_turns(robot: Robot) -> None:
+    """Refuse cranks that a whole turn of their actuator leaves elsewhere, one of them."""
+    for a in range(robot.n_actuators):
+        sharing = [
+            (KINDS[limb.kind].actuator_unit, abs(g[_GAIN]))
+            for limb, g in zip(robot.model.limbs, robot.slots, strict=True)
+            if limb.actuator == a
+        ]
+        if "rad" in dict(sharing) and len(set(sharing)) > 1:
+            raise ArgumentError(
+                f"robot: limbs of {robot.name} share actuator q{a + 1} with different gears; which"
+                " of its turns they agree on is more than a header finds"
+            )
 
 
 def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
@@ -95,7 +114,11 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
     rows = _rows(robot)
     actuators = [limb.actuator for limb in limbs]
     lengths = sum(name in "xyz" for name in MAPS[map])
-    functions = c_source.with_callees(_needed(robot, drivers, [row["name"] for row in rows]))
+    laws = _laws(robot)
+    turning = [bool(each) for each in machine.struct.angle[0 : len(limbs)]]
+    needed = _needed(robot, drivers, [row["name"] for row in rows])
+    needed += _LAWS[: 2 if laws else 0] + _LAWS[2:3] * _any(laws, "waves")
+    functions = c_source.with_callees(needed + _LAWS[3:] * _any(laws, "points"))
     state = int(
         re.findall(r"state\[(\d+)\]", c_source.functions()[f"map_{map}_frame"].arguments)[0]
     )
@@ -104,7 +127,7 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
         return c_source.literal(value, number)
 
     def several(values: Any) -> str:
-        return ", ".join(one(value) for value in np.ravel(values))
+        return ", ".join(one(value) for value in np.ravel(list(values)))
 
     def whole(values: Any) -> str:
         return ", ".join(str(int(value)) for value in values)
@@ -112,6 +135,8 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
     first, second, frame, axis = prepared(robot)
     texts = [c_source.as_c99(f, prefix, number, _ENUMERATORS) for f in functions]
     slots = c_source.slots_read(texts, prefix, _ENUMERATORS)
+    blank = np.zeros((1, n))
+    _, own, _ = machine.bare(robot.slots, blank)
     wide = number == "double"
     size = machine.struct.size
     return {
@@ -133,9 +158,7 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
         "home": several(robot.home),
         "slots": [f"{prefix}_{name}" for name in slots],
         "axes": len(AXES),
-        "numbers": [
-            several(row[[_ENUMERATORS.index(slot) for slot in slots]]) for row in robot.slots
-        ],
+        "numbers": [several(row[[_ENUMERATORS.index(slot) for slot in slots]]) for row in own],
         "first": [several(row) for row in first],
         "second": [several(row) for row in second],
         "frame": [several(row) for row in frame],
@@ -147,6 +170,29 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
         "shared": n < len(limbs),
         "which": f"{prefix}_actuator[i]" if n < len(limbs) else "i",
         "actuator": whole(actuators),
+        "leads": whole(actuators.index(actuator) == i for i, actuator in enumerate(actuators)),
+        "turning": any(turning),
+        "all_turning": all(turning),
+        "angle": whole(turning),
+        "near": several(
+            machine.struct.near[i] if turns else 0.0 for i, turns in enumerate(turning)
+        ),
+        "turn": one(2.0 * np.pi),
+        "laws": [
+            {
+                "base": several(law.base),
+                "waves": [several(wave) for wave in law.waves],
+                "points": [several(point) for point in law.points],
+                "span": several(np.clip(law.span, -_largest(number), _largest(number))),
+            }
+            for law in laws
+        ],
+        "waves": _starts(laws, "waves"),
+        "points": _starts(laws, "points"),
+        "most": several(law.most for law in laws),
+        "corrected": whole(bool(law.waves or law.points) for law in laws),
+        "most_steps": MOST_STEPS,
+        "law_rounding": one(ROUNDING if wide else 1e-6),
         "sharing": several([float(actuators.count(i)) for i in range(n)]),
         "framed": None
         if robot.frames.trivial
@@ -189,6 +235,40 @@ def _needed(robot: Robot, drivers: Sequence[str], rows: Sequence[str]) -> list[s
 
 _MAP_PARTS = ("from_pose", "frame", "retract", "angles", "pull", "free")
 _DRIVER_PARTS = ("inverse", "anchor", "radius", "derivatives")
+
+
+_LAWS = ["law_drive", "law_drive_inverse", "law_harmonic", "law_segment"]
+
+
+def _laws(robot: Robot) -> list[LawNumbers]:
+    """The laws of the drives; empty where none has one.
+
+    Raises
+    ------
+    ArgumentError
+        A law without an inverse.
+    """
+    machine = robot.machine
+    if not isinstance(machine, DrivenMachine):
+        return []
+    for d, why in machine.laws.doubts(robot.slots).items():
+        raise ArgumentError(f"robot: limb {d + 1} of {robot.name}: its drive law: {why}")
+    return machine.laws.numbers_of(robot.slots)
+
+
+def _any(laws: list[LawNumbers], part: str) -> bool:
+    return any(getattr(law, part) for law in laws)
+
+
+def _starts(laws: list[LawNumbers], part: str) -> str:
+    """Where the harmonics or points of each law begin in one table of all; empty without any."""
+    counts = [len(getattr(law, part)) for law in laws]
+    starts = np.cumsum([0, *counts]).tolist()
+    return ", ".join(map(str, starts)) if starts[-1] else ""
+
+
+def _largest(number: Number) -> float:
+    return float(np.finfo(np.float64 if number == "double" else np.float32).max)
 
 
 def _rows(robot: Robot) -> list[dict[str, Any]]:

@@ -17,10 +17,11 @@ import numpy as np
 from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
-from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files import reading
+from pkmcal.files.text_lines import lines_of
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import Limb
 from pkmcal.kinematics.robot import Robot
@@ -100,7 +101,7 @@ def import_comp_file(path: str | PathLike[str], rows: Meaning = "positions") -> 
     place = as_path("path", path)
     text = reading.content(place, reading.MOST_ROBOT).decode("utf-8", "replace")
     found: list[list[float]] = []
-    for line in text.splitlines():
+    for line in lines_of(text):
         try:
             found.append([float(cell) for cell in line.split()[:3]])
         except ValueError:
@@ -142,7 +143,7 @@ def comp_texts(robot: Robot, least: FloatArray, most: FloatArray) -> dict[int, s
             continue
         several = [each for each in robot.model.drives if each.actuator == drive.actuator]
         if law.quadratic or law.spool or law.harmonics or len(several) > 1:
-            require_no_laws(robot, "a COMP_FILE, which is for a table or backlash,")
+            require_plain_limbs(robot, "a COMP_FILE, which is for a table or backlash,")
         numbers = robot.slots.ravel()
         gain, offset = numbers[drive.gain], numbers[drive.offset]
         ends = [least[drive.actuator], most[drive.actuator]]

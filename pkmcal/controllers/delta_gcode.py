@@ -4,29 +4,50 @@ Both have towers at 210°, 330° and 90° plus a correction X Y Z each, and a he
 RepRapFirmware: a carriage at its switch is at H + √(L² - R²) + adjustment, and adjustments have the
 mean 0. Marlin: from the switch a carriage moves by its adjustment, never upwards, and is then at
 H + √((L + trim)² - R²).
+
+RepRapFirmware's M666 A B tilts the bed: carriages go by z + A x + B y, in percent. A robot file has
+no such numbers; the bed of an exported robot is level.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from os import PathLike
 
 import numpy as np
 
 from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
-from pkmcal.controllers.gcode_words import TOWERS, corrections, words, words_of
+from pkmcal.controllers.gcode_words import (
+    TOWERS,
+    Commands,
+    Settings,
+    changed,
+    each,
+    in_inches,
+    lines,
+    number,
+    numbers,
+    off_towers,
+    settings,
+)
 from pkmcal.controllers.linear_delta import FirmwareDelta, of_robot
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.rotary_delta import is_rotary_delta
 from pkmcal.controllers.rotary_delta import of_robot as rotary_of_robot
-from pkmcal.controllers.rotary_gcode import reprap_text as rotary_text
+from pkmcal.controllers.rotary_gcode import reprap_commands as rotary_commands
+from pkmcal.controllers.rotary_gcode import reprap_lines as rotary_lines
 from pkmcal.exceptions import FileError
 from pkmcal.files.atomic import write_whole
+from pkmcal.files.text_lines import text_in
 from pkmcal.kinematics.robot import Robot
 
 
-def reprap(robot: Robot, path: str | PathLike[str], project: bool = False) -> Loss:
+def reprap(
+    robot: Robot,
+    path: str | PathLike[str],
+    project: bool = False,
+    config: str | PathLike[str] | None = None,
+) -> Loss:
     """Write a delta's numbers for RepRapFirmware 3: M665 and M666 for config.g.
 
     Of a rotary delta M669 and M666, with the end stops at the greatest angle of the cranks.
@@ -39,6 +60,9 @@ def reprap(robot: Robot, path: str | PathLike[str], project: bool = False) -> Lo
         Where to write; an existing file is replaced, whole or not at all.
     project : bool, optional
         Write the nearest numbers where the firmware cannot hold the robot.
+    config : str or path, optional
+        The printer's own config.g: it is written with the changed numbers, and not a character
+        else of it. By default the two lines alone are written.
 
     Returns
     -------
@@ -48,15 +72,25 @@ def reprap(robot: Robot, path: str | PathLike[str], project: bool = False) -> Lo
     Raises
     ------
     ValueError
-        The firmware cannot hold the robot; nothing is written.
+        The firmware cannot hold the robot, or the file has no such lines; nothing is written.
+    OSError
+        A file that cannot be read or written.
     """
     path, project = as_path("path", path), flag("project", project)
+    place = str(as_path("config", "config.g" if config is None else config))
+    text = None if config is None else text_in(config, "surrogateescape")
+    shift = 0.0 if text is None else mean_adjustment(text, place)
     if is_rotary_delta(robot):
         turning, loss = rotary_of_robot(robot, project, one_height=False)
-        write_whole(path, rotary_text(turning))
-        return loss
-    firmware, loss = of_robot(robot, project)
-    write_whole(path, reprap_text(firmware))
+        commands = rotary_commands(turning, shift, text, place)
+        new = rotary_lines(commands)
+    else:
+        firmware, loss = of_robot(robot, project)
+        commands = reprap_commands(firmware, shift)
+        new = lines(commands)
+    if text is not None:
+        new = changed(text, place, commands)
+    write_whole(path, new.encode("utf-8", "surrogateescape"))
     return loss
 
 
@@ -88,26 +122,27 @@ def marlin(robot: Robot, path: str | PathLike[str], project: bool = False) -> Lo
     return loss
 
 
-def reprap_text(firmware: FirmwareDelta) -> str:
-    """The two lines for RepRapFirmware."""
-    height = float(np.mean(firmware.endstops))
-    rods = ":".join(f"{arm:.6f}" for arm in firmware.arms)
-    return (
-        f"M665 L{rods} R{firmware.radius:.6f} H{height:.6f} {corrections(firmware.angles)}\n"
-        f"M666 {words('XYZ', [endstop - height for endstop in firmware.endstops])}\n"
-    )
+def reprap_commands(firmware: FirmwareDelta, shift: float) -> Commands:
+    """The settings of RepRapFirmware, whose adjustments have the mean `shift`."""
+    height = float(np.mean(firmware.endstops)) - shift
+    size = {"L": firmware.arms, "R": [firmware.radius], "H": [height]}
+    ends = each("XYZ", [endstop - height for endstop in firmware.endstops])
+    return {"M665": size | off_towers(firmware.angles), "M666": ends | each("AB", [0.0, 0.0])}
+
+
+def mean_adjustment(text: str, place: str) -> float:
+    """The mean of X Y Z of M666."""
+    ends = settings(text, "M666", place)
+    return float(np.mean([number(ends, letter, "M666", place, 0.0) for letter in "XYZ"]))
 
 
 def marlin_text(firmware: FirmwareDelta) -> str:
     """The two lines for Marlin."""
-    height = min(firmware.endstops)
-    rod = float(np.mean(firmware.arms))
-    trims = words("ABC", [arm - rod for arm in firmware.arms])
-    towers = corrections(firmware.angles)
-    return (
-        f"M665 L{rod:.6f} R{firmware.radius:.6f} H{height:.6f} {towers} {trims}\n"
-        f"M666 {words('XYZ', [height - endstop for endstop in firmware.endstops])}\n"
-    )
+    height, rod = min(firmware.endstops), float(np.mean(firmware.arms))
+    size = each("LRH", [rod, firmware.radius, height]) | off_towers(firmware.angles)
+    trims = each("ABC", [arm - rod for arm in firmware.arms])
+    ends = each("XYZ", [height - endstop for endstop in firmware.endstops])
+    return lines({"M665": size | trims, "M666": ends})
 
 
 def of_reprap(text: str, place: str = "M665") -> FirmwareDelta:
@@ -116,20 +151,21 @@ def of_reprap(text: str, place: str = "M665") -> FirmwareDelta:
     Raises
     ------
     ValueError
-        A number that is missing.
+        A number that is missing, or a bed that the firmware takes to be tilted.
     """
-    size, ends = words_of(text, "M665", place), words_of(text, "M666", place)
-    radius = _one(size, "R", place)
-    arms = [_number(each, "L", place) for each in _text(size, "L", place).split(":")]
-    arms = arms * 3 if len(arms) == 1 else arms
-    if len(arms) != 3 or min(arms) <= radius:
-        raise FileError(f"{place}: L of M665 must be 1 or 3 rods longer than R, found {size['L']}")
-    height = _one(size, "H", place)
-    ats = [
-        height + float(np.sqrt(arm**2 - radius**2)) + _one(ends, letter, place, 0.0)
-        for arm, letter in zip(arms, "XYZ", strict=True)
-    ]
-    return FirmwareDelta(radius, _angles(size, place), tuple(arms), tuple(ats))
+    size, ends = settings(text, "M665", place), settings(text, "M666", place)
+    for letter in "AB":
+        if number(ends, letter, "M666", place, 0.0):
+            raise FileError(
+                f"{place}: {letter} of M666 tilts the bed by {ends[letter].value} %, which a robot"
+                " file cannot hold: set A0 B0 and let the calibration find the end stops"
+            )
+    radius = number(size, "R", "M665", place)
+    arms = numbers(size, "L", "M665", place, counts=(1, 3))
+    arms *= 3 // len(arms)
+    height = number(size, "H", "M665", place)
+    ats = [height + number(ends, letter, "M666", place, 0.0) for letter in "XYZ"]
+    return _delta(size, radius, arms, ats, place)
 
 
 def of_marlin(text: str, place: str = "M665") -> FirmwareDelta:
@@ -138,40 +174,35 @@ def of_marlin(text: str, place: str = "M665") -> FirmwareDelta:
     Raises
     ------
     ValueError
-        A number that is missing.
+        A number that is missing, or one that Marlin does not take.
     """
-    size, ends = words_of(text, "M665", place), words_of(text, "M666", place)
-    radius, rod = _one(size, "R", place), _one(size, "L", place)
-    arms = tuple(rod + _one(size, letter, place, 0.0) for letter in "ABC")
-    if min(arms) <= radius:
-        raise FileError(f"{place}: the rods of M665 must be longer than R, found {size['L']}")
-    height = _one(size, "H", place)
-    ats = [
-        height + float(np.sqrt(arm**2 - radius**2)) - _one(ends, letter, place, 0.0)
-        for arm, letter in zip(arms, "XYZ", strict=True)
-    ]
-    return FirmwareDelta(radius, _angles(size, place), arms, tuple(ats))
+    if in_inches(text):
+        raise FileError(f"{place}: G20: the numbers are in inches; list them in mm, after G21")
+    size, ends = settings(text, "M665", place), settings(text, "M666", place)
+    radius, rod = number(size, "R", "M665", place), number(size, "L", "M665", place)
+    arms = [rod + number(size, letter, "M665", place, 0.0) for letter in "ABC"]
+    height = number(size, "H", "M665", place)
+    adjustments = [number(ends, letter, "M666", place, 0.0) for letter in "XYZ"]
+    if max(adjustments) > 0.0:
+        raise FileError(
+            f"{place}: X Y Z of M666 must not be above 0, found {max(adjustments):g}: Marlin takes"
+            " no such number"
+        )
+    ats = [height - adjustment for adjustment in adjustments]
+    return _delta(size, radius, arms, ats, place)
 
 
-def _text(words: Mapping[str, str], letter: str, place: str) -> str:
-    if letter not in words:
-        raise FileError(f"{place}: {letter} of M665 is missing")
-    return words[letter]
-
-
-def _one(words: Mapping[str, str], letter: str, place: str, default: float | None = None) -> float:
-    if letter not in words and default is not None:
-        return default
-    return _number(_text(words, letter, place), letter, place)
-
-
-def _number(text: str, letter: str, place: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise FileError(f"{place}: {letter} must be a number, found {text!r}") from None
-
-
-def _angles(words: Mapping[str, str], place: str) -> tuple[float, ...]:
+def _delta(
+    size: Settings, radius: float, arms: list[float], endstops: list[float], place: str
+) -> FirmwareDelta:
+    """The delta whose nozzle is at `endstops` with a carriage at its switch."""
+    if not 0.0 < radius < min(arms):
+        found = size["L"].value
+        raise FileError(f"{place}: L of M665 must be rods longer than R, found {found}")
     pairs = zip(TOWERS, "XYZ", strict=True)
-    return tuple(tower + _one(words, letter, place, 0.0) for tower, letter in pairs)
+    angles = tuple(tower + number(size, letter, "M665", place, 0.0) for tower, letter in pairs)
+    ats = [
+        endstop + float(np.sqrt(arm**2 - radius**2))
+        for endstop, arm in zip(endstops, arms, strict=True)
+    ]
+    return FirmwareDelta(radius, angles, tuple(arms), tuple(ats))

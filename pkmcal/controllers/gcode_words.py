@@ -1,33 +1,185 @@
-"""Words of G-code, by their letters: out and in."""
+"""Settings in G-code: words of commands such as M665, by their letters, out and in.
+
+Own code: where each word stands is needed, to change it and nothing else, and what is no plain
+number, such as an expression, has to be refused rather than passed over.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from pkmcal.exceptions import FileError
+from pkmcal.files.text_lines import MARK
 
 TOWERS = (210.0, 330.0, 90.0)  # of RepRapFirmware and Marlin
-_WORD = re.compile(r"([A-Z])([-+]?[\d.]+(?::[-+]?[\d.]+)*)")
+SAME = 5e-7  # of numbers with six decimals
+_LINE = re.compile(r"[^\r\n]+")
+_REMARK = re.compile(r"\([^)]*\)|;.*|\*\s*\d+\s*$")  # a checksum, too
+_START = re.compile(  # as M503 lists it, or numbered
+    MARK + r"?(?:[^;]*\becho:|\s*N\s*\d+)?\s*", re.IGNORECASE
+)
+_CODE = re.compile(r"([GM])\s*0*(\d+)(?![\d.])", re.IGNORECASE)
+_WORD = re.compile(
+    r'\s*([A-Za-z])\s*(\{[^}]*\}|"[^"]*"|(?:[^A-Za-z\s]|(?<=[\d.])[eE](?=[-+]?\d))*)\s*'
+)
+_NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
 
 
-def words(letters: str, values: Sequence[float]) -> str:
-    """Numbers with six decimals behind their letters."""
-    pairs = zip(letters, values, strict=True)
-    return " ".join(f"{letter}{round(value, 6) + 0.0:.6f}" for letter, value in pairs)
+class Setting(NamedTuple):
+    """What stands behind a letter, and where in the text."""
+
+    value: str
+    start: int
+    end: int
 
 
-def corrections(angles: Sequence[float]) -> str:
+Settings = dict[str, Setting]
+Commands = Mapping[str, Mapping[str, Sequence[float]]]  # numbers by command and letter
+
+
+def written(*values: float) -> str:
+    """Numbers with six decimals and colons between them."""
+    return ":".join(f"{round(value, 6) + 0.0:.6f}" for value in values)
+
+
+def lines(commands: Commands, **kinds: int) -> str:
+    """The lines of commands; of those of `kinds` with a K before the other words."""
+    text = ""
+    for command, values in commands.items():
+        kind = f" K{kinds[command]}" if command in kinds else ""
+        words = " ".join(letter + written(*each) for letter, each in values.items())
+        text += f"{command}{kind} {words}\n"
+    return text
+
+
+def each(letters: str, values: Sequence[float]) -> dict[str, list[float]]:
+    """A number for each letter."""
+    return {letter: [value] for letter, value in zip(letters, values, strict=True)}
+
+
+def off_towers(angles: Sequence[float]) -> dict[str, list[float]]:
     """X Y Z: by how much towers stand off the firmware's angles, deg."""
-    off = [
-        (angle - tower + 180.0) % 360.0 - 180.0 for angle, tower in zip(angles, TOWERS, strict=True)
-    ]
-    return words("XYZ", off)
+    pairs = zip(angles, TOWERS, strict=True)
+    return each("XYZ", [(angle - tower + 180.0) % 360.0 - 180.0 for angle, tower in pairs])
 
 
-def words_of(text: str, command: str, place: str) -> dict[str, str]:
-    """The words of the last such command, as text."""
-    lines = re.findall(rf"^\s*(?:echo:\s*)?{command}\b([^;\n]*)", text, re.MULTILINE)
-    if not lines:
+def settings(text: str, command: str, place: str, missing: bool = False) -> Settings:
+    """The words of a command: what was set last, in one of them or in several.
+
+    Another K starts anew: it is another kinematics. With `missing` there may be no such command.
+
+    Raises
+    ------
+    FileError
+        There is no such command, or something beside words in it.
+    """
+    found: Settings = {}
+    times = 0
+    for line, code in _codes(text):
+        if code[0] != command:
+            continue
+        times += 1
+        new = _words_of(line, code[1], command, place)
+        if "K" in new and new["K"].value != found.get("K", new["K"]).value:
+            found = {}
+        found |= new
+    if not times and not missing:
         raise FileError(f"{place}: {command} is missing")
-    return dict(_WORD.findall(lines[-1]))
+    return found
+
+
+def in_inches(text: str) -> bool:
+    """Whether G20 is in force at the end."""
+    units = [code[0] for _, code in _codes(text) if code[0] in ("G20", "G21")]
+    return units[-1:] == ["G20"]
+
+
+def changed(text: str, place: str, commands: Commands) -> str:
+    """The text with these numbers by command and letter, and not a character else changed.
+
+    Numbers that say the same stay as they are written, also one that stands for several. A letter
+    that is missing is 0, or added to the last such command.
+
+    Raises
+    ------
+    FileError
+        There is no such command, or what stands there is no number.
+    """
+    edits: list[tuple[int, int, str]] = []
+    for command, values in commands.items():
+        found = settings(text, command, place)
+        last = max((setting.end for setting in found.values()), default=0)
+        for letter, new in values.items():
+            if letter in found:
+                old = numbers(found, letter, command, place, counts=(1, len(new)))
+                old *= len(new) // len(old)
+                start, end = found[letter][1:]
+            else:
+                old, start, end = [0.0] * len(new), last, last
+            if any(abs(one - other) > SAME for one, other in zip(old, new, strict=True)):
+                word = written(*new) if letter in found else f" {letter}{written(*new)}"
+                edits.append((start, end, word))
+    for start, end, word in sorted(edits, key=lambda edit: edit[:2], reverse=True):
+        text = text[:start] + word + text[end:]
+    return text
+
+
+def numbers(
+    found: Settings,
+    letter: str,
+    command: str,
+    place: str,
+    default: float | None = None,
+    *,
+    counts: tuple[int, ...] = (1,),
+) -> list[float]:
+    """The numbers behind a letter, as many as one of `counts`.
+
+    Raises
+    ------
+    FileError
+        It is missing and has no default, or is something else.
+    """
+    if letter not in found and default is not None:
+        return [default]
+    if letter not in found:
+        raise FileError(f"{place}: {letter} of {command} is missing")
+    value = found[letter].value
+    parts = value.split(":")
+    if len(parts) not in counts or not all(_NUMBER.fullmatch(part) for part in parts):
+        wanted = "a number" if counts == (1,) else f"{' or '.join(map(str, counts))} numbers"
+        raise FileError(f"{place}: {letter} of {command} must be {wanted}, found {value!r}")
+    return [float(part) for part in parts]
+
+
+def number(
+    found: Settings, letter: str, command: str, place: str, default: float | None = None
+) -> float:
+    """The number behind a letter; as `numbers`."""
+    return numbers(found, letter, command, place, default)[0]
+
+
+def _codes(text: str) -> list[tuple[re.Match[str], tuple[str, int]]]:
+    """Lines that begin with a G or M code: the line, the code, and where it ends in the line."""
+    found = []
+    for line in _LINE.finditer(text):
+        start = _START.match(line[0])
+        code = _CODE.match(line[0], start.end() if start else 0)
+        if code:
+            found.append((line, (f"{code[1].upper()}{code[2]}", code.end())))
+    return found
+
+
+def _words_of(line: re.Match[str], start: int, command: str, place: str) -> Settings:
+    code = _REMARK.sub(lambda found: " " * len(found[0]), line[0])
+    at, found = start, {}
+    while code[at:].strip():
+        word = _WORD.match(code, at)
+        if word is None:
+            where = f"{place}, line {line.string.count(chr(10), 0, line.start()) + 1}"
+            raise FileError(f"{where}: {code.strip()!r:.60}: {command} must have words alone")
+        found[word[1].upper()] = Setting(word[2], *(line.start() + end for end in word.span(2)))
+        at = word.end()
+    return found

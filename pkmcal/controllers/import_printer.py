@@ -23,9 +23,9 @@ from pkmcal.controllers.printer_config import (
     positive,
     read,
     step_of,
-    text_in,
 )
 from pkmcal.controllers.rotary_delta import RotaryDelta, elbow_at
+from pkmcal.files.text_lines import text_in
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.result import Result
@@ -54,6 +54,11 @@ _GCODE_HEAD = """\
 _ANCHORS_HEAD = """\
 # Imported from {file} by pkmcal: the anchors of M669.
 # An actuator coordinate is the line let out since the origin, mm; `offset` is its length there.
+"""
+_SPOOLS_HEAD = """\
+# Imported from {file} by pkmcal: the anchors of M669 and the spools of M666.
+# An actuator coordinate is turns of the motor since the origin; `offset` is the length of the line
+# there, `spool` the radius on which it is wound there.
 """
 _BELTS_HEAD = """\
 # Imported from {file} by pkmcal: the anchors of a Maslow, top left, top right, bottom left, right.
@@ -85,12 +90,15 @@ class Printer(Result):
         How many distances of a printed part are stored, which are not among the measurements.
     text : str
         The robot file.
+    notes : tuple of str
+        What the file says beside that and the robot has not, and included files that are not there.
     """
 
     robot: Robot
     measurements: Measurements | None
     distances: int
     text: str
+    notes: tuple[str, ...] = ()
 
     def _parts(self) -> Iterator[str]:
         stored = "no" if self.measurements is None else str(len(self.measurements))
@@ -101,6 +109,7 @@ class Printer(Result):
                 f"{self.distances} distances of a printed part are left out: a distance between two"
                 " poses is no kind of measurement here"
             )
+        yield from self.notes
 
 
 def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") -> Printer:
@@ -109,10 +118,10 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     Parameters
     ----------
     path : str or path
-        A printer.cfg of Klipper or Kalico: the block of SAVE_CONFIG at its end is read too,
-        included files are not. Or a file with the M665 and M666 of the other firmwares; actuator
-        coordinates are then mm down from the end stops. Or the M669 of a Hangprinter, or the
-        maslow.yaml of a Maslow or the log of its calibration.
+        A printer.cfg of Klipper or Kalico: the block of SAVE_CONFIG at its end and included files
+        that are there are read too. Or a file with the M665 and M666 of the other firmwares;
+        actuator coordinates are then mm down from the end stops. Or the M669 and M666 of a
+        Hangprinter, or the maslow.yaml of a Maslow or the log of its calibration.
     firmware : {"klipper", "reprap", "marlin", "hangprinter", "maslow"}
         Whose file it is.
 
@@ -139,9 +148,11 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
     word("firmware", firmware, get_args(Firmware))
     if firmware == "hangprinter":
         where = as_path("path", path)
-        anchors = hangprinter.of_text(text_in(path), str(where))
-        text = hangprinter.robot_text(anchors, where.stem, _ANCHORS_HEAD.format(file=where.name))
-        return Printer(hangprinter.as_robot(anchors, where.stem), None, 0, text)
+        machine = hangprinter.of_text(text_in(path, "replace"), str(where))
+        head = _ANCHORS_HEAD if machine.spools is None else _SPOOLS_HEAD
+        text = hangprinter.robot_text(machine, where.stem, head.format(file=where.name))
+        robot = hangprinter.as_robot(machine, where.stem)
+        return Printer(robot, None, 0, text, machine.notes)
     if firmware == "maslow":
         where = as_path("path", path)
         anchors, belts = maslow.of_text(text_in(path), str(where))
@@ -149,15 +160,17 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
         log = Measurements(belts, None, "closure") if len(belts) else None
         return Printer(maslow.as_robot(anchors, where.stem), log, 0, text)
     if firmware != "klipper":
-        where, text = as_path("path", path), text_in(path)
-        if firmware == "reprap" and rotary_gcode.is_rotary(text):
+        where, text = as_path("path", path), text_in(path, "replace")  # of comments
+        if firmware == "reprap" and rotary_gcode.is_rotary(text, str(where)):
             crank = rotary_gcode.of_reprap(text, str(where))
             return _turning(where, crank, _DEGREES_HEAD, None, 0)
         parse = of_reprap if firmware == "reprap" else of_marlin
         found = parse(text, str(where))
         return _printer(where, found, [-1.0] * 3, _GCODE_HEAD, None, 0)
     printer = read(path)
-    where, measured = Path(printer.place), (_heights(printer), _count(printer, "distance"))
+    absent = tuple(f"{file}, included, is not there and was not read" for file in printer.absent)
+    where = Path(printer.place)
+    measured = (_heights(printer), _count(printer, "distance"), absent)
     if kinematics(printer) == "rotary_delta":
         return _turning(where, _rotary(printer), _ROTARY_HEAD, *measured)
     radius = positive(printer, "printer", "delta_radius")
@@ -176,12 +189,17 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
 
 
 def _turning(
-    file: Path, delta: RotaryDelta, head: str, measurements: Measurements | None, distances: int
+    file: Path,
+    delta: RotaryDelta,
+    head: str,
+    measurements: Measurements | None,
+    distances: int,
+    notes: tuple[str, ...] = (),
 ) -> Printer:
     home = round(0.5 * max(delta.endstops), 3)
     text = rotary_delta.text_of(delta, home, file.stem, head.format(file=file.name))
     robot = rotary_delta.as_robot(delta, home, file.stem)
-    return Printer(robot, measurements, distances, text)
+    return Printer(robot, measurements, distances, text, notes)
 
 
 def _rotary(printer: PrinterConfig) -> RotaryDelta:
@@ -212,9 +230,10 @@ def _printer(
     head: str,
     measurements: Measurements | None,
     distances: int,
+    notes: tuple[str, ...] = (),
 ) -> Printer:
     text = text_of(delta, gains, file.stem, head.format(file=file.name))
-    return Printer(as_robot(delta, gains, file.stem), measurements, distances, text)
+    return Printer(as_robot(delta, gains, file.stem), measurements, distances, text, notes)
 
 
 def _first(printer: PrinterConfig, section: str, option: str) -> float:

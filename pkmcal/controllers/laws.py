@@ -7,19 +7,34 @@ from pkmcal.geometry.laws import Law
 from pkmcal.kinematics.robot import Robot
 
 
-def require_no_laws(robot: Robot, holder: str) -> None:
-    """Refuse a robot with drive laws; `holder` is what has no place for them.
+def require_plain_limbs(robot: Robot, holder: str) -> None:
+    """Refuse a robot with drive laws or pulleys; `holder` is what has no place for them.
 
     Raises
     ------
     ValueError
-        Naming the limb and its law.
+        Naming the limb, and its law or pulley.
     """
+    require_no_laws(robot, holder)
+    require_no_pulleys(robot, holder)
+
+
+def require_no_laws(robot: Robot, holder: str) -> None:
+    """Refuse a robot with drive laws, naming the limb and its law."""
     for d, law in enumerate(robot.model.laws):
         if law is not None:
             raise ArgumentError(
                 f"robot: limb {robot.model.limb_of_drive(d) + 1} of {robot.name} has a drive law"
                 f" ({said(law)}), which {holder} cannot hold"
+            )
+
+
+def require_no_pulleys(robot: Robot, holder: str) -> None:
+    """Refuse a robot with cables over pulleys, naming the first."""
+    for i, limb in enumerate(robot.model.limbs, 1):
+        if limb.kind == "pulley":
+            raise ArgumentError(
+                f"robot: limb {i} of {robot.name} runs over a pulley, which {holder} cannot hold"
             )
 
 

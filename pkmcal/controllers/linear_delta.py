@@ -14,7 +14,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
-from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, cylinder, fitted, require_held
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
@@ -85,7 +85,7 @@ def of_robot(robot: Robot, project: bool) -> tuple[FirmwareDelta, Loss]:
 def require_delta(robot: Robot) -> None:
     """Refuse what is no linear delta with three carriages of its own."""
     require_parallel(robot)
-    require_no_laws(robot, "a firmware")
+    require_plain_limbs(robot, "a firmware")
     if not _is_linear(robot):
         raise ArgumentError(
             f"robot: {robot.name} is no linear delta of three PUS limbs that only translates"

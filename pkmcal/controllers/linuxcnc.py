@@ -14,9 +14,9 @@ from pkmcal.arrays import FloatArray
 from pkmcal.controllers import linuxcnc_modules
 from pkmcal.controllers.c_header import text_of as header_of
 from pkmcal.controllers.comp_file import comp_texts, without_laws
-from pkmcal.controllers.laws import require_no_laws
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.rendering import rendered
+from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import POSE, SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
@@ -33,9 +33,9 @@ def linuxcnc(robot: Robot, folder: str | PathLike[str]) -> Loss | None:
     """Write a robot for LinuxCNC: its kinematics, and a headless simulation that runs them.
 
     Of a folder ``mill``: ``pkm_mill.c``, a component for halcompile with the numbers of this robot
-    folded in, ``mill.ini`` and ``mill.hal``; of joints with a table or backlash in their drive law
-    ``joint0.comp`` …, which the ini file names; and, where a module that LinuxCNC ships holds the
-    robot's numbers, its `setp` lines, such as ``genhexkins.hal``.
+    folded in, ``mill.ini`` and ``mill.hal``; where drive laws are tables and backlash alone,
+    ``joint0.comp`` … of these joints, which the ini file names; and, where a module that LinuxCNC
+    ships holds the robot's numbers, its `setp` lines, such as ``genhexkins.hal``.
 
     Parameters
     ----------
@@ -53,8 +53,8 @@ def linuxcnc(robot: Robot, folder: str | PathLike[str]) -> Loss | None:
     Raises
     ------
     ValueError
-        A machine that the component cannot hold, or a drive law that is neither a table nor
-        backlash; nothing is written.
+        A machine that the component cannot hold, or backlash beside a drive law that is no table;
+        nothing is written.
     OSError
         The folder cannot be written.
 
@@ -85,9 +85,9 @@ def contents(robot: Robot, folder: str) -> tuple[dict[str, str], Loss | None]:
             f" found {folder!r}"
         )
     tabled = robot
-    if robot.model.driven and robot.model.chains is None:  # the module is of the joints
+    if robot.model.chains is None and not _folded(robot):  # the module is of the joints
         robot = without_laws(robot)
-    module = linuxcnc_modules.of_robot(robot)
+    module = None if robot.model.driven else linuxcnc_modules.of_robot(robot)
     says = _contents(robot, name)
     tables = _tables(tabled, robot)
     for i, joint in enumerate(says["joint_list"]):
@@ -105,12 +105,20 @@ def contents(robot: Robot, folder: str) -> tuple[dict[str, str], Loss | None]:
     return files, module.loss
 
 
+def _folded(robot: Robot) -> bool:
+    """Whether the component takes the drive laws, for one has more than a table and none backlash.
+
+    Without such laws it is of joints behind their motors; LinuxCNC itself corrects these.
+    """
+    laws = [law for law in robot.model.laws if law is not None]
+    curved = any(law.quadratic or law.spool or law.harmonics for law in laws)
+    return not laws or (curved and not any(law.backlash for law in laws))
+
+
 def _tables(robot: Robot, plain: Robot) -> dict[int, str]:
     """The COMP_FILE of each joint that needs one; `plain` is the robot without laws."""
-    if not robot.model.driven:
+    if robot.model.driven == plain.model.driven:
         return {}
-    if robot.model.chains is not None:
-        require_no_laws(robot, "a kinematics module")
     at_home = plain.inverse(plain.home, match=True)
     return comp_texts(robot, *_limits(plain, at_home, plain.machine.struct.size))
 
@@ -193,16 +201,24 @@ def _limits(robot: Robot, at_home: FloatArray, size: float) -> tuple[FloatArray,
     reach = np.array([2.0 * np.pi if unit == "rad" else size for unit in robot.actuator_units])
     least, most = at_home - reach, at_home + reach
     stated: dict[int, FloatArray] = {}
-    for g, limb in zip(robot.slots, robot.model.limbs, strict=True):
+    for i, (g, limb) in enumerate(zip(robot.slots, robot.model.limbs, strict=True)):
         if limb.stroke is not None:
-            ends = np.sort(
-                (np.array(limb.stroke) - g[SLOTS.index("offset")]) / g[SLOTS.index("gain")]
-            )
+            ends = np.sort(_ends(robot, i, limb.stroke, g))
             known = stated.get(limb.actuator, ends)
             stated[limb.actuator] = np.array([max(known[0], ends[0]), min(known[1], ends[1])])
     for i, ends in stated.items():
         least[i], most[i] = ends
     return least, most
+
+
+def _ends(robot: Robot, i: int, stroke: tuple[float, float], g: FloatArray) -> FloatArray:
+    """The actuator coordinates (2,) at the ends of a limb's stroke."""
+    machine = robot.machine
+    if isinstance(machine, DrivenMachine):
+        ways = np.repeat(np.array(stroke)[:, None], len(robot.model.limbs), axis=1)
+        return machine.laws.readings(robot.slots, ways)[:, i]
+    ends: FloatArray = (np.array(stroke) - g[SLOTS.index("offset")]) / g[SLOTS.index("gain")]
+    return ends
 
 
 def _in_degrees(value: float, turns: bool) -> str:

@@ -18,11 +18,12 @@ from pkmcal.arguments import flag
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
-from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.gcode_words import SAME
+from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, fitted, require_held
-from pkmcal.controllers.printer_config import text_in
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
+from pkmcal.files.text_lines import text_in
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 CORNERS = ("tl", "tr", "bl", "br")  # in the order of the motors
@@ -31,7 +32,7 @@ _ZERO = ("blX", "blY", "brY")  # where the frame begins; the log does not print 
 _NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
 _ANCHOR = re.compile(
     r"^(?P<start>[^#\n]*?(?<![A-Za-z])(?P<name>[tb][lr][XY])[ \t]*[:=][ \t]*)"
-    rf"(?P<value>{_NUMBER})",
+    rf"(?P<value>{_NUMBER})(?![\w.]|,\d)",
     re.MULTILINE,
 )
 _ROW = re.compile(r"\{([^{}]*)\}")
@@ -159,7 +160,7 @@ def _corners(robot: Robot) -> list[int]:
         raise ArgumentError(f"robot: {robot.name} is no point in the plane (map xy) on four cables")
     if not robot.frames.trivial:
         raise ArgumentError(f"robot: {robot.name} has base and tool frames, the firmware has none")
-    require_no_laws(robot, "a firmware")
+    require_plain_limbs(robot, "a firmware")
     anchors = robot.slots[:, 0:2]
     left, low = (anchors < anchors.mean(axis=0)).T.tolist()
     corners = [("b" if low[i] else "t") + ("l" if left[i] else "r") for i in range(4)]
@@ -183,10 +184,16 @@ def _workspace(anchors: FloatArray) -> FloatArray:
 
 
 def _changed(text: str, place: str, values: dict[str, float]) -> str:
-    """The user's file with the anchors written into it."""
+    """The user's file with the anchors written into it, where they are not the same."""
     there = [found["name"] for found in _ANCHOR.finditer(text)]
     for name in values:
         if there.count(name) != 1:
             times = f"stands {there.count(name)} times" if name in there else "is missing"
             raise FileError(f"{place}: {name} {times}; a maslow.yaml has each anchor once")
-    return _ANCHOR.sub(lambda found: f"{found['start']}{values[found['name']]:.6f}", text)
+
+    def new(found: re.Match[str]) -> str:
+        value = values[found["name"]]
+        same = abs(float(found["value"]) - value) <= SAME
+        return found[0] if same else f"{found['start']}{value:.6f}"
+
+    return _ANCHOR.sub(new, text)

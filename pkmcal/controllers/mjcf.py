@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray, furthest_axis
 from pkmcal.controllers.c_header import prepared
-from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
@@ -64,7 +64,7 @@ def mjcf(robot: Robot, path: str | PathLike[str]) -> None:
 def text_of(robot: Robot) -> str:
     """The MJCF text."""
     _require(robot)
-    require_no_laws(robot, "this model")
+    require_plain_limbs(robot, "this model")
     home = robot.own_home
     drives, directions, _ = robot.limb_machine.limbs(robot.slots, home[None])
     if not np.isfinite(drives).all():

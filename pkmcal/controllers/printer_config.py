@@ -1,20 +1,24 @@
 """A printer.cfg of Klipper or Kalico: numbers with their lines, and the text with some changed.
 
-The block at the end that SAVE_CONFIG writes is read too. As in the firmware, an option above it
-goes before the same one in it. Own code, for configparser loses lines and comments.
+Lines are read as by the firmware, which is by Python's configparser: an option may go on in lines
+that are indented more, and `#` begins a comment anywhere. Included files are read where they are
+named; the block at the end that SAVE_CONFIG writes comes last, and an option above it goes before
+the same one in it. Own code, for configparser loses lines and comments.
 """
 
 from __future__ import annotations
 
+import glob
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
+from pathlib import Path
 
 from pkmcal.arguments import path as as_path
 from pkmcal.exceptions import FileError
-from pkmcal.files.reading import MOST_TEXT, content
+from pkmcal.files.text_lines import MARK, lines_of, text_in
 
 STEPPERS = ("stepper_a", "stepper_b", "stepper_c")
 ANGLES = {  # by kinematics, where the file says nothing
@@ -24,18 +28,76 @@ ANGLES = {  # by kinematics, where the file says nothing
 SAME = 5e-7  # of numbers with six decimals
 
 _SAVED = re.compile(r"#\*# <-+ SAVE_CONFIG -+>")
+_PREFIX = "#*# "
 _SECTION = re.compile(r"\[([^\]]+)\]")
-_OPTION = re.compile(r"(?P<name>[^\s#;\[:=][^:=#;]*?)\s*[:=]\s*(?P<value>[^#;]*?)\s*(?:[#;].*)?")
+_INCLUDE = re.compile(r"\[include +([^\]]+)\]")
+_OPTION = re.compile(r"(?P<name>.*?)\s*[:=]\s*(?P<value>.*)")
+_NAMED = re.compile(r"\$\{(?:([^.:${}]+)[.:])?([^${}]+)\}")  # Kalico: a value of another option
+_MOST_NAMES = 10  # of which each names the next
+_REMARK = re.compile(r"#.*|(?:^|(?<=\s));.*")
 
 
 @dataclass(frozen=True)
 class _Place:
     """Line of an option, counted from 0, and where its value begins and ends in it."""
 
+    file: str
     line: int
     start: int
     end: int
     text: str
+
+
+@dataclass(frozen=True)
+class _End:
+    """The last line of a section with something in it, and how its options are indented."""
+
+    line: int
+    indent: str
+
+
+class _Reader:
+    """Sections and options of lines, as the firmware reads them.
+
+    Parameters
+    ----------
+    file : str
+        What messages call the file.
+    """
+
+    def __init__(self, file: str) -> None:
+        self.options: dict[tuple[str, str], _Place] = {}
+        self.ends: dict[str, _End] = {}
+        self._file = file
+        self._section = ""
+        self._option: tuple[str, str] | None = None
+        self._lead = ""
+
+    def take(self, i: int, line: str, start: int) -> None:
+        """Read line i from `start`."""
+        code = _REMARK.sub("", line[start:]).rstrip()
+        if not code:
+            return
+        lead = code[: len(code) - len(code.lstrip())]
+        start, code = start + len(lead), code.lstrip()
+        if self._option and len(lead) > len(self._lead):
+            self._go_on(i, start, code)
+        elif header := _SECTION.match(code):
+            self._section, self._option, self._lead = header[1].strip(), None, lead
+        elif option := _OPTION.fullmatch(code):
+            self._option, self._lead = (self._section, option["name"].lower()), lead
+            at, end = (start + each for each in option.span("value"))
+            self.options[self._option] = _Place(self._file, i, at, end, option["value"])
+        self.ends[self._section] = _End(i, self._lead)
+
+    def _go_on(self, i: int, start: int, code: str) -> None:
+        """A line that goes on with the value above it."""
+        assert self._option is not None
+        value = self.options[self._option]
+        if value.text:
+            self.options[self._option] = replace(value, text=f"{value.text}\n{code}")
+        else:
+            self.options[self._option] = _Place(self._file, i, start, start + len(code), code)
 
 
 class PrinterConfig:
@@ -46,43 +108,75 @@ class PrinterConfig:
     text : str
         The file.
     place : str
-        What messages call it.
+        What messages call it, and where it is: included files are sought beside it.
+
+    Attributes
+    ----------
+    absent : list of str
+        Included files that are not there.
     """
 
     def __init__(self, text: str, place: str) -> None:
         self.place = place
-        self._lines = text.splitlines(keepends=True)
+        self.absent: list[str] = []
+        self._lines = lines_of(text)
         self._options: dict[tuple[str, str], _Place] = {}
-        self._sections: dict[str, int] = {}  # the last line with something in it
-        above: dict[tuple[str, str], _Place] = {}
-        saved, section = False, ""
-        for i, whole in enumerate(self._lines):
-            line, start = whole.rstrip("\r\n"), 0
-            if _SAVED.match(line):
-                saved, section = True, ""
-                continue
-            if saved and line.startswith("#*#"):
-                start = 4 if line.startswith("#*# ") else 3
-            if match := _SECTION.match(line, start):
-                section = match[1].strip()
-                self._sections.setdefault(section, i)
-            elif match := _OPTION.fullmatch(line, start):
-                found = _Place(i, *match.span("value"), match["value"])
-                (self._options if saved else above)[section, match["name"].lower()] = found
-                if not saved:
-                    self._sections[section] = i
-            elif not saved and line[:1].isspace() and line.strip() and section:
-                self._sections[section] = i  # goes on with the value above it
-        self._options |= above
+        self._ends: dict[str, _End] = {}
+        self._saved: dict[str, _End] = {}
+        self._read(self._lines, place, (place,))
 
-    def has(self, section: str, option: str | None = None) -> bool:
-        """Whether there is such a section, or such an option in it."""
-        if option is None:
-            return section in self._sections
+    def _read(self, lines: list[str], file: str, within: tuple[str, ...]) -> None:
+        above, saved, start = _Reader(file), None, 0
+        while lines and not lines[-1].strip():
+            lines = lines[:-1]
+        for i, whole in enumerate(lines):
+            line = whole.rstrip("\r\n")
+            if len(within) == 1 and _SAVED.match(line):
+                saved = _Reader(file)
+            elif saved is not None:
+                self._require_saved(i, line)
+                saved.take(i, line, len(_PREFIX))
+            elif include := _INCLUDE.match(line):
+                self._options |= above.options
+                above.options = {}
+                self._include(include[1].strip(), within)
+            else:
+                start = len(MARK) if i == 0 and line.startswith(MARK) else 0
+                above.take(i, line, start)
+        self._options |= above.options
+        if len(within) == 1:
+            self._ends = above.ends
+        if saved is not None:
+            self._options = saved.options | self._options
+            self._saved = saved.ends
+
+    def _require_saved(self, i: int, line: str) -> None:
+        """Refuse lines for which the firmware would leave the block of SAVE_CONFIG out."""
+        if line != _PREFIX.rstrip() and not line.startswith(_PREFIX):
+            raise FileError(
+                f"{self.place}, line {i + 1}: behind SAVE_CONFIG lines must begin with"
+                f" {_PREFIX!r}, or the firmware leaves the whole block out: move others above it"
+            )
+
+    def _include(self, named: str, within: tuple[str, ...]) -> None:
+        """Read the files that a line names, relative to the file it is in."""
+        pattern = Path(within[-1]).parent / named
+        found = sorted(
+            each for each in glob.glob(str(pattern), recursive=True) if Path(each).is_file()
+        )
+        if not found and not glob.has_magic(named):
+            self.absent.append(named)
+        for file in found:
+            if file in within:
+                raise FileError(f"{within[-1]}: [include {named}] includes itself")
+            self._read(lines_of(text_in(file)), file, (*within, file))
+
+    def has(self, section: str, option: str) -> bool:
+        """Whether there is such an option."""
         return (section, option) in self._options
 
-    def text(self, section: str, option: str, default: str | None = None) -> str:
-        """What an option says.
+    def text(self, section: str, option: str, default: str | None = None, depth: int = 0) -> str:
+        """What an option says, `depth` names away from the one that was asked for.
 
         Raises
         ------
@@ -90,12 +184,19 @@ class PrinterConfig:
             It is not there and has no default.
         """
         if (section, option) in self._options:
-            return self._options[section, option].text
+            if depth > _MOST_NAMES:
+                raise self.wrong(section, option, "names itself")
+            return _NAMED.sub(
+                lambda named: self.text(named[1] or section, named[2].lower(), depth=depth + 1),
+                self._options[section, option].text,
+            )
         if default is not None:
             return default
-        raise FileError(
-            f"{self.place}: [{section}] {option} is missing; included files are not read"
-        )
+        raise FileError(f"{self.place}: [{section}] {option} is missing{self._lacking()}")
+
+    def _lacking(self) -> str:
+        """What a number may be missing for."""
+        return f"; {', '.join(self.absent)}, included, is not there" if self.absent else ""
 
     def number(self, section: str, option: str, default: float | None = None) -> float:
         """The number that an option says."""
@@ -121,7 +222,8 @@ class PrinterConfig:
         """What is wrong with an option, as an error to raise."""
         where = self.place
         if (section, option) in self._options:
-            where += f", line {self._options[section, option].line + 1}"
+            found = self._options[section, option]
+            where = f"{found.file}, line {found.line + 1}"
         return FileError(f"{where}: [{section}] {option} {message}")
 
     def changed(self, values: Mapping[tuple[str, str], float]) -> str:
@@ -129,6 +231,11 @@ class PrinterConfig:
 
         Six decimals, as the firmware writes them. An option that already says the same is left
         alone; one that is missing is added at the end of its section.
+
+        Raises
+        ------
+        FileError
+            An option that would change is in an included file, or has no section.
         """
         text = list(self._lines)
         for (section, option), value in values.items():
@@ -137,32 +244,30 @@ class PrinterConfig:
             if place is None:
                 self._add(text, section, f"{option}: {new}")
             elif abs(self.number(section, option) - value) > SAME:
-                line = self._lines[place.line]
+                if place.file != self.place:
+                    raise self.wrong(
+                        section,
+                        option,
+                        f"would be {new}, in an included file, which is not changed; without"
+                        " config the lines alone are written",
+                    )
+                line = text[place.line]
                 text[place.line] = line[: place.start] + new + line[place.end :]
         return "".join(text)
 
     def _add(self, text: list[str], section: str, line: str) -> None:
-        if section not in self._sections:
-            raise FileError(f"{self.place}: [{section}] is missing; included files are not read")
-        last = self._sections[section]
-        before = text[last]
+        if section not in self._ends and section not in self._saved:
+            raise FileError(f"{self.place}: [{section}] is missing in it{self._lacking()}")
+        last = self._ends.get(section) or self._saved[section]
+        before = text[last.line]
         end = "\r\n" if before.endswith("\r\n") else "\n"
-        prefix = "#*# " if self._lines[last].startswith("#*# ") else ""
-        text[last] = before + ("" if before.endswith("\n") else end) + prefix + line + end
+        prefix = last.indent if section in self._ends else _PREFIX
+        text[last.line] = before + ("" if before.endswith("\n") else end) + prefix + line + end
 
 
 def read(path: str | PathLike[str]) -> PrinterConfig:
     """Read a printer.cfg."""
     return PrinterConfig(text_in(path), str(as_path("path", path)))
-
-
-def text_in(path: str | PathLike[str]) -> str:
-    """What a text file says, line ends as they are."""
-    where = as_path("path", path)
-    try:
-        return content(path, MOST_TEXT).decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise FileError(f"{where}: this is no text in UTF-8") from None
 
 
 def kinematics(printer: PrinterConfig) -> str:

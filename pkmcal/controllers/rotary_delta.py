@@ -14,7 +14,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
 from pkmcal.controllers.c_header import prepared
-from pkmcal.controllers.laws import require_no_laws
+from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, fitted, require_held
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
@@ -114,7 +114,7 @@ def of_robot(robot: Robot, project: bool, one_height: bool) -> tuple[RotaryDelta
 def require_rotary_delta(robot: Robot) -> None:
     """Refuse what is no rotary delta with three cranks of its own."""
     require_parallel(robot)
-    require_no_laws(robot, "a firmware")
+    require_plain_limbs(robot, "a firmware")
     if not is_rotary_delta(robot):
         raise ArgumentError(
             f"robot: {robot.name} is no rotary delta of three RUS limbs that only translates, or"

@@ -6,35 +6,49 @@ above the horizontal; shoulders may have heights of their own.
 
 from __future__ import annotations
 
-import re
+from collections.abc import Sequence
 
 import numpy as np
 
-from pkmcal.controllers.gcode_words import TOWERS, corrections, words, words_of
+from pkmcal.controllers.gcode_words import (
+    TOWERS,
+    Commands,
+    each,
+    lines,
+    number,
+    numbers,
+    off_towers,
+    settings,
+)
 from pkmcal.controllers.rotary_delta import RotaryDelta
-from pkmcal.exceptions import FileError
 
+_KIND = 10  # K
 _LEAST = -90.0  # deg: where the firmware's limit is not known
 
 
-def is_rotary(text: str) -> bool:
+def is_rotary(text: str, place: str) -> bool:
     """Whether a config.g has the M669 of a rotary delta."""
-    return re.search(r"^\s*M669\b[^;\n]*\bK10\b", text, re.MULTILINE) is not None
+    found = settings(text, "M669", place, missing=True)
+    return number(found, "K", "M669", place, 0.0) == _KIND
 
 
-def reprap_text(delta: RotaryDelta) -> str:
-    """The two lines."""
+def reprap_commands(
+    delta: RotaryDelta, shift: float, text: str | None = None, place: str = "M669"
+) -> Commands:
+    """The settings, whose adjustments have the mean `shift`; the least angle is that of `text`."""
     angles = [-float(np.degrees(elbow)) for elbow in delta.elbows]
-    greatest = float(np.mean(angles))
-    three = {"U": delta.cranks, "L": delta.rods, "H": delta.heights}
-    numbers = " ".join(
-        letter + ":".join(f"{value:.6f}" for value in values) for letter, values in three.items()
-    )
-    return (
-        f"M669 K10 {numbers} R{delta.radius:.6f} A{_LEAST:g}:{greatest:.6f}"
-        f" {corrections(delta.angles)}\n"
-        f"M666 {words('XYZ', [angle - greatest for angle in angles])}\n"
-    )
+    greatest = float(np.mean(angles)) - shift
+    least = _LEAST
+    if text is not None:
+        least, _ = numbers(settings(text, "M669", place), "A", "M669", place, counts=(2,))
+    size: dict[str, Sequence[float]] = {"U": delta.cranks, "L": delta.rods, "H": delta.heights}
+    size |= {"R": [delta.radius], "A": [least, greatest], **off_towers(delta.angles)}
+    return {"M669": size, "M666": each("XYZ", [angle - greatest for angle in angles])}
+
+
+def reprap_lines(commands: Commands) -> str:
+    """The two lines."""
+    return lines(commands, M669=_KIND)
 
 
 def of_reprap(text: str, place: str = "M669") -> RotaryDelta:
@@ -45,31 +59,20 @@ def of_reprap(text: str, place: str = "M669") -> RotaryDelta:
     ValueError
         A number that is missing.
     """
-    size, ends = words_of(text, "M669", place), words_of(text, "M666", place)
+    size, ends = settings(text, "M669", place), settings(text, "M666", place)
 
-    def several(letter: str, count: int) -> list[float]:
-        try:
-            found = [float(each) for each in size[letter].split(":")]
-        except (KeyError, ValueError):
-            found = []
-        if len(found) == 1 and count == len(TOWERS):
-            found *= count
-        if len(found) != count:
-            wanted = f"{count} numbers" if count > 1 else "a number"
-            raise FileError(
-                f"{place}: {letter} of M669 must be {wanted}, found {size.get(letter)!r}"
-            )
-        return found
+    def three(letter: str) -> tuple[float, ...]:
+        found = numbers(size, letter, "M669", place, counts=(1, 3))
+        return tuple(found * (3 // len(found)))
 
-    cranks, rods, heights = (several(letter, len(TOWERS)) for letter in "ULH")
-    (radius,), (_, greatest) = several("R", 1), several("A", 2)
-    try:
-        elbows = [-np.radians(greatest + float(ends.get(letter, 0.0))) for letter in "XYZ"]
-        angles = [
-            tower + float(size.get(letter, 0.0))
-            for tower, letter in zip(TOWERS, "XYZ", strict=True)
-        ]
-    except ValueError:
-        raise FileError(f"{place}: X Y Z of M669 and M666 must be numbers") from None
-    parts = (tuple(heights), tuple(angles), tuple(cranks), tuple(rods))
-    return RotaryDelta(radius, *parts, tuple(map(float, elbows)), (1.0,) * len(TOWERS))
+    cranks, rods, heights = (three(letter) for letter in "ULH")
+    radius = number(size, "R", "M669", place)
+    _, greatest = numbers(size, "A", "M669", place, counts=(2,))
+    elbows = tuple(
+        -float(np.radians(greatest + number(ends, letter, "M666", place, 0.0))) for letter in "XYZ"
+    )
+    angles = tuple(
+        tower + number(size, letter, "M669", place, 0.0)
+        for tower, letter in zip(TOWERS, "XYZ", strict=True)
+    )
+    return RotaryDelta(radius, heights, angles, cranks, rods, elbows, (1.0,) * len(TOWERS))

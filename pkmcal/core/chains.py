@@ -9,12 +9,12 @@ import numpy as np
 from pkmcal._core import ffi, lib
 from pkmcal.arrays import FloatArray, Int32Array, IntArray
 from pkmcal.core import screws
-from pkmcal.core.chain_rates import actuator_rates, platform_motion
 from pkmcal.core.chain_readings import readings
 from pkmcal.core.chain_tail import coordinates
 from pkmcal.core.core_machine import CoreMachine
 from pkmcal.core.library import COORDINATE_UNITS, ISA, MAPS, call, pointer
 from pkmcal.core.machine import CLOSURE_TOLERANCE, Closure, Machine
+from pkmcal.core.path_differences import actuator_rates, platform_motion
 
 MAX_CHAIN: int = lib.PKM_MAX_CHAIN
 MAX_JOINTS: int = lib.PKM_MAX_JOINTS
@@ -251,7 +251,7 @@ class ChainMachine(CoreMachine):
         out = np.empty((len(pose), 6, self.actuators))
         given = (len(pose), slots, 0, pose, q, None, self.actuators, twists)
         call("chain_response", self.struct, *given, out, isa=self.isa)
-        return out
+        return out if twists else self.as_written(pose, out, 1)
 
     def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
         """The rows that the passive joints leave, and their derivatives.
@@ -270,6 +270,7 @@ class ChainMachine(CoreMachine):
         )
         stride = slots[0].size if slots.ndim == 3 else 0
         call("chain_closure", self.struct, n, slots, stride, pose, q, *out, isa=self.isa)
+        self.as_written(pose, out.by_free, 2)
         return _without_shared(out, self.m) if shared else out
 
     def frames(

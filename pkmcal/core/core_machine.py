@@ -11,10 +11,11 @@ import numpy as np
 
 from pkmcal._core import ffi
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.core.library import call, in_threads, part
+from pkmcal.core.library import MAPS, call, in_threads, part
 
 M = TypeVar("M", bound="CoreMachine")
 _MOST_TURNS = 16  # of the first limb of an actuator, until the others have turned as well
+_AT_ONCE = 500  # rows, where more would be copies of a long batch
 _WHOLE = 5e-3  # of a turn: by so much gains that were identified differ from one another
 
 
@@ -51,6 +52,31 @@ class CoreMachine(ABC):
     isa: int
     actuators: int
     m: int
+
+    @property
+    def _free(self) -> tuple[str, ...]:
+        return MAPS[list(MAPS)[int(self.struct.map)]]
+
+    @property
+    def turns_freely(self) -> bool:
+        """Whether its pose map has every rotation, which two triples of angles name."""
+        return {"alpha", "beta", "gamma"} <= set(self._free)
+
+    def as_written(self, pose: FloatArray, rates: FloatArray, axis: int) -> FloatArray:
+        """Derivatives of or by angles of poses (N, 6) as these write their rotations; in place.
+
+        In the core cos β is not negative. A pose with β beyond ±90° is the same rotation as
+        α + π, π - β, γ + π, and its β goes the other way. `axis` counts all six coordinates, or
+        the free ones.
+        """
+        if self.turns_freely:
+            place = 4 if rates.shape[axis] == 6 else self._free.index("beta")
+            beta = np.moveaxis(rates, axis, -1)[..., place]
+            with np.errstate(invalid="ignore"):  # infinite angles
+                for start in range(0, len(pose), _AT_ONCE):
+                    rows = slice(start, start + _AT_ONCE)
+                    beta[rows][np.cos(pose[rows, 4]) < 0.0] *= -1.0
+        return rates
 
     def with_tolerance(self: M, closure_tolerance: float) -> M:
         """The same with another `closure_tolerance`, mm."""
@@ -159,9 +185,10 @@ class CoreMachine(ABC):
         Or of the twist (ω, v) of the platform by them.
         """
         out = np.empty((len(pose), 6, len(columns)))
-        given = (len(pose), slots, 0, pose, q, columns, len(columns), twists)
+        stride = slots[0].size if slots.ndim == 3 else 0
+        given = (len(pose), slots, stride, pose, q, columns, len(columns), twists)
         call(self._ERRORS, self.struct, *given, out, isa=self.isa)
-        return out
+        return out if twists else self.as_written(pose, out, 1)
 
     def moved(self, pose: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Poses (N, 6) moved by steps of the map (N, m), mm and rad.

@@ -15,6 +15,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray, Int32Array
 from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.core_machine import CoreMachine, whole_turn
+from pkmcal.core.drive_turns import agreed_turns
 from pkmcal.core.laws import Drive, Laws, Ways
 from pkmcal.core.library import rows
 from pkmcal.core.machine import Closure, Machine
@@ -159,23 +160,22 @@ class DrivenMachine(CoreMachine):
     ) -> FloatArray:
         """Coordinates (N, n) with whole turns of the drives added, as `inverse` gives them."""
         q = super().nearest_turns(slots, q, near)
-        alone = [
-            drives[0] if len(drives) == 1 and self.laws.drives[drives[0]].angle else -1
+        way = self.drives(slots, q)  # a turn of the drive is one, whatever q makes of it
+        turned = self._turned(slots, way, near)
+        first = [drives[0] for drives in self._driven]
+        moved = np.isinf(self.turns(slots)) & (turned != way)[:, first]
+        return np.where(moved, self.at_drives(slots, turned), q) if moved.any() else q
+
+    def _turned(self, slots: FloatArray, way: FloatArray, near: FloatArray | None) -> FloatArray:
+        """Ways (N, drives) at the turns nearest to coordinates that have readings."""
+        about = self.laws.ways(
+            slots, np.atleast_2d(self.reference(slots) if near is None else near)
+        )
+        chosen = [
+            drives if self.laws.drives[drives[0]].angle and (near is not None or drives[1:]) else []
             for drives in self._driven
         ]
-        open_ended = np.isinf(self.turns(slots)) & (np.array(alone) >= 0)
-        if not open_ended.any():
-            return q
-        way = self.drives(slots, q)  # a turn of the drive is one, whatever q makes of it
-        turned = self.inner.nearest_turns(self._bare(slots), way, self._near(slots, near))
-        moved = open_ended & (turned != way)[:, alone]
-        return np.where(moved, self.at_drives(slots, turned), q)
-
-    def _near(self, slots: FloatArray, near: FloatArray | None) -> FloatArray | None:
-        if near is None:
-            return None
-        way = self.laws.ways(slots, np.atleast_2d(near)).way
-        return way if near.ndim == 2 else way[0]
+        return agreed_turns(self.laws, slots, chosen, way, about.way, self._approach(len(way)))
 
     # kinematics: as `pkmcal.core.machine.Machine` -------------------------------------------------
 
@@ -183,8 +183,8 @@ class DrivenMachine(CoreMachine):
         self, slots: FloatArray, pose: FloatArray, near: FloatArray | None = None
     ) -> FloatArray:
         """Poses (N, 6) to readings (N, n)."""
-        way = self.inner.inverse(self._bare(slots), pose, self._near(slots, near))
-        return self.at_drives(slots, way)
+        way = self.inner.inverse(self._bare(slots), pose)
+        return self.at_drives(slots, self._turned(slots, way, near))
 
     def forward(
         self,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,9 +17,9 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.library import rows
 
 _CELLS = 2000  # of a stroke, in which the least slope is bounded
-_MOST_STEPS = 80  # of Newton's method; bisection alone needs some 60
+MOST_STEPS = 80  # of Newton's method; bisection alone needs some 60
 _PERIOD = 1e-9  # of a period of harmonics, by which a turn may miss it
-_ROUNDING = 1e-13  # of the numbers of a way
+ROUNDING = 1e-13  # of the numbers of a way
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +72,30 @@ class Ways:
     way: FloatArray
     slope: FloatArray
     bend: FloatArray
+
+
+class LawNumbers(NamedTuple):
+    """The numbers of one law, as its inverse needs them.
+
+    Attributes
+    ----------
+    base : tuple of float
+        Offset, gain, quadratic, radius of the spool and its build-up; 0, 1 and 0 without these.
+    waves : list of (float, float, float)
+        k, cos and sin of each harmonic.
+    points : list of (float, float)
+        Readings and corrections of the table.
+    most : float
+        How large the corrections can be.
+    span : (float, float)
+        Between which readings it is monotone for certain; NaN: nowhere.
+    """
+
+    base: tuple[float, ...]
+    waves: list[tuple[float, float, float]]
+    points: list[tuple[float, float]]
+    most: float
+    span: tuple[float, float]
 
 
 class Laws:
@@ -207,6 +232,25 @@ class Laws:
         periods = np.array(waves) * turn / (2.0 * np.pi)
         whole = np.abs(periods - np.rint(periods)) <= _PERIOD
         return bool(whole.all()) and not numbers[list(drive.corrections)].any()
+
+    def numbers_of(self, slots: FloatArray) -> list[LawNumbers]:
+        """The numbers of each drive of one geometry."""
+        numbers, found = self._numbers(slots), []
+        for d, (drive, span) in enumerate(
+            zip(self.drives, self.spans(slots).tolist(), strict=True)
+        ):
+            flat = numbers[0].tolist()
+            table = [] if drive.table is None else drive.table.tolist()
+            found.append(
+                LawNumbers(
+                    (flat[drive.offset], *numbers[0, self._base[d]].tolist()),
+                    [(k, flat[a], flat[b]) for k, a, b in drive.harmonics],
+                    list(zip(table, (flat[p] for p in drive.corrections), strict=True)),
+                    self._most(numbers, d),
+                    (span[0], span[1]),
+                )
+            )
+        return found
 
     # where laws are monotone ----------------------------------------------------------------------
 
@@ -346,15 +390,34 @@ class Laws:
         found: FloatArray = rows("law_drive_inverse", x.reshape(-1, 5))[0].reshape(way.shape)
         return found
 
+    def reading(
+        self, slots: FloatArray, way: FloatArray, d: int, approach: FloatArray | None = None
+    ) -> FloatArray:
+        """`readings` (N,) of one drive at its ways (N,)."""
+        numbers = self._numbers(slots)
+        rest = way - numbers[:, self._offset[d]]
+        if approach is not None:
+            rest = rest + 0.5 * approach[..., d] * numbers[:, self._backlash[d]]
+        if self.drives[d].corrected:
+            return self._newton(numbers, rest, d, self.spans(slots)[d])
+        q: FloatArray = self._uncorrected(numbers, rest[:, None], [d])[:, 0]
+        return q
+
+    def _most(self, numbers: FloatArray, d: int) -> float:
+        """How large the corrections of a drive can be."""
+        drive = self.drives[d]
+        values = numbers[0, [p for _, a, b in drive.harmonics for p in (a, b)]]
+        most = float(np.abs(values).sum())
+        if drive.table is not None:
+            most += float(np.abs(numbers[0, list(drive.corrections)]).max())
+        return most
+
     def _newton(self, numbers: FloatArray, way: FloatArray, d: int, span: FloatArray) -> FloatArray:
         """The readings of a drive with corrections, within brackets that Newton's method keeps."""
         drive = self.drives[d]
         if np.isnan(span).any():
             return np.full(len(way), np.nan)
-        values = numbers[0, [p for _, a, b in drive.harmonics for p in (a, b)]]
-        most = float(np.abs(values).sum())
-        if drive.table is not None:
-            most += float(np.abs(numbers[0, list(drive.corrections)]).max())
+        most = self._most(numbers, d)
         ends = [self._uncorrected(numbers, way[:, None] + e, [d])[:, 0] for e in (-most, most)]
         rising = numbers[0, drive.gain] * numbers[0, self._base[d, 2]] > 0.0
         low, high = ends if rising else ends[::-1]
@@ -364,18 +427,20 @@ class Laws:
         q: FloatArray = 0.5 * (low + high)
         offset, sign = numbers[0, drive.offset], 1.0 if rising else -1.0
         scale = np.abs(way) + most + abs(offset)
-        done, alone = np.zeros(len(q), dtype=bool), self._alone(d)
-        for _ in range(_MOST_STEPS):
+        done, over = np.zeros((2, len(q)), dtype=bool)
+        alone = self._alone(d)
+        for _ in range(MOST_STEPS):
             found = alone.ways(numbers[:, :-2], q[:, None])
             off = found.way[:, 0] - offset - way
             low, high = np.where(sign * off < 0.0, q, low), np.where(sign * off > 0.0, q, high)
             with np.errstate(divide="ignore", invalid="ignore"):
                 step = q - off / found.slope[:, 0]
             inside = (step >= low) & (step <= high)
-            over = done.all()
-            done = np.abs(off) <= _ROUNDING * scale
-            q = np.where(inside, step, np.where(done, q, 0.5 * (low + high)))
-            if over or not np.isfinite(q).any():
+            last = done  # one more step, and none that another row needs
+            done = np.where(over, done, np.abs(off) <= ROUNDING * scale)
+            moved = np.where(inside, step, np.where(done, q, 0.5 * (low + high)))
+            q, over = np.where(over, q, moved), over | last
+            if (over | ~np.isfinite(q)).all():
                 break
         q[~done | (q < span[0]) | (q > span[1])] = np.nan
         return q

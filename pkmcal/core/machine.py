@@ -20,9 +20,11 @@ from pkmcal.core.library import (
     ensure,
     pointer,
 )
+from pkmcal.core.path_differences import platform_motion
 
 CLOSURE_TOLERANCE = 2e-3  # of a machine's size
 FAR_HOME = 10.0  # times the limbs' numbers: a home beyond is that of another geometry
+_MET = 1e-12  # of the size: closures that are met to rounding
 _OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 
 
@@ -73,9 +75,12 @@ class Machine(CoreMachine):
         size.
     isa : int
         Index into `ISAS`.
+
+    A geometry is (limbs, SLOTS), or (N, limbs, SLOTS) with one for each row of a call.
     """
 
     _FORWARD, _ERRORS = "forward", "error_jacobian"
+    fixed_spheres = True  # the actuators say where anchors are and how long, whatever the pose
 
     def __init__(
         self,
@@ -133,7 +138,8 @@ class Machine(CoreMachine):
         """
         q = np.empty((len(pose), self.actuators))
         stride = self.actuators if near is not None and near.ndim == 2 else 0
-        call("inverse", self.struct, len(pose), slots, 0, pose, near, stride, q, isa=self.isa)
+        given = (len(pose), slots, _by_row(slots), pose, near, stride, q)
+        call("inverse", self.struct, *given, isa=self.isa)
         return q
 
     def turns(self, slots: FloatArray) -> FloatArray:
@@ -178,17 +184,17 @@ class Machine(CoreMachine):
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m)."""
         out = np.empty((len(pose), self.actuators, self.m))
-        call("jacobian", self.struct, len(pose), slots, 0, pose, out, isa=self.isa)
-        return out
+        call("jacobian", self.struct, len(pose), slots, _by_row(slots), pose, out, isa=self.isa)
+        return self.as_written(pose, out, 2)
 
     def forward_jacobian(
         self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool = False
     ) -> FloatArray:
         """∂pose/∂q at poses (N, 6): (N, 6, n), or of the twist (ω, v) of the platform by them."""
         out = np.empty((len(pose), 6, self.actuators))
-        given = (len(pose), slots, 0, pose, q, twists, out)
+        given = (len(pose), slots, _by_row(slots), pose, q, twists, out)
         call("forward_jacobian", self.struct, *given, isa=self.isa)
-        return out
+        return out if twists else self.as_written(pose, out, 1)
 
     def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators, (N, n) each.
@@ -197,7 +203,7 @@ class Machine(CoreMachine):
         derivative by time.
         """
         velocity, acceleration = np.empty((2, len(motion), self.actuators))
-        given = (len(motion), slots, motion, velocity, acceleration)
+        given = (len(motion), slots, _by_row(slots), motion, velocity, acceleration)
         call("rates", self.struct, *given, isa=self.isa)
         return velocity, acceleration
 
@@ -207,12 +213,40 @@ class Machine(CoreMachine):
         """The platform's motion at poses (N, 6) as the actuators move with q1 and q2 (N, n).
 
         The homogeneous matrix with its first and second derivative by time (N, 3, 4, 4), and
-        velocity and acceleration of the pose (N, 6) each. NaN where singular.
+        velocity and acceleration of the pose (N, 6) each. NaN where singular. With more rows than
+        free coordinates it is that of the poses which miss them least, solved again.
         """
         n = len(pose)
         motion, rates = np.empty((n, 3, 4, 4)), np.empty((n, 2, 6))
-        call("motion", self.struct, n, slots, pose, q, q1, q2, motion, rates, isa=self.isa)
-        return motion, rates[:, 0], rates[:, 1]
+        given = (n, slots, _by_row(slots), pose, q, q1, q2, motion, rates)
+        call("motion", self.struct, *given, isa=self.isa)
+        found = (motion, rates[:, 0], rates[:, 1])
+        return found if self.rows == self.m else self._missing(slots, pose, q, q1, q2, found)
+
+    def _missing(
+        self,
+        slots: FloatArray,
+        pose: FloatArray,
+        q: FloatArray,
+        q1: FloatArray,
+        q2: FloatArray,
+        exact: tuple[FloatArray, FloatArray, FloatArray],
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """`motion` where not all closures can be met: the rows that they are exact for stay."""
+        closing, missed = self.with_tolerance(np.inf), np.zeros(len(pose))
+
+        def forward(at: FloatArray) -> FloatArray:
+            found, _, _, residual = closing.forward(slots, at, pose, threads=None)
+            np.fmax(missed, residual, out=missed)
+            return found
+
+        scale = np.full(self.actuators, 1.0 / self.struct.size)
+        scale[list(self._angles)] = 1.0
+        found = platform_motion(forward, pose, q, q1, q2, scale)
+        rows = missed > _MET * self.struct.size
+        for each, solved in zip(exact, found, strict=True):
+            each[rows] = solved[rows]
+        return exact
 
     def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
         """The closure rows and their derivatives at poses (N, 6) and coordinates (N, n)."""
@@ -225,7 +259,8 @@ class Machine(CoreMachine):
             np.empty((n, 6)),
             np.empty((n, 6, m)),
         )
-        call("closure", self.struct, n, slots, pose, q, *out, isa=self.isa)
+        call("closure", self.struct, n, slots, _by_row(slots), pose, q, *out, isa=self.isa)
+        self.as_written(pose, out.by_free, 2)
         return out
 
     def readings(
@@ -242,7 +277,7 @@ class Machine(CoreMachine):
         residual, by_step = np.empty((n, self.rows)), np.empty((n, self.rows, self.m))
         count = 0 if columns is None else len(columns)
         by_number = None if columns is None else np.empty((n, self.rows, count))
-        given = (n, slots, pose, q, columns, count, residual, by_step, by_number)
+        given = (n, slots, _by_row(slots), pose, q, columns, count, residual, by_step, by_number)
         call("readings", self.struct, *given, isa=self.isa)
         return residual, by_step, by_number
 
@@ -272,7 +307,8 @@ class Machine(CoreMachine):
         """
         n, limbs = len(pose), slots.shape[-2]
         drive, base, platform = np.empty((n, limbs)), *np.empty((2, n, limbs, 3))
-        call("limbs", self.struct, n, slots, pose, drive, base, platform, isa=self.isa)
+        given = (n, slots, _by_row(slots), pose, drive, base, platform)
+        call("limbs", self.struct, *given, isa=self.isa)
         return drive, base, platform
 
     def closure_cost(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
@@ -284,6 +320,11 @@ class Machine(CoreMachine):
         given = (self.struct, len(slots), slots, len(pose), pose, q)
         call("closure_cost", *given, cost, isa=self.isa)
         return cost
+
+
+def _by_row(slots: FloatArray) -> int:
+    """Stride of geometries: one for all rows (limbs, SLOTS), or one for each (N, limbs, SLOTS)."""
+    return int(slots[0].size) if slots.ndim == 3 else 0
 
 
 def with_errors(

@@ -13,7 +13,17 @@ from collections.abc import Sequence
 from pkmcal.core.library import POSE
 
 BESIDE = ("index", "time", "date", "comment", "name", "collection")  # not looked at by themselves
-RESERVED = ("sigma", "cov", "target", "attachment", "actuator_sigma", "approach", "to", "touch")
+RESERVED = (
+    "sigma",
+    "cov",
+    "target",
+    "attachment",
+    "actuator_sigma",
+    "approach",
+    "to",
+    "touch",
+    "temperature",
+)
 EULER = (("rx", "ry", "rz"), ("a", "b", "c"), ("w", "p", "r"))  # in the order of their letters
 VECTOR = ("rvx", "rvy", "rvz")
 QUATERNION = ("qw", "qx", "qy", "qz")
@@ -36,7 +46,8 @@ _SYNONYMS: dict[str, str] = {
     "gamma": "yaw|yaw angle",
     "distance": "dist|length measured|measured length|measured distance|ball bar length",
     "sigma": "std|stdev|stddev|std dev|standard deviation|sigma xyz",
-    "group": "pose|pose id|pose no|pose nr|pose number|pose name|configuration|config",
+    "group": "pose|pose id|pose no|pose nr|pose number|pose name|configuration|config|pos|pos id"
+    "|pos no|pos nr|pos number|position id|position no|position nr|position number|position name",
     "run": "run id|run no|run number|run name",
     "tilt1": "tilt 1|inclination 1|inclinometer 1",
     "tilt2": "tilt 2|inclination 2|inclinometer 2",
@@ -50,16 +61,24 @@ _SYNONYMS: dict[str, str] = {
     "comment": "comments|note|notes|remark|remarks|description",
     "index": "no|nr|frame|sub frame|sample|number|#|line|row|count|item",
     "time": "timestamp|time stamp|datetime|date time|time seconds|time s|time utc|utc|date and time"
-    "|measurement time|meas time|clock|uhrzeit|zeit|heure",
+    "|measurement time|meas time|clock|uhrzeit|zeit|heure|datum zeit|datum uhrzeit"
+    "|datum und uhrzeit",
     "date": "day|measurement date|datum",
-    "temperature": "temp|temp c|air temperature|t c|temperature c|machine temperature"
-    "|ambient temperature",
+    "temperature": "temp|temp c|t c|temperature c|machine temperature|machine temp"
+    "|temperatur|température|temperature machine",
+    "temperature.base": "temp base|base temp|base temperature|temperature base",
+    "temperature.platform": "temp platform|platform temp|platform temperature|temperature platform",
+    "air temperature": "air temp|temperature air|ambient temperature|ambient temp|room temperature",
     "probe": "probed|probed z|z probed|probe z|z probe|trigger z|z trigger|triggered|mesh|mesh z"
     "|bed mesh|bed z",
     "rx": "rot x|rotx|x rotation|euler x|angle x|actual rx",
     "ry": "rot y|roty|y rotation|euler y|angle y|actual ry",
     "rz": "rot z|rotz|z rotation|euler z|angle z|actual rz",
-    **{axis: f"rotvec {axis[-1]}|rotation vector {axis[-1]}|rv {axis[-1]}" for axis in VECTOR},
+    **{
+        axis: f"rotvec {axis[-1]}|rot vec {axis[-1]}|rotation vector {axis[-1]}|rv {axis[-1]}"
+        f"|rvec {axis[-1]}"
+        for axis in VECTOR
+    },
     **{
         part: f"q {part[1]}|quat {part[1]}|quaternion {part[1]}|quat{part[1]}|rotation {part[1]}"
         f"|orientation {part[1]}|pose orientation {part[1]}|pose pose orientation {part[1]}"
@@ -88,6 +107,12 @@ _DRIVEN = re.compile(
 _QUATERNION = re.compile(r"(?:q|quat|quaternion) ?([0-4])")
 _OF_A_TARGET = re.compile(r"(?P<target>.*[^\s_\-.:/])[\s_\-.:/]+(?P<axis>[xyz])", re.IGNORECASE)
 _OF_A_KIND = re.compile(r"(?:angle|touch):.+", re.IGNORECASE)
+_TEMPERATURE = re.compile(  # of what an actuator drives
+    r"(?:temp|temperature) (?:q|joint|axis|leg|limb|strut|actuator|motor|drive|slider|tower) ?"
+    r"(?P<after>[1-9][0-9]?)"
+    r"|(?:q|joint|axis|leg|limb|strut|actuator|motor|drive|slider|tower) ?(?P<before>[1-9][0-9]?)"
+    r" (?:temp|temperature)(?: c)?"
+)
 _SIGMA = re.compile(
     r"(?:sigma|std|stdev|stddev|std dev|s) (?P<one>x|y|z|alpha|beta|gamma)"
     r"|(?P<other>x|y|z) (?:sigma|std|stdev|stddev|std dev)"
@@ -102,6 +127,7 @@ def is_known(name: str) -> bool:
             plain in _NAMES
             or _DRIVEN.fullmatch(plain)
             or _SIGMA.fullmatch(plain)
+            or _TEMPERATURE.fullmatch(plain)
             or _OF_A_KIND.fullmatch(name)
             or _dotted(name)
         )
@@ -180,6 +206,8 @@ def _alone(name: str) -> str:
         return _NAMES[plain]
     if match := _SIGMA.fullmatch(plain):
         return f"sigma.{match['one'] or match['other']}"
+    if match := _TEMPERATURE.fullmatch(plain):
+        return f"temperature.q{match['after'] or match['before']}"
     if dotted := _dotted(name):
         return dotted
     small = name.lower()

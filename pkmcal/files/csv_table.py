@@ -25,11 +25,13 @@ from pkmcal.exceptions import FileError
 from pkmcal.files import reading, units
 from pkmcal.files.column_names import BESIDE, is_known
 from pkmcal.files.header import Header, find_header, parted
+from pkmcal.files.number_text import Signs, plain, thousands
 from pkmcal.files.reading import LONGEST_NAME, MOST_CELLS, MOST_COLUMNS
-from pkmcal.files.text_rows import TextRows, text_rows
+from pkmcal.files.text_rows import TextRows, is_number, text_rows
 from pkmcal.files.xlsx_rows import xlsx_rows
 
 _UNSEEN = ("-", "--", "---", "n/a", "na", "nan", "null", "none", "#n/a", "?")
+_LONGEST = 60  # letters of a line in a note
 _SHOWN = 8  # names of columns in a message
 
 
@@ -91,6 +93,8 @@ class Table:
         The line of each row.
     notes : list of str
         What was assumed where the file does not say.
+    elsewhere : list of str
+        The same of tables that were joined with it, each with its file.
 
     Raises
     ------
@@ -122,7 +126,7 @@ class Table:
         self._units = dict(header.units)
         self.left_out: tuple[str, ...] = ()  # headings of unknown columns
         self._default_units = dict(default_units or {})
-        self.notes = [*text.notes, *header.notes]
+        self.notes, self.elsewhere = [*text.notes, *header.notes], list[str]()
         names = header.headings
         if len(names) > MOST_COLUMNS or len(names) * len(text.rows) > MOST_CELLS:
             raise FileError(
@@ -138,13 +142,19 @@ class Table:
             raise FileError(f"{self.path}: no rows below the column names of line {header.line}")
         width = len(names)
         rows = [(line, _fitted(cells, names, packed)) for line, cells in rows]
+        while len(rows) > 1 and len(rows[-1][1]) < width and not any(map(is_number, rows[-1][1])):
+            line, below = rows.pop()
+            self.notes.append(
+                f"line {line} below the table left out: {' '.join(below)[:_LONGEST]!r}"
+            )
         for line, cells in rows:
             if len(cells) != width:
                 hint = ""
                 if text.separator == "," and len(cells) > width and not packed:
                     hint = " (a decimal comma needs ';' or tabs between columns)"
+                found = f"{len(cells)} cell{'s' * (len(cells) != 1)}"
                 raise FileError(
-                    f"{self.path}, line {line}: {len(cells)} cells under {width} column names{hint}"
+                    f"{self.path}, line {line}: {found} under {width} column names{hint}"
                 )
         self.lines = [line for line, _ in rows]
         self.columns: dict[str, Column] = {}
@@ -237,12 +247,16 @@ class Table:
         """Raise for the first of `names` that is not a column."""
         for name in names:
             if name not in self.columns:
-                hint = ""
-                if self.left_out:
-                    named = ", ".join(map(repr, self.left_out[:_SHOWN]))
-                    more = ", …" if len(self.left_out) > _SHOWN else ""
-                    hint = f"; not known: {named}{more}; --rename OLD=NEW says what one is"
-                raise self.header_error(f"missing column {name!r}{hint}")
+                raise self.missing(name)
+
+    def missing(self, name: str, otherwise: str = "") -> FileError:
+        """An error that a column is not there; `otherwise` is said where none was left out."""
+        hint = otherwise
+        if self.left_out:
+            named = ", ".join(map(repr, self.left_out[:_SHOWN]))
+            more = ", …" if len(self.left_out) > _SHOWN else ""
+            hint = f"; not known: {named}{more}; --rename OLD=NEW says what one is"
+        return self.header_error(f"missing column {name!r}{hint}")
 
     def _column(self, name: str) -> Column:
         self.require([name])
@@ -284,16 +298,17 @@ class Table:
         column = self._column(name)
         if column.unit is None and like in self.columns and (unit := self.columns[like].unit):
             other = self.columns[like].name
-            self._note(f"column {column.name!r} has no unit, taken as [{unit}] like {other!r}")
+            self.note(f"column {column.name!r} has no unit, taken as [{unit}] like {other!r}")
             column = replace(column, unit=unit)
         quantity, (times, over) = self._conversion(column, quantities, expected)
         values = np.empty(len(self))
+        signs = self._signs(column)
         for row, cell in enumerate(column.cells):
             if unseen and cell.lower() in _UNSEEN:
                 values[row] = math.nan
-                self._note(f"cells with {cell!r} taken as not measured")
+                self.note(f"cells with {cell!r} taken as not measured")
                 continue
-            values[row] = math.nan if blank and not cell else self._number(name, row, cell)
+            values[row] = math.nan if blank and not cell else self._number(name, row, cell, signs)
         with np.errstate(over="ignore"):
             converted = values * times / over
         if (row := int(np.argmax(np.isinf(converted)))) or np.isinf(converted[0]):
@@ -311,14 +326,17 @@ class Table:
         self, column: Column, quantities: tuple[str, ...], expected: str | None
     ) -> tuple[str, tuple[float, float]]:
         known = {unit: q for q in reversed(quantities) for unit in units.factors(q)}
-        usual = ", ".join(u for q in quantities for u in units.factors(q) if u.isascii())
+        usual = ", ".join(
+            u for q in quantities for u in units.factors(q) if u.isascii() and u.isalnum()
+        )
         if not column.unit and "1" in quantities:
             return "1", (1.0, 1.0)
+        column_unit = {"rad": "deg"}.get(quantities[0], quantities[0])
         stated = column.unit or self._stated(column, (expected,) if expected else quantities)
         if not stated:
             raise self.header_error(
                 f"column {column.name!r} has no unit: expected '{column.name} [{quantities[0]}]'"
-                f" (or another of {usual})",
+                f" (or another of {usual}), or --units {column_unit} for all columns without one",
                 column,
             )
         unit = units.plain(stated, known)
@@ -339,19 +357,24 @@ class Table:
             return self._default_units[of[0]]
         unit, line = column.stated[of[0]]
         where = f"line {line}" if column.place == str(self.path) else f"{column.place}, line {line}"
-        self._note(f"{what} without a unit in {unit}, as {where} states")
+        self.note(f"{what} without a unit in {unit}, as {where} states")
         return unit
 
-    def _note(self, text: str) -> None:
+    def note(self, text: str) -> None:
+        """Say what was assumed, once."""
         if text not in self.notes:
             self.notes.append(text)
 
-    def _number(self, name: str, row: int, cell: str) -> float:
-        text = cell
-        if self.columns[name].decimal_comma and "." not in cell:
-            text = cell.replace(",", ".", 1)
+    def _signs(self, column: Column) -> Signs | None:
+        found = thousands(column.cells)
+        if found is None:
+            return None
+        self.note(f"{found[1]!r} in column {column.name!r} taken as a number with thousands apart")
+        return found[0]
+
+    def _number(self, name: str, row: int, cell: str, signs: Signs | None) -> float:
         try:
-            value = float(text.replace("_", "no number"))  # float() takes 1_000 for 1000
+            value = float(plain(cell, signs, self.columns[name].decimal_comma))
         except ValueError:
             found = f"found {cell!r}" if cell else "found an empty cell"
             raise self.cell_error(name, row, f"expected a number, {found}") from None

@@ -18,10 +18,11 @@ Row = tuple[int, list[str]]
 POINTS = ("collection", "group", "name")  # names before the coordinates, where no line names them
 _LOOSE = re.compile(
     rf"(?P<name>.*[^\s_/])\s*"
-    rf"(?:\(\s*(?P<in>{units.PATTERN})\s*\)|[_/ ]\s*(?P<after>{units.PATTERN}))",
+    rf"(?:\(\s*(?P<in>{units.IN_BRACKETS})\s*\)|[_/ ]\s*(?P<after>{units.PATTERN}))",
     re.IGNORECASE,
 )
 _HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
+_LOOKED_AT = 20  # rows at the top of a file among which its column names are
 _NUMBERED = re.compile(r"(?P<name>.*)\[(?P<number>[0-9]+)\]\s*")
 
 
@@ -110,9 +111,21 @@ def parted(heading: str) -> tuple[str, str | None]:
 
 
 def _first_data(rows: Sequence[Row]) -> int | None:
-    """The first row of numbers; None where there is none."""
+    """The first row of numbers; None where there is none.
+
+    Numbers above a line of column names, such as those of rigid bodies, are not data.
+    """
     width = Counter(len(row) for _, row in rows).most_common(1)[0][0]
-    for i, (_, row) in enumerate(rows):
+    named = [sum(map(_recognised, row)) for _, row in rows[:_LOOKED_AT]]
+    last = max((i for i, count in enumerate(named) if count > 1), default=-1)
+    start = (
+        0 if any(count > 1 for count in named[: _first_numbers(rows, width, 0) or 0]) else last + 1
+    )
+    return _first_numbers(rows, width, start)
+
+
+def _first_numbers(rows: Sequence[Row], width: int, start: int) -> int | None:
+    for i, (_, row) in enumerate(rows[start:], start):
         filled = [cell for cell in row if cell]
         numbers = sum(map(is_number, filled))
         if len(row) == width and numbers and (numbers > 1 or 2 * numbers >= len(filled)):

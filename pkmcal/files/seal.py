@@ -64,6 +64,7 @@ _FORMS = {
     ".svg": _Form(_remark),
     ".xml": _Form(_remark),
     ".urdf": _Form(_remark),
+    ".sdf": _Form(_remark),
     ".png": _Form(_chunk, before=_IEND),
 }
 

@@ -15,16 +15,20 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pkmcal.exceptions import FileError
+from pkmcal.files.text_lines import lines_of
 
 SEPARATORS = ("\t", ";", ",", " ")  # the first of those that fit equally well
 _LOOKED_AT = 200  # lines
 _COMMENT = re.compile(r"\s*(?:#|//|%)+")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?")
-_TRIGGER = re.compile(  # Klipper and Kalico; Marlin
+_TRIGGER = re.compile(  # Klipper until 2025 and Kalico; Marlin
     r"probe at (-?[0-9.]+),(-?[0-9.]+) is z=(-?[0-9.]+)"
     r"|Bed X: ?(-?[0-9.]+) Y: ?(-?[0-9.]+) Z: ?(-?[0-9.]+)"
 )
-_REPORTS = ("probe at ", "Bed X:")  # what such lines hold
+_CONTACT = re.compile(  # Klipper since: not of the nozzle when it triggered, but of the bed
+    r"probe: at (-?[0-9.]+),(-?[0-9.]+) bed will contact at z=(-?[0-9.]+)"
+)
+_REPORTS = ("probe at ", "Bed X:", "bed will contact at")  # what such lines hold
 _GAP = re.compile(r" {2,}")
 _BRACKET = re.compile(r"\s+(?=[\[(])")
 
@@ -69,12 +73,20 @@ def text_rows(path: Path, content: bytes) -> TextRows:
         else:
             lines.append((number, line.rstrip("\n")))
     if any(words in text for words in _REPORTS):
-        triggers = [
-            (n, m) for n, line in enumerate(text.splitlines(), 1) if (m := _TRIGGER.search(line))
-        ]
-        if triggers:
-            _take_triggers(found, triggers)
-            return found
+        reports = {
+            what: [(n, m) for n, line in enumerate(lines_of(text), 1) if (m := form.search(line))]
+            for what, form in (("probe", _TRIGGER), ("contact", _CONTACT))
+        }
+        if all(reports.values()):
+            new, old = reports["contact"][0][0], reports["probe"][0][0]
+            raise FileError(
+                f"{path}, line {new}: the firmware reports its probe in another way than in line"
+                f" {old}: make two files of it"
+            )
+        for what, found_in in reports.items():
+            if found_in:
+                _take_triggers(found, what, found_in)
+                return found
     found.separator = _separator([line for _, line in lines[:_LOOKED_AT]])
     found.rows = [(number, cells(path, number, line, found.separator)) for number, line in lines]
     if found.separator == " ":
@@ -82,9 +94,9 @@ def text_rows(path: Path, content: bytes) -> TextRows:
     return found
 
 
-def _take_triggers(found: TextRows, triggers: list[tuple[int, re.Match[str]]]) -> None:
+def _take_triggers(found: TextRows, what: str, triggers: list[tuple[int, re.Match[str]]]) -> None:
     """Make a table of the lines in which a firmware reports its probe."""
-    found.rows = [(triggers[0][0], ["x [mm]", "y [mm]", "probe [mm]"])]
+    found.rows = [(triggers[0][0], ["x [mm]", "y [mm]", f"{what} [mm]"])]
     found.rows += [(n, [part for part in m.groups() if part is not None]) for n, m in triggers]
     found.notes.append(f"{len(triggers)} lines in which a firmware reports its probe")
 

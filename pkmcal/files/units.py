@@ -15,6 +15,7 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
         "cm": (10.0, 1.0),
         "m": (1000.0, 1.0),
         "in": (25.4, 1.0),
+        '"': (25.4, 1.0),
     },
     "rad": {
         "rad": (1.0, 1.0),
@@ -25,7 +26,13 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
         "arcmin": (math.pi, 10_800.0),
         "arcsec": (math.pi, 648_000.0),
         "″": (math.pi, 648_000.0),
+        '"': (math.pi, 648_000.0),
+        "′": (math.pi, 10_800.0),
+        "'": (math.pi, 10_800.0),
     },
+    "°C": {"°C": (1.0, 1.0)},
+    "K": {"K": (1.0, 1.0)},
+    "°F": {"°F": (1.0, 1.0)},
     "count": {"steps": (1.0, 1.0), "counts": (1.0, 1.0), "rev": (1.0, 1.0)},
 }
 # Other spellings of units; a unit may also be in capitals.
@@ -40,11 +47,21 @@ SPELLINGS = {
     "radian": "rad", "radians": "rad", "milliradian": "mrad", "milliradians": "mrad",
     "arc sec": "arcsec", "arcseconds": "arcsec", "arc seconds": "arcsec", "arcminutes": "arcmin",
     "revs": "rev", "revolution": "rev", "revolutions": "rev", "turns": "rev",
+    "c": "°C", "degc": "°C", "deg c": "°C", "ºc": "°C", "celsius": "°C", "k": "K", "kelvin": "K",
+    "degf": "°F", "deg f": "°F", "ºf": "°F", "f": "°F", "fahrenheit": "°F",
     "step": "steps", "microsteps": "steps", "count": "counts", "increments": "counts",
     "ticks": "counts", "pulses": "counts",
 }  # fmt: skip
 _KNOWN = {unit for units in UNITS.values() for unit in units}
-PATTERN = "|".join(sorted(map(re.escape, (*_KNOWN, "\u03bcm", *SPELLINGS)), key=len, reverse=True))
+_LETTERS = {"K", "k", "c", "f", '"', "'"}  # which behind a name may as well be a part of it
+
+
+def _pattern(without: Collection[str] = ()) -> str:
+    words = {*_KNOWN, "\u03bcm", *SPELLINGS} - {*without}
+    return "|".join(sorted(map(re.escape, words), key=lambda word: (-len(word), word)))
+
+
+PATTERN, IN_BRACKETS = _pattern(_LETTERS), _pattern()
 _STATED = re.compile(r"\bunits?\b", re.IGNORECASE)
 _WORD = re.compile(r"[^\W\d_]+|[°º″]")
 _BETWEEN = re.compile(

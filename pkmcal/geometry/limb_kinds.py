@@ -13,7 +13,7 @@ from typing import Literal
 from pkmcal.arrays import Unit
 from pkmcal.core.library import AXES, DRIVERS, ROWS, SLOTS
 
-Driver = Literal["length", "slider", "crank"]
+Driver = Literal["length", "slider", "crank", "pulley"]
 
 POINT_SLOTS = SLOTS[:6]
 
@@ -26,8 +26,9 @@ class LimbKind:
     ----------
     name : str
         The name of the kind.
-    driver : {"length", "slider", "crank"}
-        How the actuator moves the limb; a crank's coordinate is an angle.
+    driver : {"length", "slider", "crank", "pulley"}
+        How the actuator moves the limb; a crank's coordinate is an angle. Of a pulley the core
+        knows limbs between two points that stand for it (`pkmcal.core.pulleys`).
     what : str
         What the limb is, in a few words.
     axes : mapping of str to str
@@ -35,6 +36,8 @@ class LimbKind:
         with ``_tilt`` behind it.
     rows : tuple of str
         The closures beside the sphere row.
+    cable : bool
+        Whether it pulls and cannot push.
     couple : bool
         Whether a stated length `couple` adds a row and makes the base axis part of the limb.
         Otherwise every limb of the kind has all its axes.
@@ -46,9 +49,10 @@ class LimbKind:
     axes: Mapping[str, str] = field(default_factory=dict)
     rows: tuple[str, ...] = ()
     couple: bool = False
+    cable: bool = False
 
     def __post_init__(self) -> None:
-        unknown = {self.driver, *self.axes, *self.rows} - {*DRIVERS, *AXES, *ROWS}
+        unknown = {self.driver, *self.axes, *self.rows} - {*DRIVERS, "pulley", *AXES, *ROWS}
         if unknown:
             raise ValueError(f"{self.name}: the core has no {', '.join(sorted(unknown))}")
         for couple in {False, self.couple}:
@@ -66,14 +70,25 @@ class LimbKind:
         return "rad" if self.driver == "crank" else "mm"
 
     @property
-    def lengths(self) -> tuple[str, ...]:
-        """Fixed lengths of the limb, keys and slots of the same name."""
-        return {"length": (), "slider": ("rod",), "crank": ("rod", "crank")}[self.driver]
+    def lengths(self) -> Mapping[str, str]:
+        """Keys of the fixed lengths of the limb, and the slots they are in."""
+        of_drivers: dict[Driver, dict[str, str]] = {
+            "length": {},
+            "slider": {"rod": "rod"},
+            "crank": {"rod": "rod", "crank": "crank"},
+            "pulley": {"radius": "crank"},  # what turns about the base point, as a crank does
+        }
+        return of_drivers[self.driver]
 
     @property
     def has_branch(self) -> bool:
         """Whether the inverse has two branches to choose from."""
-        return self.driver != "length"
+        return self.driver in ("slider", "crank")
+
+    @property
+    def has_zero(self) -> bool:
+        """Whether the direction in which an angle about the base axis is 0 can be stated."""
+        return self.driver in ("crank", "pulley")
 
     def axes_of(self, couple: bool) -> dict[str, str]:
         """The axes of a limb with or without a couple length, in the order of the core."""
@@ -89,10 +104,10 @@ class LimbKind:
         axes = self.axes.values()
         return (
             ("kind", "base", "platform", "offset", "gain", "actuator")
-            + self.lengths
+            + tuple(self.lengths)
             + tuple(axes)
             + tuple(f"{axis}_tilt" for axis in axes)
-            + (("zero",) if self.driver == "crank" else ())
+            + (("zero",) if self.has_zero else ())
             + (("branch",) if self.has_branch else ())
             + (("couple",) if self.couple else ())
             + (("weights",) if self.rows or self.couple else ())
@@ -109,8 +124,8 @@ class LimbKind:
         }
         found["offset"] = (f"offset{limb}", self.actuator_unit)
         found["gain"] = (f"gain{limb}", "1")
-        for slot in self.lengths:
-            found[slot] = (f"{slot}{limb}", "mm")
+        for key, slot in self.lengths.items():
+            found[slot] = (f"{key}{limb}", "mm")
         for axis, key in self.axes_of(couple).items():
             for i, slot in enumerate(AXES[axis], 1):
                 found[slot] = (f"{key}{limb}.tilt{i}", "rad")
@@ -144,7 +159,14 @@ KINDS: dict[str, LimbKind] = {
             axes={"base": "slider", "hinge": "normal"},
             rows=("hinge_plane",),
         ),
-        LimbKind("cable", "length", "a cable or belt from point to point, taut"),
+        LimbKind("cable", "length", "a cable or belt from point to point, taut", cable=True),
+        LimbKind(
+            "pulley",
+            "pulley",
+            "a cable over a swivelling pulley, taut",
+            axes={"base": "swivel"},
+            cable=True,
+        ),
         LimbKind("RUS", "crank", "a crank and a rod", axes={"base": "axis"}),
     )
 }

@@ -96,8 +96,8 @@ class _Edit:
             self._point(table, point, [numbers.get(f"{point}.{axis}") for axis in "xyz"])
         for axis, name in kind.axes_of(limb.couple > 0.0).items():
             self._list(table, f"{name}_tilt", [numbers.get(slot) for slot in AXES[axis]])
-        for key in (*kind.lengths, "offset", "gain"):
-            if key in numbers and self._concerns(name := numbers[key].name):
+        for key, slot in {**kind.lengths, "offset": "offset", "gain": "gain"}.items():
+            if slot in numbers and self._concerns(name := numbers[slot].name):
                 self._put(table, key, self._written(name), [name])
         if limb.law is not None:
             of_law = limb.law.numbers(i + 1, kind.actuator_unit)

@@ -21,7 +21,7 @@ from pkmcal.geometry.ties import LimbNumber, Term, Tie
 
 PARAMETER_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 CHAIN_HELP = "chain of joints (docs/machines.md)"
-RIGHT_ANGLE = 1e-3  # how far a crank's zero direction may be from a right angle to its axis, rad
+RIGHT_ANGLE = 1e-3  # how far a zero direction may be from a right angle to its axis, rad
 UNIT_WORDS: dict[Unit, str] = {
     "mm": "a length",
     "rad": "an angle",
@@ -163,7 +163,7 @@ def read_limb(
         for key in (kind.axes[axis], f"{kind.axes[axis]}_tilt"):
             if key in table:
                 table.fail(key, "only a limb with a couple length has this")
-    zero = "zero" if kind.driver == "crank" else None
+    zero = "zero" if kind.driver == "crank" or (kind.has_zero and "zero" in table) else None
     frames = {
         axis: _frame(table, key, zero if axis == "base" else None) for axis, key in axes.items()
     }
@@ -206,9 +206,9 @@ def _read_numbers(
     entries["gain"] = entry("gain", table.data.get("gain", 1.0), of_gain)
     if entries["gain"].value == 0.0:
         table.fail("gain", "must not be 0: the actuator would not move the limb")
-    for key in kind.lengths:
-        entries[key] = entry(key, table[key], "mm")
-        _positive(table, key, entries[key].value)
+    for key, slot in kind.lengths.items():
+        entries[slot] = entry(key, table[key], "mm")
+        _positive(table, key, entries[slot].value)
     for axis, name in kind.axes_of(couple).items():
         key = f"{name}_tilt"
         tilts = table.list_of(key, 2, "two angles") if key in table else (0.0, 0.0)

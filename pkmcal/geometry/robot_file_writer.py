@@ -98,9 +98,10 @@ def _limb(limb: Limb, i: int, geometry: Geometry) -> dict[str, Any]:
     for axis, key in kind.axes_of(couple).items():
         data[key] = limb.frames[axis][:, 2].tolist()
         data[f"{key}_tilt"] = [entry(slot) for slot in AXES[axis]]
-    if kind.driver == "crank":
+    if kind.has_zero:
         data["zero"] = limb.frame[:, 0].tolist()
-    data.update({key: entry(key) for key in (*kind.lengths, "offset", "gain")})
+    named = {**kind.lengths, "offset": "offset", "gain": "gain"}
+    data.update({key: entry(slot) for key, slot in named.items()})
     if limb.law is not None:
         unit = kind.actuator_unit
         data["drive"] = law_table(limb.law, unit, lambda name: entry(f"drive.{name}"))

@@ -16,6 +16,7 @@ from pkmcal.arrays import BoolArray, FloatArray, wrapped
 from pkmcal.core.driven import CompiledMachine
 from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Closure
+from pkmcal.core.path_differences import along_path
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.frames import Frames
 from pkmcal.screw import from_pose
@@ -23,6 +24,7 @@ from pkmcal.screw import from_pose
 ITERATIONS = 30
 SETTLED = 1e-12  # of the machine's size
 KEPT = 1e-9  # of the size, or rad: a matched coordinate that is off by more was not kept
+OTHER_BRANCH = 1e-6  # of the size: so far apart, at a pose, are the drives of a limb's branches
 
 
 def matched_coordinates(match: bool | str | Sequence[str], moved: Sequence[str]) -> list[int]:
@@ -134,17 +136,31 @@ def complete(
         done[rows] = np.where(good, np.abs(step).max(axis=1) <= SETTLED * size, met)
     own[~done], q[~done] = np.nan, np.nan
     q = machine.nearest_turns(slots, q, near)  # a long step may have gone round
-    own = machine.forward(slots, q, own, threads=None)[0]
+    own = _forward(machine, slots, frames, own, q, matched, wanted)
     if machine.rows > len(free):
         own, q = _correct_actuators(machine, slots, frames, own, q, matched, wanted)
     seen = _seen(frames, own, matched, wanted)
-    if map == "spatial":
-        seen = _same_rotation(_as_wanted(seen, matched, wanted), matched, wanted, KEPT)
-    off = np.abs(_off(seen, matched, wanted))
-    kept = off <= KEPT * np.where(np.array(matched) < 3, size, 1.0)
-    unsolved = ~kept.all(axis=1)  # at a stationary point that is no solution, or without a pose
+    limit = KEPT * np.where(np.array(matched) < 3, size, 1.0)
+    kept = (np.abs(_off(seen, matched, wanted)) <= limit).all(axis=1)
+    if machine.turns_freely:
+        seen[~kept] = _same_rotation(seen[~kept], matched, wanted[~kept], KEPT)
+        kept = (np.abs(_off(seen, matched, wanted)) <= limit).all(axis=1)
+        own = seen.copy() if frames.trivial else own
+    # not at a stationary point that is no solution, and with no limb on its other branch
+    unsolved = ~(kept & _as_inverse(machine, slots, own, q))
     seen[unsolved], own[unsolved], q[unsolved] = np.nan, np.nan, np.nan
     return Completed(seen, own, q)
+
+
+def _as_inverse(
+    machine: CompiledMachine, slots: FloatArray, own: FloatArray, q: FloatArray
+) -> BoolArray:
+    """Whether limbs at actuators (N, n) are in the working mode in which the inverse has them."""
+    way, there = (machine.drives(slots, each) for each in (q, machine.inverse(slots, own, q)))
+    missed = machine.struct.closure_tolerance if machine.rows > machine.m else 0.0
+    most = max(OTHER_BRANCH * machine.struct.size, 10.0 * missed)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.abs(there - way) <= most).all(axis=1))
 
 
 def _to_map(
@@ -189,11 +205,11 @@ def _seen(
     """Own poses (N, 6) in the user's frames."""
     if frames.trivial:
         return np.array(own)
-    return _as_wanted(frames.outward(own), matched, wanted)
+    return written_as(frames.outward(own), matched, wanted)
 
 
-def _as_wanted(pose: FloatArray, matched: Sequence[int], wanted: FloatArray) -> FloatArray:
-    """Poses with their rotations written as is nearer to what is wanted.
+def written_as(pose: FloatArray, matched: Sequence[int], wanted: FloatArray) -> FloatArray:
+    """Poses (N, 6) with rotations written as is nearer to what is wanted, (N, matched).
 
     α + π, π - β, γ + π is the same rotation as α, β, γ.
     """
@@ -275,18 +291,27 @@ def completed_rates(
         Velocity and acceleration of the matched coordinates, by time.
     """
     free = [POSE.index(name) for name in MAPS[map]]
+    if machine.rows > len(free):  # closures that depend cannot be solved for rates, one by one
+        scale = np.where(np.array(matched) < 3, 1.0 / machine.struct.size, 1.0)
+
+        def completed(change: FloatArray) -> FloatArray:
+            pose = at.pose.copy()
+            pose[:, matched] += change
+            return complete(machine, map, slots, frames, pose, matched, at.q).q
+
+        return along_path(completed, *rates, scale)
     left = _system(machine.closure(slots, at.own, at.q), frames, at.own, at.pose, free, matched)
     good = np.isfinite(left).all(axis=(1, 2))
     inverse = np.full((len(left), machine.actuators, len(matched)), np.nan)
     inverse[good] = np.linalg.pinv(left[good])[:, -machine.actuators :, machine.rows :]
     velocity = np.einsum("nij,nj->ni", inverse, rates[0])
     motion = machine.motion(slots, at.own, at.q, velocity, np.zeros_like(velocity))[0]
-    carried = _acceleration(frames.motion_outward(motion))[:, matched]
+    carried = _acceleration(frames.motion_outward(motion), at.pose)[:, matched]
     return velocity, np.einsum("nij,nj->ni", inverse, rates[1] - carried)
 
 
-def _acceleration(motion: FloatArray) -> FloatArray:
-    """Second derivatives of x y z α β γ, (N, 6), of motions (N, 3, 4, 4).
+def _acceleration(motion: FloatArray, pose: FloatArray) -> FloatArray:
+    """Second derivatives of x y z α β γ as poses (N, 6) write them, of motions (N, 3, 4, 4).
 
     Of an angle φ with sine s and cosine c up to a factor, n = s² + c²: n φ̇ = c ṡ - s ċ.
     """
@@ -298,6 +323,7 @@ def _acceleration(motion: FloatArray) -> FloatArray:
         speed = (c[:, 0] * s[:, 1] - s[:, 0] * c[:, 1]) / n
         out[:, k] = (c[:, 0] * s[:, 2] - s[:, 0] * c[:, 2] - speed * by_time) / n
     sine, cosine = -R[:, 2, 0], np.hypot(R[:, 0, 0, 0], R[:, 1, 0, 0])
+    cosine = np.copysign(cosine, np.cos(pose[:, 4]))
     out[:, 4] = (sine[:, 2] + sine[:, 0] * (sine[:, 1] / cosine) ** 2) / cosine
     return out
 
@@ -322,10 +348,27 @@ def _correct_actuators(
         live = np.flatnonzero(np.abs(missing).max(axis=1) > SETTLED * machine.struct.size)
         if not live.size:
             break
-        slope = machine.forward_jacobian(slots, own[live], q[live])
-        slope = frames.rates_outward(own[live], seen[live], slope)[:, matched]
+        slope = machine.forward_jacobian(slots, own[live], q[live], twists=True)
+        slope = frames.twists_outward(own[live], slope)
+        slope = frames.rates_of_twists(seen[live], slope)[:, matched]
         good = np.isfinite(slope).all(axis=(1, 2))
         live, slope = live[good], slope[good]
         q[live] -= (np.linalg.pinv(slope) @ missing[live][..., None])[..., 0]
-        own[live] = machine.forward(slots, q[live], own[live], threads=None)[0]
+        own[live] = _forward(machine, slots, frames, own[live], q[live], matched, wanted[live])
     return own, q
+
+
+def _forward(
+    machine: CompiledMachine,
+    slots: FloatArray,
+    frames: Frames,
+    own: FloatArray,
+    q: FloatArray,
+    matched: Sequence[int],
+    wanted: FloatArray,
+) -> FloatArray:
+    """Own poses (N, 6) at actuators, near those given; written as is wanted if they are seen so."""
+    own = machine.forward(slots, q, own, threads=None)[0]
+    if frames.trivial and machine.turns_freely:
+        return written_as(own, matched, wanted)
+    return own

@@ -14,6 +14,7 @@ from pkmcal.core.chains import ChainMachine
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Machine
+from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import CHAIN, Model
@@ -380,9 +381,10 @@ class Kinematics:
 
     @property
     def passive_names(self) -> tuple[str, ...]:
-        """The passive joints of chains, in the order of `Forward.passive`; none of other limbs."""
+        """Passive joints, in the order of `Forward.passive`: of chains, and swivels of pulleys."""
         if self.model.chains is None:
-            return ()
+            limbs = enumerate(self.model.limbs, 1)
+            return tuple(f"swivel{i}" for i, limb in limbs if limb.kind == "pulley")
         names = list(self.model.chains.parts)
         coordinate = self.model.chains.layout.coordinate
         order = sorted(range(len(names)), key=lambda k: int(coordinate[k]))
@@ -391,9 +393,12 @@ class Kinematics:
     def passive_joints(self, own: FloatArray, q: FloatArray) -> FloatArray:
         """What the passive joints turn or slide by from home at own poses (N, 6), (N, passive).
 
-        Each chain closed for itself, in the posture that is reached from home.
+        Each chain closed for itself, in the posture that is reached from home. Swivels of pulleys
+        turn from the direction `zero` of their limb.
         """
         machine, slots, at = self.machine.bare(self.slots, q)
+        if isinstance(machine, PulleyMachine):
+            return machine.swivels(slots, np.ascontiguousarray(own))[0]
         if not isinstance(machine, ChainMachine):
             raise ArgumentError(f"{self.model.name}: its limbs are no chains of joints")
         return machine.frames(slots, np.ascontiguousarray(own), at)[0]

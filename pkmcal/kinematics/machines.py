@@ -9,6 +9,7 @@ from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.driven import CompiledMachine, DrivenMachine
 from pkmcal.core.library import MAPS, SLOTS
 from pkmcal.core.machine import Machine
+from pkmcal.core.pulleys import PulleyMachine, has_pulleys
 from pkmcal.geometry.model import Model
 
 
@@ -47,4 +48,5 @@ def _of_limbs(model: Model, slots: FloatArray, length: float) -> Machine:
         for limb in limbs:  # nothing to weigh: all closures hold
             limb["weights"] = [1.0] * len(limb["weights"])
     home = np.ascontiguousarray(model.home, dtype=np.float64)
-    return Machine(model.map, limbs, length, slots, home, model.closure_tolerance)
+    made = PulleyMachine if has_pulleys(limbs) else Machine
+    return made(model.map, limbs, length, slots, home, model.closure_tolerance)

@@ -27,9 +27,8 @@ def error_jacobian(
     q: FloatArray,
     columns: Int32Array,
     units: Sequence[str],
-    twists: bool,
 ) -> FloatArray:
-    """∂pose/∂(numbers at `columns` of the flattened slots): (N, 6, columns).
+    """Twist (ω, v) of the platform by numbers at `columns` of the flattened slots: (N, 6, columns).
 
     Parameters
     ----------
@@ -43,8 +42,6 @@ def error_jacobian(
         Which numbers.
     units : sequence of str, k
         Theirs.
-    twists : bool
-        Of the twist (ω, v) of the platform in place of the pose.
     """
     size = machine.struct.size
     steps = {"mm": _STEP * size, "rad": _STEP, "1": _STEP}
@@ -58,8 +55,27 @@ def error_jacobian(
             for change in (-step, step)
         )
         alike = columns == column
-        out[:, :, alike] = (_between(start, end, twists) / (2.0 * step))[:, :, None]
+        out[:, :, alike] = (_between(start, end) / (2.0 * step))[:, :, None]
     out *= factor[:, None]
+    return out
+
+
+def actuator_twists(
+    machine: CompiledMachine,
+    slots: FloatArray,
+    pose: FloatArray,
+    q: FloatArray,
+    units: Sequence[str],
+) -> FloatArray:
+    """Twist (ω, v) of the platform by actuators in these units, as `error_jacobian`: (N, 6, n)."""
+    out = np.empty((len(pose), 6, q.shape[1]))
+    for a, unit in enumerate(units):
+        step = _STEP * (machine.struct.size if unit == "mm" else 1.0)
+        change = np.where(np.arange(q.shape[1]) == a, step, 0.0)
+        start, end = (
+            machine.forward(slots, q + way, pose, threads=None)[0] for way in (-change, change)
+        )
+        out[:, :, a] = _between(start, end) / (2.0 * step)
     return out
 
 
@@ -69,10 +85,7 @@ def _changed(slots: FloatArray, column: int, change: float) -> FloatArray:
     return changed
 
 
-def _between(start: FloatArray, end: FloatArray, twists: bool) -> FloatArray:
-    """From poses to others near them, (N, 6)."""
-    between: FloatArray = np.diff(np.unwrap([start, end], axis=0), axis=0)[0]
-    if twists:
-        between[:, 3:] = between[:, :3]
-        between[:, :3] = log(from_pose(end) @ np.linalg.inv(from_pose(start)))[:, :3]
-    return between
+def _between(start: FloatArray, end: FloatArray) -> FloatArray:
+    """How poses (N, 6) turn and move to others near them, (N, 6)."""
+    turned = log(from_pose(end) @ np.linalg.inv(from_pose(start)))[:, :3]
+    return np.concatenate([turned, end[:, :3] - start[:, :3]], axis=1)

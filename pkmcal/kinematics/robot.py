@@ -125,11 +125,12 @@ class Robot(Kinematics, Result):
         q = self.machine.inverse(self.slots, rows)
         closure = self.machine.closure(self.slots, rows, q)
         worst = np.abs(closure.residual).max(axis=1)
-        if self.model.map != "spatial":  # which has every pose, by whatever angles
+        fixed = [i for i, name in enumerate(POSE) if name not in self.coordinates]
+        if fixed:
             with np.errstate(invalid="ignore"):  # rows that are no poses
                 off = np.abs(rows - closure.pose)
                 off[:, 3:] = self.length * np.abs(wrapped(off[:, 3:]))
-            worst = np.maximum(worst, off.max(axis=1))
+            worst = np.maximum(worst, off[:, fixed].max(axis=1))
         return np.asarray(worst).reshape(shape)
 
     def feasible(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> Feasibility:
@@ -286,8 +287,13 @@ class Robot(Kinematics, Result):
             pose which misses them least.
         """
         given, own, q, shape = self._commanded(pose, actuators)
-        errors = self._by_numbers(own, q, twists=False)
-        errors = self._through_ties(self.frames.rates_outward(own, given, errors))
+        if self.frames.trivial and self.machine.rows == self.machine.m:  # without copies
+            columns = self.geometry.slot_index.astype(np.int32)
+            errors = self.machine.error_jacobian(self.slots, own, q, columns)
+        else:  # rates of the machine's own angles may be infinite where the user's are not
+            twists = self.frames.twists_outward(own, self._by_numbers(own, q))
+            errors = self.frames.rates_of_twists(given, twists)
+        errors = self._through_ties(errors)
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def error_twists(self, pose: ArrayLike, actuators: ArrayLike | None = None) -> FloatArray:
@@ -314,8 +320,7 @@ class Robot(Kinematics, Result):
         True
         """
         _, own, q, shape = self._commanded(pose, actuators)
-        errors = self._by_numbers(own, q, twists=True)
-        errors = self._through_ties(self.frames.twists_outward(own, errors))
+        errors = self._through_ties(self.frames.twists_outward(own, self._by_numbers(own, q)))
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
@@ -340,7 +345,11 @@ class Robot(Kinematics, Result):
         True
         """
         _, own, q, shape = self._commanded(pose, actuators)
-        by_q = self.machine.forward_jacobian(self.slots, own, q, twists=True)
+        if self.machine.rows > self.machine.m:
+            given = (self.machine, self.slots, own, q, self.actuator_units)
+            by_q = overconstrained.actuator_twists(*given)
+        else:
+            by_q = self.machine.forward_jacobian(self.slots, own, q, twists=True)
         return self.frames.twists_outward(own, by_q).reshape(*shape, 6, self.n_actuators)
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
@@ -367,15 +376,13 @@ class Robot(Kinematics, Result):
             raise ArgumentError(f"actuators are a batch {q_shape}, poses a batch {shape}")
         return q
 
-    def _by_numbers(self, own: FloatArray, q: FloatArray, twists: bool) -> FloatArray:
-        """How the machine's own pose follows each number of each limb, (N, 6, numbers)."""
+    def _by_numbers(self, own: FloatArray, q: FloatArray) -> FloatArray:
+        """Twist of the platform in the machine's own frame by each number, (N, 6, numbers)."""
         columns = self.geometry.slot_index.astype(np.int32)
         if self.machine.rows > self.machine.m:
             units = self.geometry.units[: len(columns)]
-            return overconstrained.error_jacobian(
-                self.machine, self.slots, own, q, columns, units, twists
-            )
-        return self.machine.error_jacobian(self.slots, own, q, columns, twists)
+            return overconstrained.error_jacobian(self.machine, self.slots, own, q, columns, units)
+        return self.machine.error_jacobian(self.slots, own, q, columns, twists=True)
 
     def _through_ties(self, errors: FloatArray) -> FloatArray:
         """The same (N, 6, p) with the columns of named parameters after those of the numbers."""

@@ -11,6 +11,15 @@ from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
 from pkmcal.kinematics.robot import Robot
 
+_WITHOUT = (
+    "; the actuators at each row are needed: of a log of the controller with --controller LOG; of"
+    " where a printer's probe triggered, column probe beside x and y"
+)
+_QUANTITIES: dict[str | None, tuple[str, ...]] = {  # the one that is meant where two have a unit
+    "mm": ("mm", "count", "rad"),
+    "rad": ("rad", "mm", "count"),
+    None: ("mm", "rad", "count"),
+}
 _ACTUATOR = re.compile(r"q[1-9][0-9]*")
 
 
@@ -41,12 +50,14 @@ def columns_of_actuators(table: Table, what: str, count: int) -> list[str]:
 
 def read_actuators(table: Table, robot: Actuated | None) -> tuple[FloatArray, tuple[str, ...]]:
     """Actuator coordinates (N, n), and the unit of each, "mm" or "rad"."""
-    count = max((int(name[1:]) for name in actuators_in(table)), default=1)
+    count = max((int(name[1:]) for name in actuators_in(table)), default=0)
+    if not count:
+        raise table.missing("q1", _WITHOUT)
     expected = () if robot is None else tuple(robot.actuator_units)
     columns, units = [], []
     for i in range(count):
         of_robot = expected[i] if i < len(expected) else None
-        quantities = ("mm", "rad", "count") if of_robot != "mm" else ("mm", "count", "rad")
+        quantities = _QUANTITIES[of_robot]
         values, unit = table.numbers(f"q{i + 1}", *quantities, expected=of_robot)
         if unit == "count":
             unit = _counted(table, i, of_robot, robot)
@@ -63,25 +74,29 @@ def _counted(table: Table, i: int, of_robot: str | None, robot: Actuated | None)
             f"column {column.name!r} has unit [{column.unit}]: give the robot, whose gain says"
             " how much one is"
         )
-    gain = _gain(robot, i)
+    gain, winds = _gain(robot, i)
     if gain is None or abs(gain) == 1.0:
         raise table.header_error(
             f"column {column.name!r} has unit [{column.unit}], and the robot does not state how"
             f" much one is: set the gain of the limb, in {of_robot} each"
         )
-    note = f"actuators in {column.unit}, converted by the robot's gain ({gain:.6g} {of_robot} each)"
+    turns = "rad of the spool" if winds else of_robot
+    note = f"actuators in {column.unit}, converted by the robot's gain ({gain:.6g} {turns} each)"
     if note not in table.notes:
         table.notes.append(note)
     return of_robot
 
 
-def _gain(robot: object, actuator: int) -> float | None:
-    """The gain of the first limb of an actuator; None where there is none."""
+def _gain(robot: object, actuator: int) -> tuple[float | None, bool]:
+    """The gain of the first limb of an actuator, and whether it turns a spool; None: no limb."""
     if not isinstance(robot, Robot):
-        return None
+        return None, False
     limbs = robot.model.limbs
     limb = next((k for k, limb in enumerate(limbs) if limb.actuator == actuator), None)
-    return None if limb is None else float(robot.geometry[f"gain{limb + 1}"])
+    if limb is None:
+        return None, False
+    law = limbs[limb].law
+    return float(robot.geometry[f"gain{limb + 1}"]), law is not None and law.spool
 
 
 def compare(table: Table, units: tuple[str, ...], robot: Actuated | None) -> None:

@@ -14,6 +14,7 @@ from pkmcal.files.reading import LONGEST_NAME
 from pkmcal.measurements.components import KINDS, Kind, noun
 from pkmcal.measurements.tracker import Tracker
 
+_COLDEST = -273.15  # °C
 _ROUNDED = 1e-9  # share by which a covariance may miss symmetry, as what was computed or typed does
 
 
@@ -42,6 +43,31 @@ def integers(name: str, given: ArrayLike, rows: int) -> Int64Array:
         row = int(np.argmax(array != np.round(array)))
         raise ArgumentError(f"{name} must be whole numbers; found {array[row]} in row {row}")
     return array.astype(np.int64)
+
+
+def row_numbers(name: str, given: ArrayLike, rows: int) -> FloatArray:
+    """A copy as finite doubles, one per row."""
+    array = numbers(name, given)
+    if array.shape != (rows,):
+        raise ArgumentError(f"{name} must have shape ({rows},); found {array.shape}")
+    return array
+
+
+def temperature_array(given: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None:
+    """Temperatures (N, 2 + n) of base, platform and what each actuator drives, °C."""
+    if given is None:
+        return None
+    found = numbers("temperature", given, blank=True)
+    rows, parts = shape[0], shape[1] + 2
+    if found.shape not in ((), (rows,), (rows, parts)):
+        raise ArgumentError(
+            f"temperature must be a number or have shape ({rows},) or ({rows}, {parts}): of base,"
+            f" platform and {shape[1]} actuators; found {found.shape}"
+        )
+    if (found < _COLDEST).any():
+        raise ArgumentError(f"temperature in °C is above {_COLDEST}; found {np.nanmin(found):g}")
+    of_rows = found[:, None] if found.ndim == 1 else found
+    return np.array(np.broadcast_to(of_rows, (rows, parts)))
 
 
 def sigma_array(

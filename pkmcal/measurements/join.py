@@ -13,13 +13,14 @@ from pkmcal.exceptions import FileError
 from pkmcal.files.csv_table import Table
 from pkmcal.measurements.actuator_columns import actuators_in
 from pkmcal.measurements.point_names import split
-from pkmcal.measurements.time_stamps import seconds
+from pkmcal.measurements.time_stamps import seconds, with_date
 
 Join = Literal["auto", "name", "row", "time"]
 JOINS: tuple[Join, ...] = ("auto", "name", "row", "time")
 _ENOUGH = 0.5  # of the points have to be found by a key for it to be one
 _NUMBER = re.compile(r"([0-9]+)\D*$")
 _LISTED = 3
+_BESIDE = ("session", "approach", "temperature")  # of the log, beside its actuators
 _EPOCH = 1e8  # s: seconds since 1970 are more
 
 Rows = list[int | None]  # of the log, for each row of the instrument
@@ -74,11 +75,12 @@ def _put(table: Table, log: Table, actuators: Sequence[str], rows: Rows, said: s
     beside = [
         name
         for name in log.columns
-        if (name == "session" or name.startswith("approach")) and name not in table.columns
+        if name.partition(".")[0] in _BESIDE and name not in table.columns
     ]
     for name in [*actuators, *beside]:
         table.put(name, log.columns[name].take(chosen))
-    table.notes += [*(f"{log.path}: {note}" for note in log.notes), said]
+    table.elsewhere += [f"{log.path}: {note}" for note in log.notes]
+    table.notes.append(said)
 
 
 def _by_name(table: Table, log: Table) -> tuple[Rows, str] | str:
@@ -138,7 +140,7 @@ def _by_time(table: Table, log: Table) -> tuple[Rows, str] | str:
         if "time" not in each.columns:
             return f"{each.path} has no time-stamps"
         cells = each.columns["time"].cells
-        found = seconds(_with_date(each, cells))
+        found = seconds(with_date(each, cells))
         if found is None:
             return f"the time-stamps of {each.path}, such as {cells[0]!r}, are not of one form"
         times.append(found)
@@ -177,14 +179,6 @@ def _relative(table: Table) -> bool:
     """Whether time-stamps are small numbers, as of seconds since a start."""
     found = seconds(table.columns["time"].cells)
     return found is not None and found[1] == "a start" and float(found[0].max()) < _EPOCH
-
-
-def _with_date(table: Table, cells: Sequence[str]) -> Sequence[str]:
-    """Times of day after the date that another column has."""
-    dates = table.columns.get("date")
-    if dates is None or any(len(cell) > 15 for cell in cells):
-        return cells
-    return [f"{date} {cell}" for date, cell in zip(dates.cells, cells, strict=True)]
 
 
 def _by_row(table: Table, log: Table) -> tuple[Rows, str] | str:

@@ -19,6 +19,9 @@ columns                               meaning
 ``actuator_sigma.q1 [mm]`` …          … or of each of them
 ``group``                             a whole number, the same for repeats of one pose
 ``session``                           when the row was measured, by a name
+``time``                              when, in seconds or as a time-stamp
+``temperature [°C]``                  of the machine; or ``temperature.base``, ``.platform``,
+                                      ``.q1`` …, of what that actuator drives
 ``approach.q1`` …                     1 or -1: the reading had grown or fallen; 0: not known
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
@@ -49,8 +52,8 @@ from numpy.typing import ArrayLike
 
 from pkmcal import arguments
 from pkmcal.arguments import word
-from pkmcal.arrays import FloatArray, TextArray
-from pkmcal.exceptions import ArgumentTypeError, FileError
+from pkmcal.arrays import FloatArray, TextArray, as_rows
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError, FileError
 from pkmcal.files.column_names import SYNONYMS
 from pkmcal.files.csv_table import Table
 from pkmcal.kinematics.robot import Robot
@@ -92,6 +95,8 @@ from pkmcal.measurements.table_layout import (
     split_names,
 )
 from pkmcal.measurements.target_columns import read_several, read_targets, several_targets
+from pkmcal.measurements.temperature_columns import WHOLE, parts_of, read_temperature
+from pkmcal.measurements.time_stamps import times_of
 
 _AXES = ("x", "y", "z")
 _TRIED = 200  # rows by which an order of angles is told
@@ -177,9 +182,10 @@ def read_measurements(
     split_names(table)
     number_groups(table)
     several = several_targets(table)
+    times = times_of(table)
     leave_out_unknown(table, _known(table, several), SYNONYMS)
-    if "probe" in table.columns:
-        return _read_probe(table, robot, probe_offset)
+    if not table.columns.keys().isdisjoint(("probe", "contact")):
+        return _read_probe(table, robot, probe_offset, times)
     actuators, actuator_units = read_actuators(table, robot)
     compare(table, actuator_units, robot)
     kind = _kind(table, several)
@@ -189,6 +195,8 @@ def read_measurements(
     if "group" in table.columns:
         fields["group"] = table.integers("group")
     fields["session"] = _read_session(table)
+    fields["time"] = times
+    fields["temperature"] = read_temperature(table, len(actuator_units))
     fields["approach"] = _read_approach(table, len(actuator_units))
     values: FloatArray | None
     if several:
@@ -221,18 +229,22 @@ def read_measurements(
 
 
 def _notes(table: Table) -> tuple[str, ...]:
-    return tuple(f"{table.path}: {note}" for note in table.notes)
+    return (*table.elsewhere, *(f"{table.path}: {note}" for note in table.notes))
 
 
-def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Measurements:
+def _read_probe(
+    table: Table, robot: Actuated | None, offset: ArrayLike, times: FloatArray | None
+) -> Measurements:
     """Heights of a probe's tip where it triggered: 0, on the bed."""
+    what = "probe" if "probe" in table.columns else "contact"
     if not isinstance(robot, Robot):
         raise table.header_error(
-            f"column {table.columns['probe'].name!r}: give the robot, as the firmware had it when"
+            f"column {table.columns[what].name!r}: give the robot, as the firmware had it when"
             " it probed"
         )
+    if what == "contact":
+        return _read_contacts(table, robot, offset, times)
     z = table.numbers("probe", "mm")[0]
-    sigma = read_sigma(table, "height")
     if actuators_in(table):
         actuators, units = read_actuators(table, robot)
         compare(table, units, robot)
@@ -248,20 +260,45 @@ def _read_probe(table: Table, robot: Actuated | None, offset: ArrayLike) -> Meas
         poses = robot.forward(actuators).pose[:, :3]
     else:
         poses = np.column_stack([table.stacked(["x", "y"], ["mm", "mm"]), z])
-    try:
-        measured = probed(robot, poses, offset=offset, sigma=sigma)
-    except ValueError as error:
-        raise FileError(f"{table.path}: {error}") from None
     table.notes.append(
         f"{table.columns['probe'].name!r} taken as the firmware's z when the probe triggered: the"
         " actuators are those that the robot file has there, and the probe's tip is at 0"
     )
+    return _probed(table, robot, poses, offset, times)
+
+
+def _read_contacts(
+    table: Table, robot: Robot, offset: ArrayLike, times: FloatArray | None
+) -> Measurements:
+    """The same where the firmware says where the nozzle would touch: its offsets are taken off."""
+    places = table.stacked(["x", "y", "contact"], ["mm", "mm", "mm"])
+    given, shape = as_rows("probe_offset", offset, 3)
+    if shape != () or not np.isfinite(given).all():
+        raise ArgumentError("probe_offset must be three finite numbers; found others")
+    shown = ", ".join(f"{value:g}" for value in given[0])
+    table.notes.append(
+        "the firmware says where the nozzle would touch the bed, by its offsets of the probe;"
+        f" they are taken as {shown} mm (--probe-offset, x_offset, y_offset and z_offset of its"
+        " configuration)"
+    )
+    return _probed(table, robot, places - given[0] * [1.0, 1.0, -1.0], offset, times)
+
+
+def _probed(
+    table: Table, robot: Robot, points: FloatArray, offset: ArrayLike, times: FloatArray | None
+) -> Measurements:
+    try:
+        measured = probed(robot, points, offset=offset, sigma=read_sigma(table, "height"))
+    except ValueError as error:
+        raise FileError(f"{table.path}: {error}") from None
     return replace(
         measured,
         notes=_notes(table),
         lines=np.array(table.lines),
         file=table.path.name,
         session=_read_session(table),
+        time=times,
+        temperature=read_temperature(table, measured.actuators.shape[1]),
         approach=_read_approach(table, measured.actuators.shape[1]),
     )
 
@@ -298,9 +335,19 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
     """Names of columns that are read."""
     components = _AXES + ANGLES
     actuators = {f"q{i + 1}" for i in range(len(table.columns))} | {*actuators_in(table)}
-    names = actuators | {*components, "distance", "sigma", "group", "session", "target", "probe"}
-    names |= {"actuator_sigma", "approach"}
-    names |= {f"{what}.{q}" for what in ("actuator_sigma", "approach") for q in actuators}
+    names = actuators | {
+        *components,
+        "distance",
+        "sigma",
+        "group",
+        "session",
+        "target",
+        "probe",
+        "contact",
+    }
+    names |= {"actuator_sigma", "approach", *parts_of(0), WHOLE}
+    whats = ("actuator_sigma", "approach", WHOLE)
+    names |= {f"{what}.{q}" for what in whats for q in actuators}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
     names |= {f"sigma.{name}" for name in component_names()} | names_of_kinds(table)

@@ -12,6 +12,7 @@ from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.files.csv_writer import write_csv
 from pkmcal.measurements.components import components
 from pkmcal.measurements.kind_columns import OfAKind, columns_read, kind_cells
+from pkmcal.measurements.temperature_columns import temperature_cells
 
 
 class Writable(OfAKind, Protocol):
@@ -52,6 +53,14 @@ class Writable(OfAKind, Protocol):
     @property
     def attachments(self) -> FloatArray:
         """The attachment of every row (N, 3)."""
+
+    @property
+    def temperature(self) -> FloatArray | None:
+        """Temperatures (N, 2 + n)."""
+
+    @property
+    def time(self) -> FloatArray | None:
+        """Seconds of each row."""
 
     @property
     def actuator_sigma(self) -> FloatArray | None:
@@ -128,6 +137,10 @@ def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
         yield "group", [str(number) for number in m.group]
     if m.session is not None:
         yield "session", m.session.tolist()
+    if m.temperature is not None:
+        yield from temperature_cells(m.temperature)
+    if m.time is not None:
+        yield "time", _exact(m.time)
     if m.approach is not None:
         for i, each in enumerate(m.approach.T):
             yield f"approach.q{i + 1}", [f"{direction:.0f}" for direction in each]

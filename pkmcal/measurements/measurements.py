@@ -24,9 +24,11 @@ from pkmcal.measurements.fields import (
     names_of_targets,
     number_of_row,
     numbers,
+    row_numbers,
     sessions_array,
     sigma_array,
     target_array,
+    temperature_array,
     units_of_actuators,
     value_of_row,
     values_array,
@@ -39,12 +41,13 @@ from pkmcal.measurements.kind_fields import (
 )
 from pkmcal.measurements.listing import deviations, table, title
 from pkmcal.measurements.measurement_writer import write_measurements
+from pkmcal.measurements.poses import pose_index
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.result import Result
 
 _PER_ROW = (
     "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines", "session",
-    "approach", "other", "run", "touched",
+    "approach", "other", "run", "touched", "temperature", "time",
 )  # fmt: skip
 
 
@@ -83,8 +86,8 @@ class Measurements(Result):
         with `target_index`. None: the platform's origin. For distances: the fixed point of the
         base frame, and required.
     group : (N,) array of int, optional
-        Rows with the same number are repeats of one pose. None: rows with the same actuator
-        readings are.
+        Rows with the same number are repeats of one pose, as rows with the same actuator readings
+        are.
     target_index : (N,) array of int, optional
         Which of several targets each row measured, counted from 0. With `target=None` the
         targets' places on the platform are not known.
@@ -118,6 +121,12 @@ class Measurements(Result):
         From where each actuator came, for drives with backlash: 1 where its reading had grown, -1
         where it had fallen, 0 where that is not known. "order": the machine was driven from row to
         row as they stand. Kept as (N, n).
+    temperature : scalar, (N,) or (N, 2 + n) array, optional
+        °C, of the whole machine, or of base, platform and what each actuator drives; NaN: not read.
+        `identify` refers numbers to 20 °C where it is told how the machine expands. Kept as
+        (N, 2 + n).
+    time : (N,) array, optional
+        When each row was measured, in seconds from any start: for the test of drift.
     lines : (N,) array of int, optional
         The line of each row in the file it was read from, to name it by.
     file : str
@@ -158,6 +167,8 @@ class Measurements(Result):
     joint: str | None = None
     session: TextArray | None = None
     approach: FloatArray | None = None
+    temperature: FloatArray | None = None
+    time: FloatArray | None = None
     lines: Int64Array | None = None
     file: str = ""
     notes: tuple[str, ...] = ()
@@ -185,6 +196,8 @@ class Measurements(Result):
         joint: str | None = None,
         session: str | Sequence[str] | TextArray | None = None,
         approach: ArrayLike | None = None,
+        temperature: ArrayLike | None = None,
+        time: ArrayLike | None = None,
         lines: ArrayLike | None = None,
         file: str = "",
         notes: Sequence[str] = (),
@@ -203,7 +216,9 @@ class Measurements(Result):
         k = len(components(kind, own["artefact"]))
         if alone:
             values = value_of_row(values, kind, k, q.shape[1:])
-            group, target_index, lines = map(number_of_row, (group, target_index, lines))
+            group, target_index, lines, time = map(
+                number_of_row, (group, target_index, lines, time)
+            )
             if k > 1 and not isinstance(sigma, Tracker) and np.asarray(sigma).shape == (k, k):
                 sigma = np.asarray(sigma)[None]
         shape = (len(q), k)
@@ -226,6 +241,8 @@ class Measurements(Result):
             **own,
             "session": sessions_array(session, len(q)),
             "approach": approach_array(approach, q),
+            "temperature": temperature_array(temperature, q.shape),
+            "time": None if time is None else row_numbers("time", time, len(q)),
             "lines": None if lines is None else integers("lines", lines, len(q)),
             "file": file,
             "notes": words("notes", notes),
@@ -263,7 +280,8 @@ class Measurements(Result):
         if self.target is None and self.target_names is not None:
             raise ArgumentError(
                 f"target: the places of {', '.join(self.target_names)} on the platform are not"
-                ' known; give them as an array, or identify them with target="unknown"'
+                " known; give them as an array, or identify them with --target unknown"
+                ' (target="unknown")'
             )
         return self._of_rows(self.target)
 
@@ -280,13 +298,11 @@ class Measurements(Result):
 
     @property
     def pose_index(self) -> Int64Array:
-        """Which pose each row belongs to, (N,), counted from 0: by `group`, else by actuators."""
-        rows: FloatArray | Int64Array = self.actuators
-        if self.group is not None:
-            rows = self.group[:, None]
-        elif self.approach is not None:  # backlash is between them
-            rows = np.hstack([self.actuators, self.approach])
-        return np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int64)
+        """Which pose each row belongs to, (N,), counted from 0.
+
+        Rows of one `group` are of one pose, and rows at the same actuators.
+        """
+        return pose_index(self.actuators, self.approach, self.group)
 
     @property
     def sessions(self) -> tuple[str, ...]:

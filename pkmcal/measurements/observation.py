@@ -114,15 +114,19 @@ def predict(
     return _rows(seen, np.array([[2]])) if kind == "height" else seen
 
 
-def read_angles(angles: FloatArray, zero: FloatArray = _ZERO) -> Predicted:
+def read_angles(
+    angles: FloatArray, by_twist: FloatArray | None = None, zero: FloatArray = _ZERO
+) -> Predicted:
     """Readings of a passive joint that is turned by angles (N,): these less a zero, rad.
 
-    A passive joint is where its chain closes, for which the pose alone does not say enough; how it
-    follows the machine's numbers is not among these derivatives.
+    A passive joint of a chain is where that closes, for which the pose alone does not say enough:
+    without `by_twist` (N, 6) it does not follow the pose. How it follows the machine's numbers is
+    not among these derivatives.
     """
     rows = len(angles)
     values = angles[:, None] - np.broadcast_to(zero, (rows, 1))
-    return Predicted(values, np.zeros((rows, 1, 6)), {"zero": np.full((rows, 1, 1), -1.0)})
+    moves = np.zeros((rows, 1, 6)) if by_twist is None else by_twist[:, None, :]
+    return Predicted(values, moves, {"zero": np.full((rows, 1, 1), -1.0)})
 
 
 def _points(

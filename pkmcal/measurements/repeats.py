@@ -10,8 +10,11 @@ from pkmcal.measurements.measurements import Measurements
 
 def groups(measured: Measurements) -> IntArray:
     """Which pose and target each row measured, (N,), counted from 0."""
-    target = measured.target_index
-    of = np.zeros(len(measured), dtype=np.intp) if target is None else target
+    of = measured.target_index
+    if of is None:
+        target = measured.target
+        places = np.zeros((len(measured), 1)) if target is None or target.ndim == 1 else target
+        of = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
     return np.unique(np.column_stack([measured.pose_index, of]), axis=0, return_inverse=True)[
         1
     ].reshape(-1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
+from pkmcal.files.units import UNITS, plain
 from pkmcal.measurements.actuator_columns import columns_of_actuators
 from pkmcal.measurements.components import Kind, noun
 from pkmcal.measurements.kind_columns import components_in, value_columns
@@ -66,5 +67,22 @@ def read_actuator_sigma(table: Table, units: tuple[str, ...]) -> FloatArray | No
             "column 'actuator_sigma' for lengths and angles: expected"
             f" 'actuator_sigma.q1' to 'actuator_sigma.q{len(units)}'"
         )
-    stated = table.stacked(names, units[: len(names)])
-    return np.broadcast_to(stated, (len(table), len(units)))
+    columns = [
+        _like_the_reading(table, name, i, unit)
+        for i, (name, unit) in enumerate(zip(names, units, strict=False))
+    ]
+    return np.broadcast_to(np.stack(columns, axis=1), (len(table), len(units)))
+
+
+def _like_the_reading(table: Table, name: str, i: int, unit: str) -> FloatArray:
+    """Deviations of actuator i: in steps where its readings are, for a gain converts both."""
+    of_reading = table.columns[f"q{i + 1}"]
+    of = plain(of_reading.unit or unit)
+    counted = of in UNITS["count"] and of not in UNITS[unit]
+    values, quantity = table.numbers(name, *(("count", unit) if counted else (unit,)))
+    if counted and quantity != "count":
+        raise table.header_error(
+            f"column {table.columns[name].name!r} has unit [{table.columns[name].unit}], and"
+            f" {of_reading.name!r} [{of_reading.unit}]: expected the same"
+        )
+    return values

@@ -21,6 +21,7 @@ from pkmcal.measurements.point_names import split
 
 _SLIP = 0.8  # how like a known name a mistyped one is, as difflib counts
 _SHOWN = 8  # names of columns in a message
+_LAST_NUMBER = re.compile(r"([0-9]{1,9})\D*$")
 _OF_NUMBERS = re.compile(r"[+-]?[0-9.,]+")
 
 
@@ -140,14 +141,14 @@ def split_names(table: Table) -> None:
             f"{written!r} such as {cells[0]!r} taken as pose {poses[0]!r}, target {targets[0]!r}:"
             f" {len(set(poses))} poses, {len(set(targets))} targets"
         )
-        place = {pose: str(i) for i, pose in enumerate(dict.fromkeys(poses))}
+        place = _numbers_of(poses)
         table.put("group", table.written(source, [place[pose] for pose in poses]))
         table.put("target", table.written(source, targets))
         return
 
 
 def number_groups(table: Table) -> None:
-    """Groups that are names become numbers, in the order of the file; one for all says nothing."""
+    """Groups that are names become the numbers in them; one group for all says nothing."""
     if "group" not in table.columns:
         return
     column = table.columns["group"]
@@ -157,8 +158,18 @@ def number_groups(table: Table) -> None:
         table.notes.append(f"column {column.name!r} left out: all rows are {column.cells[0]!r}")
         table.leave_out(["group"])
         return
-    place = {name: str(i) for i, name in enumerate(dict.fromkeys(column.cells))}
+    place = _numbers_of(column.cells)
     table.columns["group"] = replace(column, cells=tuple(place[name] for name in column.cells))
+
+
+def _numbers_of(names: Sequence[str]) -> dict[str, str]:
+    """A number for each name: the last one in it, or if two would have the same, their order."""
+    distinct = list(dict.fromkeys(names))
+    matches = [_LAST_NUMBER.search(name) for name in distinct]
+    own = [str(int(match[1])) for match in matches if match]
+    if len(set(own)) < len(distinct):
+        own = [str(i) for i in range(len(distinct))]
+    return dict(zip(distinct, own, strict=True))
 
 
 def leave_out_unknown(table: Table, known: Collection[str], also: Collection[str] = ()) -> None:

@@ -10,6 +10,7 @@ from datetime import datetime, timezone
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.files.csv_table import Table
 
 _CLOCKS = ("%H:%M:%S.%f", "%I:%M:%S.%f %p", "%H:%M")
 _DATES = ("%Y-%m-%d", "%Y/%m/%d", "%Y%m%d", "%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d-%b-%Y")
@@ -47,6 +48,22 @@ def seconds(cells: Sequence[str]) -> tuple[FloatArray, str] | None:
     if any(not np.array_equal(steps[0], other) for other in steps[1:]):
         return None  # 03/04 to 04/04: a day or a month
     return first, since
+
+
+def times_of(table: Table) -> FloatArray | None:
+    """Seconds of each row of a table, where it has a column of them that can be read."""
+    if "time" not in table.columns:
+        return None
+    found = seconds(with_date(table, table.columns["time"].cells))
+    return None if found is None else found[0]
+
+
+def with_date(table: Table, cells: Sequence[str]) -> Sequence[str]:
+    """Times of day after the date that another column has."""
+    dates = table.columns.get("date")
+    if dates is None or any(len(cell) > 15 for cell in cells):
+        return cells
+    return [f"{date} {cell}" for date, cell in zip(dates.cells, cells, strict=True)]
 
 
 def _read(texts: Sequence[str], form: str) -> tuple[FloatArray, str] | None:

@@ -60,7 +60,7 @@ class AssemblyProblem(NamedTuple):
     def provable(self) -> bool:
         """Whether the closures are quadratic equations, as many as there are free coordinates."""
         square = self.machine.rows == self.machine.m
-        return square and not isinstance(self.machine, ChainMachine)
+        return square and isinstance(self.machine, Machine) and self.machine.fixed_spheres
 
     def spheres(self) -> FloatArray:
         """The limbs (limbs, 7 + 3 axes), or of each row."""
@@ -124,7 +124,7 @@ def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
         return Found(*_certified(problem, real), False, "chains of joints: random starts", None)
     square = problem.machine.rows == problem.machine.m
     spheres = problem.spheres()
-    start = start_system(problem.map, problem.rows, spheres) if square else None
+    start = start_system(problem.map, problem.rows, spheres) if problem.provable else None
     ends, real, reason, all_proven = None, np.empty((0, 12)), "", False
     if not np.isfinite(spheres).all():
         nothing = np.empty(0)
@@ -132,6 +132,8 @@ def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
         return Found(np.empty((0, 6)), proof, False, "a limb has no positive finite length", None)
     if not square:
         reason = "more closures than free coordinates"
+    elif not problem.provable:
+        reason = "cables over pulleys"
     elif start is None:
         reason = "no start system for such limbs"
     else:
@@ -291,7 +293,7 @@ def signs(problem: AssemblyProblem, poses: FloatArray) -> Signs:
 def mirror_images(problem: AssemblyProblem, poses: FloatArray) -> Int32Array:
     """Index of each pose's mirror image in the plane of the anchors; -1 where none is."""
     none = np.full(len(poses), -1, dtype=np.int32)
-    if isinstance(problem.machine, ChainMachine):
+    if isinstance(problem.machine, ChainMachine) or not problem.machine.fixed_spheres:
         return none
     spheres, frames = problem.spheres(), frames_of(poses)
     b, c = spheres[:, 0:3], spheres[:, 3:6]

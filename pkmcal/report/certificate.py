@@ -201,18 +201,20 @@ def _misfit(found: Identification) -> list[Contribution]:
     ]
 
 
-def _shown(stated: Statement) -> str:
+def _shown(stated: Statement, read: tuple[float, float] | None) -> str:
     if not np.isfinite(stated.temperature):
-        return ""
+        return "" if read is None else f"{read[0]:.4g} to {read[1]:.4g} °C, as measured"
     return f"({stated.temperature:g} ± {stated.temperature_uncertainty:g}) °C"
 
 
-def as_data(stated: Statement, made: Budget) -> dict[str, Any]:
-    """The certificate as JSON files hold it."""
+def as_data(
+    stated: Statement, made: Budget, read: tuple[float, float] | None = None
+) -> dict[str, Any]:
+    """The certificate as JSON files hold it; `read` are temperatures that were measured, °C."""
     return {
         **stated.texts,
         "instrument": stated.instrument,
-        "temperature": _shown(stated),
+        "temperature": _shown(stated, read),
         "instrument_stated": bool(np.isfinite(stated.expanded)),
         "standard_uncertainty": made.combined,
         "expanded_uncertainty": made.expanded,

@@ -15,6 +15,7 @@ from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
 from pkmcal.display import printable
+from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import reach, sample_poses, workspace
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.iso9283 import performance
@@ -121,8 +122,9 @@ def points(found: Identification) -> list[dict[str, Any]]:
 
 def worst(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Select the rows with the largest distances after the calibration."""
-    off = np.array([row["after"] for row in rows])
-    return [rows[i] for i in largest_first(off, _ALIKE)[:_WORST]]
+    read = [row for row in rows if np.isfinite(row["after"])]
+    off = np.array([row["after"] for row in read])
+    return [read[i] for i in largest_first(off, _ALIKE)[:_WORST]]
 
 
 def moved(rows: list[dict[str, Any]]) -> list[tuple[int, str, str, int]]:
@@ -285,12 +287,15 @@ def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice 
         positions = as_machine(machine).forward(random).pose[:, :3]
         where = f"{_DRAWN} joint positions drawn within the range that was measured"
         return WorkspaceAccuracy(random, positions, expected(found, random), where), None
+    where = f"{_DRAWN} poses drawn in the workspace, {100 * _SHARE:.0f} % of the way to its ends"
+    if _endless(machine):
+        machine = machine.within(_measured_box(found, machine))
+        where = f"{_DRAWN} poses drawn between those that were measured, for no strokes are stated"
     try:
         poses = sample_poses(machine, _DRAWN, share=_SHARE)
         ends = reach(machine)
     except ValueError as error:
         return str(error)
-    where = f"{_DRAWN} poses drawn in the workspace, {100 * _SHARE:.0f} % of the way to its ends"
     sampled = WorkspaceAccuracy(poses, poses[:, :3], expected(found, poses), where)
     axes = [name for name in ends if name in "xyz" and ends[name][0] < ends[name][1]][:2]
     if len(axes) < 2:
@@ -301,6 +306,24 @@ def over_the_workspace(found: Identification) -> tuple[WorkspaceAccuracy, Slice 
     accuracy[inside] = expected(found, grid.poses[inside])
     accuracy[~np.isfinite(accuracy)] = np.nan
     return sampled, Slice((axes[0], axes[1]), (grid.values[0], grid.values[1]), accuracy)
+
+
+def _endless(robot: Robot) -> bool:
+    """Whether nothing says how far legs, cables or carriages go: a workspace may be anywhere."""
+    return not robot.model.workspace and any(
+        drive.stroke is None and not drive.angle for drive in robot.model.drives
+    )
+
+
+def _measured_box(found: Identification, robot: Robot) -> dict[str, tuple[float, float]]:
+    """Ends of the measured positions, with home, along each coordinate that the robot moves."""
+    poses = np.vstack([found.fit.end.pose, robot.home])
+    poses = poses[np.isfinite(poses).all(axis=1)]
+    return {
+        name: (float(poses[:, k].min()), float(poses[:, k].max()))
+        for k, name in enumerate(POSE[:3])
+        if name in robot.moved
+    }
 
 
 def _largest(values: FloatArray) -> float:

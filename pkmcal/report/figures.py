@@ -21,7 +21,7 @@ from pkmcal.report.drawing import (
     sample,
 )
 from pkmcal.report.exaggerated import middle_exaggerated
-from pkmcal.view.plot import lines
+from pkmcal.view.plot import lines, widen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +32,6 @@ _WIDTH = 9.0  # inches
 _LEAST = 1e-6  # mm; what a logarithmic axis begins with
 _FEW = 50  # largest over least below which numbers between the powers of ten are named
 _NAMED = 80  # parameters up to which a correlation picture names each
-_SLENDER = 0.4  # of the longest side: a shorter one gets room, so that its ticks do not collide
 
 
 @in_context
@@ -82,7 +81,7 @@ def machine(found: Identification) -> Figure | None:
         panel.set_title(title, fontsize="medium")
         panel.view_init(elevation, turn)
         panel.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="" if elevation == 90 else "z [mm]")
-        _widen(panel)
+        widen(panel)
         panel.set_aspect("equal")
         panel.tick_params(labelsize="small")
         for axis in (panel.xaxis, panel.yaxis, panel.zaxis):
@@ -94,15 +93,6 @@ def machine(found: Identification) -> Figure | None:
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
     return figure
-
-
-def _widen(panel: Any) -> None:
-    """Room for the ticks of a side that is much shorter than the others."""
-    ends = [getattr(panel, f"get_{name}lim")() for name in "xyz"]
-    least = _SLENDER * max(high - low for low, high in ends)
-    for name, (low, high) in zip("xyz", ends, strict=True):
-        more = max(least - (high - low), 0.0) / 2
-        getattr(panel, f"set_{name}lim")(low - more, high + more)
 
 
 @in_context
@@ -162,16 +152,16 @@ def accuracy(sampled: WorkspaceAccuracy, area: Slice | None) -> Figure:
         filled = left.pcolormesh(
             first, second, area.accuracy.T, cmap="viridis", rasterized=True, shading="nearest"
         )
-        figure.colorbar(filled, ax=left, label="one standard deviation [mm]")
+        figure.colorbar(filled, ax=left)
         left.set(xlabel=f"{area.axes[0]} [mm]", ylabel=f"{area.axes[1]} [mm]")
-        left.set_title("slice through home", fontsize="medium")
+        left.set_title("one standard deviation [mm], slice through home", fontsize="medium")
     else:
         finite = np.isfinite(sampled.accuracy)
         x, y = sampled.positions[finite, :2].T
         marks = left.scatter(x, y, c=sampled.accuracy[finite], cmap="viridis", s=12)
-        figure.colorbar(marks, ax=left, label="one standard deviation [mm]")
+        figure.colorbar(marks, ax=left)
         left.set(xlabel="x [mm]", ylabel="y [mm]")
-        left.set_title("poses drawn, top view", fontsize="medium")
+        left.set_title("one standard deviation [mm], poses from above", fontsize="medium")
     errors = np.sort(sampled.predicted)
     share = 100 * (np.arange(len(errors)) + 0.5) / len(sampled.accuracy)
     right.plot(share, errors, color=BLUE)

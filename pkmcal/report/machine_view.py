@@ -11,14 +11,13 @@ import numpy as np
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.row_names import row_names
-from pkmcal.core import instruments
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_given
 from pkmcal.report.drawing import sample
 from pkmcal.report.exaggerated import middle_exaggerated
+from pkmcal.report.residual_vectors import measured_places, residual_vectors
 from pkmcal.view import page
 
 _NAMED = 100  # outliers, which have the names of their lines; others have numbers
@@ -32,40 +31,12 @@ def element(found: Identification) -> tuple[str, str]:
     Nothing, and "none", of a machine that the page cannot hold: the still pictures stay.
     """
     robot = found.robot
-    if isinstance(robot, Robot) and robot.model.driven:
+    if isinstance(robot, Robot) and any(limb.kind == "pulley" for limb in robot.model.limbs):
         return "", "none"
     data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
     data["places"] = _measured(found)
     data["calibration"] = {"points": _points(found), "change": _change(found)}
     return page.plain_element(data)
-
-
-def residual_vectors(found: Identification, at: Evaluation) -> FloatArray:
-    """Residuals of all rows as vectors in the robot's base frame, mm (N, 3); NaN where unread.
-
-    A reading changes with the platform's velocity by the last three columns of its derivative by
-    the twist: unit vectors of the instrument's axes, of a height's axis or along a distance.
-    """
-    parts = []
-    for residual, predicted in zip(at.residuals, at.predicted, strict=True):
-        k = min(residual.shape[1], 3)
-        along = predicted.by_twist[:, :k, 3:]
-        vectors = np.einsum("nk,nki->ni", residual[:, :k], along)
-        parts.append(vectors if k else np.full((len(residual), 3), np.nan))
-    return np.concatenate(parts)
-
-
-def measured_places(found: Identification) -> FloatArray:
-    """Where the measured points of all rows are in the robot's base frame, mm (N, 3)."""
-    equations, end = found.fit.equations, found.fit.end
-    parts = []
-    for i in range(len(equations.sets)):
-        target = equations.arguments_of(i, end.theta).get("target")
-        if target is None:
-            parts.append(end.pose[equations.pose_of[i], :3])
-        else:
-            parts.append(instruments.points(end.pose[equations.pose_of[i]], target)[0])
-    return np.concatenate(parts)
 
 
 def _points(found: Identification) -> list[dict[str, Any]]:
@@ -105,7 +76,13 @@ def _measured(found: Identification) -> dict[str, Any]:
 
 
 def _change(found: Identification) -> dict[str, Any]:
-    """Numbers of the machine that changed, as the core has them, before and after."""
+    """Numbers of the machine that changed, as the core has them, before and after.
+
+    None of a machine with drive laws, whose numbers are not in the memory of the page's core: there
+    the machine as assumed is not overlaid.
+    """
+    if isinstance(found.robot, Robot) and found.robot.model.driven:
+        return {"places": [], "before": [], "after": [], "times": 1, "most": 1}
     parameters = found.fit.equations.parameters
     assumed = as_given(parameters.robot.replace(parameters.values_at(found.fit.start.theta)))
     before, after = _numbers(assumed), _numbers(found.robot)

@@ -126,13 +126,13 @@ def places(robot: Robot, own: FloatArray) -> tuple[FloatArray, FloatArray, Float
         anchors, joints = (np.stack([c[:, k] for c in chains], axis=1) for k in (-2, -1))
         return base, anchors, joints
     slots = robot.slots
-    drive, direction, _ = robot.limb_machine.limbs(slots, own)
+    _, direction, _ = robot.limb_machine.limbs(slots, own)
     platform = np.column_stack([slots[:, 3:6], np.ones(len(slots))])
     joints = (screw.from_pose(own) @ platform.T).transpose(0, 2, 1)[..., :3]
     rods = slots[:, SLOTS.index("rod")]
-    driven = [KINDS[limb.kind].driver == "length" for limb in robot.model.limbs]
-    lengths = np.where(driven, drive, rods)
-    return slots[:, 0:3], joints - lengths[..., None] * direction, joints
+    carried = np.array([KINDS[limb.kind].has_branch for limb in robot.model.limbs])
+    ends = np.where(carried[:, None], joints - rods[:, None] * direction, slots[:, 0:3])
+    return slots[:, 0:3], ends, joints
 
 
 def _ring(points: FloatArray) -> FloatArray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from pkmcal import display
 from pkmcal.arms.arm import SerialArm
+from pkmcal.calibration.expansion import in_words, temperatures
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.row_names import row_names
 from pkmcal.display import printable
@@ -24,6 +25,7 @@ from pkmcal.view import page
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_CERTAIN = 1e4  # degrees of freedom that are as good as infinitely many
 _SMALL = 1e-3  # below which numbers are written with a power of ten
 _TEMPLATE = "report.html.jinja"
 FILES = ("report.html", "report.json", "robot.toml")
@@ -72,7 +74,9 @@ def gather(
     signed = None
     if stated is not None:
         sure = np.empty(0) if accuracy is None else accuracy.predicted
-        signed = certificate.as_data(stated, certificate.budget(found, stated, sure))
+        made = certificate.budget(found, stated, sure)
+        read = temperatures(found.fit.equations.sets)
+        signed = certificate.as_data(stated, made, read)
     return {
         "state": state,
         "verdict": sentence,
@@ -88,6 +92,7 @@ def gather(
         "iso9283": contents.iso9283(found),
         "axes": axes(found),
         "certificate": signed,
+        "heat": in_words(found.fit.equations.sets, found.expansion),
         "accuracy": accuracy,
         "slice": None if isinstance(predicted, str) else predicted[1],
         "no_accuracy": predicted if isinstance(predicted, str) else "",
@@ -112,6 +117,7 @@ def html(facts: Mapping[str, Any]) -> str:
     )
     environment.filters |= {
         "short": _short,
+        "of_freedom": lambda dof: "∞" if dof > _CERTAIN else _short(dof),
         "shown": contents.shown,
         "fixed": lambda value, unit, places: display.fixed(
             display.displayed(value, unit)[0], places
@@ -131,7 +137,7 @@ def html(facts: Mapping[str, Any]) -> str:
 
 def _as_data(facts: Mapping[str, Any]) -> dict[str, Any]:
     """Select what goes into the JSON file: the facts, and every attribute of the calibration."""
-    left_out = ("found", "worst", "outlier_names", "moved", "arm")
+    left_out = ("found", "heat", "worst", "outlier_names", "moved", "arm")
     kept = {name: value for name, value in facts.items() if name not in left_out}
     return kept | {"calibration": facts["found"]}
 
@@ -144,7 +150,7 @@ def _figures(facts: Mapping[str, Any]) -> dict[str, str]:
 
     found: Identification = facts["found"]
     fitted = np.array([[row["before"], row["after"]] for row in facts["points"]]).T
-    groups = {f"fitted, {len(found.rows)} points": (fitted[0], fitted[1])}
+    groups = {f"fitted, {int(np.isfinite(fitted[1]).sum())} points": (fitted[0], fitted[1])}
     held = int(np.isfinite(found.holdout_off).sum())
     if held:
         pair = (found.holdout_off_before, found.holdout_off)

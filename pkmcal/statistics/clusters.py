@@ -129,3 +129,31 @@ class Sandwich:
             if square > 0 and trace > _SPENT * own[:, i].sum():
                 found[i] = trace**2 / square
         return found
+
+    def joint_freedom(self, contrasts: FloatArray) -> float:
+        """Degrees of freedom of the covariance of contrasts (k, p) in `data`, taken together.
+
+        Those of the Wishart distribution with as much variance in all, under equal independent
+        errors (Pustejovsky and Tipton's approximation of Hotelling's T²); 0 where there are none.
+        """
+        fit, k = self.fit, len(contrasts)
+        size, axes = np.linalg.eigh(contrasts @ contrasts.T)
+        if not size[0] > _SPENT * size[-1]:
+            return 0.0
+        alpha = self.adjusted(fit.design @ (contrasts.T @ axes / np.sqrt(size)))
+        pulls = [sums(fit.design * alpha[:, i, None], fit.cluster) for i in range(k)]
+        spread = 0.0
+        for s in range(k):
+            for t in range(s, k):
+                own = [sums(alpha[:, i] * alpha[:, j], fit.cluster) for i, j in _pairs(s, t)]
+                lengths = [(pulls[i] * pulls[j]).sum(axis=1) for i, j in _pairs(s, t)]
+                cross = pulls[s].T @ pulls[t]
+                square = own[0] @ own[1] - own[0] @ lengths[1] - own[1] @ lengths[0]
+                square += own[2] @ own[2] - 2.0 * own[2] @ lengths[2]
+                square += float((cross**2).sum() + (cross * cross.T).sum())
+                spread += float(square) * (1.0 if s == t else 2.0)
+        return k * (k + 1.0) / spread if spread > 0 else 0.0
+
+
+def _pairs(s: int, t: int) -> tuple[tuple[int, int], ...]:
+    return (s, s), (t, t), (s, t)

@@ -123,7 +123,7 @@ def covariance(
     components : VarianceComponents, optional
         Of classes of equations, for the classical covariance.
     """
-    score, (squares, freedom) = shared_error_score(fit), _spare(fit, robust)
+    score, (squares, freedom) = shared_error_score(fit), spare(fit, robust)
     scale, of_scale = 1.0, np.inf
     if not stated or robust or chi2_tail(squares, freedom) < REFUTED:
         of_scale = max(freedom, 0.0)
@@ -134,7 +134,7 @@ def covariance(
     return Covariance(fit, chosen, score, scale, of_scale, components)
 
 
-def _spare(fit: LinearFit, robust: bool) -> tuple[float, float]:
+def spare(fit: LinearFit, robust: bool = False) -> tuple[float, float]:
     """Sum of squares that shows the noise, and its degrees of freedom.
 
     With a prior that of the data alone: a prior that they contradict is no noise.

@@ -114,11 +114,12 @@ def prior_test(
     judged = allowed > _INFORMED
     pulls = np.where(judged, moved / np.where(judged, allowed, 1.0), np.nan)
     largest = float(np.nanmax(np.abs(pulls))) if judged.any() else 0.0
+    chances = max(1, int(judged.sum()))  # without any the largest is 0, which is certain
     return PriorTest(
         ratio=ratio,
         chance=f_tail(ratio, count, second),
         pulls=pulls,
-        pull_chance=min(1.0, int(judged.sum()) * t_tail(largest, freedom)),
+        pull_chance=min(1.0, chances * t_tail(largest, freedom)),
         factor=_fitting(along, singular, variance),
     )
 

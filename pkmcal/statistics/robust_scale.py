@@ -13,6 +13,8 @@ from pkmcal.arrays import FloatArray, IntArray
 _LIMIT = 2.385  # of the Cauchy loss: 95 % as efficient as least squares for Gaussian noise
 _ROUNDS, _SETTLED = 60, 1e-4
 _LEAST_FREEDOM = 5  # below, some rows are always met
+_DRAWS = 100
+_ENOUGH = 100.0  # rows' worth of spare equations from which chance no longer moves a ratio much
 _MET = 1e-6  # share of the first scale below which half of the rows are met exactly
 
 
@@ -54,3 +56,18 @@ def robust_ratio(design: FloatArray, residual: FloatArray, components: IntArray)
         root = np.sqrt(weights)
         left = residual - design @ np.linalg.lstsq(design * root[:, None], residual * root)[0]
     return float(np.sqrt(residual @ residual / (m - p)) / scale)
+
+
+def ratio_by_chance(design: FloatArray, components: IntArray) -> float:
+    """The largest `robust_ratio` of 100 draws of equal independent errors, which no row carries.
+
+    The median of few rows says little, and a robust fit meets some of them exactly: how far chance
+    goes depends on the design. 1 where spare equations are many.
+    """
+    m, p = design.shape
+    if (m - p) ** 2 / m > _ENOUGH:
+        return 1.0
+    rng = np.random.default_rng(0)
+    errors = rng.normal(size=(_DRAWS, m))
+    left = errors - (errors @ design) @ design.T
+    return float(np.nanmax([robust_ratio(design, each, components) for each in left]))

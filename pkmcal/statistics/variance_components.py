@@ -22,7 +22,7 @@ from pkmcal.statistics.distributions import chi2_tail
 from pkmcal.statistics.linear_fit import LinearFit
 
 _LEAST_FREEDOM = 15.0  # degrees of freedom for each class that is told apart
-_DIFFERENT = 0.01  # chance of the likelihood ratio below which classes are told apart
+_DIFFERENT = 0.10  # chance of the likelihood ratio below which classes are told apart
 _ROUNDS, _SETTLED, _STEP, _HALVINGS = 50, 1e-6, 1.0, 12  # of the logarithms of the variances
 _SPENT = 1e-6  # share of the equations of a class that must be left
 _TINY = 1e-18  # of the mean variance: a class that the fit meets exactly

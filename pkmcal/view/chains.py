@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import ChainMachine
 from pkmcal.geometry.chain_joints import Joint
@@ -29,17 +27,20 @@ def strokes(chains: Chains, slots: FloatArray) -> list[tuple[float, float] | Non
     return found
 
 
-def looks(robot: Robot, moves: list[list[float]]) -> dict[str, Any]:
+def looks(
+    robot: Robot, machine: ChainMachine, slots: FloatArray, moves: FloatArray
+) -> dict[str, Any]:
     """Joints, limits and rails, limb by limb.
 
     A joint's `frame` is its place in what `chain_frames` of the core gives; axes and directions of
-    cones are in the axes of such frames, so that they move along.
+    cones are in the axes of such frames, so that they move along. `moves` (drives, 2) are the
+    ends to which sliders take its drives.
     """
-    chains, machine = robot.model.chains, robot.machine
-    assert chains is not None and isinstance(machine, ChainMachine)
+    chains = robot.model.chains
+    assert chains is not None
     layout = machine.layout
     place = layout.drive_place
-    offset, gain = robot.slots.ravel()[place], robot.slots.ravel()[place + 1]
+    offset, gain = slots.ravel()[place], slots.ravel()[place + 1]
     axes = home_axes(machine)
     platform = from_pose(robot.own_home)[:3, :3]
     limbs = []
@@ -69,10 +70,15 @@ def looks(robot: Robot, moves: list[list[float]]) -> dict[str, Any]:
                 }
             if k == 0 and joint.kind == "P" and joint.actuator is not None:
                 a = joint.actuator
-                ends = gain[a] * np.array(moves[a]) + offset[a] - layout.zero[a]
+                ends = gain[a] * moves[a] + offset[a] - layout.zero[a]
                 seen["track"] = (joint.at + ends[:, None] * joint.axes[0]).round(3).tolist()
             joints.append(seen)
-        limbs.append({"kind": "chain", "joints": joints, "end": _end(limb[-1], robot)})
+        base = limb[
+            0
+        ].at.tolist()  # of a joint that slides too: the carriage moves, the base does not
+        limbs.append(
+            {"kind": "chain", "joints": joints, "base": base, "end": _end(limb[-1], robot)}
+        )
     drive = {"gain": gain.tolist(), "offset": offset.tolist()}
     frames = int(len(layout.member) + len(layout.ball))
     return {"limbs": limbs, "drive": drive, "frame_count": frames, "passive": layout.passive}

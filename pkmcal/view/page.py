@@ -23,7 +23,7 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import to_pose
 from pkmcal.view import parallel, serial
 
-_SCRIPTS = ("algebra", "core", "mover", "arm", "limits", "bodies", "scene", "panel")
+_SCRIPTS = ("algebra", "core", "laws", "mover", "arm", "limits", "bodies", "scene", "panel")
 _MODULES = {"limbs": "limbs", "chains": "chains", "arm": "arms"}
 _DIGITS = 3  # of the ends of the cloud, mm
 
@@ -45,7 +45,7 @@ def html(robot: Robot | SerialArm, poses: FloatArray | None = None) -> str:
 
 
 def machine(robot: Robot | SerialArm, cloud: bool = True) -> dict[str, Any]:
-    """A robot or an arm as the scripts take it; of a robot with a cloud of where it gets to."""
+    """A robot or an arm as the scripts take it; of a robot with a cloud of its workspace."""
     found = serial.data(robot) if isinstance(robot, SerialArm) else parallel.data(robot, cloud)
     found["name"] = printable(found["name"])
     found["machine"] = packed(found["machine"])

@@ -11,6 +11,7 @@ from pkmcal.core.chains import ChainMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.core.poses import invert
+from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Cone
@@ -18,7 +19,7 @@ from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.frames import NOWHERE
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
-from pkmcal.view import chains, memory, ranges, words
+from pkmcal.view import chains, drives, memory, ranges, words
 
 _OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 _TRACK = 25  # points of the path of a crank's end
@@ -29,17 +30,22 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
 
     With `cloud` the positions of good poses too, which take a while to find.
     """
-    model, machine = robot.model, robot.machine
-    if model.driven:
-        raise ArgumentError(f"robot: {model.name} has drive laws, which the page cannot hold")
+    model = robot.model
+    machine, slots = drives.within(robot)
+    laws = drives.laws(robot)
+    if isinstance(machine, PulleyMachine):
+        raise ArgumentError(f"robot: {model.name} has pulleys, which the page cannot hold")
     size = float(machine.struct.size)
-    spans = ranges.poses(robot, size)
     if isinstance(machine, Machine):
-        blob, numbers, strokes = memory.limbs(machine, robot.slots), 0, _strokes(robot)
+        blob, numbers, strokes = memory.limbs(machine, slots), 0, _strokes(robot)
     else:
         assert isinstance(machine, ChainMachine) and model.chains is not None
-        blob, numbers = memory.chains(machine, robot.slots)
+        blob, numbers = memory.chains(machine, slots)
         strokes = chains.strokes(model.chains, robot.slots)
+    if laws is not None:
+        strokes = drives.strokes(robot)
+    most = ranges.farthest(robot, strokes)
+    spans = ranges.poses(robot, size, most)
     moves = ranges.actuators(robot, strokes, spans)
     at_home = dexterity(robot, robot.home)
     found = {
@@ -47,7 +53,7 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
         "name": robot.name,
         "what": words.of_robot(robot),
         "numbers": numbers,
-        "geometry": numbers or len(blob) - robot.slots.nbytes,
+        "geometry": numbers or len(blob) - slots.nbytes,
         "map": model.map,
         "free": [POSE.index(name) for name in MAPS[model.map]],
         "moved": [POSE.index(name) for name in spans],
@@ -57,23 +63,25 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
         "length": robot.length,
         "home": robot.home.tolist(),
         "conditioning": _number(float(at_home.conditioning)),
-        "poses": [ranges.beyond(ends) for ends in spans.values()],
+        "poses": ranges.sliders(robot, spans, most),
         "reach": [list(ends) for ends in spans.values()],
         "actuators": [
             {"unit": unit, "range": ends, "stroke": stroke}
             for unit, ends, stroke in zip(robot.actuator_units, moves, strokes, strict=True)
         ],
-        "turns": [_number(turn) for turn in robot.turns.tolist()],
-        "near": machine.reference(robot.slots).tolist(),
+        "turns": [_number(turn) for turn in machine.turns(slots).tolist()],
+        "near": machine.reference(slots).tolist(),
         "frames": _frames(robot),
         "modes": ranges.modes(robot),
         "machine": blob,
+        "laws": laws,
     }
     if cloud:
         found["cloud"] = ranges.cloud(robot, spans)
     if model.chains is None:
         return found | {"limbs": _limbs(robot, np.array(moves))}
-    return found | chains.looks(robot, moves)
+    assert isinstance(machine, ChainMachine)
+    return found | chains.looks(robot, machine, slots, drives.ways(robot, np.array(moves).T).T)
 
 
 def _strokes(robot: Robot) -> list[tuple[float, float] | None]:

@@ -16,6 +16,10 @@ from pkmcal.view.skeleton import Skeleton, skeleton
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_SLENDER = 0.4  # of the longest side: a shorter one gets room, so that its ticks do not collide
+_TICKS = 4  # an axis in space
+_FLAT = ("planar", "xy")  # pose maps of machines that are seen from above
+
 
 def of_robot(
     robot: Robot, axes: Axes | None, pose: ArrayLike | None, numbers: bool, colour: str | None
@@ -26,7 +30,7 @@ def of_robot(
     drawn = skeleton(robot, q, at) if np.isfinite(q).all() else None
     if drawn is None:
         raise ArgumentError(f"pose: {robot.name} does not get there")
-    return _drawn(drawn, axes, numbers, colour)
+    return _drawn(drawn, axes, numbers, colour, flat=robot.model.map in _FLAT)
 
 
 def of_arm(arm: SerialArm, axes: Axes | None, theta: ArrayLike | None, colour: str | None) -> Axes:
@@ -53,11 +57,23 @@ def lines(axes: Any, drawn: Skeleton, colour: str | None, label: str) -> str:
     return colour
 
 
-def _drawn(drawn: Skeleton, axes: Any, numbers: bool, colour: str | None) -> Axes:
+def widen(axes: Any) -> None:
+    """Room for the ticks of a side that is much shorter than the others."""
+    ends = [getattr(axes, f"get_{name}lim")() for name in "xyz"]
+    least = _SLENDER * max(high - low for low, high in ends)
+    for name, (low, high) in zip("xyz", ends, strict=True):
+        more = max(least - (high - low), 0.0) / 2
+        getattr(axes, f"set_{name}lim")(low - more, high + more)
+
+
+def _drawn(
+    drawn: Skeleton, axes: Any, numbers: bool, colour: str | None, flat: bool = False
+) -> Axes:
     if axes is None:
         from matplotlib import pyplot
 
-        axes = pyplot.figure().add_subplot(projection="3d", proj_type="ortho")
+        space = {} if flat else {"projection": "3d", "proj_type": "ortho"}
+        axes = pyplot.figure().add_subplot(**space)
     used = lines(axes, drawn, colour, "_")
     dimensions = 3 if hasattr(axes, "get_zlim") else 2
     names = "xyz"[:dimensions]
@@ -67,6 +83,10 @@ def _drawn(drawn: Skeleton, axes: Any, numbers: bool, colour: str | None) -> Axe
             axes.text(*at, f" {k + 1}", color=used)
     for name in names:
         getattr(axes, f"set_{name}label")(f"{name} [mm]")
+    if dimensions == 3:
+        widen(axes)
+        for name in names:
+            getattr(axes, f"{name}axis").get_major_locator().set_params(nbins=_TICKS)
     axes.set_aspect("equal")
     result: Axes = axes
     return result

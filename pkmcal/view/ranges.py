@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,17 +20,46 @@ _DRAWS = 2500
 _ANGLE, _LENGTH = np.radians(30.0), 0.2  # where the machine says nothing: rad, and of its size
 
 
-def poses(robot: Robot, size: float) -> dict[str, tuple[float, float]]:
-    """From where to where each coordinate of the pose alone goes from home, mm and rad."""
+def poses(robot: Robot, size: float, most: float) -> dict[str, tuple[float, float]]:
+    """From where to where each coordinate of the pose alone goes from home, mm and rad.
+
+    No farther than `most`, mm.
+    """
     try:
-        return reach(robot)
+        found = reach(robot)
     except ArgumentError:  # home is singular or breaks a limit: it can be looked at all the same
         home = dict(zip(POSE, robot.home.tolist(), strict=True))
         by = {name: _ANGLE if name in POSE[3:] else _LENGTH * size for name in robot.moved}
-        return {name: (home[name] - by[name], home[name] + by[name]) for name in robot.moved}
+        found = {name: (home[name] - by[name], home[name] + by[name]) for name in robot.moved}
+    return {name: _within(robot, name, ends, most) for name, ends in found.items()}
 
 
-def beyond(ends: tuple[float, float]) -> list[float]:
+def sliders(
+    robot: Robot, ranges: dict[str, tuple[float, float]], most: float
+) -> list[tuple[float, float]]:
+    """From where to where the slider of each coordinate goes: beyond what is reached."""
+    return [_within(robot, name, beyond(ends), most) for name, ends in ranges.items()]
+
+
+def farthest(robot: Robot, strokes: list[tuple[float, float] | None]) -> float:
+    """How far sliders lead from home, mm: where no stroke ends that, to the farthest base joint."""
+    units = robot.actuator_units
+    if all(stroke or unit == "rad" for stroke, unit in zip(strokes, units, strict=True)):
+        return np.inf
+    chains = robot.model.chains
+    base = [limb[0].at for limb in chains.limbs] if chains is not None else robot.slots[:, :3]
+    return float(np.linalg.norm(np.array(base) - robot.own_home[:3], axis=1).max())
+
+
+def _within(robot: Robot, name: str, ends: Sequence[float], most: float) -> tuple[float, float]:
+    low, high = ends
+    if name in POSE[3:]:
+        return low, high
+    home = float(robot.home[POSE.index(name)])
+    return max(low, home - most), min(high, home + most)
+
+
+def beyond(ends: Sequence[float]) -> list[float]:
     """A range with a margin at both ends."""
     more = BEYOND * (ends[1] - ends[0])
     return [ends[0] - more, ends[1] + more]

@@ -15,6 +15,7 @@ _COUNTS = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight",
 _PLURALS = {
     "a leg": "legs", "a carriage and a rod": "carriages, each with a rod",
     "a crank and a rod": "cranks, each with a rod", "a cable or belt": "cables or belts",
+    "a cable over a swivelling pulley": "cables over swivelling pulleys",
 }  # fmt: skip
 
 

@@ -120,3 +120,34 @@ def test_rows_and_lines_on_the_command_line(run: Any, refused: Any, tmp_path: Pa
         "--drop P18: expected the number of a row, or FILE:LINE"
     )
     assert "one of the two" in refused(*command, "--drop", "1", "--drop-outliers")
+
+
+def test_outliers_of_another_file_that_is_held_out_are_left_out_and_named(
+    run: Any, tmp_path: Path
+) -> None:
+    robot, measured = readings(gross=())
+    _, gross = readings(gross=(3, 20))
+    later = gross.select(slice(0, 30))
+    found = pk.identify(robot, measured.select(slice(30, 60)), drop="outliers", holdout=later)
+    assert found.holdout_dropped == (3, 20) and found.dropped == ()
+    assert found.verdict.state == "calibrated" and len(found.holdout.rows) == 28
+    assert found.left_out == "2 rows were left out, as asked: row 3, row 20"
+    measured.select(slice(30, 60)).write(tmp_path / "first.csv")
+    later.write(tmp_path / "later.csv")
+    command = ("calibrate", "hexapod", tmp_path / "first.csv", "--holdout", tmp_path / "later.csv")
+    first = int(pk.read_measurements(tmp_path / "later.csv", robot).lines[0])  # type: ignore[index]
+    lines = f"later.csv:{first + 3},later.csv:{first + 20}"
+    done = run(*command, "--drop", lines)
+    assert f"later.csv: lines {first + 3}, {first + 20} left out of the hold-out" in done.stderr
+    asked = json.loads(run(*command, "--drop", lines, "--json").stdout)
+    assert len(asked["holdout_off"]) == 28 and not asked["holdout_contradicts"]
+
+
+def test_a_machine_that_moved_has_no_outliers_to_leave_out() -> None:
+    """All rows of the second day contradict the fit: none of them is dropped to hide that."""
+    robot, measured = readings(gross=())
+    values = measured.values + np.array([0.5, 0, 0, 0, 0, 0])
+    moved = pk.Measurements(measured.actuators, values, "pose", sigma=measured.sigma)
+    found = pk.identify(robot, measured, drop="outliers", holdout=moved)
+    assert found.holdout_dropped == () and found.verdict.state == "doubtful"
+    assert "the held-out points contradict the fit" in found.verdict.reasons[0]

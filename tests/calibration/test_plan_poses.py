@@ -341,3 +341,66 @@ def test_measurements_that_no_parameter_moves_are_refused(name: str) -> None:
     robot = pk.load(name)
     with pytest.raises(ValueError, match=r"candidates: .* depends on no parameter"):
         pk.plan_poses(robot, pk.sample_poses(robot, 20), 10, kind="height", free="offset*")
+
+
+# --- several kinds -------------------------------------------------------------------------------
+
+KINDS: dict[Any, int] = {"position": 12, "distance": 9}
+POINTS: dict[Any, Any] = {"position": [40.0, 0.0, 60.0], "distance": [0.0, 0.0, -300.0]}
+NOISE: dict[Any, float] = {"position": 0.02, "distance": 0.005}
+
+
+@pytest.fixture(scope="module")
+def mixed(hexapod: Robot, candidates: np.ndarray) -> Plan:
+    return pk.plan_poses(hexapod, candidates, kind=KINDS, target=POINTS, noise=NOISE, prior=0.5)  # type: ignore[arg-type]
+
+
+def test_a_plan_of_two_kinds_has_so_many_of_each(hexapod: Robot, mixed: Plan) -> None:
+    assert [mixed.kinds.count(kind) for kind in KINDS] == [12, 9]
+    assert mixed.all_candidates < mixed.predicted < mixed.at_random
+    assert "measure" in str(mixed) and "distance" in str(mixed)
+
+
+def test_its_prediction_is_that_of_a_calibration_by_both(
+    hexapod: Robot, candidates: np.ndarray, mixed: Plan
+) -> None:
+    kinds = np.array(mixed.kinds)
+    sets = [
+        pk.VirtualMachine(hexapod, NOISE[kind]).measure(
+            mixed.actuators[kinds == kind], kind, POINTS[kind]
+        )
+        for kind in KINDS
+    ]
+    found = pk.identify(hexapod, sets, prior=0.5)
+    aims = candidates[np.isfinite(found.accuracy(candidates))]
+    again = pk.plan_poses(
+        hexapod, candidates, targets=aims, kind=KINDS, target=POINTS, noise=NOISE, prior=0.5
+    )
+    rms = np.sqrt(np.mean(found.accuracy(aims) ** 2))
+    assert again.predicted == pytest.approx(rms, rel=0.02)
+
+
+def test_no_exchange_within_a_kind_is_left_that_gains(
+    hexapod: Robot, candidates: np.ndarray, mixed: Plan
+) -> None:
+    """Distances add to positions alone, and better chosen ones more than others."""
+    alone = pk.plan_poses(hexapod, candidates, 12, target=POINTS["position"], noise=0.02, prior=0.5)
+    assert mixed.predicted < alone.predicted
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"kind": {"position": 3}, "count": 3}, "kind: a mapping says how many"),
+        ({"kind": {}}, "kind: a mapping says how many"),
+        ({"kind": {"position": 0}}, "kind must be a whole number from 1"),
+        ({"kind": {"positions": 3}}, "kind must be one of"),
+        ({"kind": {"position": 3}, "noise": {"pose": 1.0}}, "noise: the plan has position"),
+        ({"kind": {"position": 3, "pose": 2}, "noise": {"pose": 1.0}}, "noise: of position not"),
+    ],
+)
+def test_what_several_kinds_do_not_take(
+    words: dict[str, Any], message: str, hexapod: Robot, candidates: np.ndarray
+) -> None:
+    with pytest.raises(pk.ArgumentError, match=message):
+        pk.plan_poses(hexapod, candidates[:10], free="offset*", **words)

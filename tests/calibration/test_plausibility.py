@@ -279,3 +279,19 @@ def test_distances_alone_have_no_frame(paper: Robot) -> None:
     far = VirtualMachine(paper).measure(q, kind="distance", target=[500, 0, 0])
     with pytest.raises(ValueError, match="distances do not depend on it"):
         identify(paper, far, frame="unknown")
+
+
+def test_struts_exchanged_in_a_log_that_is_a_row_late_are_both_named(hexapod: pk.Robot) -> None:
+    """Either alone explains nothing."""
+    rng = np.random.default_rng(2)
+    q = hexapod.inverse(hexapod_poses(hexapod, 30, rng))
+    true = hexapod.replace({"offset1": 0.4, "offset5": -0.3})
+    points = true.forward(q).pose[:, :3] + rng.normal(0, 0.01, (30, 3))
+    wrong = np.roll(q, -1, axis=0)[:, [0, 1, 3, 2, 4, 5]]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        try:
+            said = "; ".join(pk.identify(hexapod, pk.Measurements(wrong, points)).verdict.reasons)
+        except pk.ArgumentError as error:
+            said = str(error)
+    assert "if q3 and q4 are exchanged and each reading belongs to the row 1 before it" in said

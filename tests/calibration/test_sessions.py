@@ -323,7 +323,7 @@ def test_a_held_out_session_finds_its_own_zeros_first(
     free = FREE
     without = pk.identify(hexapod, first, free, holdout=second)
     assert without.holdout_contradicts and without.verdict.state == "doubtful"
-    assert "per_session='offset*' finds such numbers anew" in without.verdict.reasons[1]
+    assert "(per_session='offset*') finds such numbers anew" in without.verdict.reasons[1]
     found = pk.identify(hexapod, first, free, holdout=second, per_session="offset*")
     assert not found.holdout_contradicts and found.verdict.state == "calibrated"
     assert found.moved == ()

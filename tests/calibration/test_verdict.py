@@ -148,7 +148,7 @@ def test_one_pose_that_is_wrong_by_far_is_found_beside_a_linear_fit() -> None:
     assert found.verdict.state == "not calibrated"
     first = found.verdict.reasons[0]
     assert first.startswith("3 rows disagree with the rest: row 30 (1), row 31 (2), row 32 (3);")
-    assert first.endswith("fit with loss='cauchy'")
+    assert first.endswith("or fit with --loss cauchy (loss='cauchy')")
     robust = fitted(arm, replace(measured, values=values), loss="cauchy", **UNKNOWN)
     assert robust.outliers == (30, 31, 32)
     assert robust.distances.rms_without_outliers < 0.15 < robust.rms

@@ -72,3 +72,21 @@ def test_a_probes_log_that_contradicts_itself_is_not_trusted(run: Any) -> None:
     m.write("circular.csv")
     done = run("calibrate", DELTA / "robot.toml", "circular.csv")
     assert done.exit_code == 1 and "those that the robot file itself gives" in done.stderr
+
+
+def test_a_warm_machine_is_referred_to_20_degrees(run: Any, refused: Any) -> None:
+    robot = pk.load("hexapod")
+    poses = pk.sample_poses(robot, 30, seed=1, share=0.5)
+    larger = poses[:, :3] * (1 + 11.5e-5)
+    warm = pk.Measurements(robot.inverse(poses), larger, sigma=0.01, temperature=30.0)
+    warm.write("warm.csv")
+    arguments = ("calibrate", "hexapod", "warm.csv", "--free", "offset*")
+    assert "which is not allowed for: --expansion" in run(*arguments).stdout
+    done = run(*arguments, "--expansion", "base=11.5e-6,limbs=11.5e-6", "--expansion",
+               "platform=11.5e-6", "--report", ".")  # fmt: skip
+    said = " ".join(done.stdout.split())
+    assert "numbers are those at 20 °C; the machine was at 30 °C, expansion: base, limbs" in said
+    assert "Numbers are those at 20 °C" in Path("report.html").read_text("utf-8")
+    assert "--expansion base: expected PART=NUMBER" in refused(*arguments, "--expansion", "base")
+    assert "stands alone" in refused(*arguments, "--expansion", "1e-5,base=1e-5")
+    assert "of steel 11.5e-6; found 11.5" in refused(*arguments, "--expansion", "11.5")

@@ -176,3 +176,26 @@ def test_calibrate_finds_where_wires_end(run: Any, tmp_path: Path) -> None:
     found = json.loads(run("calibrate", "hexapod", "wire.csv", *options).stdout)
     end = found["parameters"]["attachment1.x"]
     assert end["value"] == pytest.approx(60, abs=5 * end["stderr"])
+
+
+def test_a_plan_of_two_instruments_has_commands_for_each(run: Any, refused: Any) -> None:
+    arguments = (
+        "plan", "hexapod", "--kind", "position=8,distance=5", "--target", "distance=0,0,-300",
+        "--noise", "position=0.02,distance=0.005", "--free", "offset*",
+    )  # fmt: skip
+    done = run(*arguments, "--out", "plan")
+    assert done.exit_code == 0 and "hexapod: measure 13 poses for 6 parameters" in done.stdout
+    rows = {
+        kind: len(read_commands(Path("plan") / f"commands-{kind}.csv", ("mm",) * 6))
+        for kind in ("position", "distance")
+    }
+    assert rows == {"position": 8, "distance": 5} and not Path("plan/commands.csv").exists()
+    assert "without --count and --accuracy" in refused(*arguments, "--count", "3")
+    assert "expected KIND=N" in refused("plan", "hexapod", "--kind", "position=x")
+    assert "the plan has position; found 'pose'" in refused(
+        "plan", "hexapod", "--kind", "position=3", "--noise", "pose=1"
+    )
+    assert "expected X,Y,Z in mm" in refused("plan", "hexapod", "--target", "1,2")
+    assert "stands alone" in refused(
+        "plan", "hexapod", "--kind", "pose=3", "--target", "1,2,3", "--target", "pose=1,2,3"
+    )

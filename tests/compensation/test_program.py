@@ -246,6 +246,10 @@ def test_after_homing_the_pose_is_as_stated_or_has_to_be_named(tmp_path: Path) -
         ("G1 X[1+2]", "no plain G-code"),
         ("o100 sub", "no plain G-code"),
         ("/G1 X1", "no plain G-code"),
+        ("M206 X1", "M206 moves the origin"),
+        ("SET_GCODE_OFFSET Z=0.1", "SET_GCODE_OFFSET moves the origin"),
+        ("M665 L360", "M665 gives the controller other numbers"),
+        ("N2 G1 X1*71", "the checksum would no longer be right"),
         ("G1 A5", "A is no axis of the robot, which has XYZ"),
         ("G1 X900", "the machine does not reach a pose of this move"),
     ],
@@ -256,6 +260,35 @@ def test_what_cannot_be_followed_is_refused_with_its_line(
     with pytest.raises(pk.FileError) as caught:
         corrected(tmp_path, f"G1 X1 Y1 Z20\n{line}\n")
     assert f"part.gcode, line 2: {reason}" in str(caught.value).replace("'" + line + "' is ", "")
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "M117 G1 X9 Y9",  # a message
+        "M118 G1 X9",
+        "; a note\x0cG1 X9 Y9",  # no line ends at a form feed, nor at these
+        "; a note\x85G1 X9 Y9",
+        "; a note\u2028G1 X9 Y9",
+        "G10 P0 S195 R175",  # temperatures of a tool
+    ],
+)
+def test_what_is_no_move_moves_nothing(line: str, tmp_path: Path) -> None:
+    text = "G1 X1 Y1 Z20 F600\n{}\nG1 X-30 Y20\n"
+    found = corrected(tmp_path, text.format(line))
+    assert found.moves == 2
+    plain = corrected(tmp_path, text.format("M400"))
+    assert found.text == plain.text.replace("M400", line)
+
+
+def test_axes_that_are_homed_need_no_numbers(tmp_path: Path) -> None:
+    with pytest.raises(pk.FileError, match="line 3: where X and Y is, is not known"):
+        corrected(tmp_path, "G1 X1 Y1 Z20\nG28 X Y\nG1 Z20 F600\n")
+
+
+def test_a_byte_order_mark_stays_before_the_program(tmp_path: Path) -> None:
+    text = "G1 X1 Y1 Z20 F600\n"
+    assert corrected(tmp_path, "\ufeff" + text).text == "\ufeff" + corrected(tmp_path, text).text
 
 
 def test_the_command_line_writes_the_program_by_its_name(

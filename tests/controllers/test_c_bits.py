@@ -12,6 +12,7 @@ import pytest
 import pkmcal as pk
 
 from .c_headers import needed
+from .test_c_header import lawful
 
 # Poses from integers, so that they are exact; the hash (FNV-1a) of the bits of q and pose.
 _PROGRAM = """\
@@ -121,7 +122,7 @@ TARGETS = {
 def printed(machine: str, build: str, start: str, folder: Path) -> str:
     """What the program prints when it is built and started so."""
     needed(build.split()[0], start.split()[0] if not start.startswith("./") else "gcc")
-    robot = pk.load(machine)
+    robot = MACHINES[machine]()
     pk.export.c_header(robot, folder / "robot.h")
     (folder / "program.c").write_text(_PROGRAM.replace("SIZE", str(robot.n_actuators)))
     (folder / "start.c").write_text(_START)
@@ -151,8 +152,11 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
     return of_machine
 
 
-# with everything of its own, sine to arctangent; and with constraints
-@pytest.mark.parametrize("machine", ["6-rus", "3prs"])
+# everything of its own, sine to arctangent; constraints; drive laws and their Newton's method
+MACHINES = {"6-rus": lambda: pk.load("6-rus"), "3prs": lambda: pk.load("3prs"), "laws": lawful}
+
+
+@pytest.mark.parametrize("machine", MACHINES)
 @pytest.mark.parametrize("target", TARGETS)
 def test_bits_are_the_same(
     target: str, machine: str, reference: Callable[[str], str], tmp_path: Path

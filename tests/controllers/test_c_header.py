@@ -41,8 +41,65 @@ def mixed() -> pk.Robot:
     return robots.hexapod(rail, crank, {"offset": 20.0}, rail, frames=FRAMES)
 
 
+TABLE = [[300.0, 0.0], [500.0, 0.3], [700.0, -0.2], [900.0, 0.1]]
+WAVES = [{"k": 0.2, "cos": 0.05, "sin": -0.03}, {"k": 0.5, "cos": 0.01, "sin": 0.02}]
+
+
+def lawful() -> pk.Robot:
+    """Every drive law, alone and together, and a limb without any."""
+    laws: list[dict[str, Any]] = [
+        {"drive": {"quadratic": 1e-5}},
+        {"drive": {"spool": 75.0, "buildup": -0.1}, "gain": -1 / 70, "offset": 2000.0},
+        {"drive": {"harmonics": WAVES}},
+        {"drive": {"table": TABLE, "backlash": 0.1}},
+        {"drive": {"quadratic": -1e-5, "harmonics": WAVES[:1], "table": TABLE}},
+    ]
+    return robots.hexapod(*[law | {"stroke": [300.0, 1500.0]} for law in laws])
+
+
+def turned(**law: Any) -> pk.Robot:
+    """Cranks whose strokes are some whole turns from their angles at home; one drives two rods."""
+    limbs = [
+        {"kind": "RUS", "base": robots.ring(200.0, at), "platform": robots.ring(45.0, at)}
+        | {"axis": robots.ring(1.0, at + 90.0), "zero": robots.ring(1.0, at), "branch": 1}
+        | {"crank": 170.0, "rod": 400.0, "stroke": [12.0, 16.0]}
+        | ({"drive": law} if law else {})
+        for at in (0.0, 120.0, 240.0)
+    ]
+    return robots.made("translation", {"z": -350.0}, limbs)
+
+
+def paired(**changes: Any) -> pk.Robot:
+    """Two cranks on every actuator, side by side."""
+    limbs = [
+        {"kind": "RUS", "base": base + side, "platform": robots.ring(45.0, at) + side}
+        | {"axis": robots.ring(1.0, at + 90.0), "zero": robots.ring(1.0, at), "branch": 1}
+        | {"crank": 170.0, "rod": 400.0, "offset": turn, "actuator": i}
+        for i, at in enumerate((0.0, 120.0, 240.0), 1)
+        for base in [robots.ring(200.0, at)]
+        for side, turn in ((robots.ring(20.0, at + 90), 0.0), (robots.ring(-20.0, at + 90), 6.3))
+    ]
+    limbs[3] |= changes
+    return robots.made("spatial", {"z": -350.0}, limbs, match=["x", "y", "z"])
+
+
+def cables() -> pk.Robot:
+    """A point on three cables."""
+    anchors = ([0, -1600, -120], [1400, 800, -120], [0, 0, 2300])
+    limbs = [{"kind": "cable", "base": at, "platform": [0, 0, 0]} for at in anchors]
+    return robots.made("translation", {"z": 400.0}, limbs)
+
+
 CASES = {name: lambda name=name: pk.load(name) for name in PARALLEL}
-CASES |= {"mixed, framed": mixed}
+CASES |= {
+    "mixed, framed": mixed,
+    "cables": cables,
+    "drive laws": lawful,
+    "turned": turned,
+    "turned, with laws": lambda: turned(harmonics=[{"k": 1.0, "cos": 0.01, "sin": 0.02}]),
+    "paired": paired,
+    "paired, with laws": lambda: paired(drive={"quadratic": 1e-3}),
+}
 # every driver, row and pose map
 SOME = [
     "2tpr2tps",
@@ -52,6 +109,9 @@ SOME = [
     "3rrr-planar",
     "linear-delta",
     "mixed, framed",
+    "drive laws",
+    "turned, with laws",
+    "paired, with laws",
 ]
 
 
@@ -113,6 +173,31 @@ def test_clang_too_has_nothing_to_say(case: str, number: str, tmp_path: Path) ->
     compiled(CASES[case](), tmp_path, number, "clang")  # gcc: in every test here
 
 
+@pytest.mark.parametrize("case", ["mixed, framed", "drive laws", "paired, with laws"])
+def test_cpp_takes_it_too(case: str, tmp_path: Path) -> None:
+    needed("g++")
+    for number in ("double", "float"):
+        pk.export.c_header(CASES[case](), tmp_path / f"a_{number}.h", number)  # type: ignore[arg-type]
+    (tmp_path / "a.cpp").write_text(
+        '#include "a_double.h"\n#include "a_float.h"\nint main()\n'
+        "{ double q[6]; float l[6]; return a_double_inverse(a_double_home, q)\n"
+        "    + a_float_inverse(a_float_home, l); }\n"
+    )
+    flags = [flag.replace("c99", "c++11") for flag in STRICT]
+    subprocess.run(["g++", *flags, "-o", tmp_path / "a", tmp_path / "a.cpp"], check=True)
+    subprocess.run([tmp_path / "a"], check=True)
+
+
+def test_a_double_that_is_a_float_is_refused_when_it_is_compiled(tmp_path: Path) -> None:
+    """As on processors of eight bits."""
+    needed("gcc")
+    pk.export.c_header(pk.load("hexapod"), tmp_path / "robot.h")
+    small = ["-U__DBL_MANT_DIG__", "-D__DBL_MANT_DIG__=24"]
+    command = ["gcc", "-fsyntax-only", *small, "-x", "c", tmp_path / "robot.h"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode != 0 and "export it with --number float" in done.stderr
+
+
 def test_what_is_refused_leaves_the_numbers_alone(tmp_path: Path) -> None:
     robot = pk.load("linear-delta")
     library = compiled(robot, tmp_path)
@@ -143,6 +228,20 @@ def test_machine_with_more_closures_than_coordinates_is_refused(tmp_path: Path) 
     with pytest.raises(pk.ArgumentError, match="8 closures for 6 free coordinates"):
         pk.export.c_header(robot, tmp_path / "robot.h")
     assert not (tmp_path / "robot.h").exists()
+
+
+def test_cranks_with_different_gears_on_one_actuator_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(pk.ArgumentError, match="share actuator q2 with different gears"):
+        pk.export.c_header(paired(gain=2.0), tmp_path / "robot.h")
+    assert not (tmp_path / "robot.h").exists()
+
+
+def test_turns_of_a_crank_are_those_of_its_stroke(library: Any) -> None:
+    """Not those of an arctangent, which would jump by a whole turn between -π and π."""
+    robot = turned()
+    poses = poses_of(robot)
+    status, found = library("turned", "double").inverse(poses)
+    assert (status == 0).all() and found.min() > 12.0 and found.max() < 16.0
 
 
 def test_machine_of_chains_is_refused(tmp_path: Path) -> None:

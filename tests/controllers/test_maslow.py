@@ -104,6 +104,17 @@ def test_users_file_is_kept_but_for_the_anchors(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.robot.slots[:, :2], ANCHORS)
 
 
+def test_numbers_that_say_the_same_stay_as_they_are_written(tmp_path: Path) -> None:
+    own = "\ufefftlX: -27.6\ntlY: +2064.90 # left\r\ntrX: 2924.3\ntrY: 2.0665e3\nblX: 0\nblY: 0\n"
+    own += "brX: 2953.2\nbrY: 0.0\n"
+    (tmp_path / "m.yaml").write_bytes(own.encode())
+    robot = machine([0, 1, 2, 3])
+    pk.export.maslow(robot, tmp_path / "n.yaml", tmp_path / "m.yaml")
+    assert (tmp_path / "n.yaml").read_bytes().decode() == own
+    pk.export.maslow(robot.replace({"base2.x": 2925.0}), tmp_path / "n.yaml", tmp_path / "m.yaml")
+    assert (tmp_path / "n.yaml").read_bytes().decode() == own.replace("2924.3", "2925.000000")
+
+
 def test_a_log_is_its_last_set_and_its_last_anchors(tmp_path: Path) -> None:
     (tmp_path / "m.log").write_text(LOG)
     found = pk.import_printer(tmp_path / "m.log", "maslow")
@@ -128,6 +139,7 @@ def test_offsets_and_gains_are_refused_or_projected(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("tlX: 1\n", r"no number for tlY, trX, trY, brX: anchors of a Maslow"),
+        (YAML.replace("tlX: ", "tlX: 1,5"), r"no number for tlX"),  # a decimal comma
         (LOG.replace("tl:1680.0", ""), r"place 2 of CLBM must have bl, br, tr and tl"),
         (LOG.replace("tl:1680.0", "tl:nan"), r"place 2 of CLBM must have"),
     ],

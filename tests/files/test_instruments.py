@@ -154,10 +154,8 @@ def test_revolutions_of_a_turning_joint_are_angles(tmp_path: Path) -> None:
 
 
 def test_unknown_columns_are_left_out_in_one_line(tmp_path: Path) -> None:
-    m = read(tmp_path, "q1 [mm],z [mm],Temperature,Operator\n1,2,20.4,someone\n")
-    assert m.notes == (
-        f"{tmp_path / 'm.csv'}: unknown columns left out: 'Temperature', 'Operator'",
-    )
+    m = read(tmp_path, "q1 [mm],z [mm],Humidity,Operator\n1,2,40,someone\n")
+    assert m.notes == (f"{tmp_path / 'm.csv'}: unknown columns left out: 'Humidity', 'Operator'",)
 
 
 @pytest.mark.parametrize("head", ["sigmas [mm]", "taget", "grp1,groups"])
@@ -326,3 +324,56 @@ def test_names_with_and_without_leading_zeros_are_all_joined(tmp_path: Path) -> 
     points = "Point,z [mm]\n" + "".join(f"P{i},{i}\n" for i in range(1, 21))
     m = two(tmp_path, points, "Pose,q1 [mm]\n" + "".join(f"P{i:02},{i}0\n" for i in range(1, 21)))
     assert m.actuators[:, 0].tolist() == [10.0 * i for i in range(1, 21)]
+
+
+# --- what people do ------------------------------------------------------------------------------
+
+
+def test_a_rigid_body_that_is_called_by_a_number_is_no_data(tmp_path: Path) -> None:
+    """Motive writes the ID of a body above each column; `1` there is not a measurement."""
+    text = POSES["motive"](TRUTH).replace(b'"7F3A"', b'"1"')
+    poses = written(tmp_path, "poses.csv", text)
+    logged = written(tmp_path, "log.csv", LOGS["log_struts"](TRUTH))
+    m = pk.read_measurements(poses, ROBOT, controller=logged, join="row")
+    np.testing.assert_allclose(m.values, TRUTH.poses, atol=2e-5)
+
+
+@pytest.mark.parametrize("head", ["Pos", "Pose", "Position No", "Pos Nr", "Pos-ID"])
+def test_poses_are_counted_as_their_names_are(head: str, tmp_path: Path) -> None:
+    m = read(tmp_path, f"{head},q1 [mm],z [mm]\nP07,1,2\nP18,3,4\nP07,1.001,2\n")
+    assert m.group is not None and m.group.tolist() == [7, 18, 7]
+    m = read(tmp_path, f"{head},q1 [mm],z [mm]\nhome,1,2\nleft,3,4\nhome,1.001,2\n")
+    assert m.group is not None and m.group.tolist() == [0, 1, 0]
+    m = read(tmp_path, f"{head},q1 [mm],z [mm]\nA1,1,2\nB1,3,4\nA1,1.001,2\n")
+    assert m.group is not None and m.group.tolist() == [0, 1, 0]
+
+
+def test_home_by_another_name_is_the_same_pose(tmp_path: Path) -> None:
+    m = read(tmp_path, "Pose,q1 [mm],z [mm]\nP1,1,2\nP2,3,4\nP3,1,2\nP2,3.001,4\n")
+    assert m.pose_index.tolist() == [0, 1, 0, 1]
+
+
+def test_seconds_of_arc_are_written_as_two_strokes(tmp_path: Path) -> None:
+    m = read(
+        tmp_path,
+        "q1 [mm],X [mm],Y [mm],Z [mm],Roll [\"],Pitch [''],Yaw [']\n1,2,3,4,3600,0,60\n".replace(
+            "['']", "[″]"
+        ),
+    )
+    np.testing.assert_allclose(m.values[0, 3:], np.radians([1, 0, 1]), rtol=1e-14)
+    assert read(tmp_path, 'q1 ["],z [mm]\n1,2\n').actuators.tolist() == [[25.4]]
+
+
+@pytest.mark.parametrize("x", ["rot_vec_x [rad]", "rvec_x [rad]", "Rotation Vector X [rad]"])
+def test_rotation_vectors_are_known_by_name(x: str, tmp_path: Path) -> None:
+    heads = ",".join(x.replace("x", axis).replace("X", axis) for axis in "xyz")
+    m = read(tmp_path, f"q1 [mm],X [mm],Y [mm],Z [mm],{heads}\n1,2,3,4,0.1,0,0\n")
+    np.testing.assert_allclose(m.values[0, 3:], [0.1, 0, 0], atol=1e-15)
+
+
+def test_what_was_assumed_of_the_log_names_the_log(tmp_path: Path) -> None:
+    points = written(tmp_path, "points.csv", b"Point,X [mm],Y [mm],Z [mm]\nP1,1,2,3\nP2,1,2,4\n")
+    log = written(tmp_path, "log.csv", "Tür\nPoint,q1 [mm]\nP1,1\nP2,2\n".encode("cp1252"))
+    notes = pk.read_measurements(points, controller=log).notes
+    assert notes[0] == f"{log}: not UTF-8, read as Windows-1252"
+    assert notes[-1].startswith(f"{points}: joined with {log} by name")

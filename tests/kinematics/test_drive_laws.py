@@ -276,6 +276,40 @@ def test_a_turn_of_a_drive_is_one_whatever_its_law(name: str) -> None:
         assert abs(robot.nearest_turns(far, near=q) - q).max() < 1e-9
 
 
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("name", ["rotary-delta", "6-rus", "3rrr-planar", *generated.KINDS])
+def test_whatever_turn_is_asked_for_a_reading_is_given_that_leads_to_the_pose(
+    name: str, seed: int
+) -> None:
+    """Also where a law ends before that turn, or limbs that share a crank agree at one turn."""
+    robot, at = driven(name, seed)
+    if robot.machine.rows > robot.n_actuators:  # as the limbs that share an actuator stand
+        at = robot.forward(robot.inverse(at), guess=at).pose
+        at = at[np.isfinite(at).all(axis=1)]
+        at = at[robot.violation(at) < 1e-7]
+    q = robot.inverse(at)
+    rng = np.random.default_rng(seed)
+    for turns in (0.5, 1.0, 3.0):
+        near = q + 2 * np.pi * turns * rng.uniform(-1, 1, q.shape)
+        far = robot.inverse(at, near=near)
+        assert np.isfinite(far).all()
+        found = robot.forward(far, guess=at)
+        assert found.ok.all()
+        off = pk.screw.from_pose(found.pose) - pk.screw.from_pose(at)
+        assert abs(off).max(initial=0.0) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["rotary-delta", "hexapod", *generated.KINDS])
+def test_a_row_does_not_depend_on_the_rows_beside_it(name: str) -> None:
+    robot, at = driven(name, 1)
+    q = robot.inverse(at)
+    alone = np.stack([robot.inverse(pose) for pose in at])
+    assert (alone == q).all()
+    poses = robot.forward(q).pose
+    alone = np.stack([robot.forward(row).pose for row in q])
+    assert np.array_equal(alone, poses, equal_nan=True)
+
+
 def test_errors_that_return_with_every_turn_leave_turns_as_they_are() -> None:
     plain = pk.load("6-rus")
     rng = np.random.default_rng(3)

@@ -307,7 +307,10 @@ ERRORS = [
     (POSITION + "\n1,2,1_000,4\n", "line 2, column 'y': expected a number, found '1_000'"),
     (POSITION + "\n1,2,nan,4\n", "line 2, column 'y': expected a finite number, found 'nan'"),
     (POSITION + "\n1,2,3,1e999\n", "line 2, column 'z': expected a finite number"),
-    ("q1 [mm];z [mm]\n1;1.234,5\n", "line 2, column 'z': expected a number, found '1.234,5'"),
+    (
+        "q1 [mm];z [mm]\n1;1.234,5\n1;12.34\n",
+        "line 3, column 'z': expected a number, found '12.34'",
+    ),
     ("q1 [mm],z [mm],sigma [mm]\n1,2,0.1\n1,2,0\n", "line 3, column 'sigma': must be positive"),
     ("q1 [mm],z [mm],group\n1,2,3.5\n", "line 2, column 'group': expected a whole number"),
     (POSE + ",sigma [mm]\n1,2,3,4,5,6,7,1\n", "expected 'sigma.x' to 'sigma.gamma'"),

@@ -158,7 +158,11 @@ BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"values": [[1, 2, 3], [4, np.inf, 6]]}, ValueError, "values must be finite.* at index 1, 1"),
     ({"values": None}, ValueError, "'position' must be given, found None: that goes with"),
     ({"kind": "closure", "sigma": 0.1, "values": None}, ValueError, "sigma: nothing was read"),
-    ({"kind": "closure", "target": [0, 0, 1], "values": None}, ValueError, "target: a closure"),
+    (
+        {"kind": "closure", "target": [0, 0, 1], "values": None},
+        ValueError,
+        "target: closures are not of a point",
+    ),
     (
         {"kind": "pose", "values": [[1, 2, 3, 0, np.nan, 0], [1, 2, 3, 0, 0, 0]]},
         ValueError,
@@ -193,7 +197,7 @@ BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     (
         {"kind": "pose", "values": np.ones((2, 6)), "target": [0, 0, 1]},
         ValueError,
-        "target: a pose",
+        "target: poses are not of a point",
     ),
 ]
 

@@ -122,3 +122,22 @@ def test_heights_that_a_file_was_calibrated_with_are_not_warned_of(tmp_path: Pat
     calibrated = pk.identify(FIRMWARE, measured).robot
     again = pk.read_measurements(EXAMPLE.parent / "probe.csv", calibrated)  # no warning
     assert "unless it was calibrated with them" in again.notes[0] and not measured.notes
+
+
+def test_where_the_nozzle_would_touch_is_where_the_probe_triggered(tmp_path: Path) -> None:
+    """Klipper's newer lines have its offsets of the probe taken in: x, y added, z taken off."""
+    points = triggers(OFFSET)
+    path = tmp_path / "klippy.log"
+    old = [f"// probe at {x:.3f},{y:.3f} is z={z:.6f}" for x, y, z in points]
+    path.write_text("\n".join(old))
+    m = pk.read_measurements(path, FIRMWARE, probe_offset=OFFSET)
+    beds = points + OFFSET * [1, 1, -1]
+    new = [f"// probe: at {x:.3f},{y:.3f} bed will contact at z={z:.6f}" for x, y, z in beds]
+    path.write_text("\n".join(["// Result: at 1.000,2.000 estimate contact at z=3.000000", *new]))
+    again = pk.read_measurements(path, FIRMWARE, probe_offset=OFFSET)
+    np.testing.assert_allclose(again.actuators, m.actuators, atol=1e-5)
+    np.testing.assert_allclose(again.targets, m.targets)
+    assert "--probe-offset" in again.notes[-1] and off(pk.identify(FIRMWARE, again)) < 1e-3
+    path.write_text("\n".join(old + new))
+    with pytest.raises(pk.FileError, match="in another way than in line 1: make two files"):
+        pk.read_measurements(path, FIRMWARE)

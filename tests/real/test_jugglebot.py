@@ -76,7 +76,7 @@ def test_offsets_5_and_3_moved_and_nothing_else(
     assert str(found).startswith("Doubtful: the held-out points contradict the fit")
     assert "moved, or the model is wrong there: offset5 by" in found.verdict.reasons[1]
     assert found.verdict.reasons[1].endswith(
-        "per_session='offset*' finds such numbers anew in each session"
+        "--per-session 'offset*' (per_session='offset*') finds such numbers anew in each session"
     )
 
 

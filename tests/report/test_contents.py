@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
-from pkmcal.report.contents import as_seen, expected, instrument_identified
+from pkmcal.report.contents import (
+    as_seen,
+    expected,
+    instrument_identified,
+    over_the_workspace,
+    worst,
+)
 
 from ..simulated import hexapod_poses
 
@@ -61,3 +69,31 @@ def test_machine_is_as_far_off_as_expected_where_the_instrument_stands_anywhere(
     off = seen(commands, targets[0]) - (euler(placed[3:]).apply(points) + placed[:3])
     ratio = np.linalg.norm(off, axis=1) / expected(found, places)
     assert np.sqrt(np.mean(ratio**2)) == pytest.approx(1.0, abs=0.45)
+
+
+def test_where_no_stroke_ends_the_workspace_it_is_what_was_measured() -> None:
+    belts = pk.load(Path(__file__).parents[2] / "examples" / "belts" / "robot.toml")
+    low, high = np.array([800.0, 500.0]), np.array([2200.0, 1500.0])
+    places = np.random.default_rng(0).uniform(low, high, (30, 2))
+    measured = pk.VirtualMachine(belts, noise=0.1).measure(
+        belts.inverse(np.pad(places, ((0, 0), (0, 4)))), "position"
+    )
+    found = pk.identify(belts, measured, free=["base1.x", "base1.y"])
+    predicted = over_the_workspace(found)
+    assert not isinstance(predicted, str)
+    sampled, area = predicted
+    assert area is not None and "between those that were measured" in sampled.where
+    margin = 2.0  # mm: poses are where the noise says
+    for seen in (sampled.positions[:, :2], np.transpose([ends[[0, -1]] for ends in area.values])):
+        assert (seen > low - margin).all() and (seen < high + margin).all()
+    drives = pk.load("hexapod")
+    q = drives.inverse(hexapod_poses(drives, 20, np.random.default_rng(0)))
+    bounded = over_the_workspace(
+        pk.identify(drives, pk.VirtualMachine(drives).measure(q), free="offset*")
+    )
+    assert not isinstance(bounded, str) and "way to its ends" in bounded[0].where
+
+
+def test_rows_that_were_not_read_are_not_among_the_worst() -> None:
+    rows = [{"row": k, "after": after} for k, after in enumerate([np.nan, 0.2, 0.5, np.nan])]
+    assert [row["row"] for row in worst(rows)] == [2, 1]

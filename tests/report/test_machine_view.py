@@ -15,9 +15,9 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
-from pkmcal.report import machine_view
+from pkmcal.report.residual_vectors import measured_places, residual_vectors
 
-from .. import browser
+from .. import browser, driven
 from ..simulated import hexapod_poses
 from ..view import pages
 
@@ -58,9 +58,9 @@ def targets(found: Identification) -> np.ndarray:
 
 def test_positions_leave_vectors_as_they_are() -> None:
     found = found_from("position")
-    vectors = machine_view.residual_vectors(found, found.fit.end)
+    vectors = residual_vectors(found, found.fit.end)
     np.testing.assert_allclose(vectors, found.residuals[0], atol=1e-12)
-    np.testing.assert_allclose(machine_view.measured_places(found), targets(found), atol=1e-9)
+    np.testing.assert_allclose(measured_places(found), targets(found), atol=1e-9)
 
 
 def test_vectors_of_a_tracker_somewhere_are_turned_into_the_base() -> None:
@@ -69,7 +69,7 @@ def test_vectors_of_a_tracker_somewhere_are_turned_into_the_base() -> None:
     seen = measured.values @ rotation(frame[3:]).T + frame[:3]
     away = pk.Measurements(measured.actuators, seen, kind="position", target=TARGET)
     found = pk.identify(HEXAPOD, away, free="offset*", frame="unknown")
-    vectors = machine_view.residual_vectors(found, found.fit.end)
+    vectors = residual_vectors(found, found.fit.end)
     np.testing.assert_allclose(
         np.linalg.norm(vectors, axis=1), np.linalg.norm(found.residuals[0], axis=1), atol=1e-12
     )
@@ -79,14 +79,14 @@ def test_vectors_of_a_tracker_somewhere_are_turned_into_the_base() -> None:
 
 def test_heights_point_along_z() -> None:
     found = found_from("height")
-    vectors = machine_view.residual_vectors(found, found.fit.end)
+    vectors = residual_vectors(found, found.fit.end)
     np.testing.assert_allclose(vectors[:, :2], 0.0, atol=1e-15)
     np.testing.assert_allclose(vectors[:, 2], found.residuals[0][:, 0], atol=1e-12)
 
 
 def test_distances_point_away_from_their_anchor() -> None:
     found = found_from("distance")
-    vectors = machine_view.residual_vectors(found, found.fit.end)
+    vectors = residual_vectors(found, found.fit.end)
     way = targets(found) - ANCHOR
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     np.testing.assert_allclose(vectors, found.residuals[0] * way, atol=1e-9)
@@ -216,3 +216,17 @@ def test_arms_and_chains_have_it_too(name: str, tmp_path: Path) -> None:
     found.report(tmp_path)
     seen = pages.started(tmp_path / "report.html")
     assert not seen.console and "the machine as assumed before" in seen.dom
+    assert not re.search(r"<td>\d{6,}</td>", seen.dom)  # degrees of freedom of a prior: infinite
+
+
+def test_a_machine_with_drive_laws_moves_but_is_not_overlaid(tmp_path: Path) -> None:
+    """The numbers of laws are not those of the page's core."""
+    robot = driven.with_laws(HEXAPOD, np.random.default_rng(3), ("quadratic", "spool"))
+    assert robot.model.driven
+    poses = pk.sample_poses(robot, 20, seed=1, share=0.5)
+    true = robot.replace({"base1.x": robot.geometry["base1.x"] + 0.5})
+    measured = pk.VirtualMachine(true, noise=0.01).measure(robot.inverse(poses), "position")
+    pk.identify(robot, measured, free=["base1.x", "base2.y"]).report(tmp_path)
+    seen = pages.started(tmp_path / "report.html")
+    assert not seen.console and "Measured minus predicted, at the places" in seen.dom
+    assert "the machine as assumed before" not in seen.dom

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from matplotlib.quiver import Quiver
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
+from pkmcal.measurements.components import TOUCHES, Artefact
 from pkmcal.report.drawing import MOST_DRAWN, sample
-from pkmcal.report.residual_figure import residuals
+from pkmcal.report.residual_figure import _look, residuals
 
 from ..simulated import hexapod_poses
 
@@ -53,7 +55,66 @@ def test_every_residual_is_drawn_in_its_unit(found: Identification) -> None:
 def test_outliers_are_ringed(found: Identification) -> None:
     assert found.outliers == (3,)
     rings = [line for line in residuals(found).axes[0].get_lines() if line.get_markersize() > 10]
-    assert {tuple(ring.get_xdata()) for ring in rings} == {(3,), ()}
+    assert {row for ring in rings for row in ring.get_xdata().tolist()} == {3}
+
+
+def test_an_outlier_does_not_hide_the_others() -> None:
+    """It is marked at the edge with its value; the others fill the panels."""
+    robot = pk.load("hexapod")
+    q = robot.inverse(hexapod_poses(robot, 30, np.random.default_rng(0)))
+    measured = pk.VirtualMachine(robot, noise=0.01).measure(q)
+    wrong = measured.values.copy()
+    wrong[11, 1] += 3.0
+    found = pk.identify(
+        robot, dataclasses.replace(measured, values=wrong), free="offset*", loss="cauchy"
+    )
+    figure = residuals(found)
+    rows, over, quantiles = (
+        next(panel for panel in figure.axes if panel.get_ylabel().startswith(name))
+        for name in ("measured", "y [mm]", "residual over")
+    )
+    assert max(rows.get_ylim()) < 0.2 and "3" in {text.get_text() for text in rows.texts}
+    (ring,) = (line for line in rows.get_lines() if line.get_markersize() > 10)
+    assert all(abs(y) < max(rows.get_ylim()) for y in ring.get_ydata())
+    arrows = next(each for each in over.collections if isinstance(each, Quiver))
+    lengths = np.sort(np.hypot(arrows.U, arrows.V))
+    assert lengths[-1] < 10.0 * np.median(lengths)
+    assert "1 of" in quantiles.get_title() and max(quantiles.get_ylim()) < 15.0
+
+
+def readings(kind: str) -> Identification:
+    """A hexapod of which only such readings were taken."""
+    robot, tip = pk.load("hexapod"), [40.0, -30.0, 120.0]
+    q = robot.inverse(hexapod_poses(robot, 40, np.random.default_rng(0)))
+    other = robot.inverse(hexapod_poses(robot, 40, np.random.default_rng(1)))
+    machine = pk.VirtualMachine(robot, noise=0.01)
+    more: dict[str, dict[str, Any]] = {
+        "distance": {"target": ANCHOR},
+        "relative-distance": {"target": ANCHOR, "run": ["A"] * len(q)},
+        "between": {"target": tip, "other": other},
+    }
+    return pk.identify(robot, machine.measure(q, kind, **more.get(kind, {})), free="offset*")
+
+
+@pytest.mark.parametrize("kind", [
+    "pose", "position", "height", "distance", "between", "relative-distance", "orientation", "tilt",
+])  # fmt: skip
+def test_readings_of_every_kind_are_drawn(kind: str) -> None:
+    found = readings(kind)
+    figure = residuals(found)
+    measured = found.fit.equations.sets[0]
+    drawn = {name for panel in figure.axes for name in marks(panel)}
+    assert set(measured.components) <= drawn
+    labels = {panel.get_ylabel() for panel in figure.axes}
+    assert ("z [mm]" in labels) == ("mm" in measured.units)
+    assert ("angle off [deg]" in labels) == ("mm" not in measured.units)
+
+
+@pytest.mark.parametrize("artefact", TOUCHES)
+def test_components_of_touches_are_told_apart(artefact: Artefact) -> None:
+    components = TOUCHES[artefact]
+    looks = {_look(len(components), k, name) for k, (name, _) in enumerate(components)}
+    assert len(looks) == len(components)
 
 
 def test_rows_are_marked_at_whole_numbers() -> None:
@@ -145,6 +206,12 @@ def test_a_file_of_the_wanted_kind_is_written_always_the_same(
         contents.append((tmp_path / f"{name}.{ending}").read_bytes())
     assert contents[0] == contents[1]
     assert contents[0].startswith(start)
+
+
+def test_without_a_path_the_figure_is_returned_to_be_shown(found: Identification) -> None:
+    figure = found.plot()
+    assert figure.get_suptitle().endswith("residuals of the calibration")
+    assert figure.get_facecolor() == (1.0, 1.0, 1.0, 1.0)  # dark notebooks too
 
 
 def test_another_ending_is_refused_and_nothing_is_written(

@@ -11,6 +11,7 @@ import pytest
 from pkmcal.arrays import FloatArray
 from pkmcal.statistics.clusters import Sandwich, shared_error_score
 from pkmcal.statistics.covariance import covariance
+from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import LinearFit, linear_fit
 
 from .designs import Design, arm, coverage, errors, hexapod
@@ -198,3 +199,31 @@ def test_a_refuted_sigma_is_scaled(equations: int, true: float, least: float) ->
 
     held, _, _ = coverage(design, lambda rng: true * rng.normal(size=equations), covered, 1500)
     assert least < held < 0.965
+
+
+# --- several contrasts at once -------------------------------------------------------------------
+
+
+def test_one_contrast_has_the_same_degrees_of_freedom_alone_and_together() -> None:
+    sandwich = Sandwich(arm(15).fit)
+    for row in arm(15).contrasts[:5]:
+        assert sandwich.joint_freedom(row[None]) == pytest.approx(sandwich.freedom(row[None])[0])
+
+
+@pytest.mark.parametrize(
+    ("poses", "least"), [(15, 0.0), (40, 0.01)]
+)  # with few poses the test keeps to the safe side
+@pytest.mark.parametrize("shared", [0.0, 2.0])
+def test_numbers_that_are_zero_are_found_needed_in_5_of_100(
+    poses: int, least: float, shared: float
+) -> None:
+    """Hotelling's T² with the degrees of freedom of all of them, not the least of any."""
+    design, rng = hexapod(poses, 5), np.random.default_rng(0)
+    contrasts, count, found = design.contrasts, len(design.contrasts), []
+    freedom = Sandwich(design.fit).joint_freedom(contrasts) - count + 1.0
+    for _ in range(500):
+        fit, wrong = design.fitted(errors(design, shared, rng))
+        matrix = contrasts @ Sandwich(fit).data @ contrasts.T
+        ratio = float(wrong @ np.linalg.solve(matrix, wrong)) / count
+        found.append(f_tail(ratio * freedom / (freedom + count - 1.0), count, freedom))
+    assert least <= np.mean(np.array(found) < 0.05) <= 0.075

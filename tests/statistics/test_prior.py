@@ -85,3 +85,12 @@ def test_a_prior_on_which_the_data_say_nothing_is_not_contradicted() -> None:
     others = rng.normal(size=(6, 6))
     found = prior_test(rng.normal(size=(6, 3)), others, rng.normal(size=6), 1.0, np.inf)
     assert not found.contradicted and np.isnan(found.pulls).all()
+
+
+def test_a_prior_of_which_the_data_say_next_to_nothing_is_not_contradicted() -> None:
+    """Far tighter than what the data could show: no parameter is moved enough to be judged."""
+    rng = np.random.default_rng(5)
+    jacobian = rng.normal(size=(30, 4))
+    found = contrasted(jacobian, 2, rng.normal(size=30), 1e-6)
+    assert np.isnan(found.pulls).all()
+    assert found.pull_chance == 1.0 and not found.contradicted

@@ -20,6 +20,7 @@ DEVIATIONS = {
     "z 3": [1, 1, 3, 1, 1, 1],
     "z 10": [1, 1, 10, 1, 1, 1],
     "angles 10": [1, 1, 1, 10, 10, 10],
+    "angles 1.5": [1, 1, 1, 1.5, 1.5, 1.5],
     "angles 1/40": [1, 1, 1, 0.025, 0.025, 0.025],
 }
 
@@ -97,9 +98,10 @@ def run(design: Design, kind: str, runs: int, seed: int = 2) -> tuple[float, flo
     )
 
 
-def test_alike_components_are_not_told_apart() -> None:
+def test_nothing_is_lost_where_alike_components_are_told_apart_by_chance() -> None:
+    """A tenth at each of two steps: later, components half as bad again would go unnoticed."""
     held, error, width, split = run(hexapod(60), "alike", 100)
-    assert split <= 0.06 and 0.92 < held < 0.98
+    assert split <= 0.25 and 0.92 < held < 0.98
     assert error < 1.12 and width < 1.08
 
 
@@ -123,7 +125,15 @@ def test_intervals_of_poses_with_unlike_components_hold_93_to_97_percent(
     held, error, width, split = run(poses(count), kind, 300)
     assert 0.93 <= held <= 0.97
     assert error < 1.12 and width < 1.15
-    assert split < 0.04 if kind == "alike" else split > 0.9
+    assert split < 0.3 if kind == "alike" else split > 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [20, 40])
+def test_angles_half_as_bad_again_cost_a_tenth_of_the_width_at_most(count: int) -> None:
+    """They are between what is told apart for sure and what does not matter."""
+    held, _, width, _ = run(poses(count), "angles 1.5", 300)
+    assert 0.93 <= held <= 0.97 and width < 1.10
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import html
 import json
 import re
@@ -50,7 +51,7 @@ def dumped(file: Path) -> browser.Seen:
 
 
 def started(file: Path) -> browser.Seen:
-    """The document of a page once its machine has started, by its own policy.
+    """The document of a page, without its scripts, once its machine has started, by its own policy.
 
     That names what may run by hash in a report: what waits is named beside it.
     """
@@ -59,7 +60,9 @@ def started(file: Path) -> browser.Seen:
     text = text.replace("script-src 'sha256-", f"script-src 'sha256-{digest}' 'sha256-")
     other = file.with_name("waits.html")
     other.write_text(text.replace("</body>", f"<script>{_WAIT}</script></body>"), encoding="utf-8")
-    return dumped(other)
+    seen = dumped(other)
+    without = re.sub(r"<script.*?</script>", "", seen.dom, flags=re.DOTALL)
+    return dataclasses.replace(seen, dom=without)
 
 
 def said(

@@ -20,7 +20,7 @@ BOX = 0.35  # of what is reached: the poses that are asked for
 
 def _moves(robot: pk.Robot) -> list[list[Any]]:
     """Poses of the workspace coordinate by coordinate, then actuators from there."""
-    data = parallel.data(robot)
+    data = parallel.data(robot, cloud=False)
     poses = sample_poses(robot, 3, seed=1, share=BOX)
     moves = [["movePose", j, float(pose[k])] for pose in poses for j, k in enumerate(data["moved"])]
     q = robot.inverse(poses[-1])

@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.core.library import POSE
 from pkmcal.files.seal import is_sealed
 from pkmcal.view import page
 
+from .. import driven
 from . import pages
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -86,8 +88,7 @@ def test_strokes_that_are_exceeded_are_named(tmp_path: Path) -> None:
     moves = [["movePose", 2, 1150.0], ["movePose", 2, 1050.0], ["moveActuator", 3, 1101.0]]
     (states,) = pages.said(tmp_path, [pk.load("hexapod")], [moves])
     assert "within all limits" in states[0]["text"]
-    for i in range(1, 5):
-        assert f"limb {i}: stroke exceeded" in states[1]["text"]
+    assert "limbs 1, 2, 3, 4, 5, 6: stroke exceeded" in states[1]["text"]
     assert "within all limits" in states[2]["text"]
     assert re.findall(r"limb \d: stroke", states[3]["text"]) == ["limb 4: stroke"]
 
@@ -127,6 +128,72 @@ def test_every_assembly_mode_can_be_stepped_through(name: str, tmp_path: Path) -
     assert f"{count} of {count}" in states[-1]["text"]
 
 
+def test_limits_that_a_machine_does_not_have_are_not_said_to_be_kept(tmp_path: Path) -> None:
+    """Nor are cones offered where no joint has one."""
+    robots = [pk.load(name) for name in ("3rrr-planar", "hexapod", "2tpr2tps")]
+    free, strokes, cones = (state["text"] for (state,) in pages.said(tmp_path, robots, [[]] * 3))
+    assert "in reach; no limits are stated" in free and "within all limits" not in free
+    assert "within all limits" in strokes and "joint cones" not in strokes
+    assert "within all limits" in cones and "joint cones" in cones
+
+
+def test_a_pose_that_the_inverse_kinematics_does_not_lead_to_is_named(tmp_path: Path) -> None:
+    """A carriage below its rod's other end: actuators get there, commands of poses do not."""
+    robot = pk.load("linear-delta")
+    (states,) = pages.said(tmp_path, [robot], [[["moveActuator", 0, 60.0]]])
+    pose, q = states[-1]["pose"], states[-1]["q"]
+    assert robot.forward(q, pose).ok and abs(robot.inverse(pose) - q).max() > 100.0
+    assert "actuator 1: the limb has passed a dead point" in states[-1]["text"]
+    assert "dead point" not in states[0]["text"]
+
+
+def test_actuators_that_cannot_move_alone_are_not_offered(tmp_path: Path) -> None:
+    belts = pk.load(ROOT / "examples" / "belts" / "robot.toml")
+    ((one,), (other,)) = pages.said(tmp_path, [belts, pk.load("hexapod")], [[], []])
+    assert "more of them than ways to move" in one["text"]
+    assert "Move the actuators" in other["text"] and "Move the actuators" not in one["text"]
+
+
+@pytest.mark.parametrize(("name", "kinds"), [
+    ("hexapod", ("quadratic", "spool", "backlash")), ("6-rus", ("harmonics", "table")),
+    ("linear-delta-6", ("quadratic", "harmonics")), ("tricept", ("quadratic", "table")),
+])  # fmt: skip
+def test_machines_with_drive_laws_are_moved_by_their_readings(
+    name: str, kinds: tuple[str, ...], tmp_path: Path
+) -> None:
+    robot = driven.with_laws(pk.load(name), np.random.default_rng(3), kinds)
+    assert robot.model.driven
+    poses = pk.sample_poses(robot, 2, seed=1, share=0.3)
+    moves: list[list[Any]] = [
+        ["movePose", j, float(pose[POSE.index(n)])]
+        for pose in poses
+        for j, n in enumerate(robot.moved)
+    ]
+    last = robot.inverse(poses[-1])
+    step = np.where(np.array(robot.actuator_units) == "rad", 0.02, 3.0) / np.abs(slopes(robot))
+    moves += [["moveActuator", a, float(q + step[a])] for a, q in enumerate(last)]
+    (states,) = pages.said(tmp_path, [robot], [moves])
+    for move, state in zip([["home"], *moves], states, strict=True):
+        assert not state["stopped"], move
+        q, pose = np.array(state["q"]), np.array(state["pose"])
+        np.testing.assert_allclose(q, robot.inverse(pose), rtol=0, atol=1e-7 * (1 + abs(q).max()))
+        off = np.abs(robot.forward(q, pose).pose - pose)
+        assert off.max() < 1e-7
+        kept = robot.feasible(pose, q)
+        said = [np.inf if each["stroke"] is None else each["stroke"] for each in state["limits"]]
+        np.testing.assert_allclose(said, kept.stroke_margin, atol=1e-6)
+
+
+def slopes(robot: pk.Robot) -> np.ndarray:
+    """How far drives go by their readings at home, those of each actuator alike."""
+    q, h = robot.inverse(robot.home), 1e-4
+    ways = [robot.machine.drives(robot.slots, (q + d)[None])[0] for d in (-h, h)]
+    found = np.zeros(len(q))
+    for drive, slope in zip(robot.model.drives, (ways[1] - ways[0]) / (2 * h), strict=True):
+        found[drive.actuator] = slope
+    return found
+
+
 def framed() -> pk.Robot:
     """A 3-RPS that stands upright on a stand, with a tool."""
     base, tool = np.array([100.0, 0, 50, np.pi / 2, 0, 0]), np.array([0.0, 0, 120, 0, 0.25, 0])
@@ -137,8 +204,6 @@ def framed() -> pk.Robot:
 def test_poses_are_in_the_users_frames(tmp_path: Path) -> None:
     robot = framed()
     target = pk.sample_poses(robot, 1, seed=2, share=0.3)[0]
-    from pkmcal.core.library import POSE
-
     moves = [["movePose", j, float(target[POSE.index(n)])] for j, n in enumerate(robot.moved)]
     (states,) = pages.said(tmp_path, [robot], [moves])
     np.testing.assert_allclose(states[-1]["pose"], target, atol=1e-7)

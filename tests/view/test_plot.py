@@ -47,6 +47,26 @@ def test_an_arm_ends_at_its_tool() -> None:
     np.testing.assert_allclose(points(axes)[-1], arm.forward(theta)[:3, 3], atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("name", "dimensions"), [("3rrr-planar", 2), ("five-bar", 2), ("hexapod", 3)]
+)
+def test_machines_of_the_plane_are_drawn_in_it(name: str, dimensions: int) -> None:
+    from matplotlib import pyplot
+
+    try:
+        axes = pk.load(name).plot()
+        assert hasattr(axes, "get_zlim") == (dimensions == 3)
+    finally:
+        pyplot.close("all")
+
+
+def test_no_side_of_an_arm_in_a_plane_is_too_short_for_its_ticks() -> None:
+    axes = Figure().add_subplot(projection="3d")
+    pk.load("3r").plot(axes, [0.0, 0.0, 0.0])
+    sides = [np.ptp(getattr(axes, f"get_{name}lim")()) for name in "xyz"]
+    assert min(sides) > 0.35 * max(sides)
+
+
 def test_without_axes_there_are_new_ones() -> None:
     from matplotlib import pyplot
 

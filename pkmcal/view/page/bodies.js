@@ -14,6 +14,13 @@ class Bodies {
   line(points, colour, wide = 1, dashed = false) { this.list.push({ line: points, colour, wide, dashed }) }
   text(at, text, colour = 'ink') { this.list.push({ at, text, colour }) }
 
+  // a joint's name; of joints in one place one text
+  name(p, aside, word, entry) {
+    const there = this.list.find(body => body.word === word && norm(sub(body.of, p)) < this.thick)
+    if (there) there.text += `, ${entry}`
+    else this.list.push({ at: add(p, aside), text: word + entry, colour: 'dim', of: p, word })
+  }
+
   triad(p, R, length, name) {
     ;['x', 'y', 'z'].forEach((axis, k) => {
       const tip = add(p, column(R, k), length)
@@ -36,6 +43,33 @@ class Bodies {
   }
 }
 
+// The edges of the convex hull: those of a plate where all points lie in a plane, more or less, those
+// of a frame where they do not. An edge is in a plane that all points are on one side of, and in that
+// plane all are on one side of it.
+function hullEdges(given) {
+  const size = Math.max(...given.map(p => norm(sub(p, given[0]))), 1e-9), least = 0.02 * size
+  const points = given.filter((p, k) => given.findIndex(other => norm(sub(p, other)) < least) === k), edges = []
+  const oneSide = values => values.every(x => x > -least) || values.every(x => x < least)
+  points.forEach((a, i) => points.slice(0, i).forEach(b => {
+    const along = unit(sub(b, a)), others = points.filter(p => p !== a && p !== b)
+    const edge = others.some(c => {
+      const aside = add(sub(c, a), along, -dot(along, sub(c, a)))
+      if (norm(aside) < least) return false
+      const across = unit(aside), normal = cross(along, across), far = points.map(p => dot(normal, sub(p, a)))
+      return oneSide(far) && oneSide(points.filter((_, k) => Math.abs(far[k]) < least).map(p => dot(across, sub(p, a))))
+    })
+    if (edge) edges.push([a, b])
+  }))
+  return edges.length ? edges : inLine(points)
+}
+
+// the two ends of points in a line
+function inLine(points) {
+  const from = points[0], far = points.map(p => norm(sub(p, from))), end = points[far.indexOf(Math.max(...far))]
+  const along = points.map(p => dot(sub(p, from), sub(end, from))), start = points[along.indexOf(Math.min(...along))]
+  return start === end ? [] : [[start, end]]
+}
+
 // points in the order in which they stand around their middle
 function outline(points) {
   const middle = scaled(points.reduce((a, b) => add(a, b)), 1 / points.length)
@@ -55,9 +89,9 @@ function drawParallel(mover, limits, show) {
     else closedLimb(out, core, limb, i, limits[i], show, base, top, R, p)
   })
   const frame = (points, r, colour, face) => {
-    const around = outline(points)
-    if (points.length > 2) out.face(around, face)
-    around.forEach((a, k) => { if (points.length > 1) out.rod(a, around[(k + 1) % around.length], r, colour) })
+    const edges = hullEdges(points), corners = [...new Set(edges.flat())]
+    if (edges.length > 2 && edges.length === corners.length) out.face(outline(corners), face) // a plate
+    edges.forEach(([a, b]) => out.rod(a, b, r, colour))
   }
   frame(base, 0.9, 'base', 'baseface')
   frame(top, 0.9, 'platform', 'platformface')
@@ -120,8 +154,8 @@ function closedLimb(out, core, limb, i, limit, show, base, top, R, p) {
   }
   if (show.numbers) {
     out.text(mix(c, b, 0.5), `${i + 1}`, 'label')
-    out.text(add(limb.base, [0, 0, -4 * out.thick]), `base${i + 1}`, 'dim')
-    out.text(add(b, [0, 0, 4 * out.thick]), `platform${i + 1}`, 'dim')
+    out.name(limb.base, [0, 0, -4 * out.thick], 'base', i + 1)
+    out.name(b, [0, 0, 4 * out.thick], 'platform', i + 1)
   }
 }
 
@@ -152,7 +186,7 @@ function chain(out, mover, limb, i, limit, show, base, top, R, p) {
   if (mover.data.map === 'spherical') return sphericalChain(out, frame, limb, i, limit, show, base, top, p)
   const points = limb.joints.map(joint => frame(joint.frame).p), end = placed(R, p, limb.end)
   const last = norm(sub(points.at(-1), end)) > 2 * out.thick ? [...points, end] : points
-  base.push(points[0]), top.push(end)
+  base.push(limb.base), top.push(end)
   for (let k = 0; k + 1 < last.length; k++) {
     const joint = limb.joints[k], bad = joint && !(limit.joints[k] >= INSIDE)
     const moved = joint?.kind === 'P' || (joint?.kind === 'C')
@@ -174,7 +208,7 @@ function chain(out, mover, limb, i, limit, show, base, top, R, p) {
       const axis = turned(frame(joint.frame).R, joint.cone.from)
       out.cone(at, axis, joint.cone.angle, 0.13 * out.size, limit.joints[k] >= INSIDE ? 'cone' : 'bad')
     }
-    if (show.numbers) out.text(add(at, [0, 0, 3.4 * out.thick * (k % 2 ? 1 : -1)]), `${i + 1}.${k + 1} ${joint.kind}`, 'dim')
+    if (show.numbers) out.name(at, [0, 0, 3.4 * out.thick * (k ? 1 : -1)], '', `${i + 1}.${k + 1} ${joint.kind}`)
   })
   const lengths = last.slice(1).map((b, k) => norm(sub(b, last[k]))), longest = lengths.indexOf(Math.max(...lengths))
   if (show.numbers) out.text(mix(last[longest], last[longest + 1] ?? end, 0.5), `${i + 1}`, 'label')

@@ -90,7 +90,7 @@ class Calibration {
     } else {
       core.q.set(mover.q), core.pose.set(mover.own)
       const status = core.wasm.forward()
-      this.lost.textContent = status ? 'so much larger the change leaves no pose here' : ''
+      this.lost.textContent = status ? `× ${this.exaggeration}: as assumed, the machine has no pose at these actuator coordinates` : ''
       if (status) return
       other.own = Array.from(core.found.subarray(0, 6))
       other.pose = other.own

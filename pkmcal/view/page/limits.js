@@ -4,7 +4,7 @@ const INSIDE = -1e-12
 
 function limitsOf(mover) {
   const { core, data } = mover
-  core.pose.set(mover.own), core.q.set(mover.q)
+  core.pose.set(mover.own), core.q.set(waysOf(data, mover.q))
   core.wasm.places()
   return data.kind === 'chains' ? chainLimits(mover) : limbLimits(mover)
 }
@@ -24,7 +24,7 @@ function limbLimits({ core, data }) {
 
 function chainLimits({ core, data, own, q }) {
   const R = rotation(own), frame = k => core.frames.subarray(12 * k, 12 * k + 9)
-  const drive = q.map((x, a) => data.drive.gain[a] * x + data.drive.offset[a])
+  const drive = waysOf(data, q).map((x, a) => data.drive.gain[a] * x + data.drive.offset[a])
   return data.limbs.map(limb => {
     const found = { stroke: Infinity, base: Infinity, platform: Infinity, joints: [] }
     limb.joints.forEach((joint, k) => {
@@ -49,9 +49,15 @@ function chainLimits({ core, data, own, q }) {
 
 const WHAT = { stroke: 'stroke', base: 'cone of the base joint', platform: 'cone of the platform joint' }
 
-// in words, one for each limit that is broken
+// in words, one for each kind of limit that is broken
 function broken(limits) {
-  return limits.flatMap((limit, i) => Object.keys(WHAT)
-    .filter(name => !(limit[name] >= INSIDE))
-    .map(name => `limb ${i + 1}: ${WHAT[name]} exceeded`))
+  return Object.keys(WHAT).flatMap(name => {
+    const over = limits.flatMap((limit, i) => (limit[name] >= INSIDE ? [] : [i + 1]))
+    return over.length ? [`${counted('limb', over)}: ${WHAT[name]} exceeded`] : []
+  })
 }
+
+const counted = (what, numbers) => `${what}${numbers.length > 1 ? 's' : ''} ${numbers.join(', ')}`
+
+const hasCones = ({ limbs = [] }) => limbs.some(limb => limb.base_cone || limb.platform_cone || limb.joints?.some(joint => joint.cone))
+const hasLimits = data => hasCones(data) || data.limbs.some(limb => limb.stroke || limb.joints?.some(joint => joint.stroke))

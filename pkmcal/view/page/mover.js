@@ -1,13 +1,14 @@
 // A parallel machine: its pose, its actuators, and how either follows the other.
 // Poses are x y z [mm] α β γ [rad] in the user's frames; `own` is the same in the machine's own.
-const STATUS = ['', 'no pose was found', 'a singularity is in the way', 'a limb has no length', 'no numbers',
+const STATUS = ['', 'beyond it no pose was found', 'a singularity is in the way', 'a limb has no length', 'no numbers',
   'the limbs do not meet']
 const SETTLED = 1e-12, KEPT = 1e-9, ON_THE_MANIFOLD = 1e-10, ITERATIONS = 30
+const FOLDED = 0.02 // of the size, or rad: limbs with errors miss each other by much less
 const PARTS = 12 // of a way on which poses are completed one after the other
 
 class Mover {
   constructor(core, data) {
-    Object.assign(this, { core, data, m: data.free.length, n: data.actuators.length, mode: 0, stopped: '' })
+    Object.assign(this, { core, data, m: data.free.length, n: (data.laws ?? data.actuators).length, mode: 0, stopped: '' })
     this.fixed = [0, 1, 2, 3, 4, 5].filter(k => !data.free.includes(k))
     this.home()
   }
@@ -36,27 +37,32 @@ class Mover {
   }
 
   // kinematics of the core -----------------------------------------------------------------------
-  inverse(own) {
+  inverse(own) { return readingsOf(this.data, this.ways(own)) }
+
+  // of the drives
+  ways(own) {
     this.core.pose.set(own)
     this.core.wasm.inverse()
-    const q = Array.from(this.core.q.subarray(0, this.n))
-    return this.data.kind === 'chains' ? this.nearestTurns(q) : q
+    const ways = Array.from(this.core.q.subarray(0, this.n))
+    return this.data.kind === 'chains' ? this.nearestTurns(ways) : ways
   }
 
-  nearestTurns(q) {
+  nearestTurns(ways) {
     const { turns, near } = this.data, even = 6755399441055744
-    return q.map((x, a) => (turns[a] === null ? x : x - turns[a] * ((x - near[a]) / turns[a] + even - even)))
+    return ways.map((x, a) => (turns[a] === null ? x : x - turns[a] * ((x - near[a]) / turns[a] + even - even)))
   }
 
-  forward(q, guess) {
-    this.core.q.set(q), this.core.pose.set(guess)
+  forward(q, guess) { return this.solved(waysOf(this.data, q), guess) }
+
+  solved(ways, guess) {
+    this.core.q.set(ways), this.core.pose.set(guess)
     const status = this.core.wasm.forward()
     return { status, own: Array.from(this.core.found.subarray(0, 6)) }
   }
 
-  closure(own, q) {
+  closure(own, ways) {
     const { core, m, n } = this, { rows, shared } = this.data, wide = m + shared
-    core.pose.set(own), core.q.set(q)
+    core.pose.set(own), core.q.set(ways)
     core.wasm.closure()
     let step = rowsOf(core.byStep, rows, wide)
     let all = rowsOf(core.byFree, rows, m)
@@ -75,7 +81,7 @@ class Mover {
 
   // σ_min/σ_max of the closures by a twist: 0 is a singularity
   conditioning() {
-    const { byStep } = this.closure(this.own, this.q)
+    const { byStep } = this.closure(this.own, waysOf(this.data, this.q))
     if (!byStep.every(finite)) return NaN
     const sigma = singular(byStep).sigma
     return Math.min(...sigma) / Math.max(...sigma)
@@ -109,9 +115,9 @@ class Mover {
 
   // q of a pose that the machine can take as it is, or null
   takes(own) {
-    const q = this.inverse(own)
+    const ways = this.ways(own), q = readingsOf(this.data, ways)
     if (!finite(q)) return null
-    const { phi, onMap } = this.closure(own, q), least = ON_THE_MANIFOLD * this.data.size
+    const { phi, onMap } = this.closure(own, ways), least = ON_THE_MANIFOLD * this.data.size
     const away = this.data.map === 'spatial' ? 0 : Math.max(...this.fixed.map(k => Math.abs(own[k] - onMap[k])), 0)
     return Math.max(...phi.map(Math.abs)) <= least && away <= KEPT ? q : null
   }
@@ -121,22 +127,21 @@ class Mover {
     let own = this.inward(pose), q = this.takes(own)
     if (q) return { own, q }
     if (map !== 'spatial') this.toMap(own, wanted)
-    q = this.inverse(own)
-    let done = false
-    for (let k = 0; k < ITERATIONS && finite(q) && !done; k++) {
-      const closure = this.closure(own, q)
+    let ways = this.ways(own), done = false
+    for (let k = 0; k < ITERATIONS && finite(ways) && !done; k++) {
+      const closure = this.closure(own, ways)
       for (const i of this.fixed) own[i] = closure.onMap[i]
       const seen = this.seen(own, wanted)
-      const left = [...closure.by, ...this.kept(closure, own, seen, wanted).map(row => [...row, ...q.map(() => 0)])]
+      const left = [...closure.by, ...this.kept(closure, own, seen, wanted).map(row => [...row, ...ways.map(() => 0)])]
       const right = [...closure.phi, ...this.off(seen, wanted)]
       if (!left.every(finite) || !finite(right)) return null
       const step = leastSquares(left, right)
       this.data.free.forEach((i, j) => { own[i] -= step[j] })
-      q = add(q, step.slice(this.m), -1)
+      ways = add(ways, step.slice(this.m), -1)
       done = Math.max(...step.map(Math.abs)) <= SETTLED * size
     }
     if (!done) return null
-    const found = this.forward(this.data.kind === 'chains' ? this.nearestTurns(q) : q, own)
+    const found = this.solved(this.data.kind === 'chains' ? this.nearestTurns(ways) : ways, own)
     if (found.status) return null
     const off = this.off(this.seen(found.own, wanted), wanted)
     if (off.some((x, j) => Math.abs(x) > KEPT * (moved[j] < 3 ? size : 1))) return null
@@ -146,7 +151,7 @@ class Mover {
 
   // onto what the map moves, where the frames make that something else than zeros
   toMap(own, wanted) {
-    const none = this.q.map(() => 0)
+    const none = Array(this.n).fill(0)
     for (let k = 0; k < ITERATIONS; k++) {
       const closure = this.closure(own, none)
       for (const i of this.fixed) own[i] = closure.onMap[i]
@@ -155,6 +160,13 @@ class Mover {
       const step = leastSquares(this.kept(closure, own, seen, wanted), off)
       this.data.free.forEach((i, j) => { own[i] -= step[j] })
     }
+  }
+
+  // actuators that lead to this pose otherwise than the inverse kinematics does, counted from 1
+  pastDeadPoint() {
+    const { size, actuators } = this.data, q = this.inverse(this.own)
+    const far = q.map((x, a) => (actuators[a].unit === 'rad' ? Math.abs(wrapped(x - this.q[a])) : Math.abs(x - this.q[a]) / size))
+    return far.flatMap((x, a) => (x > FOLDED ? [a + 1] : []))
   }
 
   // what the sliders ask for ---------------------------------------------------------------------
@@ -184,10 +196,10 @@ class Mover {
 
   unreached(target) {
     if (this.data.kind === 'chains') return 'a chain does not reach'
-    this.core.pose.set(this.inward(target)), this.core.q.set(this.q)
+    this.core.pose.set(this.inward(target)), this.core.q.set(waysOf(this.data, this.q))
     this.core.wasm.places()
     const missing = this.data.limbs.flatMap((_, i) => (Number.isFinite(this.core.drive[i]) ? [] : [i + 1]))
-    return missing.length ? `limb ${missing.join(', ')} does not reach` : 'its limbs do not allow it'
+    return missing.length ? `${counted('limb', missing)} ${missing.length > 1 ? 'do' : 'does'} not reach` : 'its limbs do not allow it'
   }
 
   moveActuator(a, value) {

@@ -1,5 +1,10 @@
 // The words and sliders beside the picture.
 const NAMES = ['x', 'y', 'z', 'α', 'β', 'γ'], ABOUT = ['along x', 'along y', 'along z', 'about x', 'about y', 'about z']
+const LEGEND = {
+  limbs: 'Grey: the base and the limbs; blue-green: the platform. base1 and platform1 are the joints at the ends of limb 1.',
+  chains: 'Grey: the base and the limbs; blue-green: the platform and the joints that are driven. 2.3 U is joint 3 of limb 2; R turns, P slides, U is universal, S spherical, C cylindrical.',
+  arm: 'Blue-green: the tool.',
+}
 const DIGITS = 3
 const fixed = x => (Math.round(x * 10 ** DIGITS) / 10 ** DIGITS || 0).toFixed(DIGITS) // no -0
 
@@ -15,7 +20,7 @@ function made(tag, parent, settings = {}, ...children) {
 }
 
 // A slider with a number beside it, in mm or degrees; `allowed` is drawn under it.
-function slider(parent, { name, title, unit, range, allowed, moved }) {
+function slider(parent, { name, title, unit, range, allowed, disabled, moved }) {
   const by = unit === 'rad' ? 1 / DEGREE : 1, shown = range.map(x => x * by)
   const label = made('label', parent, { className: 'row', title })
   made('span', label, { text: name })
@@ -30,6 +35,7 @@ function slider(parent, { name, title, unit, range, allowed, moved }) {
     shaded.style.left = `${low}%`
     shaded.style.width = `${high - low}%`
   }
+  input.disabled = number.disabled = Boolean(disabled)
   input.oninput = () => moved(+input.value / by)
   number.onchange = () => { if (number.value !== '' && Number.isFinite(+number.value)) moved(+number.value / by) }
   return value => {
@@ -47,14 +53,15 @@ class Panel {
     this.state = made('p', side, { className: 'state', role: 'status' })
     this.meter = made('div', side, { className: 'meter', title: 'σmin/σmax of the closures: 0 is a singularity, where the machine cannot hold or cannot move' })
     this.bar = made('i', made('span', this.meter))
-    this.condition = made('b', this.meter)
+    this.condition = made('p', side, { className: 'hint' })
     this.platform(side, data)
     this.actuators(side, data)
     const buttons = made('div', side, { className: 'buttons' })
-    made('button', buttons, { type: 'button', text: 'Home', onclick: () => { mover.home(); changed() } })
+    made('button', buttons, { type: 'button', text: 'Home', onclick: () => { mover.home(); changed(true) } })
     if (data.places) this.places(side, data.places)
     if (data.modes?.poses.length > 1) this.modes(side, data)
     this.toggles(side, show)
+    made('p', side, { className: 'hint', text: LEGEND[data.kind] })
     made('p', side, { className: 'hint', text: 'Drag the picture to turn it; the wheel or two fingers zoom.' })
   }
 
@@ -69,11 +76,14 @@ class Panel {
     if (this.others.length) this.follows = made('p', side, { className: 'follows' })
   }
 
-  actuators(side, { kind, actuators, joints }) {
-    made('h3', side, { text: kind === 'arm' ? 'Turn the joints' : 'Move the actuators' })
-    made('p', side, { className: 'hint', text: kind === 'arm' ? 'The tool follows.' : 'The platform follows; shaded: the stroke, where it is stated.' })
+  actuators(side, { kind, actuators, joints, moved }) {
+    const arm = kind === 'arm', surplus = !arm && actuators.length > moved.length, stated = actuators.some(({ stroke }) => stroke)
+    const slides = arm && joints.some(joint => joint.kind === 'P')
+    made('h3', side, { text: arm ? (slides ? 'Move the joints' : 'Turn the joints') : surplus ? 'Actuators' : 'Move the actuators' })
+    const what = arm ? 'The tool follows' : surplus ? 'There are more of them than ways to move: none moves alone, all follow' : 'The platform follows'
+    made('p', side, { className: 'hint', text: `${what}${stated ? '; shaded: the stroke' : ''}.` })
     this.q = actuators.map(({ unit, range, stroke }, a) => slider(side, {
-      name: `q${a + 1}`, title: joints?.[a].name ?? `actuator ${a + 1}`, unit, range, allowed: stroke,
+      name: `q${a + 1}`, title: joints?.[a].name ?? `actuator ${a + 1}`, unit, range, allowed: stroke, disabled: surplus,
       moved: value => { this.mover.moveActuator(a, value); this.changed() },
     }))
   }
@@ -124,16 +134,20 @@ class Panel {
     mover.q.forEach((x, a) => this.q[a](x))
     if (this.follows) {
       const unit = k => (k < 3 ? ' mm' : '°'), value = k => (k < 3 ? mover.pose[k] : mover.pose[k] / DEGREE)
-      this.follows.textContent = 'follows: ' + this.others.map(k => `${NAMES[k]} ${fixed(value(k))}${unit(k)}`).join(', ')
+      this.follows.textContent = 'These follow: ' + this.others.map(k => `${NAMES[k]} ${fixed(value(k))}${unit(k)}`).join(', ')
     }
     const found = limits ? broken(limits) : [], conditioning = mover.conditioning()
     const near = data.conditioning ? conditioning / data.conditioning : conditioning / 0.3
     const singular = !(near > 0.1)
-    this.state.textContent = mover.stopped || found.slice(0, 4).join('; ') || (singular ? 'near a singularity' : limits ? 'within all limits' : 'in reach')
+    const over = limits ? mover.pastDeadPoint() : []
+    if (over.length) found.push(`${counted('actuator', over)}: the limb has passed a dead point (another working mode)`)
+    const good = !limits ? 'in reach' : hasLimits(data) ? 'within all limits' : 'in reach; no limits are stated'
+    this.state.textContent = mover.stopped || found.join('; ') || (singular ? 'near a singularity' : good)
     this.state.classList.toggle('bad', Boolean(mover.stopped || found.length || singular))
     this.bar.style.width = `${Math.max(1.5, Math.min(100, 60 * near)) || 1.5}%`
     this.meter.classList.toggle('bad', singular)
-    this.condition.textContent = `conditioning ${Number.isFinite(conditioning) ? conditioning.toPrecision(3) : '–'}`
+    const said = x => (Number.isFinite(x) ? x.toPrecision(3) : '–')
+    this.condition.textContent = `conditioning ${said(conditioning)} (${data.conditioning ? `home ${said(data.conditioning)}, ` : ''}singular at 0)`
     if (this.mode) this.mode.textContent = mover.mode < 0 ? `– of ${data.modes.poses.length}` : `${mover.mode + 1} of ${data.modes.poses.length}`
   }
 }

@@ -4,18 +4,19 @@ const COLOURS = {
     paper: '#f6f7f5', ink: '#1d2a33', dim: '#56656e', label: '#0b5c70', base: '#5b6770', baseface: '#5b677018',
     platform: '#0b7285', platformface: '#0b728530', joint: '#37424a', tube: '#b9c0c4', rod: '#8a959c', rail: '#a9b1b6',
     track: '#a9b1b6', cable: '#56656e', bad: '#d6303a', badface: '#d6303a22', cone: '#8a6d00', coneface: '#c9a2271c',
-    x: '#c0392b', y: '#2e8b3d', z: '#2a5bd7', cloud: '#0b728548', grid: '#d8dedd', shadow: '#1d2a3314',
+    x: '#c0392b', y: '#2e8b3d', z: '#2a5bd7', cloud: '#0b728599', grid: '#d8dedd', shadow: '#1d2a3314',
     before: '#d55e00', after: '#0072b2', ghost: '#d55e0099', planned: '#7b4ab5',
   },
   dark: {
     paper: '#12191d', ink: '#e6ecec', dim: '#9fb0b8', label: '#7fe0f0', base: '#71808a', baseface: '#71808a22',
     platform: '#1fa6bd', platformface: '#3bc9db2c', joint: '#97a5ad', tube: '#8d989f', rod: '#66737b', rail: '#56636b',
     track: '#56636b', cable: '#9fb0b8', bad: '#ff5a63', badface: '#ff5a6328', cone: '#d8b84a', coneface: '#d8b84a1c',
-    x: '#ff7b6b', y: '#63cf74', z: '#7ea4ff', cloud: '#3bc9db55', grid: '#26323a', shadow: '#00000040',
+    x: '#ff7b6b', y: '#63cf74', z: '#7ea4ff', cloud: '#3bc9dbaa', grid: '#26323a', shadow: '#00000040',
     before: '#ff9d4d', after: '#5db4ea', ghost: '#ff9d4d99', planned: '#b892ea',
   },
 }
 const FOCAL = 2.6, PIECE = 0.09 // of the size: long rods are sorted in pieces
+const ASIDE = 26, SIDES = 12 // pixels around the machine, where labels stand; from how many sides it is fitted
 
 const shades = {}
 function shade(colour, by) { // towards black or, above 1, white
@@ -27,7 +28,7 @@ function shade(colour, by) { // towards black or, above 1, white
 
 class Scene {
   constructor(canvas, redraw) {
-    Object.assign(this, { canvas, redraw, turn: -0.9, tilt: 0.32, zoom: 1, centre: [0, 0, 0], radius: 1 })
+    Object.assign(this, { canvas, redraw, turn: -0.9, tilt: 0.32, zoom: 1, room: 1, centre: [0, 0, 0], radius: 1, points: [] })
     this.context = canvas.getContext('2d')
     this.dark = matchMedia('(prefers-color-scheme: dark)')
     this.dark.addEventListener('change', redraw)
@@ -35,26 +36,65 @@ class Scene {
     this.listen()
   }
 
+  // these points in the middle of the picture, as large as they can be turned around there
   fit(points) {
     const low = [0, 1, 2].map(k => Math.min(...points.map(p => p[k])))
     const high = [0, 1, 2].map(k => Math.max(...points.map(p => p[k])))
     this.centre = mix(low, high, 0.5)
     this.radius = Math.max(norm(sub(high, low)) / 2, 1e-3)
     this.floor = low[2]
+    this.points = points
+    this.tilted = this.tilt
+    this.fitted = ''
+  }
+
+  // and these too: a machine that moves stays in the picture
+  include(points) {
+    const { wide, high } = this.size(), eye = this.eyeFrom(wide, high, this.turn, this.tilt, this.room)
+    const outside = points.filter(p => !this.inside(eye, p))
+    if (!outside.length) return
+    this.points = [...this.points, ...outside]
+    this.fitted = ''
+  }
+
+  inside(eye, p) {
+    const [x, y] = this.seen(eye, p)
+    return Math.abs(x - eye.wide / 2) < eye.wide / 2 - ASIDE && Math.abs(y - eye.high / 2) < eye.high / 2 - ASIDE
+  }
+
+  // how far away, in radii, one has to be to see all points from every side
+  roomFor(wide, high) {
+    let near = 0.3, far = 64
+    const all = room => Array.from({ length: SIDES }, (_, k) => this.eyeFrom(wide, high, (2 * Math.PI * k) / SIDES, this.tilted, room))
+      .every(eye => this.points.every(p => this.inside(eye, p)))
+    for (let k = 0; k < 12; k++) {
+      const middle = Math.sqrt(near * far)
+      if (all(middle)) far = middle
+      else near = middle
+    }
+    return far
+  }
+
+  size() { return { wide: Math.max(this.canvas.clientWidth, 1), high: Math.max(this.canvas.clientHeight, 1) } }
+
+  eyeFrom(wide, high, turn, tilt, room) {
+    const [ct, st, ce, se] = [Math.cos(turn), Math.sin(turn), Math.cos(tilt), Math.sin(tilt)]
+    return {
+      wide, high, away: FOCAL * this.radius * room, scale: (FOCAL * Math.min(wide, high)) / 2,
+      right: [-st, ct, 0], up: [-ct * se, -st * se, ce], back: [ct * ce, st * ce, se],
+    }
   }
 
   look() {
-    const { canvas, context } = this, ratio = devicePixelRatio || 1
-    const wide = Math.max(canvas.clientWidth, 1), high = Math.max(canvas.clientHeight, 1)
+    const { canvas, context } = this, ratio = devicePixelRatio || 1, { wide, high } = this.size()
     if (canvas.width !== Math.round(wide * ratio)) canvas.width = Math.round(wide * ratio)
     if (canvas.height !== Math.round(high * ratio)) canvas.height = Math.round(high * ratio)
     context.setTransform(ratio, 0, 0, ratio, 0, 0)
-    const [ct, st, ce, se] = [Math.cos(this.turn), Math.sin(this.turn), Math.cos(this.tilt), Math.sin(this.tilt)]
-    const away = (FOCAL * 1.14 * this.radius) / this.zoom * Math.max(1, high / wide)
-    return {
-      wide, high, away, scale: (FOCAL * high) / 2 * Math.min(1, (wide / high)) * Math.max(1, high / wide),
-      right: [-st, ct, 0], up: [-ct * se, -st * se, ce], back: [ct * ce, st * ce, se],
+    if (this.fitted !== `${wide} ${high}`) {
+      this.fitted = `${wide} ${high}`
+      this.room = this.roomFor(wide, high)
     }
+    return this.eyeFrom(wide, high, this.turn, this.tilt, this.room / this.zoom)
   }
 
   // x and y on the canvas, the distance, and how many pixels a mm is there
@@ -180,9 +220,11 @@ class Scene {
     const taken = [], { context } = this
     const planned = bodies.map(body => ({ ...body, seen: this.seen(eye, body.at) }))
     planned.sort((a, b) => (b.colour === 'label') - (a.colour === 'label') || a.seen[2] - b.seen[2])
-    for (const { text, colour, seen: [x, y] } of planned) {
+    for (const { text, colour, seen: [middle, y] } of planned) {
       context.font = `${colour === 'label' ? '600 14px' : '12px'} system-ui, sans-serif`
       const half = context.measureText(text).width / 2 + 2
+      if (middle < 0 || middle > eye.wide) continue
+      const x = Math.max(half, Math.min(eye.wide - half, middle))
       const free = at => taken.every(([l, r, t]) => x + half < l || x - half > r || Math.abs(at - t) > 13)
       const at = [y, y - 14, y + 14].find(free)
       if (at === undefined) continue

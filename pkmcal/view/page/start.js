@@ -4,8 +4,8 @@ async function start(root, data) {
   const mover = data.kind === 'arm' ? new Arm(core, data) : new Mover(core, data)
   const cloud = data.cloud ? await cloudOf(data.cloud) : null
   const show = { numbers: !data.calibration, frames: true, limits: true, cloud: false, places: true, names: { numbers: 'numbers', frames: 'frames' } }
-  if (data.kind !== 'arm') show.names.limits = 'joint cones'
-  if (cloud) show.names.cloud = 'where it gets to'
+  if (hasCones(data)) show.names.limits = 'joint cones'
+  if (cloud) show.names.cloud = 'workspace'
   if (data.places) show.names.places = data.places.name
   const assumed = data.calibration ? await loadedCore(data) : null
   root.replaceChildren()
@@ -23,21 +23,22 @@ async function start(root, data) {
   const redraw = () => { if (parts.panel) draw(looks()) }
   const scene = new Scene(canvas, redraw)
   if (data.map === 'planar' || data.map === 'xy') scene.tilt = 1.1
-  const changed = () => {
+  const places = ({ list }) => list.flatMap(b => b.rod ?? (b.wide ? [] : b.line) ?? (b.ball ? [b.ball] : []))
+  const changed = anew => {
     const found = looks()
     parts.panel.update(found[0])
+    if (anew) scene.fit(places(found[1]))
+    else scene.include(places(found[1]))
     draw(found)
   }
   parts.panel = new Panel(side, mover, changed, show)
-  const [, bodies] = looks()
-  scene.fit(bodies.list.flatMap(b => b.rod ?? b.line ?? (b.ball ? [b.ball] : [])))
   if (assumed) {
     const first = made('div')
     parts.calibration = new Calibration(assumed, data, mover, first, redraw)
-    side.children[3].after(first)
+    parts.panel.condition.after(first)
     scene.pointed = (x, y) => parts.calibration.point(x, y, scene)
   }
-  changed()
+  changed(true)
   root.classList.add('moves')
   root.machine = { mover, scene, show, changed, calibration: parts.calibration, limits: () => looks()[0] }
 }

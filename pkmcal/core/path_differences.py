@@ -1,4 +1,7 @@
-"""Motions of machines of chains: actuators by the platform's, and the platform's by theirs.
+"""Motions without a closed form: actuators by the platform's, and the platform's by theirs.
+
+Of machines of chains, and of those with more closures than free coordinates, whose pose that misses
+them least moves with their second derivatives.
 
 By central differences of fourth order along a path with the velocity and acceleration asked for.
 The kinematics they are taken of is exact to 1e-13 of the size, and the path goes 1e-3 of it to each
@@ -79,13 +82,8 @@ def platform_motion(
     scale : ndarray (n,)
         To which part of the size a unit of each actuator compares.
     """
-    speed = np.abs(q1 * scale).max(axis=1, initial=0.0)
-    bent = np.sqrt(np.abs(q2 * scale).max(axis=1, initial=0.0))
-    step = WAY / np.maximum(np.maximum(speed, bent), 1e-12)
-    poses = []
-    for k in range(-2, 3):
-        t = (k * step)[:, None]
-        poses.append(forward(np.ascontiguousarray(q + t * q1 + t * t / 2 * q2)))
+    changes, step = _path(q1, q2, scale)
+    poses = [forward(np.ascontiguousarray(q + change)) for change in changes]
     still = _frames(pose)
     turned = []
     for each in poses:
@@ -102,6 +100,38 @@ def platform_motion(
     for each in poses:
         each[:, 3:] = pose[:, 3:] + wrapped(each[:, 3:] - pose[:, 3:])
     return out, *_differences(np.array(poses), step)
+
+
+def along_path(
+    function: Callable[[FloatArray], FloatArray],
+    first: FloatArray,
+    second: FloatArray,
+    scale: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """First and second derivative by time, (N, k), of a function of numbers that change.
+
+    Parameters
+    ----------
+    function : callable
+        Changes of the numbers (N, n) to values (N, k).
+    first, second : ndarray (N, n)
+        Their velocity and acceleration.
+    scale : ndarray (n,)
+        To which part of the size a unit of each compares.
+    """
+    changes, step = _path(first, second, scale)
+    return _differences(np.array([function(change) for change in changes]), step)
+
+
+def _path(
+    first: FloatArray, second: FloatArray, scale: FloatArray
+) -> tuple[list[FloatArray], FloatArray]:
+    """Changes (N, n) at five times around now, and the time from one to the next, (N,)."""
+    speed = np.abs(first * scale).max(axis=1, initial=0.0)
+    bent = np.sqrt(np.abs(second * scale).max(axis=1, initial=0.0))
+    step = WAY / np.maximum(np.maximum(speed, bent), 1e-12)
+    times = [(k * step)[:, None] for k in range(-2, 3)]
+    return [t * first + t * t / 2 * second for t in times], step
 
 
 def _differences(values: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,152 @@
+"""Thermal expansion: what a machine that is not at 20 °C reads, by stated coefficients.
+
+The identified numbers are those of the machine at 20 °C, the reference temperature of ISO 1. Beside
+it every length of base, platform and limbs is longer by its coefficient times the difference: what
+is predicted of a row is moved by that, to first order, at each step of the search: what is left is
+the square of 0.01 % and its like.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arguments import did_you_mean, shown
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.measurements.measurements import Measurements
+
+Coefficients = float | Mapping[str, float] | None
+REFERENCE = 20.0  # °C
+_LARGEST = 1e-3  # 1/K: no material; µm/m/K were meant
+_PARTS = ("base", "platform", "limbs")
+_LIMB = re.compile(r"limb([1-9][0-9]*)")
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """How the numbers of a machine grow with temperature.
+
+    Attributes
+    ----------
+    given : mapping of str to float
+        The coefficients as stated.
+    coefficient : ndarray (k,)
+        Of each number of its limbs, 1/K; 0 of angles.
+    column : ndarray of int (k,)
+        Which of the temperatures of a row it has.
+    platform : float
+        Of the platform, with the targets on it, 1/K.
+    """
+
+    given: Mapping[str, float]
+    coefficient: FloatArray
+    column: IntArray
+    platform: float
+
+    def growth(self, measured: Measurements) -> tuple[FloatArray, FloatArray]:
+        """Relative growth of each number (N, k), and of places on the platform (N,).
+
+        Raises
+        ------
+        ValueError
+            No temperature, or none of a part that grows.
+        """
+        if measured.temperature is None:
+            raise ArgumentError(
+                "expansion: the measurements have no temperature; the file needs a column"
+                " temperature [°C]"
+            )
+        above = measured.temperature - REFERENCE
+        by_number = above[:, self.column]
+        by_number[:, self.coefficient == 0.0] = 0.0
+        platform = above[:, 1] if self.platform else np.zeros(len(above))
+        unread = np.isnan(by_number).any(axis=1) | np.isnan(platform)
+        if unread.any():
+            row = int(np.argmax(unread))
+            where = f"row {row}" if measured.lines is None else f"line {measured.lines[row]}"
+            file = f"{measured.file}, " if measured.file else ""
+            raise ArgumentError(f"expansion: {file}{where}: a temperature is missing")
+        return by_number * self.coefficient, platform * self.platform
+
+
+def expansion_of(robot: Calibratable, given: Coefficients) -> Expansion | None:
+    """The coefficients that `identify` was given, of the numbers of a machine.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An unknown part, no coefficient, a machine whose lengths are not among its numbers.
+    """
+    if given is None:
+        return None
+    limbs = robot.model.limbs if isinstance(robot, Robot) else ()
+    if not isinstance(robot, Robot) or robot.model.chains is not None or robot.model.driven:
+        raise ArgumentError(
+            f"expansion: {robot.name} is an arm, or has limbs that are chains of joints or drives"
+            " with laws: which of their numbers are lengths is not known; found coefficients"
+        )
+    of = {name: _coefficient(name, value) for name, value in _named(given, len(limbs)).items()}
+    numbers = robot.geometry.numbers
+    coefficient, column = np.zeros(len(numbers)), np.zeros(len(numbers), dtype=np.intp)
+    for i, number in enumerate(numbers):
+        part = number.slot.partition(".")[0]
+        if part in _PARTS:
+            coefficient[i], column[i] = of.get(part, 0.0), _PARTS.index(part)
+            continue
+        actuator = limbs[number.limb].actuator
+        scale = number.slot == "gain" and robot.actuator_units[actuator] == "mm"
+        if number.unit == "mm" or scale:
+            coefficient[i] = of.get(f"limb{number.limb + 1}", of.get("limbs", 0.0))
+            column[i] = 2 + actuator
+    return Expansion(of, coefficient, column, of.get("platform", 0.0))
+
+
+def _named(given: float | Mapping[str, float], limbs: int) -> Mapping[str, float]:
+    if not isinstance(given, Mapping):
+        return dict.fromkeys(_PARTS, given)
+    for name in given:
+        match = _LIMB.fullmatch(name) if isinstance(name, str) else None
+        if name not in _PARTS and not (match and int(match[1]) <= limbs):
+            known = [*_PARTS, *(f"limb{i + 1}" for i in range(limbs))]
+            raise ArgumentError(
+                f"expansion: of base, platform, limbs or limb1 to limb{limbs}; found"
+                f" {name!r}{did_you_mean(str(name), known)}"
+            )
+    return given
+
+
+def _coefficient(name: str, value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+        raise ArgumentTypeError(f"expansion: {name}: expected a number, found {shown(value)}")
+    if not abs(float(value)) < _LARGEST:
+        raise ArgumentError(f"expansion: {name}: in 1/K, of steel 11.5e-6; found {float(value):g}")
+    return float(value)
+
+
+def temperatures(sets: Iterable[Measurements]) -> tuple[float, float] | None:
+    """The lowest and the highest that was read, °C; None where nothing was."""
+    read = [m.temperature[np.isfinite(m.temperature)] for m in sets if m.temperature is not None]
+    whole = np.concatenate(read) if read else np.empty(0)
+    return (float(whole.min()), float(whole.max())) if whole.size else None
+
+
+def in_words(sets: Sequence[Measurements], given: Mapping[str, float]) -> str:
+    """What became of the temperatures that were read; "" where none were."""
+    between = temperatures(sets)
+    if between is None:
+        return ""
+    low, high = between
+    span = f"{low:.4g} to {high:.4g} °C" if low < high else f"{low:.4g} °C"
+    if not given:
+        return f"the machine was at {span}, which is not allowed for: --expansion (expansion=)"
+    parts: dict[float, list[str]] = {}
+    for name, coefficient in given.items():
+        parts.setdefault(coefficient, []).append(name)
+    each = "; ".join(f"{', '.join(names)} {c * 1e6:.3g} µm/m/K" for c, names in parts.items())
+    return f"numbers are those at {REFERENCE:g} °C; the machine was at {span}, expansion: {each}"

@@ -1,0 +1,57 @@
+"""Whether the machine is linear over what the parameters are uncertain by.
+
+Standard deviations and intervals are those of the linear machine at the solution. Where a
+combination is hardly determined they can carry the machine so far that they say nothing: the misfit
+there is not what the linear machine has.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.calibration.estimator import Estimate
+from pkmcal.calibration.identifiability import CLEAR, listed
+from pkmcal.calibration.uncertainty import Uncertainty
+
+_DRAWS = 8
+_BY_PRIOR = 0.5  # share of what is known of a combination from which a prior determines it
+_OFF = 0.5  # share of the rise of the misfit by which the machine may differ from the linear one
+
+
+def beyond_linear(estimate: Estimate, uncertainty: Uncertainty) -> list[str]:
+    """Say which parameters are so uncertain that their deviations say nothing.
+
+    Parameters are drawn by their covariance, and the rise of the sum of squares is compared with
+    that of the linear machine; only where some combination that the measurements determine, more
+    than a prior does, is not determined to `CLEAR` of the machine's size.
+    """
+    equations, state, linear_fit = uncertainty.equations, estimate.state, uncertainty.fit
+    chosen, fitted = equations.parameters, state.fitted.identifiable
+    shares, directions = np.linalg.eigh(linear_fit.prior.T @ linear_fit.prior)
+    measured = directions[:, shares < _BY_PRIOR]
+    if not uncertainty.known or not measured.shape[1]:
+        return []
+    values, vectors = np.linalg.eigh(uncertainty.covariance.of(measured.T))
+    root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
+    root = fitted @ (fitted.T @ linear_fit.back @ measured @ root)
+    least = CLEAR * chosen.robot.length
+    if not np.linalg.norm(root, 2) > least:
+        return []
+    weights = np.repeat(estimate.weights, equations.components)
+    rises = []
+    for draw in np.random.default_rng(0).normal(size=(_DRAWS, root.shape[1])):
+        step = root @ draw
+        equations.warm_start(estimate.evaluation)
+        there = equations.at(estimate.evaluation.theta + chosen.scale * step, state.noise)
+        residual = equations.residual(there, state.noise)
+        linear = estimate.residual - estimate.jacobian @ step
+        beyond = weights @ residual**2 - weights @ linear**2
+        rises.append(beyond / (weights @ (estimate.jacobian @ step) ** 2))
+    equations.warm_start(estimate.evaluation)
+    if np.median(np.nan_to_num(np.abs(rises), nan=np.inf)) < _OFF:
+        return []
+    names = listed([chosen.names[i] for i in np.flatnonzero(np.linalg.norm(root, axis=1) > least)])
+    return [
+        f"{names} are hardly determined: the machine is not linear over their ±, which say little;"
+        " measure other poses, state a prior or free fewer parameters"
+    ]

@@ -1,0 +1,48 @@
+"""Whether sets of measurements have the noise that was stated for each of them.
+
+A common slip is a matter of scale; sets that slipped apart are weighted wrongly against each other,
+and the classical covariance, which trusts the weights, is then wrong too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.statistics.distributions import chi2_tail
+
+_CHANCE = 0.01  # of residuals as far from what was stated, on either side
+_APART = 1.2  # ratio of deviations from which it matters
+
+
+def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
+    """Deviation of the residuals of each set in units of its stated sigma; 1 where that holds.
+
+    All 1 where sigma is nowhere stated, where all sets slipped alike, for robust losses, and where
+    equations are mixtures of readings.
+    """
+    equations = estimator.equations
+    ratios = np.ones(len(equations.sets))
+    if equations.closures.unknowns or estimator.loss != "linear":
+        return ratios
+    squares, freedom = (part[: len(ratios)] for part in estimate.shares[:2])
+    unstated = estimator.unstated[: len(ratios)]
+    common = 1.0 if unstated.any() else float(squares.sum() / max(freedom.sum(), 1e-9))
+    for i in np.flatnonzero(~unstated & (freedom > 0)):
+        above = chi2_tail(float(squares[i]) / common, float(freedom[i]))
+        if min(above, 1.0 - above) < _CHANCE / 2.0:
+            ratios[i] = np.sqrt(squares[i] / freedom[i])
+    return ratios if ratios.max() > _APART * ratios.min() else np.ones_like(ratios)
+
+
+def unlike_noise(ratios: FloatArray) -> list[str]:
+    """Name the sets whose sigma is wrong beside that of the others."""
+    wrong = [i for i, ratio in enumerate(ratios) if max(ratio, 1.0 / ratio) > _APART]
+    if not wrong:
+        return []
+    parts = [f"of measurements {i + 1} {ratios[i]:.2g} times" for i in wrong]
+    return [
+        f"the residuals {' and '.join(parts)} what sigma says: the sets are weighted wrongly beside"
+        " each other; state the true sigma, or none"
+    ]

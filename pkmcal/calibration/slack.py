@@ -1,0 +1,211 @@
+"""Slack cables: readings of actuators that are longer than the way to the platform.
+
+A cable pulls and cannot push: what its winch has let out is the distance to the platform or more.
+Where it is more the reading says next to nothing of the pose, and taken for a distance it bends the
+geometry. Slack shows on machines with more cables than needed, as a residual of one sign.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.calibration.begin import estimator_at
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.display import first_rows
+from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.robot import Robot
+from pkmcal.statistics.robust_scale import median_ratio
+
+Slack = Literal["keep", "drop"]
+SLACK: tuple[Slack, ...] = ("keep", "drop")
+_LISTED = 3  # cables that a warning names
+_FALSE_ALARM = 0.01  # chance of calling any cable slack where all are taut
+_ROUNDS = 10  # of leaving cables out and fitting anew
+_TOO_SHORT = 4.0  # deviations by which a reading is shorter than a slack cable's can be
+_SEEN = 1e-6  # degrees of freedom from which an equation's residual shows anything
+_ALIKE = 1e-3  # share by which squares differ that cannot be told apart
+
+
+@dataclass(frozen=True)
+class SlackCable:
+    """A cable that was slack at a pose.
+
+    Attributes
+    ----------
+    rows : tuple of int
+        Numbers of the rows that are of this pose.
+    actuators : tuple of int
+        Whose reading it is, counted from 1; several where it cannot be told which of them.
+    longer : float
+        By how much the reading is longer than the way, mm.
+    """
+
+    rows: tuple[int, ...]
+    actuators: tuple[int, ...]
+    longer: float
+
+    def __str__(self) -> str:
+        which = " or ".join(f"q{a}" for a in self.actuators)
+        return f"{which} of row {first_rows(self.rows, 3)} by {self.longer:.3g} mm"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A reading at a pose that is too long: the pose, and the closures that it may be."""
+
+    pose: int
+    closures: tuple[int, ...]
+
+
+def _slack_cells(estimator: Estimator, estimate: Estimate) -> list[Cell]:
+    """Readings that the others show to be longer than the way, at most one a pose."""
+    equations = estimator.equations
+    odd, limit = _odd_poses(equations, estimate)
+    if not len(odd):
+        return []
+    gain, longer = _without_each(equations, estimate, odd)
+    pulling, cells = _pulling(equations), []
+    for pose, own, sign in zip(odd.tolist(), gain, longer > 0.0, strict=True):
+        # if one that is too short explains more, something else is wrong with this row
+        alike = np.flatnonzero((own >= (1.0 - _ALIKE) * own.max()) & sign)
+        if own.max() > limit and len(alike) and pulling[alike].all():
+            cells.append(Cell(pose, tuple(alike.tolist())))
+    return cells
+
+
+def _odd_poses(equations: Equations, estimate: Estimate) -> tuple[IntArray, float]:
+    """Poses at which some closure is further off than noise explains; and a squared deviation.
+
+    That is what a closure has to explain, of all that are far off.
+    """
+    from scipy.special import ndtri
+
+    longer, redundancy = _longer(equations, estimate)
+    seen = redundancy > _SEEN
+    used = int(seen.sum())
+    if not used:
+        return np.empty(0, dtype=np.intp), np.inf
+    standard = np.where(seen, longer**2 / np.where(seen, redundancy, 1.0), 0.0)
+    width = max(1.0, median_ratio(standard[seen], np.ones(used, dtype=np.intp)))
+    limit = float(ndtri(_FALSE_ALARM / used) ** 2 * width)
+    return np.flatnonzero(standard.max(axis=1) > limit), limit
+
+
+def _without_each(
+    equations: Equations, estimate: Estimate, poses: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """By how much each closure left out lowers the squares of some poses (P, equations).
+
+    And how much longer it then reads than needed, whitened. The poses are found anew, for long
+    slack moves them far; the geometry is held.
+    """
+    evaluation, noise = estimate.evaluation, estimate.state.noise
+    before = _squares(equations, evaluation, noise)[poses]
+    shape = (len(poses), equations.closures.equations)
+    gain, longer = np.zeros(shape), np.zeros(shape)
+    for k in range(shape[1]):
+        cells = [(pose, k) for pose in poses.tolist()]
+        other = equations.without_closures([*equations.slack_cells, *cells], evaluation)
+        other.warm_start(evaluation)
+        there = other.at(evaluation.theta, noise)
+        gain[:, k] = np.where(
+            there.status[poses] == 0, before - _squares(other, there, noise)[poses], 0.0
+        )
+        off, _ = other.closures.residual(there.machines, there.states)
+        longer[:, k] = -off[poses, k]
+    return gain, longer
+
+
+def _squares(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+    """Squared residuals of each pose (K,)."""
+    found = np.zeros(len(equations.actuators))
+    found[equations.pose_of_unit] = equations.squares(equations.residual(evaluation, noise))
+    return found
+
+
+def taut(
+    equations: Equations, commanded: Equations, start: Evaluation
+) -> tuple[Equations, tuple[Cell, ...]]:
+    """The equations without cables that are slack, and which these are.
+
+    One a pose and robust fit, until what is left agrees. A cable that turns out to be shorter than
+    the way is taut after all.
+    """
+    cells: dict[tuple[int, int], Cell] = {}
+    if not _pulling(equations).any():
+        return equations, ()
+    for k in range(_ROUNDS):
+        estimator = estimator_at(equations, commanded, start, "cauchy")
+        estimate = estimator.solve()
+        longer, _ = _longer(equations, estimate)
+        kept = {key: cell for key, cell in cells.items() if longer[key] > -_TOO_SHORT}
+        more = _slack_cells(estimator, estimate)
+        found = kept | {(cell.pose, cell.closures[0]): cell for cell in more}
+        if k and found.keys() == cells.keys():
+            break
+        cells = found
+        equations = equations.without_closures(list(cells), estimate.evaluation)
+        commanded = equations.commanded()
+    return equations, tuple(cells.values())
+
+
+def _longer(equations: Equations, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
+    """Closures read less needed (K, equations), whitened, and their degrees of freedom."""
+    root = np.sqrt(np.repeat(estimate.weights, equations.components))
+    sizes, axes = np.linalg.eigh(estimate.covariance)
+    taken = root[:, None] * estimate.jacobian @ (axes * np.sqrt(np.maximum(sizes, 0.0)))
+    every = np.ones(len(estimate.weights))  # what a robust loss sets aside is looked at as well
+    return equations.closure_residuals(estimate.evaluation, estimate.state.noise, every, taken)
+
+
+def slack_cables(
+    equations: Equations, evaluation: Evaluation, cells: Sequence[Cell]
+) -> tuple[SlackCable, ...]:
+    """What cells are in words and mm, the longest first."""
+    if not cells:
+        return ()
+    off = -equations.closures_off(evaluation)
+    pose_of, actuator = np.concatenate(equations.pose_of), equations.closures.actuators
+    cables = [
+        SlackCable(
+            tuple(equations.rows[pose_of == cell.pose].tolist()),
+            tuple(sorted(actuator[closure] + 1 for closure in cell.closures)),
+            float(off[cell.pose, cell.closures[0]]),
+        )
+        for cell in cells
+    ]
+    return tuple(sorted(cables, key=lambda each: (-each.longer, each.rows)))
+
+
+def said_slack(cables: Sequence[SlackCable]) -> str:
+    """Warn of slack cables that were fitted as if they were taut."""
+    return (
+        f"cables read longer than the others allow, {listed_slack(cables)}: where they were slack,"
+        " slack='drop' (--drop-slack) leaves these readings out"
+    )
+
+
+def listed_slack(cables: Sequence[SlackCable]) -> str:
+    """Name the longest ones."""
+    more = f" and {len(cables) - _LISTED} more" if len(cables) > _LISTED else ""
+    return ", ".join(map(str, cables[:_LISTED])) + more
+
+
+def _pulling(equations: Equations) -> BoolArray:
+    """Which closures are of a cable, (equations,)."""
+    robot = equations.parameters.robot
+    if not isinstance(robot, Robot) or robot.model.chains is not None:
+        return np.zeros(equations.closures.equations, dtype=bool)
+    limbs = robot.model.limbs
+    cables = [
+        all(KINDS[limb.kind].cable for limb in limbs if limb.actuator == a)
+        for a in range(robot.n_actuators)
+    ]
+    return np.array([a >= 0 and cables[a] for a in equations.closures.actuators], dtype=bool)

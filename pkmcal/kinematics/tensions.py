@@ -1,0 +1,197 @@
+"""Tensions of cables at poses: whether all of them can pull against what acts on the platform."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal.arguments import number
+from pkmcal.arrays import FloatArray, Int32Array, IntArray, as_rows
+from pkmcal.core import instruments
+from pkmcal.core.chains import ChainMachine
+from pkmcal.display import Table
+from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.robot import Robot, require_parallel
+from pkmcal.result import RowResult
+from pkmcal.screw import from_pose
+
+_HELD, _SLACK, _TORN, _NOWHERE = range(4)
+_OPTIMAL, _INFEASIBLE = 0, 2  # of linprog
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Tensions(RowResult):
+    """Tensions of cables in equilibrium, for poses of any leading shape.
+
+    Attributes
+    ----------
+    tension : ndarray (..., limbs)
+        N; of the distributions that are in equilibrium one whose largest tension is least. Of limbs
+        that are no cables the force along them, positive where they pull; NaN where there is none.
+    status : ndarray of int (...)
+        0: the platform is held by cables that pull. 1: some cable would have to push, or to pull
+        less than `least`. 2: some cable would have to pull more than `most`. 3: out of reach.
+    """
+
+    tension: FloatArray
+    status: Int32Array
+    STATUS: ClassVar = {
+        _HELD: "held",
+        _SLACK: "not held by cables that pull",
+        _TORN: "beyond the largest tension",
+        _NOWHERE: "out of reach",
+    }
+
+    def _parts(self) -> Iterator[str | Table]:
+        yield f"tensions of {self._counts()}"
+        if self.ok.any():
+            held = self.tension[self.ok]
+            rows = [
+                [f"limb {i + 1}", *(f"{f(held[:, i]):.4g}" for f in (np.min, np.median, np.max))]
+                for i in range(held.shape[1])
+            ]
+            yield Table(["N", "least", "median", "largest"], rows, left=1)
+
+
+def tensions(
+    robot: Robot,
+    poses: ArrayLike,
+    force: ArrayLike = (0.0, 0.0, 0.0),
+    *,
+    at: ArrayLike = (0.0, 0.0, 0.0),
+    least: float = 0.0,
+    most: float = np.inf,
+) -> Tensions:
+    """Tensions of cables that hold the platform at poses.
+
+    The workspace of positive tension are the poses where this is `ok`: there all cables can pull at
+    once, with `least` or more, and balance the force. Limbs that are no cables push as well, and
+    joints that keep the platform in planes hold it there.
+
+    Parameters
+    ----------
+    robot : Robot
+        A machine with cables (kinds "cable" and "pulley").
+    poses : array_like (..., 6)
+        x y z in mm, α β γ in rad.
+    force : array_like (3,)
+        What acts on the platform from outside, N, in the axes of the base: of a mass of 10 kg
+        ``(0, 0, -98.1)``.
+    at : array_like (3,)
+        Where it acts, in the platform's frame, mm: the centre of mass, for example.
+    least, most : float
+        Tension that every cable must have, and may have, N.
+
+    Returns
+    -------
+    Tensions
+        ``.ok`` for each pose, ``.tension`` of each limb.
+
+    Raises
+    ------
+    ValueError, TypeError
+        A machine without cables, a wrong shape, or no numbers.
+
+    Examples
+    --------
+    A sled on four belts in the plane, which its own weight does not pull out of it:
+
+    >>> import pkmcal as pk
+    >>> sled = pk.load("examples/belts/robot.toml")
+    >>> found = tensions(sled, [[1500, 1000, 0, 0, 0, 0], [1500, 2500, 0, 0, 0, 0]], least=5.0)
+    >>> found.ok
+    array([ True, False])
+    >>> found.tension[0].round(3)
+    array([5., 5., 5., 5.])
+    """
+    require_parallel(robot)
+    if robot.model.chains is not None or isinstance(robot.machine, ChainMachine):
+        raise ArgumentError(f"robot: {robot.name} has chains of joints, no cables")
+    cables = np.array([KINDS[limb.kind].cable for limb in robot.model.limbs])
+    if not cables.any():
+        raise ArgumentError(f"robot: {robot.name} has no cables")
+    rows, shape = as_rows("poses", poses, 6)
+    pull, point = as_rows("force", force, 3)[0][0], as_rows("at", at, 3)[0][0]
+    low = number("least", least, least=0.0)
+    high = np.inf if most == np.inf else number("most", most, above=low)
+    slopes, load, spheres = _balance(robot, rows, pull, point)
+    found = np.full((len(rows), len(cables)), np.nan)
+    status = np.full(len(rows), _NOWHERE, dtype=np.int32)
+    for i in np.flatnonzero(np.isfinite(slopes).all(axis=(1, 2))):
+        forces = _least_largest(slopes[i], load[i], spheres[cables], low)
+        if forces is None:
+            status[i] = _SLACK
+            continue
+        found[i] = forces[spheres]
+        status[i] = _TORN if (found[i, cables] > high).any() else _HELD
+    found[status != _HELD] = np.nan
+    return Tensions(found.reshape(*shape, len(cables)), status.reshape(shape))
+
+
+def _balance(
+    robot: Robot, poses: FloatArray, force: FloatArray, at: FloatArray
+) -> tuple[FloatArray, FloatArray, IntArray]:
+    """Pulls of the closures by a unit force (N, m, rows), and the load (N, m); which are limbs'.
+
+    Of the generalised forces of a step of the pose map, torques over the characteristic length.
+    """
+    machine, slots = robot.limb_machine, robot.slots
+    own = robot.on_map(robot.frames.inward(poses))
+    twists = machine.moved(own, np.zeros((len(own), machine.m)))[1]
+    arcs = np.array([1.0 if name in "xyz" else robot.length for name in robot.coordinates])
+
+    def generalised(pull: FloatArray, point: FloatArray) -> FloatArray:
+        """Of forces (N, 3) at points (N, 3), (N, m)."""
+        wrench = np.concatenate([np.cross(point - own[:, :3], pull), pull], axis=1)
+        forces: FloatArray = (twists.transpose(0, 2, 1) @ wrench[:, :, None])[:, :, 0] / arcs
+        return forces
+
+    directions = machine.limbs(slots, own)[1]
+    slopes = machine.closure(slots, own, machine.inverse(slots, own)).by_step.transpose(0, 2, 1)
+    kinds = [1 + int(row).bit_count() for row in machine.struct.rows[0 : machine.struct.limbs]]
+    first = np.concatenate([[0], np.cumsum(kinds)[:-1]]).astype(np.intp)
+    for i, row in enumerate(first):  # closures are in mm to some 1e-7, forces to rounding
+        joint = instruments.points(own, np.ascontiguousarray(slots[i, 3:6]))[0]
+        slopes[:, :, row] = generalised(directions[:, i], joint)
+    points = instruments.points(poses, at)[0]
+    if robot.model.base_frame is not None:
+        base = from_pose(robot.model.base_frame)
+        points, force = (points - base[:3, 3]) @ base[:3, :3], force @ base[:3, :3]
+    return slopes, generalised(np.tile(force, (len(own), 1)), points), first
+
+
+def _least_largest(
+    slopes: FloatArray, load: FloatArray, cables: IntArray, least: float
+) -> FloatArray | None:
+    """Forces (rows,) with slopes (m, rows) that balance a load (m,): the largest tension least.
+
+    None where there are none. `cables` are the rows of cables, which pull with `least` or more.
+    """
+    from scipy.optimize import linprog
+
+    count = slopes.shape[1]
+    of_cables = np.zeros((len(cables), count + 1))
+    of_cables[np.arange(len(cables)), cables], of_cables[:, -1] = 1.0, -1.0
+    low = np.full(count + 1, -np.inf)
+    low[cables] = least
+    found = linprog(
+        np.append(np.zeros(count), 1.0),
+        A_ub=of_cables,
+        b_ub=np.zeros(len(cables)),
+        A_eq=np.column_stack([slopes, np.zeros(len(load))]),
+        b_eq=load,
+        bounds=np.column_stack([low, np.full(count + 1, np.inf)]),
+        method="highs",
+    )
+    if found.status == _INFEASIBLE:
+        return None
+    if found.status != _OPTIMAL:
+        raise ArgumentError(f"poses: tensions were not found: {found.message}")
+    # the solver balances to its tolerance, a step of least norm to rounding
+    forces: FloatArray = found.x[:-1] + np.linalg.pinv(slopes) @ (load - slopes @ found.x[:-1])
+    return forces

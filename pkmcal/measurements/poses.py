@@ -1,0 +1,41 @@
+"""Which rows are of one pose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, Int64Array
+
+
+def pose_index(
+    actuators: FloatArray, approach: FloatArray | None, group: Int64Array | None
+) -> Int64Array:
+    """The pose of each row (N,), from 0: rows of one group are one, and rows at equal actuators.
+
+    Readings of actuators may differ by their last digit where a group says that they are repeats,
+    and home that is measured again has the name of another point.
+
+    Examples
+    --------
+    >>> home, other, near = [1.0], [2.0], [2.001]
+    >>> pose_index(np.array([home, other, home, near]), None, np.array([1, 2, 3, 2])).tolist()
+    [0, 1, 0, 1]
+    """
+    # backlash is between places that were approached from other sides
+    places = actuators if approach is None else np.hstack([actuators, approach])
+    pose = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
+    if group is not None:
+        pose = _joined(np.unique(group, return_inverse=True)[1].reshape(-1), pose)
+    return pose.astype(np.int64)
+
+
+def _joined(one: Int64Array, other: Int64Array) -> Int64Array:
+    """Rows that either of two numberings puts together, in the order of the first."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    size = int(one.max()) + 1
+    nodes = size + int(other.max()) + 1
+    links = coo_array((np.ones(len(one)), (one, size + other)), (nodes, nodes))
+    found = connected_components(links, directed=False)[1][:size]
+    return np.asarray(np.unique(found, return_inverse=True)[1].reshape(-1)[one])

@@ -1,0 +1,41 @@
+"""Residuals of a calibration as vectors in space, and the places that they are of."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.calibration.evaluation import Evaluation
+from pkmcal.calibration.identification import Identification
+from pkmcal.core import instruments
+
+
+def residual_vectors(found: Identification, at: Evaluation) -> FloatArray:
+    """Residuals of all rows as vectors in the robot's base frame, mm (N, 3).
+
+    Of the components that were read; NaN where none was, and of readings that are angles alone.
+    A reading changes with the platform's velocity by the last three columns of its derivative by
+    the twist: unit vectors of the instrument's axes, of a height's axis or along a distance.
+    """
+    parts = []
+    sets = found.fit.equations.sets
+    for measured, residual, predicted in zip(sets, at.residuals, at.predicted, strict=True):
+        lengths = [k for k, unit in enumerate(measured.units) if unit == "mm"]
+        along, off = predicted.by_twist[:, lengths, 3:], residual[:, lengths]
+        vectors = np.einsum("nk,nki->ni", np.nan_to_num(off), along)
+        vectors[~np.isfinite(off).any(axis=1)] = np.nan
+        parts.append(vectors)
+    return np.concatenate(parts)
+
+
+def measured_places(found: Identification) -> FloatArray:
+    """Where the measured points of all rows are in the robot's base frame, mm (N, 3)."""
+    equations, end = found.fit.equations, found.fit.end
+    parts = []
+    for i in range(len(equations.sets)):
+        target = equations.arguments_of(i, end.theta).get("target")
+        if target is None:
+            parts.append(end.pose[equations.pose_of[i], :3])
+        else:
+            parts.append(instruments.points(end.pose[equations.pose_of[i]], target)[0])
+    return np.concatenate(parts)
