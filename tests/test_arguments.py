@@ -288,6 +288,7 @@ CALLS: dict[str, Call] = {
             "free": "names",
             "prior": "one or by name",
             "loss": "word",
+            "slack": "word",
             "frame": "word",
             "target": "word",
             "attachment": "word",
@@ -410,6 +411,17 @@ CALLS: dict[str, Call] = {
         pk.dexterity,
         {"robot": ROBOT, "poses": POSES},
         {"robot": "parallel", "poses": "numbers"},
+    ),
+    "tensions": (
+        pk.tensions,
+        {"robot": BELTS, "poses": POSES, "force": [0, 0, -9.81], "at": [0, 0, 1], "least": 1.0},
+        {
+            "robot": "parallel",
+            "poses": "numbers",
+            "force": "numbers",
+            "at": "numbers",
+            "least": "number",
+        },
     ),
     "workspace": (
         pk.workspace,

@@ -94,6 +94,7 @@ class Blocks:
                 self._alike.append(_Alike(some, order[first[some, None] + np.arange(k)]))
         left = [each for each in self._alike if each.equations.shape[1] > unknowns]
         self._left = left
+        self._last: tuple[FloatArray, list[list[FloatArray]]] | None = None
         none = np.empty(0, dtype=np.intp)
         self.pose_of_unit: IntArray = np.concatenate([none, *(each.poses for each in left)])
         self.components: IntArray = np.concatenate([
@@ -110,14 +111,22 @@ class Blocks:
         """
         width, found = part.shape[1:], np.empty((self._equations_left, *part.shape[1:]))
         first = 0
-        for each in self._left:
+        for each, mirrors in zip(self._left, self._mirrors_of(by_unknown), strict=True):
             mine = part[each.equations].reshape(*each.equations.shape, -1)
-            for mirror in _mirrors(by_unknown[each.equations]):
+            for mirror in mirrors:
                 _reflect(mirror, mine)
             rest = mine[:, self.unknowns :].reshape(-1, *width)
             found[first : first + len(rest)] = rest
             first += len(rest)
         return found
+
+    def _mirrors_of(self, by_unknown: FloatArray) -> list[list[FloatArray]]:
+        """Mirrors of each lot of alike poses; of one array they are found once."""
+        if self._last is None or self._last[0] is not by_unknown:
+            self._last = None
+            found = [_mirrors(by_unknown[each.equations]) for each in self._left]
+            self._last = by_unknown, found
+        return self._last[1]
 
     def spread(self, by_unknown: FloatArray, left: FloatArray) -> FloatArray:
         """Equations (E,) of which so much is left (M,), and nothing for the poses to take."""
@@ -131,11 +140,11 @@ class Blocks:
 
     def _bases(self, by_unknown: FloatArray) -> Iterator[tuple[IntArray, FloatArray]]:
         """Equations (G, k) of alike poses and Q₂ (G, k, k - u), across their unknowns."""
-        for each in self._left:
+        for each, mirrors in zip(self._left, self._mirrors_of(by_unknown), strict=True):
             count, k = each.equations.shape
             rest = np.zeros((count, k, k - self.unknowns))
             rest[:, self.unknowns :] = np.eye(k - self.unknowns)
-            for mirror in reversed(_mirrors(by_unknown[each.equations])):
+            for mirror in reversed(mirrors):
                 _reflect(mirror, rest)
             yield each.equations, rest
 

@@ -36,6 +36,9 @@ from pkmcal.measurements import orientation
 from pkmcal.measurements.observation import by_difference, corrected, distance_per_point
 from pkmcal.result import failed_rows
 
+# Whose, where, with which noise, and what `_system` says there; copies have another "whose".
+_Last = tuple["Equations", Evaluation, FloatArray, tuple[FloatArray, FloatArray]]
+
 
 class Equations(Readings):
     """The stacked residual equations of all measurements, and their Jacobian.
@@ -82,6 +85,7 @@ class Equations(Readings):
                     guess[place[read], 3:] = orientation.shortest(measured.values[read, 3:])
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
+        self._last: _Last | None = None
         self._no_sigma = np.array([
             m.sigma is None and bool(np.isfinite(m.values).any()) for m in self.sets
         ])  # fmt: skip
@@ -215,7 +219,15 @@ class Equations(Readings):
         )
 
     def _at(self, evaluation: Evaluation, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
-        return self._system(evaluation.machines, evaluation.states, evaluation.theta, noise)
+        """The system at an evaluation; the last one is kept, which a step asks for three times."""
+        last = self._last
+        mine = last is not None and last[0] is self and last[1] is evaluation
+        if last is not None and mine and np.array_equal(last[2], noise):
+            return last[3]
+        self._last = None
+        found = self._system(evaluation.machines, evaluation.states, evaluation.theta, noise)
+        self._last = self, evaluation, noise, found
+        return found
 
     def residual(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Measured less predicted (M,), whitened: what is left when poses have taken their part."""

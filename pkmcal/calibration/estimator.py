@@ -27,6 +27,7 @@ _ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
 _LEAST_FALL = 0.1  # of a mean square, which a step of scoring does not go below
 _LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
 LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
+FEW = 5.0  # below which residuals hardly show it
 LEAST_REDUNDANCY = 2.0  # the same of one group of several that share poses
 
 

@@ -16,6 +16,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
 from pkmcal.calibration.drift import Drift, drift
+from pkmcal.calibration.estimator import FEW
 from pkmcal.calibration.expansion import in_words
 from pkmcal.calibration.law_tests import LawTest, law_tests
 from pkmcal.calibration.moved import Moved, moved
@@ -58,9 +59,12 @@ class Identification(Parts, Result):
     def moved(self) -> tuple[Moved, ...]:
         """What moved between the fitted measurements and others that were held out.
 
-        Empty where nothing did, or where the points held out were drawn from the same measurements.
+        Empty where nothing did: where the points held out were drawn from the same measurements,
+        and where they do not contradict a fit of several spare equations.
         """
         later, end = self.holdout.later, self.holdout.end
+        if not self.holdout_contradicts and self.fit.uncertainty.fit.freedom >= FEW:
+            return ()
         if self.holdout.drawn or later is None or end is None or not self.fit.uncertainty.known:
             return ()
         return moved(self.fit, later, end)
@@ -272,7 +276,7 @@ class Identification(Parts, Result):
         )
         if self.sessions:
             yield summary.sessions(self.sessions)
-        if heat := in_words(self.fit.equations.sets, self.expansion):
+        if heat := in_words(self.fit.equations.sets, self.expansion, self.fit.parameters.robot):
             yield summary.filled("", heat)
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -39,7 +40,6 @@ from pkmcal.calibration.fit_statistics import (
 from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.linearity import beyond_linear
 from pkmcal.calibration.loss import LIMITS, LossName
 from pkmcal.calibration.mode_slips import in_other_modes
 from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior
@@ -268,9 +268,9 @@ def identify(
         dropped_names=row_names(given, dropped),
     )
     if slack == "keep" and result.outliers:
-        _, cells = taut(equations, commanded, start)
-    slack_ones = slack_cables(estimator.equations, estimate.evaluation, cells)
-    result = replace(result, slack=slack_ones)
+        with suppress(ArgumentError):  # a robust fit that does not come to an end says nothing
+            _, cells = taut(equations, commanded, start)
+    result = replace(result, slack=slack_cables(estimator.equations, estimate.evaluation, cells))
     notes = _warnings(result, estimator, estimate, datasets)
     if slack == "keep" and result.slack:
         notes.append(said_slack(result.slack))
@@ -300,8 +300,7 @@ def _warnings(
     notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
     notes += shrunk(equations, fit.start, fit.end)
-    notes += beyond_linear(estimate, fit.uncertainty)
-    notes += unlike_noise(fit.uncertainty.slips)
+    notes += unlike_noise(equations, fit.uncertainty.slips)
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():

@@ -7,6 +7,8 @@ there is not what the linear machine has.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pkmcal.calibration.estimator import Estimate
@@ -18,8 +20,31 @@ _BY_PRIOR = 0.5  # share of what is known of a combination from which a prior de
 _OFF = 0.5  # share of the rise of the misfit by which the machine may differ from the linear one
 
 
-def beyond_linear(estimate: Estimate, uncertainty: Uncertainty) -> list[str]:
-    """Say which parameters are so uncertain that their deviations say nothing.
+@dataclass(frozen=True)
+class Weak:
+    """Parameters whose deviations say little.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Which.
+    assembled : bool
+        Whether the machine can be assembled, and reaches its poses, over these deviations.
+    """
+
+    names: tuple[str, ...]
+    assembled: bool
+
+    def __str__(self) -> str:
+        how = "is not linear" if self.assembled else "could not even be assembled"
+        return (
+            f"{listed(self.names)} are hardly determined: the machine {how} over their ±, which say"
+            " little; measure other poses, state a prior or free fewer parameters"
+        )
+
+
+def beyond_linear(estimate: Estimate, uncertainty: Uncertainty) -> Weak | None:
+    """Find parameters so uncertain that their deviations say little; None if none are.
 
     Parameters are drawn by their covariance, and the rise of the sum of squares is compared with
     that of the linear machine; only where some combination that the measurements determine, more
@@ -30,13 +55,13 @@ def beyond_linear(estimate: Estimate, uncertainty: Uncertainty) -> list[str]:
     shares, directions = np.linalg.eigh(linear_fit.prior.T @ linear_fit.prior)
     measured = directions[:, shares < _BY_PRIOR]
     if not uncertainty.known or not measured.shape[1]:
-        return []
+        return None
     values, vectors = np.linalg.eigh(uncertainty.covariance.of(measured.T))
     root = vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T
     root = fitted @ (fitted.T @ linear_fit.back @ measured @ root)
     least = CLEAR * chosen.robot.length
     if not np.linalg.norm(root, 2) > least:
-        return []
+        return None
     weights = np.repeat(estimate.weights, equations.components)
     rises = []
     for draw in np.random.default_rng(0).normal(size=(_DRAWS, root.shape[1])):
@@ -48,10 +73,8 @@ def beyond_linear(estimate: Estimate, uncertainty: Uncertainty) -> list[str]:
         beyond = weights @ residual**2 - weights @ linear**2
         rises.append(beyond / (weights @ (estimate.jacobian @ step) ** 2))
     equations.warm_start(estimate.evaluation)
-    if np.median(np.nan_to_num(np.abs(rises), nan=np.inf)) < _OFF:
-        return []
-    names = listed([chosen.names[i] for i in np.flatnonzero(np.linalg.norm(root, axis=1) > least)])
-    return [
-        f"{names} are hardly determined: the machine is not linear over their ±, which say little;"
-        " measure other poses, state a prior or free fewer parameters"
-    ]
+    off = np.nan_to_num(np.abs(rises), nan=np.inf)
+    if np.median(off) < _OFF:
+        return None
+    names = [chosen.names[i] for i in np.flatnonzero(np.linalg.norm(root, axis=1) > least)]
+    return Weak(tuple(names), bool(np.isfinite(np.median(off))))

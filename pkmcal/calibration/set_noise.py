@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.equations import Equations
+from pkmcal.calibration.estimator import FEW, Estimate, Estimator
 from pkmcal.statistics.distributions import chi2_tail
 
 _CHANCE = 0.01  # of residuals as far from what was stated, on either side
@@ -19,8 +20,8 @@ _APART = 1.2  # ratio of deviations from which it matters
 def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
     """Deviation of the residuals of each set in units of its stated sigma; 1 where that holds.
 
-    All 1 where sigma is nowhere stated, where all sets slipped alike, for robust losses, and where
-    equations are mixtures of readings.
+    1 where fewer than `FEW` degrees of freedom show it. All 1 where sigma is nowhere stated, where
+    all sets slipped alike, for robust losses, and where equations are mixtures of readings.
     """
     equations = estimator.equations
     ratios = np.ones(len(equations.sets))
@@ -29,20 +30,24 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
     squares, freedom = (part[: len(ratios)] for part in estimate.shares[:2])
     unstated = estimator.unstated[: len(ratios)]
     common = 1.0 if unstated.any() else float(squares.sum() / max(freedom.sum(), 1e-9))
-    for i in np.flatnonzero(~unstated & (freedom > 0)):
+    for i in np.flatnonzero(~unstated & (freedom >= FEW)):
         above = chi2_tail(float(squares[i]) / common, float(freedom[i]))
         if min(above, 1.0 - above) < _CHANCE / 2.0:
             ratios[i] = np.sqrt(squares[i] / freedom[i])
     return ratios if ratios.max() > _APART * ratios.min() else np.ones_like(ratios)
 
 
-def unlike_noise(ratios: FloatArray) -> list[str]:
+def unlike_noise(equations: Equations, ratios: FloatArray) -> list[str]:
     """Name the sets whose sigma is wrong beside that of the others."""
+    names = [
+        "touch_distances" if m.kind == "touch-distance" else f"measurements {i + 1}"
+        for i, m in enumerate(equations.sets)
+    ]
     wrong = [i for i, ratio in enumerate(ratios) if max(ratio, 1.0 / ratio) > _APART]
     if not wrong:
         return []
-    parts = [f"of measurements {i + 1} {ratios[i]:.2g} times" for i in wrong]
+    parts = " and ".join(f"{names[i]} are {ratios[i]:.2g}" for i in wrong)
     return [
-        f"the residuals {' and '.join(parts)} what sigma says: the sets are weighted wrongly beside"
-        " each other; state the true sigma, or none"
+        f"the residuals of {parts} times what sigma says: the sets are weighted wrongly beside each"
+        " other; state the true sigma, or none"
     ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate, Estimator
+from pkmcal.calibration.estimator import FEW, Estimate, Estimator
 from pkmcal.calibration.labels import Labels, labels, poses_of_rows
 from pkmcal.calibration.set_noise import slipped
 from pkmcal.measurements.measurements import Measurements
@@ -19,8 +19,6 @@ from pkmcal.statistics.linear_fit import LinearFit, linear_fit, numbered
 from pkmcal.statistics.noise import Noise, Split, joined, noise, split
 from pkmcal.statistics.pseudo_residuals import PseudoResiduals, pseudo_residuals
 from pkmcal.statistics.variance_components import told_apart, variance_components
-
-FEW = 5.0  # degrees of freedom below which residuals hardly show the noise
 
 
 def stated_variances(measured: Measurements) -> FloatArray | None:

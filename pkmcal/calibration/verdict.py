@@ -7,17 +7,19 @@ from typing import Literal
 
 import numpy as np
 
+from pkmcal.arrays import FloatArray
 from pkmcal.calibration.drift import Drift
-from pkmcal.calibration.estimator import LEAST_FREEDOM
+from pkmcal.calibration.estimator import FEW, LEAST_FREEDOM
 from pkmcal.calibration.identifiability import listed
+from pkmcal.calibration.linearity import Weak, beyond_linear
 from pkmcal.calibration.moved import Moved
 from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import RobustCheck
 from pkmcal.calibration.row_errors import likely_row_errors
 from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.slack import listed_slack
-from pkmcal.calibration.uncertainty import FEW
 from pkmcal.display import chance_text, decimals, displayed, fixed, printable
+from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import spare
 from pkmcal.statistics.distributions import chi2_tail, deviation_interval
 from pkmcal.statistics.holdout_test import CHANCE, RATIO
@@ -84,9 +86,12 @@ def judge(
     if drift is not None and drift.large:
         doubts.append(str(drift))
     doubts += found.warnings
+    weak = None if grave else beyond_linear(found.fit.estimate, found.fit.uncertainty)
+    if weak is not None and not weak.assembled:
+        doubts.append(str(weak))
     if not grave and not doubts and _little_gained(found):
         doubts.append(f"little was gained, {_change(found)}: {_other_causes(found)}")
-    remarks = _remarks(found, robust, drift)
+    remarks = _remarks(found, robust, drift, weak)
     reasons = tuple(printable(text, _LONGEST) for text in grave + doubts)
     if grave:
         return Verdict("not calibrated", reasons, remarks)
@@ -134,7 +139,7 @@ def _contradicted(found: Parts, moved: tuple[Moved, ...]) -> list[str]:
         )
     elif found.holdout_outliers and _off(found) > RATIO * found.holdout_expected:
         reasons.append(_few_off(found))
-    if moved and (found.holdout_contradicts or _spare(found) < FEW):
+    if moved:
         reasons.append(_moved_text(moved))
     return reasons
 
@@ -174,8 +179,8 @@ def _size(shift: float, sigma: float, unit: str) -> str:
     value, shown = displayed(shift, unit)
     deviation, _ = displayed(sigma, unit)
     places = decimals(deviation)
-    sign = "+" if value >= 0 else ""
-    return f"{sign}{fixed(value, places)} ± {fixed(deviation, places)} {shown}"
+    sign, behind = "+" if value >= 0 else "", f" {shown}" if shown != "1" else ""
+    return f"{sign}{fixed(value, places)} ± {fixed(deviation, places)}{behind}"
 
 
 def _spare(found: Parts) -> float:
@@ -203,9 +208,19 @@ def _few(found: Parts) -> list[str]:
     spare = "1 spare equation shows" if one else f"{freedom:.2g} spare equations show"
     return [
         f"only {spare} the noise, which may be {low:.2g} to {high:.2g} times what is estimated"
-        f"{', and no hold-out can contradict the fit' if found.holdout_off.size else ''};"
-        f" {more}, or state sigma"
+        f"{_blind(found)}; {more}, or state sigma"
     ]
+
+
+def _blind(found: Parts) -> str:
+    """From where on points that were held out could contradict a fit of few spare equations."""
+    test = found.holdout.test
+    if test is None:
+        return ""
+    return (
+        f", and held-out points contradict the fit only from {test.least_ratio:.2g} times what is"
+        " expected"
+    )
 
 
 def _little_gained(found: Parts) -> bool:
@@ -277,12 +292,14 @@ def _disagreement(found: Parts, robust: RobustCheck) -> str:
     return (
         f"{count} {rows} with the rest: {row_names(found.fit.equations.datasets, robust.rows)};"
         f" a robust fit leaves {_mm(robust.rms)} in the others, this one {_mm(found.rms)} in all:"
-        " leave them out with --drop-outliers (drop='outliers'), or fit with --loss cauchy"
-        " (loss='cauchy')"
+        f" leave {'it' if count == 1 else 'them'} out with --drop-outliers (drop='outliers'), or"
+        " fit with --loss cauchy (loss='cauchy')"
     )
 
 
-def _remarks(found: Parts, robust: RobustCheck | None, drift: Drift | None) -> tuple[str, ...]:
+def _remarks(
+    found: Parts, robust: RobustCheck | None, drift: Drift | None, weak: Weak | None
+) -> tuple[str, ...]:
     remarks = []
     if drift is not None and drift.found and not drift.large:
         remarks.append(str(drift))
@@ -295,6 +312,12 @@ def _remarks(found: Parts, robust: RobustCheck | None, drift: Drift | None) -> t
         remarks.append(_disagreement(found, robust))
     if found.holdout_outliers and not found.holdout_contradicts:
         remarks.append(_few_off(found))
+    again = _fitted_again(found)
+    if again:
+        remarks.append(
+            f"{again} of the held-out points are at poses that were fitted as well: they show how"
+            " these repeat, not how good the machine is elsewhere"
+        )
     scale = found.fit.uncertainty.covariance.scale
     stated = not found.fit.uncertainty.equations.unstated.any()
     if stated and found.covariance_rule == "classical" and scale > 1.0:
@@ -307,6 +330,8 @@ def _remarks(found: Parts, robust: RobustCheck | None, drift: Drift | None) -> t
             f"the residuals are only {_larger_sigma(found):.2g} times what sigma says: if it is the"
             " noise it is too large, and so are ±"
         )
+    if weak is not None and weak.assembled:
+        remarks.append(str(weak))
     if found.idle:
         say = "poses say" if found.idle > 1 else "pose says"
         remarks.append(
@@ -321,6 +346,20 @@ def _larger_sigma(found: Parts) -> float:
     if not chi2_tail(squares, freedom) > 1.0 - CHANCE:
         return 1.0
     return float(np.sqrt(squares / freedom))
+
+
+def _fitted_again(found: Parts) -> int:
+    """How many rows were held out at actuators where others were fitted."""
+    fitted = {row.tobytes() for m in found.fit.equations.sets for row in _commands(m)}
+    return sum(
+        row.tobytes() in fitted for data in found.holdout.data for row in _commands(data.measured)
+    )
+
+
+def _commands(measured: Measurements) -> FloatArray:
+    """Actuators of each row, at both ends where there are two."""
+    parts = [measured.actuators] + ([] if measured.other is None else [measured.other])
+    return np.hstack(parts) + 0.0
 
 
 def _mm(value: float) -> str:

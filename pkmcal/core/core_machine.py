@@ -48,6 +48,8 @@ class CoreMachine(ABC):
         Index into `ISAS`.
     actuators : int
         Number of actuator coordinates, n.
+    m : int
+        Number of free coordinates.
     """
 
     _FORWARD: ClassVar[str]
@@ -55,6 +57,7 @@ class CoreMachine(ABC):
     struct: Any
     isa: int
     actuators: int
+    m: int
 
     @property
     def _free(self) -> tuple[str, ...]:
@@ -193,3 +196,12 @@ class CoreMachine(ABC):
         given = (len(pose), slots, stride, pose, q, columns, len(columns), twists)
         call(self._ERRORS, self.struct, *given, out, isa=self.isa)
         return out if twists else self.as_written(pose, out, 1)
+
+    def moved(self, pose: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Poses (N, 6) moved by steps of the map (N, m), mm and rad.
+
+        And the platform's twist (ω, v) by a step at the poses, (N, 6, m).
+        """
+        moved, twist = np.empty((len(pose), 6)), np.empty((len(pose), 6, self.m))
+        call("moved", self.struct.map, len(pose), pose, step, moved, twist, isa=self.isa)
+        return moved, twist

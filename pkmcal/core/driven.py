@@ -308,15 +308,14 @@ class DrivenMachine(CoreMachine):
         self, slots: FloatArray, pose: FloatArray, q: FloatArray, columns: Int32Array | None = None
     ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
         """Closures in units of what was read, as `pkmcal.core.machine.Machine.readings`."""
-        inner, bare, approach = self._of_limbs, self._bare(slots), self._approach(len(q))
+        inner, bare, approach = self.inner, self._bare(slots), self._approach(len(q))
         at = self.ways(slots, q)
         own, of_laws, drive = self._sorted(np.empty(0, np.int32) if columns is None else columns)
         wanted = None
         if columns is not None:
             wanted = np.array([self._within(int(columns[i])) for i in own], dtype=np.int32)
         residual, by_step, by_own = inner.readings(bare, pose, at.way, wanted)
-        rows_of = [1 + int(row).bit_count() for row in inner.struct.rows[0 : inner.struct.limbs]]
-        spheres = np.concatenate([[0], np.cumsum(rows_of)[:-1]])
+        spheres = inner.reading_rows
         of = self.laws.actuator
         needed = self.laws.readings(slots, at.way + residual[:, spheres], approach)
         reached = np.isfinite(needed)
@@ -343,7 +342,7 @@ class DrivenMachine(CoreMachine):
 
     def moved(self, pose: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Poses moved, as `pkmcal.core.machine.Machine.moved`."""
-        return self._of_limbs.moved(pose, step)
+        return self.inner.moved(pose, step)
 
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """What the limbs are at readings (N, n), as `pkmcal.core.machine.Machine.spheres`."""

@@ -103,7 +103,7 @@ def complete(
     unknown = [i for i in matched if i not in free]
     if unknown and frames.trivial:
         raise ArgumentError(f"match: {POSE[unknown[0]]} is not free on this machine")
-    freedom = len(free) + machine.actuators - machine.rows
+    freedom = len(free) + min(0, machine.actuators - machine.rows)  # joints of a tail may be more
     if len(matched) != freedom and machine.rows <= len(free):
         raise ArgumentError(f"match must name {freedom} coordinates here, found {len(matched)}")
     wanted = pose[:, matched]

@@ -71,6 +71,12 @@ class Robot(Kinematics, Result):
         """Unit of each actuator coordinate, "mm" or "rad"."""
         return self.model.actuator_units
 
+    def __copy__(self) -> Robot:
+        """The same machine, without what was computed of it: nothing is built anew."""
+        other = object.__new__(type(self))
+        other.__dict__.update((k, v) for k, v in vars(self).items() if k not in _COMPUTED)
+        return other
+
     def __reduce__(self) -> tuple[type[Robot], tuple[Model]]:
         return Robot, (self.model,)
 
@@ -521,7 +527,6 @@ class Robot(Kinematics, Result):
         if not self.model.driven:
             return self
         other = copy(self)
-        other.__dict__.pop("_of_any_misfit", None)  # of the same directions
         other.machine = self.machine.approaching(rows[0] if shape == () else rows)
         return other
 
@@ -592,6 +597,14 @@ class Robot(Kinematics, Result):
         source = Source(content, place)
         head = arguments.comment(comment)
         write_whole(path, text_like(source, self.model, deviations, head))
+
+
+_COMPUTED = frozenset(
+    name
+    for each in Robot.__mro__
+    for name, value in vars(each).items()
+    if isinstance(value, cached_property)
+)
 
 
 def determines_others(robot: Robot) -> bool:

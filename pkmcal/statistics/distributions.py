@@ -58,6 +58,21 @@ def f_tail(ratio: float, first: float, second: float) -> float:
     return float(fdtrc(min(first, _MANY), min(second, _MANY), ratio))
 
 
+def f_limit(chance: float, first: float, second: float) -> float:
+    """Ratio of mean squares that is exceeded with this chance; NaN without freedom.
+
+    Examples
+    --------
+    >>> round(f_limit(0.05, 2.0, 10.0), 2)
+    4.1
+    """
+    from scipy.special import fdtri
+
+    if not (first > 0 and second > 0):
+        return float("nan")
+    return float(fdtri(min(first, _MANY), min(second, _MANY), 1.0 - chance))
+
+
 def chi2_tail(squares: float, freedom: float) -> float:
     """Chance of a larger sum of squares; NaN without freedom."""
     from scipy.special import gammaincc

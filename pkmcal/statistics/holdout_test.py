@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.statistics.distributions import f_tail
+from pkmcal.statistics.distributions import f_limit, f_tail
 from pkmcal.statistics.linear_fit import numbered, sums
 from pkmcal.statistics.noise import Noise
 
@@ -46,6 +46,11 @@ class HoldoutTest:
     def contradicts(self) -> bool:
         """Whether the points contradict the fit: by chance, rms and median."""
         return self.few_off and self.median_ratio > RATIO
+
+    @property
+    def least_ratio(self) -> float:
+        """Ratio of rms to what is expected from which the points can contradict the fit."""
+        return max(RATIO, float(np.sqrt(f_limit(CHANCE, *self.freedom))))
 
     @property
     def few_off(self) -> bool:

@@ -15,6 +15,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray, IntArray
 
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
+_WHOLE = 9  # decimals from which degrees of freedom are whole: limits on them are
 _IN_ONE_THREAD = 8192  # numbers
 
 
@@ -54,7 +55,7 @@ class LinearFit:
     @property
     def freedom(self) -> float:
         """Equations less the parameters that went into them."""
-        return float(len(self.residual) - self.leverage.sum())
+        return round(float(len(self.residual) - self.leverage.sum()), _WHOLE)
 
     @property
     def squares(self) -> float:

@@ -190,6 +190,15 @@ def test_legs_that_push_are_never_slack(tmp_path: Path) -> None:
     assert not found.slack
 
 
+def test_the_bootstrap_leaves_out_the_same_readings(eight: pk.Robot) -> None:
+    _, q, slack = drawn(CORNERS, 9, 30, 0.2)
+    found = fitted(eight, q, "drop")
+    assert len(found.slack) == int(slack.sum())
+    spread = pk.bootstrap(found, 40, seed=1)
+    ratio = spread.stderr / found.stderr
+    assert 0.8 < np.sqrt(np.mean(ratio**2)) < 1.25  # 18 deviations from 40 replicates
+
+
 def test_words_are_checked(eight: pk.Robot) -> None:
     _, q, _ = drawn(CORNERS, 7, 20, 0.0)
     with pytest.raises(pk.ArgumentError, match="slack must be one of keep, drop"):

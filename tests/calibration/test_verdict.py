@@ -84,11 +84,11 @@ def test_a_holdout_without_sigma_has_the_noise_of_the_fit(
     first, other = session(hexapod, true, 40, 0), session(hexapod, true, 30, 1)
     stated = fitted(hexapod, replace(first, sigma=0.02), free="offset*", holdout=other)
     assert stated.holdout_expected == pytest.approx(0.02 * np.sqrt(3), rel=0.2)
-    alone = fitted(hexapod, first, free="offset*", holdout=other)
-    assert stated.holdout_expected == pytest.approx(alone.holdout_expected, rel=1e-6)
+    alone = fitted(hexapod, first, free="offset*", holdout=other)  # x, y and z may be told apart
+    assert stated.holdout_expected == pytest.approx(alone.holdout_expected, rel=1e-2)
     both = replace(first, sigma=0.02), replace(other, sigma=0.02)
     twice = fitted(hexapod, both[0], free="offset*", holdout=both[1])
-    assert twice.holdout_expected == pytest.approx(alone.holdout_expected, rel=1e-6)
+    assert twice.holdout_expected == pytest.approx(stated.holdout_expected, rel=1e-6)
 
 
 def test_a_few_held_out_points_that_are_off_are_named(hexapod: pk.Robot, true: pk.Robot) -> None:
@@ -174,7 +174,7 @@ def test_outliers_are_named_by_line_and_target(tmp_path: Path) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     found = fitted(arm, pk.read_measurements(path), **UNKNOWN)
     assert found.outliers == (37,)
-    assert "outliers: rows 37: log.csv line 15 (B)" in str(found)
+    assert "outliers: row 37: log.csv line 15 (B)" in str(found)
 
 
 @pytest.mark.parametrize("by", [1, -1, 2])

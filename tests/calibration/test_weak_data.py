@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.stats import f as f_distribution
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
@@ -46,7 +47,7 @@ def heights(count: int, seed: int) -> tuple[pk.Robot, Measurements]:
     return robot, Measurements(true.inverse(poses), rng.normal(0, 0.02, count), "height")
 
 
-SIX = ["offset*", "base*.x"]
+SIX = ["offset*", "base1.x", "base2.x", "base3.y"]
 
 
 # --- a robust fit beside few rows ----------------------------------------------------------------
@@ -102,6 +103,36 @@ def test_held_out_rows_are_named_falsely_in_one_fit_of_a_hundred(
     assert named <= 2 + 0.02 * runs
 
 
+def test_repeats_of_fitted_poses_are_no_proof_elsewhere(hexapod: pk.Robot) -> None:
+    whole = positions(hexapod, hexapod.replace({"offset1": 0.4}), 20, 4, repeats=2)
+    first = np.arange(40) % 2 == 0
+    first[-6:] = [True] * 4 + [False] * 2  # two poses are fitted alone, one is held out alone
+    found = fitted(hexapod, whole.select(first), holdout=whole.select(~first))
+    assert found.verdict.remarks[-1].startswith("17 of the held-out points are at poses that were")
+    drawn = fitted(hexapod, whole, holdout=0.3)
+    assert not any("fitted as well" in text for text in drawn.verdict.remarks)
+
+
+@pytest.mark.parametrize("spare", [1, 2, 4])
+def test_how_far_off_points_must_be_to_contradict_few_equations(spare: int) -> None:
+    robot, whole = heights(18 + spare, 1)
+    rows = np.arange(len(whole))
+    told = fitted(
+        robot, whole.select(rows < 6 + spare), SIX, holdout=whole.select(rows >= 6 + spare)
+    )
+    assert told.holdout.test is not None
+    limit = told.holdout.test.least_ratio
+    assert f"contradict the fit only from {limit:.2g} times what is" in str(told.verdict.reasons)
+    first, second = told.holdout.test.freedom
+    assert f_distribution.sf(limit**2, first, second) == pytest.approx(0.01, rel=1e-6)
+
+
+def test_five_spare_equations_are_five_whatever_the_last_bit_says() -> None:
+    for seed in range(8):
+        robot, measured = heights(11, seed)
+        assert fitted(robot, measured, SIX).verdict.state == "calibrated"
+
+
 # --- combinations that are hardly determined -----------------------------------------------------
 
 
@@ -123,13 +154,13 @@ def test_heights_of_a_planar_machine_calibrate_nothing(seed: int) -> None:
             assert verdict.reasons[0].startswith("these measurements determine no number of the")
 
 
-def test_deviations_that_the_machine_bends_under_are_said_to_say_little() -> None:
+def test_deviations_that_the_machine_cannot_take_are_said_to_say_little() -> None:
     robot = pk.load("3rrr-planar")
     q = robot.inverse(pk.sample_poses(robot, 60, seed=1))
     values = 10 + np.random.default_rng(0).normal(0, 0.02, 60)
     measured = Measurements(q, values, "height", sigma=0.02, target=[30, -20, 10])
     reasons = fitted(robot, measured, frame="unknown").verdict.reasons
-    assert "offset1 … offset3 are hardly determined: the machine is not linear" in reasons[0]
+    assert "offset1 … offset3 are hardly determined: the machine could not even be" in reasons[0]
 
 
 def test_a_prior_that_holds_a_weak_combination_is_no_reason(hexapod: pk.Robot) -> None:
@@ -167,3 +198,30 @@ def test_a_sigma_that_is_far_too_large_is_said(hexapod: pk.Robot) -> None:
         found = fitted(hexapod, replace(measured, sigma=np.full((20, 3), sigma)))
         assert found.verdict.state == "calibrated"
         assert any("times what sigma says" in text for text in found.verdict.remarks) is said
+
+
+# --- numbers whose squares are none --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [1e308, 1e-308, 1e200, 1e-200, 10**400])
+def test_priors_and_sigmas_whose_squares_are_no_numbers_are_refused_by_name(
+    hexapod: pk.Robot, value: float
+) -> None:
+    measured = positions(hexapod, hexapod, 10, 0)
+    for prior in (value, {"offset1": value}):
+        with pytest.raises(ValueError, match=r"prior.* must lie between 1e-15 and 1e\+15"):
+            pk.identify(hexapod, measured, "offset*", prior=prior)
+    if isinstance(value, float):
+        with pytest.raises(ValueError, match=r"sigma must lie between 1e-100 and 1e\+100"):
+            replace(measured, sigma=np.full((10, 3), value))
+        with pytest.raises(ValueError, match="duration must lie between"):
+            pk.trajectory.move(hexapod, hexapod.home, hexapod.home, duration=value)
+
+
+def test_the_widest_and_narrowest_priors_are_taken(hexapod: pk.Robot) -> None:
+    measured = positions(hexapod, hexapod.replace({"offset1": 0.4}), 20, 0)
+    free = fitted(hexapod, measured)
+    for wide in (1e15, np.inf):
+        assert fitted(hexapod, measured, prior=wide).values == pytest.approx(free.values, abs=1e-6)
+    narrow = fitted(hexapod, measured, prior=1e-15)
+    assert narrow.values == pytest.approx(narrow.start, abs=1e-12)

@@ -91,6 +91,24 @@ def cables() -> pk.Robot:
     return robots.made("translation", {"z": 400.0}, limbs)
 
 
+def rails() -> pk.Robot:
+    """Two rods on every carriage; its screw has a law for each."""
+    table = [[-100.0, 0.0], [50.0, 0.2], [200.0, -0.1]]
+    limbs = [
+        {"kind": "PUS", "base": base + side, "platform": robots.ring(30.0, at) + side}
+        | {"slider": [0, 0, 1], "rod": 340.0, "branch": -1, "actuator": i, "offset": 420.0}
+        | ({"drive": {"table": table}} if first else {"drive": {"quadratic": 1e-5}})
+        | {"stroke": [250.0, 700.0]}
+        for i, at in enumerate((0.0, 120.0, 240.0), 1)
+        for base in [robots.ring(160.0, at)]
+        for side, first in (
+            (robots.ring(20.0, at + 90), True),
+            (robots.ring(-20.0, at + 90), False),
+        )
+    ]
+    return robots.made("spatial", {"z": 100.0}, limbs, match=["x", "y", "z"])
+
+
 CASES = {name: lambda name=name: pk.load(name) for name in PARALLEL}
 CASES |= {
     "mixed, framed": mixed,
@@ -99,7 +117,7 @@ CASES |= {
     "turned": turned,
     "turned, with laws": lambda: turned(harmonics=[{"k": 1.0, "cos": 0.01, "sin": 0.02}]),
     "paired": paired,
-    "paired, with laws": lambda: paired(drive={"quadratic": 1e-3}),
+    "pairs on rails, with laws": rails,
 }
 # every driver, row and pose map
 SOME = [
@@ -112,7 +130,7 @@ SOME = [
     "mixed, framed",
     "drive laws",
     "turned, with laws",
-    "paired, with laws",
+    "pairs on rails, with laws",
 ]
 
 
@@ -203,7 +221,7 @@ def test_clang_too_has_nothing_to_say(case: str, number: str, tmp_path: Path) ->
     compiled(CASES[case](), tmp_path, number, "clang")  # gcc: in every test here
 
 
-@pytest.mark.parametrize("case", ["mixed, framed", "drive laws", "paired, with laws"])
+@pytest.mark.parametrize("case", ["mixed, framed", "drive laws", "pairs on rails, with laws"])
 def test_cpp_takes_it_too(case: str, tmp_path: Path) -> None:
     needed("g++")
     for number in ("double", "float"):
@@ -263,6 +281,8 @@ def test_machine_with_more_closures_than_coordinates_is_refused(tmp_path: Path) 
 def test_cranks_with_different_gears_on_one_actuator_are_refused(tmp_path: Path) -> None:
     with pytest.raises(pk.ArgumentError, match="share actuator q2 with different gears"):
         pk.export.c_header(paired(gain=2.0), tmp_path / "robot.h")
+    with pytest.raises(pk.ArgumentError, match="share actuator q1 with different gears or drive"):
+        pk.export.c_header(paired(drive={"quadratic": 1e-3}), tmp_path / "robot.h")
     assert not (tmp_path / "robot.h").exists()
 
 

@@ -243,15 +243,16 @@ static void of_machine(ptrdiff_t n, unsigned strange, int isas)
     EACH_ISA(forward_jacobian, is, n, geometry, stride, pose, drives, twists, D(0, 6 * n * q));
     EACH_ISA(error_jacobian, is, n, geometry, stride, pose, drives, column, 8, twists,
              D(0, 6 * n * 8));
-    EACH_ISA(closure, is, n, geometry, pose, drives, D(0, n * rows), D(1, n * rows * m),
+    EACH_ISA(closure, is, n, geometry, stride, pose, drives, D(0, n * rows), D(1, n * rows * m),
              D(2, n * rows * m), D(3, n * rows * q), D(4, 6 * n), D(5, 6 * n * m));
-    EACH_ISA(readings, is, n, geometry, pose, drives, column, 8, D(0, n * rows),
+    EACH_ISA(readings, is, n, geometry, stride, pose, drives, column, 8, D(0, n * rows),
              D(1, n * rows * m), D(2, n * rows * 8));
     EACH_ISA(moved, is, n, pose, guess, D(0, 6 * n), D(1, 6 * n * m));
     EACH_ISA(spheres, is, n, geometry, drives, D(0, n * limbs * PKM_SPHERE));
-    EACH_ISA(limbs, is, n, geometry, pose, D(0, n * limbs), D(1, 3 * n * limbs), D(2, 3 * n * limbs));
-    EACH_ISA(rates, is, n, geometry, motion, D(0, n * q), D(1, n * q));
-    EACH_ISA(motion, is, n, geometry, pose, drives, q1, q2, D(0, 48 * n), D(1, 12 * n));
+    EACH_ISA(limbs, is, n, geometry, stride, pose, D(0, n * limbs), D(1, 3 * n * limbs),
+             D(2, 3 * n * limbs));
+    EACH_ISA(rates, is, n, geometry, stride, motion, D(0, n * q), D(1, n * q));
+    EACH_ISA(motion, is, n, geometry, stride, pose, drives, q1, q2, D(0, 48 * n), D(1, 12 * n));
     EACH_ISA(closure_cost, is, n, geometry, n, pose, drives, D(0, n));
 }
 
@@ -312,16 +313,19 @@ static void of_arm(ptrdiff_t n, unsigned strange, int isas)
 static void of_rows(ptrdiff_t n, unsigned strange, int isas)
 {
     const double *a = numbers(6 * n + 6, strange), *b = numbers(6 * n + 6, strange);
-    const double *c = numbers(6 * n + 6, strange), *motion = numbers(16 * n, strange);
+    const double *c = numbers(6 * n + 6, strange), *motion = numbers(16 * n + 9, strange);
     const ptrdiff_t six = byte() & 1 ? 6 : 0, three = byte() & 1 ? 3 : 0;
-    one_of(17);
+    one_of(18);
     EACH_ISA(compose, n, a, six, b, 6 - six, D(0, 6 * n));
     EACH_ISA(invert, n, a, D(0, 6 * n));
     EACH_ISA(compose_rates, n, a, b, c, six, a, D(0, 36 * n));
     EACH_ISA(compose_twists, n, a, b, c, D(0, 36 * n));
     EACH_ISA(points, n, a, b, three, D(0, 3 * n), D(1, 18 * n), D(2, 9 * n));
     EACH_ISA(seen_points, n, a, b, D(0, 3 * n), D(1, 18 * n), D(2, 9 * n));
-    EACH_ISA(distances, n, a, b, three, c, 3 - three, D(0, n), D(1, 6 * n), D(2, 3 * n), D(3, 3 * n));
+    EACH_ISA(distances, n, a, b, three, c, 3 - three, b, three / 3, D(0, n), D(1, 6 * n), D(2, 3 * n),
+             D(3, 3 * n));
+    EACH_ISA(pulley, n, a, three, motion, 0, c, D(0, n), D(1, 3 * n), D(2, 3 * n), D(3, 9 * n), D(4, n),
+             D(5, 3 * n), D(6, 3 * n));
     EACH_ISA(tpr2tps_lengths, n, a, b, D(0, 4 * n));
     EACH_ISA(tpr2tps_jacobian, n, a, b, D(0, 16 * n));
     EACH_ISA(exp, n, a, D(0, 16 * n));

@@ -92,6 +92,7 @@ def test_a_written_robot_reads_back_to_the_last_bit(source: str | Path, tmp_path
     assert all_bits(written(model, tmp_path)) == all_bits(model)
 
 
+KINDS = ["UPS", "TPR", "UPR", "RPS", "PUS", "PRS", "RUS", "cable", "pulley"]
 NUMBER = st.floats(-1e4, 1e4)
 LENGTH = st.floats(1.0, 1e3)
 NAMED_LENGTH = st.sampled_from(["p", "-q", "q"]) | NUMBER
@@ -107,10 +108,11 @@ TILT = st.lists(NAMED_ANGLE, min_size=2, max_size=2)
 @st.composite
 def limbs(draw: st.DrawFn) -> dict[str, Any]:
     """A limb of any kind with any of its keys."""
-    kind = draw(st.sampled_from(["UPS", "TPR", "UPR", "RPS", "PUS", "PRS", "RUS"]))
+    kind = draw(st.sampled_from(KINDS))
     limb = {"kind": kind, "base": draw(POINT), "platform": draw(POINT)}
     axes = {"TPR": ["revolute"], "UPR": ["revolute"], "RPS": ["normal"]}
     axes |= {"PUS": ["slider"], "PRS": ["slider", "normal"], "RUS": ["axis"]}
+    axes |= {"pulley": ["swivel"]}
     named = list(axes.get(kind, []))
     if kind == "UPR":
         limb["couple"] = draw(LENGTH)
@@ -121,12 +123,13 @@ def limbs(draw: st.DrawFn) -> dict[str, Any]:
             limb[f"{key}_tilt"] = draw(TILT)
     if kind in ("PUS", "PRS", "RUS"):
         limb |= {"rod": draw(LENGTH), "branch": draw(st.sampled_from([1, -1]))}
-    if kind == "RUS":
-        x, y, z = limb["axis"]
+    if kind == "RUS" or (kind == "pulley" and draw(st.booleans())):
+        x, y, z = limb[named[0]]
         k = min(range(3), key=lambda i: abs((x, y, z)[i]))
         limb["zero"] = [[0, -z, y], [z, 0, -x], [-y, x, 0]][k]
-        limb["crank"] = draw(LENGTH | st.just("arm"))
-    elif draw(st.booleans()):
+    if kind in ("RUS", "pulley"):
+        limb["crank" if kind == "RUS" else "radius"] = draw(LENGTH | st.just("arm"))
+    if kind != "RUS" and draw(st.booleans()):
         limb["offset"] = draw(NAMED_LENGTH)
     rows = {"TPR": 1, "UPR": 2, "RPS": 1, "PRS": 1}.get(kind, 0)
     if rows and draw(st.booleans()):

@@ -264,6 +264,19 @@ def test_a_written_file_reads_back_to_the_bit(eight: pk.Robot, tmp_path: Path) -
     np.testing.assert_array_equal(again.inverse(POSES), eight.inverse(POSES))
 
 
+def test_a_calibrated_file_keeps_its_words_and_has_the_new_radii(tmp_path: Path) -> None:
+    example = Path(__file__).parents[2] / "examples" / "cable-robot" / "robot.toml"
+    robot = pk.load(example)
+    found = robot.replace({"wheel": 41.5, "swivel3.tilt2": 0.01, "base2.z": 2501.25})
+    found.save(tmp_path / "calibrated.toml", like=example)
+    again = pk.load(tmp_path / "calibrated.toml")
+    np.testing.assert_allclose(again.geometry.values, found.geometry.values, rtol=1e-15)
+    assert again.geometry["radius8"] == 41.5
+    assert "the pulley\n# turns about that axis" in (tmp_path / "calibrated.toml").read_text(
+        "utf-8"
+    )
+
+
 def test_modes_are_sought_and_not_certified(three: pk.Robot) -> None:
     modes = three.forward_all(three.inverse([100.0, 50, 600, 0, 0, 0]), starts=40)
     assert not modes.complete and not modes.certified.any() and "pulleys" in modes.reason

@@ -84,8 +84,8 @@ def test_the_second_session_is_as_expected_after_its_own_zeros(hexapod: pk.Robot
     """A least squares of each leg for itself leaves 0.842 mm."""
     first, second = session(1), session(2)
     found = pk.identify(hexapod, first, holdout=second, per_session="offset*")
-    assert found.holdout_rms < 0.87 and not found.holdout_contradicts and found.moved == ()
-    assert found.holdout_expected == pytest.approx(0.98, abs=0.01)  # calibration.md says it
+    assert found.holdout_rms < 0.86 and not found.holdout_contradicts and found.moved == ()
+    assert found.holdout_expected == pytest.approx(0.97, abs=0.01)  # calibration.md says it
     assert found.verdict.state == "calibrated"
     zeros = {name: own["value"] for name, own in found.holdout_parameters.items()}
     shifts = [
