@@ -182,7 +182,7 @@ class ChainMachine(CoreMachine):
         Angles as `pkmcal.core.machine.Machine.inverse` gives them.
         """
         if self.layout.tail < self.actuators:
-            return self.nearest_turns(slots, self._with_tail(slots, pose), near)
+            return known_rows(self.nearest_turns(slots, self._with_tail(slots, pose), near))
         q = np.empty((len(pose), self.actuators))
         call("chain_inverse", self.struct, len(pose), slots, 0, pose, q, isa=self.isa)
         return known_rows(self.nearest_turns(slots, q, near))
