@@ -55,10 +55,10 @@ int CALL(readings)(const pkm_machine *machine, ptrdiff_t n, const double *geomet
                    const int32_t *column, int columns, double *residual, double *by_step,
                    double *by_number);
 
-/* pose (n, 6), step of the map (n, m) [mm, rad] -> the pose moved by it (n, 6), and the twist
+/* pose (n, 6), step of a pose map (n, m) [mm, rad] -> the pose moved by it (n, 6), and the twist
  * (omega, v) by a step at the pose (n, 6, m). */
-int CALL(moved)(const pkm_machine *machine, ptrdiff_t n, const double *pose, const double *step,
-                double *moved, double *twist);
+int CALL(moved)(int map, ptrdiff_t n, const double *pose, const double *step, double *moved,
+                double *twist);
 
 /* q (n, actuators) -> the limbs (n, limbs, PKM_SPHERE); lengths are NaN where one of them is not
  * positive. */

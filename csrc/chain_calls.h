@@ -11,7 +11,7 @@ INLINE int chains_fit(const pkm_chains *machine)
     int rows = 0;
     if (machine->chains < 1 || machine->chains > PKM_MAX_LIMBS || machine->joints > PKM_MAX_JOINTS
         || machine->actuators < 1 || machine->actuators > PKM_MAX_LIMBS || machine->shared < 0
-        || machine->shared > PKM_MAX_SHARED || machine->numbers > PKM_MAX_NUMBERS
+        || machine->shared > PKM_MAX_SHARED || machine->tail < 1 || machine->numbers > PKM_MAX_NUMBERS
         || !(machine->length > 0) || machine->map == MAP_TRANSLATION || machine->map == MAP_2TPR2TPS)
         return 0;
     for (int l = 0; l < machine->chains; l++) {
@@ -41,43 +41,93 @@ INLINE void chain_prepare(const chain_geometry *of, ptrdiff_t first, const ptrdi
 
 #define AT_HOME 0.1  /* rad, of the length: passive joints so near those of home are of its posture */
 #define POSTURE 2e-4 /* of the size: actuators that are farther from those of a posture may be another's */
-#define LIKELY 1e-2  /* of that way: what the other then misses at most */
+#define LIKELY 0.2   /* of that way: what the other then misses at most */
 
-/* A guess: the pose, its passive joints, and the drives that lead there. Of chains that have several
- * postures at the pose it is that which is found from home; unless it is not found, or its drives are
- * far from those that are asked for, `to`, and of another posture they are not. What is no number is as
- * at home. Returns where `to` may matter: not at home. */
-SHARED mask chain_guess(const pkm_chains *machine, const chain_numbers *numbers, const real *pose,
-                        const real *to, chain_state *at, real *from)
+/* How far passive joints are from home, and drives from those asked for, mm. */
+INLINE void chain_way(const pkm_chains *machine, const real *theta, const real *from, const real *to,
+                      real *moved, real *way)
 {
-    real R[9], p[3], theta[PKM_MAX_JOINTS], drive[PKM_MAX_LIMBS];
-    real missed, moved = fill(0.0), way = fill(0.0);
-    map_from_pose(machine->map, pose, at->state);
-    FN(map_frame)(machine->map, at->state, R, p);
-    const mask good = chains_assembled(machine, numbers, R, p, NULL, 0, at->theta, from);
+    *moved = *way = fill(0.0);
     for (int j = 0; j < machine->joints; j++) {
         const int a = machine->actuator[j], c = machine->coordinate[j];
         const double arm = machine->prismatic[j] ? 1.0 : machine->length;
-        real off = a < 0 ? at->theta[c] : to[a] - from[a];
-        if (a < 0) moved = larger(moved, absolute(off) * arm);
+        real off = a < 0 ? theta[c] : to[a] - from[a];
+        if (a < 0) *moved = larger(*moved, absolute(off) * arm);
         else if (!machine->prismatic[j]) off = nearest_turn(off, fill(0.0), fill(TWO_PI));
-        if (a >= 0) way = larger(way, absolute(off) * arm);
+        if (a >= 0) *way = larger(*way, absolute(off) * arm);
     }
-    const mask other = ~(good & (moved <= AT_HOME * machine->length));
-    const mask far = ~(good & (way <= POSTURE * machine->size));
-    if (!any(other & far)) return other;
+}
+
+INLINE void chain_choose(const pkm_chains *machine, mask taken, const real *theta, const real *drive,
+                         real *to_theta, real *to_drive)
+{
+    for (int c = 0; c < machine->passive; c++) to_theta[c] = select(taken, theta[c], to_theta[c]);
+    for (int a = 0; a < machine->actuators; a++) to_drive[a] = select(taken, drive[a], to_drive[a]);
+}
+
+/* The tail of a guess at the drives asked for: with the platform where it is at home the tool is carried
+ * along, any other tool says where the platform is. */
+SHARED void chain_turn_tail(const pkm_chains *machine, const chain_numbers *numbers, const real *R,
+                            const real *p, const real *to, mask other, chain_state *at, real *from,
+                            mask *good)
+{
+    real theta[PKM_MAX_JOINTS], drive[PKM_MAX_LIMBS], pose[6], state[MAX_STATE] = {0};
+    motion frame[PKM_MAX_CHAIN + 1];
     memcpy(drive, to, sizeof(real) * machine->actuators);
-    chains_assembled(machine, numbers, R, p, &missed, 1, theta, drive);
-    const mask taken = other & far & (~good | (missed <= LIKELY * way));
-    for (int c = 0; c < machine->passive; c++) {
-        at->theta[c] = select(taken, theta[c], at->theta[c]);
+    const mask fine = chains_assembled(machine, numbers, R, p, NULL, 0, theta, drive);
+    chain_choose(machine, other, theta, drive, at->theta, from);
+    *good = select_mask(other, fine, *good);
+    for (int a = machine->tail; a < machine->actuators; a++) from[a] = to[a];
+    chain_walk(machine, 0, numbers, at->theta, from, frame);
+    const motion *end = &frame[machine->first[1] - machine->first[0]];
+    FN(motion_pose)(end->R, end->p, pose);
+    map_from_pose(machine->map, pose, state);
+    for (int s = 0; s < MAX_STATE; s++) at->state[s] = select(other, at->state[s], state[s]);
+}
+
+/* Where to begin: the state of a guess and the drives that lead there; `doubt`, whether other drives may
+ * be meant, and another state, `second`, which is with those asked for where `likely`. */
+typedef struct {
+    chain_state at, second;
+    real from[PKM_MAX_LIMBS];
+    mask doubt, likely;
+} chain_start;
+
+/* A guess: the pose, its passive joints, and the drives that lead there. Of chains that have several
+ * postures at the pose it is that which is found from home, or, where none is, that with the drives that
+ * are asked for, `to`. Where those of the first are far from them, others may be meant; where the chains
+ * nearly close with these, they are `likely`. What is no number is as at home. Returns where `to` may
+ * matter: not at home. */
+SHARED mask chain_guess(const pkm_chains *machine, const chain_numbers *numbers, const real *pose,
+                        const real *to, chain_start *start)
+{
+    real R[9], p[3], drive[PKM_MAX_LIMBS], missed, moved, way;
+    chain_state *at = &start->at;
+    map_from_pose(machine->map, pose, at->state);
+    FN(map_frame)(machine->map, at->state, R, p);
+    for (int a = 0; a < machine->actuators; a++) start->from[a] = fill(0.0);
+    mask good = chains_assembled(machine, numbers, R, p, NULL, 0, at->theta, start->from);
+    chain_way(machine, at->theta, start->from, to, &moved, &way);
+    const mask other = ~(good & (moved <= AT_HOME * machine->length));
+    if (machine->tail < machine->actuators) {
+        chain_turn_tail(machine, numbers, R, p, to, other, at, start->from, &good);
+        chain_way(machine, at->theta, start->from, to, &moved, &way);
+    }
+    const mask far = ~(good & (way <= POSTURE * machine->size));
+    start->doubt = other & far & good;
+    start->likely = fill_mask(0);
+    if (any(other & far)) {
+        memcpy(drive, to, sizeof(real) * machine->actuators);
+        start->second = *at;
+        chains_assembled(machine, numbers, R, p, &missed, 1, start->second.theta, drive);
+        start->likely = start->doubt & (missed <= LIKELY * way);
+        chain_choose(machine, other & far & ~good, start->second.theta, to, at->theta, start->from);
+    }
+    for (int c = 0; c < machine->passive; c++)
         at->theta[c] = select(finite(at->theta[c]), at->theta[c], fill(0.0));
-    }
-    for (int a = 0; a < machine->actuators; a++) {
-        from[a] = select(taken, to[a], from[a]);
-        from[a] = select(finite(from[a]), from[a], fill(0.0));
-    }
-    return other;
+    for (int a = 0; a < machine->actuators; a++)
+        start->from[a] = select(finite(start->from[a]), start->from[a], fill(0.0));
+    return machine->tail < machine->actuators ? fill_mask(-1) : other;
 }
 
 /* One block of forward kinematics: Newton from the guess, then, for what that does not solve, the
@@ -127,6 +177,75 @@ SHARED void chain_solve(const pkm_chains *machine, const chain_numbers *numbers,
     }
 }
 
+/* How far two states of the platform are apart, a turning as its arc. */
+SHARED real states_apart(const pkm_chains *machine, const real *one, const real *other)
+{
+    real R[2][9], p[2][3], apart = fill(0.0);
+    FN(map_frame)(machine->map, one, R[0], p[0]);
+    FN(map_frame)(machine->map, other, R[1], p[1]);
+    for (int i = 0; i < 9; i++) apart = larger(apart, machine->length * absolute(R[0][i] - R[1][i]));
+    for (int i = 0; i < 3; i++) apart = larger(apart, absolute(p[0][i] - p[1][i]));
+    return apart;
+}
+
+/* What a row comes to. */
+typedef struct {
+    chain_state at;
+    mask status;
+    real iterations, residual;
+} chain_answer;
+
+/* From another state, and of both answers the one that is nearer to the guess. */
+SHARED void chain_solve_again(const pkm_chains *machine, const chain_numbers *numbers,
+                              const chain_state *guess, const chain_state *other_start,
+                              const real *from, const real *to, mask doubt, chain_answer *found)
+{
+    chain_prediction start;
+    chain_answer other;
+    chain_predict(machine, numbers, other_start, from, &start);
+    chain_solve(machine, numbers, other_start, &start, from, to, doubt, &other.at, &other.status,
+                &other.iterations, &other.residual);
+    const mask ok = fill_mask(PKM_OK);
+    const mask nearer = states_apart(machine, other.at.state, guess->state)
+                        < states_apart(machine, found->at.state, guess->state);
+    const mask taken = doubt & (other.status == ok) & (nearer | (found->status != ok));
+    for (int s = 0; s < MAX_STATE; s++)
+        found->at.state[s] = select(taken, other.at.state[s], found->at.state[s]);
+    found->status = select_mask(taken, other.status, found->status);
+    found->iterations = select(doubt, found->iterations + other.iterations, found->iterations);
+    found->residual = select(taken, other.residual, found->residual);
+}
+
+/* Whole turns are no way to go. */
+INLINE void chain_unwind(const pkm_chains *machine, const real *from, real *drive)
+{
+    for (int j = 0; j < machine->joints; j++) {
+        const int a = machine->actuator[j];
+        if (a >= 0 && !machine->prismatic[j])
+            drive[a] = nearest_turn(drive[a], from[a], fill(TWO_PI));
+    }
+}
+
+/* The same where a guess leaves doubt: with the drives asked for, or, if chains do not nearly close
+ * with them at the guess, from home. */
+SHARED void chain_settle_doubt(const pkm_chains *machine, const chain_numbers *numbers,
+                               const chain_start *start, const real *to, mask valid,
+                               chain_answer *found)
+{
+    const mask likely = start->likely & valid, lost = start->doubt & ~start->likely & valid;
+    if (any(likely))
+        chain_solve_again(machine, numbers, &start->at, &start->second, to, to, likely, found);
+    if (!any(lost)) return;
+    const motion frame = fill_motion(machine->home);
+    chain_start home;
+    real pose[6], drive[PKM_MAX_LIMBS];
+    memcpy(drive, to, sizeof(real) * machine->actuators);
+    FN(motion_pose)(frame.R, frame.p, pose);
+    chain_guess(machine, numbers, pose, drive, &home);
+    chain_unwind(machine, home.from, drive);
+    chain_solve_again(machine, numbers, &start->at, &home.at, home.from, drive, lost, found);
+}
+
 int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
                         ptrdiff_t geometry_stride, const double *q, const double *guess,
                         ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
@@ -135,43 +254,40 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
     if (!chains_fit(machine)) return PKM_BAD_MACHINE;
     const chain_geometry of = {machine, geometry, geometry_stride};
     chain_numbers numbers;
-    chain_state start = {{{0}}, {{0}}};
+    chain_start start = {0};
     chain_prediction predicted;
-    real from[PKM_MAX_LIMBS];
     int own = 0; /* is what follows of the guess each row's own? */
     for (ptrdiff_t first = 0; first < n; first += LANES) {
         ptrdiff_t row[LANES];
-        real lane_q[PKM_MAX_LIMBS], drive[PKM_MAX_LIMBS], begin[6], found[6], steps, worst;
-        chain_state at;
-        mask valid = fill_mask(-1), how;
+        real lane_q[PKM_MAX_LIMBS], drive[PKM_MAX_LIMBS], begin[6], found[6];
+        chain_answer answer;
+        mask valid = fill_mask(-1);
         const int count = block_rows(first, n, row);
         chain_prepare(&of, first, row, &numbers);
         gather_row(q, machine->actuators, machine->actuators, row, lane_q);
         gather_row(guess, guess_stride, 6, row, begin);
         chain_drives(machine, &numbers, lane_q, drive);
         if (first == 0 || geometry_stride || guess_stride || own) {
-            own = any(chain_guess(machine, &numbers, begin, drive, &start, from));
-            chain_predict(machine, &numbers, &start, from, &predicted);
+            own = any(chain_guess(machine, &numbers, begin, drive, &start));
+            chain_predict(machine, &numbers, &start.at, start.from, &predicted);
         }
-        for (int j = 0; j < machine->joints; j++) { /* whole turns are no way to go */
-            const int a = machine->actuator[j];
-            if (a >= 0 && !machine->prismatic[j])
-                drive[a] = nearest_turn(drive[a], from[a], fill(TWO_PI));
-        }
+        chain_unwind(machine, start.from, drive);
         for (int a = 0; a < machine->actuators; a++) valid &= finite(drive[a]) & finite(lane_q[a]);
         for (int k = 0; k < 6; k++) valid &= finite(begin[k]);
         for (int k = 0; geometry_stride && k < machine->numbers; k++)
             valid &= finite(gather(geometry + k, geometry_stride, row));
-        chain_solve(machine, &numbers, &start, &predicted, from, drive, valid, &at, &how, &steps, &worst);
-        how = select_mask(valid, how, fill_mask(PKM_INVALID));
+        chain_solve(machine, &numbers, &start.at, &predicted, start.from, drive, valid, &answer.at,
+                    &answer.status, &answer.iterations, &answer.residual);
+        chain_settle_doubt(machine, &numbers, &start, drive, valid, &answer);
+        const mask how = select_mask(valid, answer.status, fill_mask(PKM_INVALID));
         const mask good = how == fill_mask(PKM_OK), closest = good | (how == fill_mask(PKM_NOT_CLOSED));
-        map_to_pose(machine->map, at.state, found);
+        map_to_pose(machine->map, answer.at.state, found);
         for (int k = 0; k < 6; k++) found[k] = select(good, found[k], fill(NAN));
         scatter_row(found, 6, pose, 6, row, count);
-        scatter(select(closest, worst, fill(NAN)), residual, 1, row, count);
+        scatter(select(closest, answer.residual, fill(NAN)), residual, 1, row, count);
         for (int l = 0; l < count; l++) {
             status[row[l]] = (int32_t)how[l];
-            iterations[row[l]] = (int32_t)steps[l];
+            iterations[row[l]] = (int32_t)answer.iterations[l];
         }
     }
     return 0;
@@ -190,6 +306,7 @@ int CALL(chain_inverse)(const pkm_chains *machine, ptrdiff_t n, const double *ge
         chain_prepare(&of, first, row, &numbers);
         gather_row(pose, 6, 6, row, lane_pose);
         FN(pose_frame)(lane_pose, R, p);
+        for (int a = machine->tail; a < machine->actuators; a++) drive[a] = fill(0.0);
         const mask good = chains_assembled(machine, &numbers, R, p, NULL, 0, theta, drive);
         for (int a = 0; a < machine->actuators; a++) {
             drive[a] = (drive[a] + machine->zero[a] - numbers.offset[a]) / numbers.gain[a];

@@ -227,8 +227,12 @@ SHARED real chain_worst(const pkm_chains *machine, const chain_numbers *numbers,
     return worst;
 }
 
+/* Does an actuator move a joint behind the platform? */
+INLINE int of_tail(const pkm_chains *machine, int actuator) { return actuator >= machine->tail; }
+
 /* A chain alone: its joints to a frame of the platform, by Gauss and Newton in `most` steps. With `drive` the
- * actuated joints stay there, else they follow and `own` gets them. Returns where it settled. */
+ * actuated joints stay there, else they follow and `own` gets them, but those of the tail, which stay as
+ * `own` has them. Returns where it settled. */
 SHARED mask chain_assemble(const pkm_chains *machine, int l, const chain_numbers *numbers,
                            const real *R, const real *p, const real *drive, int most, real *theta,
                            real *own)
@@ -238,8 +242,10 @@ SHARED mask chain_assemble(const pkm_chains *machine, int l, const chain_numbers
     const real settled = fill(SETTLED * machine->size);
     int movable[PKM_MAX_CHAIN], count = 0;
     mask running = fill_mask(-1), good = fill_mask(0);
-    for (int j = 0; j < k; j++)
-        if (!drive || machine->actuator[machine->member[first + j]] < 0) movable[count++] = j;
+    for (int j = 0; j < k; j++) {
+        const int a = machine->actuator[machine->member[first + j]];
+        if (a < 0 || (!drive && !of_tail(machine, a))) movable[count++] = j;
+    }
     for (int step = 0; step < most && any(running) && count; step++) {
         motion frame[PKM_MAX_CHAIN + 1];
         real J[PKM_MAX_CHAIN][6], r[6], lever[3], A[36], x[PKM_MAX_CHAIN], pivot, y[6];
@@ -321,7 +327,8 @@ SHARED mask chain_reclose(const pkm_chains *machine, int l, const chain_numbers 
         if (!any(open)) break;
         memcpy(trial, theta, sizeof(real) * machine->passive);
         chain_posture(machine, l, attempt < 0 ? 0 : attempt, trial);
-        for (int a = 0; a < machine->actuators; a++) own[a] = attempt < 0 ? fill(0.0) : drive[a];
+        for (int a = 0; a < machine->actuators; a++)
+            own[a] = attempt < 0 && !of_tail(machine, a) ? fill(0.0) : drive[a];
         if (attempt < 0)
             chain_assemble(machine, l, numbers, R, p, NULL, MAX_ASSEMBLY, trial, own);
         const mask settled = chain_assemble(machine, l, numbers, R, p, drive,
@@ -336,7 +343,7 @@ SHARED mask chain_reclose(const pkm_chains *machine, int l, const chain_numbers 
 }
 
 /* Every chain alone, and the mean of what they share. Where the actuators are not given, with `missed`
- * NULL, they follow, into `drive`. Else `nearly` is that of chain_reclose, and what chains miss is told
+ * NULL, they follow, into `drive`, but those of the tail, which are. Else `nearly` is that of chain_reclose, and what chains miss is told
  * that reach every pose. */
 SHARED mask chains_assembled(const pkm_chains *machine, const chain_numbers *numbers, const real *R,
                              const real *p, real *missed, int nearly, real *theta, real *drive)
@@ -352,7 +359,8 @@ SHARED mask chains_assembled(const pkm_chains *machine, const chain_numbers *num
         const int k = machine->first[l + 1] - machine->first[l], *which;
         const int rows = machine->ball[l] ? 3 : group_rows(machine->map, &which);
         real own[PKM_MAX_LIMBS], misses;
-        for (int a = 0; a < machine->actuators; a++) own[a] = missed ? drive[a] : fill(0.0);
+        for (int a = 0; a < machine->actuators; a++)
+            own[a] = missed || of_tail(machine, a) ? drive[a] : fill(0.0);
         for (int s = 0; s < machine->shared; s++) theta[s] = fill(0.0);
         const mask settled = chain_assemble(machine, l, numbers, R, p, NULL, MAX_ASSEMBLY, theta, own);
         if (!missed) good &= settled;

@@ -63,10 +63,11 @@ typedef struct {
 /* A machine of limbs that are chains of joints: see chains.h. Joints are counted once where chains
  * share them; a joint is turned or slid by an actuator, or passive. What chains share comes first among
  * the passive ones. Places are those of numbers in the geometry. */
-enum { PKM_MAX_CHAIN = 8, PKM_MAX_JOINTS = 72, PKM_MAX_SHARED = 6, PKM_MAX_CHAIN_ROWS = 36,
+enum { PKM_MAX_CHAIN = 10, PKM_MAX_JOINTS = 72, PKM_MAX_SHARED = 6, PKM_MAX_CHAIN_ROWS = 36,
        PKM_MAX_NUMBERS = 1024 };
 typedef struct {
     int map, chains, joints, actuators, passive, shared, numbers;
+    int tail;                       /* the first actuator of joints behind the platform, in all chains */
     double size, length, closure_tolerance; /* [mm], as of pkm_machine */
     int over;                       /* more rows than unknowns: weigh them by compliance */
     double home[12];                /* the platform's frame at home, the first rows of its matrix */

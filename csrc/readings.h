@@ -136,17 +136,16 @@ INLINE void moved_map(int map, ptrdiff_t n, const double *pose, const double *st
     }
 }
 
-int CALL(moved)(const pkm_machine *machine, ptrdiff_t n, const double *pose, const double *step,
-                double *moved, double *twist)
+int CALL(moved)(int map, ptrdiff_t n, const double *pose, const double *step, double *moved,
+                double *twist)
 {
-    if (!pkm_closure_count(machine)) return PKM_BAD_MACHINE;
-    switch (machine->map) {
+    switch (map) {
 #define CASE(NAME, name, ...)                                                                       \
-    case MAP_##NAME: moved_map(MAP_##NAME, n, pose, step, moved, twist); break;
+    case MAP_##NAME: moved_map(MAP_##NAME, n, pose, step, moved, twist); return 0;
         EACH_MAP(CASE)
 #undef CASE
     }
-    return 0;
+    return PKM_BAD_MACHINE;
 }
 
 #endif

@@ -18,9 +18,11 @@ from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 T = TypeVar("T")
 W = TypeVar("W", bound=str)  # of a Literal
 
+_SQUARED = 1e150  # of numbers up to this one squares are numbers
+
 
 def number(name: str, value: object, least: float = -math.inf, above: float = -math.inf) -> float:
-    """A finite number, `least` or more, above `above`.
+    """A finite number, `least` or more, above `above`; if above 0, one whose square is one, too.
 
     Raises
     ------
@@ -39,6 +41,8 @@ def number(name: str, value: object, least: float = -math.inf, above: float = -m
         raise ArgumentError(f"{name} must be {least:g} or more, found {value}")
     if not value > above:
         raise ArgumentError(f"{name} must be above {above:g}, found {value}")
+    if above == 0.0 and not 1.0 / _SQUARED <= value <= _SQUARED:
+        raise ArgumentError(f"{name} must be from 1e-150 to 1e150, found {value}")
     return float(value)
 
 

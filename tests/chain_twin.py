@@ -92,7 +92,7 @@ class Twin:
                 there = carried @ self.error(f"limb{i + 1}.platform", end) @ [*end, 1.0]
                 found.append((ball - there)[:3])
                 continue
-            name = f"limb{i + 1}.platform"
+            name = self.chains.end_of(i)
             if f"{name}.{ERRORS[-1]}" not in self.numbers:  # of the limb that ends there too
                 first = next(
                     k for k, other in enumerate(self.chains.limbs) if other[-1] is limb[-1]

@@ -14,6 +14,7 @@ from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.holdout import HeldOut
 from pkmcal.display import chance_text
+from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.drift_test import trend
 from pkmcal.statistics.linear_fit import numbered
@@ -178,8 +179,7 @@ def _rows(
         use = np.isfinite(residual[:, lengths]).all(axis=1) & ~np.isin(data.rows, list(odd))
         values.append(residual[use][:, lengths])
         poses.append(pose[use])
-        index = np.zeros(len(m), dtype=np.intp) if m.target_index is None else m.target_index
-        targets.append(index[use])
+        targets.append(repeats.targets(m)[use])
         times.append((data.rows.astype(float) if m.time is None else m.time)[use])
         order.append(data.rows[use])
     by_time = np.lexsort((np.concatenate(order), np.concatenate(times)))

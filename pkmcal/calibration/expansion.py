@@ -11,6 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeGuard
 
 import numpy as np
 
@@ -85,12 +86,12 @@ def expansion_of(robot: Calibratable, given: Coefficients) -> Expansion | None:
     """
     if given is None:
         return None
-    limbs = robot.model.limbs if isinstance(robot, Robot) else ()
-    if not isinstance(robot, Robot) or robot.model.chains is not None or robot.model.driven:
+    if not has_lengths(robot):
         raise ArgumentError(
             f"expansion: {robot.name} is an arm, or has limbs that are chains of joints or drives"
             " with laws: which of their numbers are lengths is not known; found coefficients"
         )
+    limbs = robot.model.limbs
     of = {name: _coefficient(name, value) for name, value in _named(given, len(limbs)).items()}
     numbers = robot.geometry.numbers
     coefficient, column = np.zeros(len(numbers)), np.zeros(len(numbers), dtype=np.intp)
@@ -105,6 +106,11 @@ def expansion_of(robot: Calibratable, given: Coefficients) -> Expansion | None:
             coefficient[i] = of.get(f"limb{number.limb + 1}", of.get("limbs", 0.0))
             column[i] = 2 + actuator
     return Expansion(of, coefficient, column, of.get("platform", 0.0))
+
+
+def has_lengths(robot: Calibratable) -> TypeGuard[Robot]:
+    """Whether the numbers of a machine are its lengths, so that it is known how they grow."""
+    return isinstance(robot, Robot) and robot.model.chains is None and not robot.model.driven
 
 
 def _named(given: float | Mapping[str, float], limbs: int) -> Mapping[str, float]:
@@ -136,7 +142,7 @@ def temperatures(sets: Iterable[Measurements]) -> tuple[float, float] | None:
     return (float(whole.min()), float(whole.max())) if whole.size else None
 
 
-def in_words(sets: Sequence[Measurements], given: Mapping[str, float]) -> str:
+def in_words(sets: Sequence[Measurements], given: Mapping[str, float], robot: Calibratable) -> str:
     """What became of the temperatures that were read; "" where none were."""
     between = temperatures(sets)
     if between is None:
@@ -144,7 +150,8 @@ def in_words(sets: Sequence[Measurements], given: Mapping[str, float]) -> str:
     low, high = between
     span = f"{low:.4g} to {high:.4g} °C" if low < high else f"{low:.4g} °C"
     if not given:
-        return f"the machine was at {span}, which is not allowed for: --expansion (expansion=)"
+        advice = "; --expansion (expansion=) states how it expands" if has_lengths(robot) else ""
+        return f"the machine was at {span}, which is not taken into account{advice}"
     parts: dict[float, list[str]] = {}
     for name, coefficient in given.items():
         parts.setdefault(coefficient, []).append(name)

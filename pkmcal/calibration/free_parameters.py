@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arguments import did_you_mean
+from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.fit_data import PLACE, FitData, Numbers
 from pkmcal.calibration.parameters import Asked, Bounds, Parameters, Prior
@@ -19,6 +19,8 @@ from pkmcal.calibration.sessions import Scope, label, matches, scopes
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
+
+_LEAST_PRIOR, _MOST_PRIOR = 1e-15, 1e15  # mm or rad, whose squares are numbers
 
 
 def parameters(
@@ -233,6 +235,11 @@ def _positive(what: str, value: object) -> float:
         raise ArgumentTypeError(f"{what} must be a number, a standard deviation; found {value!r}")
     if not value > 0:
         raise ArgumentError(f"{what} must be positive; found {value}")
+    if not (_LEAST_PRIOR <= value <= _MOST_PRIOR or value == np.inf):
+        raise ArgumentError(
+            f"{what} must lie between {_LEAST_PRIOR:g} and {_MOST_PRIOR:g}, or be inf; found"
+            f" {shown(value)}"
+        )
     return float(value)
 
 

@@ -276,7 +276,7 @@ class Identification(Parts, Result):
         )
         if self.sessions:
             yield summary.sessions(self.sessions)
-        if heat := in_words(self.fit.equations.sets, self.expansion):
+        if heat := in_words(self.fit.equations.sets, self.expansion, self.fit.parameters.robot):
             yield summary.filled("", heat)
         yield summary.misfit_table(self.misfit, self.holdout)
         yield summary.quality(self.misfit, self.repeats, self.observability)

@@ -13,6 +13,7 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, IntArray
 from pkmcal.calibration.equations import Equations
+from pkmcal.measurements import repeats
 from pkmcal.statistics.linear_fit import numbered
 
 
@@ -60,8 +61,7 @@ def _of_readings(equations: Equations) -> Labels:
     targets, components, lengths, rows = [], [], [], []
     first = 0
     for m in equations.sets:
-        index = np.zeros(len(m), dtype=np.intp) if m.target_index is None else m.target_index
-        targets.append(np.repeat(index, len(m.components)))
+        targets.append(np.repeat(repeats.targets(m), len(m.components)))
         numbers = [names.setdefault(name, len(names)) for name in m.components]
         components.append(np.tile(np.array(numbers, dtype=np.intp), len(m)))
         counted = [unit == "mm" or "mm" not in m.units for unit in m.units]

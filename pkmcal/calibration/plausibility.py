@@ -17,6 +17,7 @@ from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.parameters import Parameters
 from pkmcal.display import chance_text, first_rows, printable
 from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.prior_test import PriorTest
 
@@ -283,14 +284,11 @@ def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: b
         start += len(measured)
         if not measured.components:
             continue  # the same readings of actuators alone may well occur twice
-        targets = (
-            np.zeros(len(measured)) if measured.target_index is None else measured.target_index
-        )
         table = np.column_stack([
             measured.actuators,
             np.empty((len(measured), 0)) if measured.other is None else measured.other,
             measured.values.reshape(len(measured), -1),
-            targets,
+            repeats.targets(measured),
         ])  # fmt: skip
         _, first, inverse = np.unique(table, axis=0, return_index=True, return_inverse=True)
         twins = first[inverse.reshape(-1)]

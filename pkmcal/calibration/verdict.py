@@ -86,7 +86,7 @@ def judge(
     if drift is not None and drift.large:
         doubts.append(str(drift))
     doubts += found.warnings
-    weak = beyond_linear(found.fit.estimate, found.fit.uncertainty)
+    weak = None if grave else beyond_linear(found.fit.estimate, found.fit.uncertainty)
     if weak is not None and not weak.assembled:
         doubts.append(str(weak))
     if not grave and not doubts and _little_gained(found):
@@ -292,8 +292,8 @@ def _disagreement(found: Parts, robust: RobustCheck) -> str:
     return (
         f"{count} {rows} with the rest: {row_names(found.fit.equations.datasets, robust.rows)};"
         f" a robust fit leaves {_mm(robust.rms)} in the others, this one {_mm(found.rms)} in all:"
-        " leave them out with --drop-outliers (drop='outliers'), or fit with --loss cauchy"
-        " (loss='cauchy')"
+        f" leave {'it' if count == 1 else 'them'} out with --drop-outliers (drop='outliers'), or"
+        " fit with --loss cauchy (loss='cauchy')"
     )
 
 

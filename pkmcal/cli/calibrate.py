@@ -103,6 +103,14 @@ def calibrate(
             " their own names.",
         ),
     ] = None,
+    approach: Annotated[
+        str | None,
+        typer.Option(
+            metavar="WORD",
+            help="order: the machine was driven from row to row as they stand in a file, which says"
+            " from where each actuator came; for backlash.",
+        ),
+    ] = None,
     covariance: Annotated[
         str,
         typer.Option(
@@ -214,6 +222,9 @@ def calibrate(
     for doubt in doubts:
         say(f"pkmcal: {doubt.message}", err=True)
     held = None if holdout is None else _read_holdout(holdout, read, machine, reading)
+    if approach is not None:
+        measured = [_approached(approach, each) for each in measured]
+        held = _approached(approach, held) if isinstance(held, Measurements) else held
     anew = [name.strip() for text in per_session or [] for name in text.split(",")]
     if session or anew:
         measured, held = in_sessions(csv, measured, session or [], holdout, held)
@@ -337,6 +348,13 @@ def _seen_by(tracker: Tracker, measured: Measurements) -> Measurements:
             f"--tracker: a tracker measures positions, the file has {measured.kind}s"
         )
     return replace(measured, sigma=tracker.covariance(measured.values))
+
+
+def _approached(text: str, measured: Measurements) -> Measurements:
+    word("--approach", text, ("order",))
+    if measured.approach is not None:
+        raise ArgumentError(f"--approach: {measured.file} has columns approach")
+    return replace(measured, approach="order")  # type: ignore[arg-type]
 
 
 def _known(option: str, text: str, measured: Sequence[Measurements]) -> Known | list[Known]:

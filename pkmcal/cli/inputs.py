@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pkmcal.exceptions import FileError
 from pkmcal.files import provenance
 from pkmcal.files.reading import MOST_TABLE, Input
 from pkmcal.geometry import robot_file
 from pkmcal.loading import urdf_chain
+
+_TABLES = (".csv", ".tsv", ".txt", ".log", ".xlsx")
+_CONFIGURATIONS = (".cfg", ".g", ".gcode")
 
 
 class Inputs:
@@ -33,6 +37,14 @@ class Inputs:
         path = robot if chain is None else str(chain[0])
         if not Path(path).exists():
             return robot  # `load` refuses it
+        suffix = Path(path).suffix.lower()
+        if suffix in _TABLES:
+            raise FileError(f"{path}: measurements, where a robot is needed: the robot comes first")
+        if suffix in _CONFIGURATIONS:
+            raise FileError(
+                f"{path}: a firmware's configuration, where a robot file is needed: pkmcal import"
+                " makes one of it"
+            )
         return self.file(path, robot if chain else None)
 
     @property

@@ -87,6 +87,8 @@ class Reading:
 
     def measurements(self, path: str | Path, read: Inputs, robot: Calibratable) -> Measurements:
         """The measurements of a file; what was assumed is printed to stderr, a line each."""
+        if Path(path).suffix.lower() in (".toml", ".urdf"):
+            raise FileError(f"{path}: a robot file, where measurements are needed")
         stated: dict[str, Any] = {} if self.columns is None else _stated(self.columns, read)
         stated["ignore"] = [*stated.get("ignore", ()), *self.ignore]
         stated["rename"] = stated.get("rename", {}) | dict(map(_renamed, self.rename))

@@ -70,6 +70,7 @@ _CHAINS = """\
 #   copies, about  so many of this limb, turned about z or { axis = …, at = … }
 #   group          limbs that are copied together
 #   errors         of its joints by name: { "joint1.dx" = 0.12, "platform.dz" = -0.03 }
+# [[tail]]         below the limbs: a joint behind the platform; kind R or P, at, axis, actuator
 """
 _ARM = """\
 # units      of every number below; mm, m or in; deg or rad

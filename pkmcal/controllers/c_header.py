@@ -90,17 +90,18 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
 
 
 def _require_turns(robot: Robot) -> None:
-    """Refuse cranks that a whole turn of their actuator leaves elsewhere, one of them."""
+    """Refuse cranks that share an actuator whose whole turn may leave one of them elsewhere."""
     for a in range(robot.n_actuators):
         sharing = [
             (KINDS[limb.kind].actuator_unit, abs(g[_GAIN]))
             for limb, g in zip(robot.model.limbs, robot.slots, strict=True)
             if limb.actuator == a
         ]
-        if "rad" in dict(sharing) and len(set(sharing)) > 1:
+        geared = len(set(sharing)) > 1 or (len(sharing) > 1 and robot.model.driven)
+        if "rad" in dict(sharing) and geared:
             raise ArgumentError(
-                f"robot: limbs of {robot.name} share actuator q{a + 1} with different gears; which"
-                " of its turns they agree on is more than a header finds"
+                f"robot: limbs of {robot.name} share actuator q{a + 1} with different gears or"
+                " drive laws; which of its turns they agree on is more than a header finds"
             )
 
 
@@ -178,6 +179,7 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
             machine.struct.near[i] if turns else 0.0 for i, turns in enumerate(turning)
         ),
         "turn": one(2.0 * np.pi),
+        "beta": MAPS[map].index("beta") if machine.turns_freely else None,
         "laws": [
             {
                 "base": several(law.base),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import NamedTuple
 
 from pkmcal.exceptions import FileError
@@ -148,7 +149,8 @@ def numbers(
         raise FileError(f"{place}: {letter} of {command} is missing")
     value = found[letter].value
     parts = value.split(":")
-    if len(parts) not in counts or not all(_NUMBER.fullmatch(part) for part in parts):
+    plain = all(_NUMBER.fullmatch(part) and isfinite(float(part)) for part in parts)
+    if len(parts) not in counts or not plain:
         wanted = "a number" if counts == (1,) else f"{' or '.join(map(str, counts))} numbers"
         raise FileError(f"{place}: {letter} of {command} must be {wanted}, found {value!r}")
     return [float(part) for part in parts]

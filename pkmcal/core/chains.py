@@ -7,9 +7,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from pkmcal._core import ffi, lib
-from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.core.core_machine import CoreMachine
-from pkmcal.core.library import ISA, MAPS, call, pointer
+from pkmcal.arrays import FloatArray, Int32Array, IntArray
+from pkmcal.core import screws
+from pkmcal.core.chain_readings import readings
+from pkmcal.core.chain_tail import coordinates
+from pkmcal.core.core_machine import CoreMachine, known_rows
+from pkmcal.core.library import COORDINATE_UNITS, ISA, MAPS, call, pointer
 from pkmcal.core.machine import CLOSURE_TOLERANCE, Closure, Machine
 from pkmcal.core.path_differences import actuator_rates, platform_motion
 
@@ -18,6 +21,7 @@ MAX_JOINTS: int = lib.PKM_MAX_JOINTS
 MAX_SHARED: int = lib.PKM_MAX_SHARED
 MAX_CHAIN_ROWS: int = lib.PKM_MAX_CHAIN_ROWS
 MAX_NUMBERS: int = lib.PKM_MAX_NUMBERS
+_STEP = 1e-5  # rad, and of the characteristic length
 GROUPS = {"spatial": 6, "planar": 3, "spherical": 3}  # pose maps of chains, and the rows of a chain
 
 
@@ -62,6 +66,9 @@ class ChainLayout:
         What the actuators read at home.
     near : ndarray (actuators)
         What they read, gain and offset included, where an angle is given nearest to.
+    tail : int
+        The first actuator of the joints behind the platform, which all chains have in common and
+        which come last; the number of actuators where there are none.
     """
 
     map: str
@@ -85,6 +92,7 @@ class ChainLayout:
     drive_place: Int32Array
     zero: FloatArray
     near: FloatArray
+    tail: int
 
     @property
     def shared(self) -> int:
@@ -93,6 +101,16 @@ class ChainLayout:
         of = np.repeat(np.arange(len(chains)), chains)
         users = [len(set(of[self.member == joint])) for joint in range(len(self.place))]
         return int(((np.array(users) > 1) & (self.coordinate >= 0)).sum())
+
+    @property
+    def steps(self) -> FloatArray:
+        """By how much each number changes where effects are found by differences, mm and rad."""
+        found = np.full(self.numbers, _STEP)
+        for place in (self.place, self.end_place, self.ball_place[self.ball != 0]):
+            found[np.unique(place)[:, None] + np.arange(3)] *= self.length
+        slides = np.unique(self.actuator[(self.actuator >= 0) & (self.prismatic != 0)])
+        found[self.drive_place[slides]] *= self.length
+        return found
 
     @property
     def passive(self) -> int:
@@ -141,7 +159,7 @@ class ChainMachine(CoreMachine):
         struct.chains = len(layout.ball)
         struct.joints, struct.actuators = len(layout.place), len(layout.zero)
         struct.passive, struct.shared = layout.passive, layout.shared
-        struct.numbers = layout.numbers
+        struct.numbers, struct.tail = layout.numbers, layout.tail
         struct.size, struct.length = layout.size, layout.length
         if closure_tolerance is None:
             closure_tolerance = CLOSURE_TOLERANCE * layout.size
@@ -163,9 +181,27 @@ class ChainMachine(CoreMachine):
 
         Angles as `pkmcal.core.machine.Machine.inverse` gives them.
         """
+        if self.layout.tail < self.actuators:
+            return self.nearest_turns(slots, self._with_tail(slots, pose), near)
         q = np.empty((len(pose), self.actuators))
         call("chain_inverse", self.struct, len(pose), slots, 0, pose, q, isa=self.isa)
-        return self.nearest_turns(slots, q, near)
+        return known_rows(self.nearest_turns(slots, q, near))
+
+    def _with_tail(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """`inverse` of a machine with joints behind the platform."""
+        arms = np.append(np.ones(self.actuators), self.layout.length)
+        arms[self._angles] = self.layout.length
+        arms[:-1] *= np.abs(self.slopes(slots, pose[:1])[0]) if len(pose) else 1.0
+        guess = screws.pose(np.ascontiguousarray(self.layout.home.reshape(1, 16)))[0]
+        q = self.at_drives(slots, self.layout.zero)
+        home, status, _, _ = self.forward(slots, q[None], guess, 1)
+        if status[0] != 0:
+            return np.full((len(pose), self.actuators), np.nan)
+        return coordinates(
+            lambda there, near: self.forward(slots, there, near, 1)[:2],
+            lambda at, there: self.forward_jacobian(slots, at, there, twists=True),
+            pose, (home[0], q), self.layout.size, arms,
+        )  # fmt: skip
 
     def turns(self, slots: FloatArray) -> FloatArray:
         """How far each actuator goes in a whole turn, (n,); infinite where it is no angle."""
@@ -251,6 +287,22 @@ class ChainMachine(CoreMachine):
         given = (len(pose), slots, 0, pose, q)
         call("chain_frames", self.struct, *given, passive, frames, isa=self.isa)
         return passive, frames
+
+    def readings(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, columns: Int32Array | None = None
+    ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+        """Closures in units of what was read, as `pkmcal.core.machine.Machine.readings`."""
+        layout = self.layout
+        turns = np.array([COORDINATE_UNITS[name] == "rad" for name in MAPS[layout.map]])
+        return readings(
+            lambda numbers, needed: self.closure(numbers, pose, needed),
+            slots, q, np.where(turns, layout.length, 1.0), columns, layout.steps,
+        )  # fmt: skip
+
+    @property
+    def reading_rows(self) -> IntArray:
+        """Which row of `readings` is that of each actuator's coordinate."""
+        return np.arange(self.actuators)
 
     def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators, as `pkmcal.core.machine.Machine.rates`."""

@@ -31,6 +31,12 @@ def whole_turn(gains: FloatArray) -> float:
     return float((1 + int(np.argmax(whole))) * 2 * np.pi / abs(gains[0]))
 
 
+def known_rows(q: FloatArray) -> FloatArray:
+    """Rows (N, n) of which nothing is known where one number is not; in place."""
+    q[~np.isfinite(q).all(axis=1)] = np.nan
+    return q
+
+
 class CoreMachine(ABC):
     """A machine in the core: its struct, and calls that differ in the name of the C call alone.
 
@@ -42,6 +48,8 @@ class CoreMachine(ABC):
         Index into `ISAS`.
     actuators : int
         Number of actuator coordinates, n.
+    m : int
+        Number of free coordinates.
     """
 
     _FORWARD: ClassVar[str]
@@ -49,6 +57,7 @@ class CoreMachine(ABC):
     struct: Any
     isa: int
     actuators: int
+    m: int
 
     @property
     def _free(self) -> tuple[str, ...]:
@@ -125,9 +134,10 @@ class CoreMachine(ABC):
         if not angles.any():
             return q
         about = self.reference(slots) if near is None else near
-        off, turn = q[:, angles] - about[..., angles], turns[angles]
         out: FloatArray = q.copy()
-        out[:, angles] -= turn * np.rint(off / turn)
+        with np.errstate(invalid="ignore"):  # infinite coordinates are nowhere
+            off, turn = q[:, angles] - about[..., angles], turns[angles]
+            out[:, angles] -= turn * np.rint(off / turn)
         return out
 
     def forward(
@@ -186,3 +196,12 @@ class CoreMachine(ABC):
         given = (len(pose), slots, stride, pose, q, columns, len(columns), twists)
         call(self._ERRORS, self.struct, *given, out, isa=self.isa)
         return out if twists else self.as_written(pose, out, 1)
+
+    def moved(self, pose: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Poses (N, 6) moved by steps of the map (N, m), mm and rad.
+
+        And the platform's twist (ω, v) by a step at the poses, (N, 6, m).
+        """
+        moved, twist = np.empty((len(pose), 6)), np.empty((len(pose), 6, self.m))
+        call("moved", self.struct.map, len(pose), pose, step, moved, twist, isa=self.isa)
+        return moved, twist

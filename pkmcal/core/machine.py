@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pkmcal._core import ffi, lib
-from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.arrays import FloatArray, Int32Array, IntArray
 from pkmcal.core.core_machine import CoreMachine, whole_turn
 from pkmcal.core.library import (
     AXES,
@@ -167,7 +167,8 @@ class Machine(CoreMachine):
     def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """q̃ of each limb (N, limbs) at actuator coordinates (N, n)."""
         of_limbs = list(self.struct.actuator[0 : self.struct.limbs])
-        found: FloatArray = slots[:, _GAIN] * q[:, of_limbs] + slots[:, _OFFSET]
+        with np.errstate(over="ignore"):  # beyond all numbers: infinite
+            found: FloatArray = slots[:, _GAIN] * q[:, of_limbs] + slots[:, _OFFSET]
         return found
 
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
@@ -281,14 +282,11 @@ class Machine(CoreMachine):
         call("readings", self.struct, *given, isa=self.isa)
         return residual, by_step, by_number
 
-    def moved(self, pose: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Poses (N, 6) moved by steps of the map (N, m), mm and rad.
-
-        And the platform's twist (ω, v) by a step at the poses, (N, 6, m).
-        """
-        moved, twist = np.empty((len(pose), 6)), np.empty((len(pose), 6, self.m))
-        call("moved", self.struct, len(pose), pose, step, moved, twist, isa=self.isa)
-        return moved, twist
+    @property
+    def reading_rows(self) -> IntArray:
+        """Which row of `readings` is that of each limb's coordinate."""
+        rows_of = [1 + int(row).bit_count() for row in self.struct.rows[0 : self.struct.limbs]]
+        return np.concatenate([[0], np.cumsum(rows_of)[:-1]])
 
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """What the limbs are at coordinates (N, n): (N, limbs, 7 + 3 AXES).

@@ -82,7 +82,8 @@ class Table:
             heading = f"[[{heading}]] {below.pop(0) + 1}"
         else:
             heading = f"[{heading}]"
-        return ": ".join(filter(None, (heading, ".".join(filter(None, map(str, below))))))
+        words = [f"{each + 1}" if isinstance(each, int) else each for each in below if each != ""]
+        return ": ".join(filter(None, (heading, ".".join(words))))
 
     def fail(self, key: str, message: str, at: str = "") -> NoReturn:
         """Raise ValueError about the value of `key`; about the table itself where it is empty.

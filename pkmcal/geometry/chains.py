@@ -43,12 +43,16 @@ class Chains:
     home : ndarray (6,)
         Of the platform.
     limbs : tuple of tuple of Joint
-        Of each limb its joints from the base to the platform.
+        Of each limb its joints from the base to the platform, and those of the tail.
+    tail : int
+        How many joints are behind the platform, the same in all limbs: the pose is that of a tool
+        which they carry.
     """
 
     map: str
     home: FloatArray
     limbs: tuple[tuple[Joint, ...], ...]
+    tail: int = 0
 
     @property
     def n_actuators(self) -> int:
@@ -56,6 +60,20 @@ class Chains:
         return 1 + max(
             (j.actuator for limb in self.limbs for j in limb if j.actuator is not None), default=-1
         )
+
+    def name_of(self, i: int, k: int) -> str:
+        """The name of joint k of limb i, both counted from 0, before the letter of its part.
+
+        The first joint of the tail has errors for each limb: where the limb ends on the platform.
+        """
+        behind = k - (len(self.limbs[i]) - self.tail)
+        if behind >= 0:
+            return f"tail{behind + 1}" if behind else f"limb{i + 1}.tail"
+        return self.limbs[i][k].share or f"limb{i + 1}.joint{k + 1}"
+
+    def end_of(self, i: int) -> str:
+        """The name of the end of limb i, counted from 0: on the platform, or all on the tool."""
+        return "tool" if self.tail else f"limb{i + 1}.platform"
 
     @cached_property
     def actuated(self) -> tuple[tuple[int, Joint], ...]:
@@ -74,7 +92,10 @@ class Chains:
             for k, joint in enumerate(limb, 1):
                 drive = "" if joint.actuator is None else f"q{joint.actuator + 1}"
                 place = [fixed(float(x), 3) for x in joint.at]
-                rows.append([str(i), joint.share or str(k), joint.kind, drive, *place])
+                own = k <= len(limb) - self.tail
+                name = joint.share or str(k) if own else f"tail{k - len(limb) + self.tail}"
+                if own or i == 1:
+                    rows.append([str(i) if own else "", name, joint.kind, drive, *place])
         return Table(
             ["limb", "joint", "kind", "actuator", "x [mm]", "y [mm]", "z [mm]"], rows, left=4
         )
@@ -99,8 +120,8 @@ class Chains:
         """Of each limb the names of its parts, without a last ball."""
         return tuple(
             tuple(
-                (joint.share or f"limb{i + 1}.joint{k}") + suffix
-                for k, joint in enumerate(limb, 1)
+                self.name_of(i, k) + suffix
+                for k, joint in enumerate(limb)
                 if not _closes(limb, joint)
                 for suffix in PARTS[: joint.parts]
             )
@@ -112,14 +133,14 @@ class Chains:
         """Every axis by its name, the first of each shared joint's limbs."""
         found: dict[str, Part] = {}
         for i, limb in enumerate(self.limbs):
-            for k, joint in enumerate(limb, 1):
+            for k, joint in enumerate(limb):
                 if _closes(limb, joint):
                     continue
-                name = joint.share or f"limb{i + 1}.joint{k}"
+                name = self.name_of(i, k)
                 errors = BY_MAP[self.map]
                 axes = joint.axes
                 if joint.ball:
-                    axes, errors = ball_axes(limb, k - 1), BY_MAP[self.map][:3]
+                    axes, errors = ball_axes(limb, k), BY_MAP[self.map][:3]
                 if joint.kind == "C":
                     axes = axes * 2
                 for n, (suffix, axis) in enumerate(zip(PARTS, axes, strict=False)):
@@ -145,7 +166,7 @@ class Chains:
             if ball:
                 name = f"limb{i + 1}.joint{len(self.limbs[i])}"
                 made += _errors(name, ERRORS[:3], i, places[name])
-            name = f"limb{i + 1}.platform"
+            name = self.end_of(i)
             if places[name] not in {n.place for n in made}:
                 made += _errors(name, ERRORS[:3] if ball else BY_MAP[self.map], i, places[name])
             for a, (first, joint) in enumerate(self.actuated):
@@ -167,13 +188,16 @@ class Chains:
         for i, limb in enumerate(self.limbs):
             if _ends_in_ball(limb):
                 names.append((f"limb{i + 1}.joint{len(limb)}", 6))
-            names.append((f"limb{i + 1}.platform", 6))
+            if not (self.tail and i):
+                names.append((self.end_of(i), 6))
         names += [(f"drive{a + 1}", 2) for a in range(self.n_actuators)]
         place = 0
         for name, count in names:
             ends[name] = place
             place += count
         for i, limb in enumerate(self.limbs):  # limbs that end in the same joint have one end
+            if self.tail:
+                break
             first = next(k for k, other in enumerate(self.limbs) if _same_end(other, limb))
             ends[f"limb{i + 1}.platform"] = ends[f"limb{first + 1}.platform"]
         return ends
@@ -252,8 +276,7 @@ class Chains:
         passive.sort(key=lambda name: sum(name in limb for limb in chains) < 2)  # shared first
         coordinate = {name: k for k, name in enumerate(passive)}
         ends = [limb[-1] for limb in self.limbs]
-        names = [f"limb{i + 1}" for i in range(len(ends))]
-        balls = [f"{n}.joint{len(limb)}" for n, limb in zip(names, self.limbs, strict=True)]
+        balls = [f"limb{i}.joint{len(limb)}" for i, limb in enumerate(self.limbs, 1)]
         first = np.cumsum([0, *(len(limb) for limb in self.members)])
         zero = np.array([joint.home_value for _, joint in self.actuated])
         middle = [z if j.stroke is None else sum(j.stroke) / 2
@@ -272,7 +295,7 @@ class Chains:
             first=ints(first),
             member=ints(member),
             ball=ints([_ends_in_ball(limb) for limb in self.limbs]),
-            end_place=ints([places[f"{name}.platform"] for name in names]),
+            end_place=ints([places[self.end_of(i)] for i in range(len(ends))]),
             ball_place=ints([places.get(ball, 0) for ball in balls]),
             end=np.array([joint.at for joint in ends]),
             prismatic=ints([part.slides for part in every]),
@@ -285,6 +308,7 @@ class Chains:
             drive_place=ints([places[f"drive{a + 1}"] for a in range(self.n_actuators)]),
             zero=zero,
             near=np.array(middle),
+            tail=self.n_actuators - self.tail,
         )
 
 

@@ -34,7 +34,7 @@ STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_dia
 INDEPENDENT = "independent"  # the default free set of a file that names none: found when loaded
 TOP = (
     "name", "units", "closure_tolerance", "frames", "pose", "workspace", "parameters",
-    "calibration", "stated", "limb",
+    "calibration", "stated", "limb", "tail",
 )  # fmt: skip
 
 
@@ -148,8 +148,9 @@ def parse(source: Source, file: str | None) -> Model:
     pose_map = pose.choice("map", MAPS, "pose map")
     home = _read_pose(pose, "home", MAPS[pose_map], f"the map {pose_map}")
     chains = None
-    if any(table.data.get("kind") == CHAIN for table in described):
-        chains, own = read_chains(described, parameters, pose_map, home)
+    tail = top.tables("tail", "a robot with a tail") if "tail" in top else []
+    if tail or any(table.data.get("kind") == CHAIN for table in described):
+        chains, own = read_chains(described, tail, parameters, pose_map, home)
         limbs = Limbs(chain_limbs(chains), list(chains.numbers), own, chains.blank)
     else:
         limbs = read_limbs(described, parameters)

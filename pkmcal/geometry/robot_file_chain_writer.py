@@ -18,7 +18,7 @@ def chain_tables(chains: Chains, geometry: Geometry) -> Iterator[dict[str, Any]]
     for i, limb in enumerate(chains.limbs):
         errors: dict[str, float] = {}
         joints = []
-        for k, joint in enumerate(limb, 1):
+        for k, joint in enumerate(limb[: len(limb) - chains.tail], 1):
             if joint.share in said:
                 joints.append({"share": joint.share})
                 continue
@@ -28,8 +28,19 @@ def chain_tables(chains: Chains, geometry: Geometry) -> Iterator[dict[str, Any]]
                 errors |= _errors(geometry, f"{name}{suffix}.", f"joint{k}{suffix}.")
             if joint.share:
                 said.add(joint.share)
-        errors |= _errors(geometry, f"limb{i + 1}.platform.", "platform.")
+        for end in ("platform", "tail"):
+            errors |= _errors(geometry, f"limb{i + 1}.{end}.", f"{end}.")
         table: dict[str, Any] = {"kind": CHAIN, "joints": joints}
+        yield table | ({"errors": errors} if errors else {})
+
+
+def tail_tables(chains: Chains, geometry: Geometry) -> Iterator[dict[str, Any]]:
+    """The ``[[tail]]`` tables, as `robot_file_chains.read_tail` reads them back."""
+    for k in range(1, chains.tail + 1):
+        errors = _errors(geometry, f"tail{k}.", "")
+        if k == chains.tail:
+            errors |= _errors(geometry, "tool.", "tool.")
+        table = _joint(chains.limbs[0][k - chains.tail - 1], geometry)
         yield table | ({"errors": errors} if errors else {})
 
 

@@ -34,14 +34,22 @@ JOINT_KEYS = (
     "kind", "at", "axis", "axes", "actuator", "share", "home_value", "stroke", "cone", "soft",
     "offset", "gain", "drive",
 )  # fmt: skip
+TAIL_KEYS = (*(key for key in JOINT_KEYS if key not in ("axes", "share", "cone")), "errors")
 AXES = {"R": 1, "P": 1, "C": 1, "U": 2, "S": 3}
 FORMS = {1: "one axis, `axis = [x, y, z]`", 2: "two `axes`", 3: "three `axes`, or none of a ball"}
 
 
 def read_chains(
-    tables: Sequence[Table], parameters: Parameters, map: str, home: FloatArray
+    tables: Sequence[Table],
+    tail_tables: Sequence[Table],
+    parameters: Parameters,
+    map: str,
+    home: FloatArray,
 ) -> tuple[Chains, dict[str, float]]:
-    """Read every ``[[limb]]`` table of a machine of chains: its limbs, and its numbers by name."""
+    """Read every ``[[limb]]`` and ``[[tail]]`` table of a machine of chains.
+
+    Its limbs, and its numbers by name.
+    """
     if map not in GROUPS:
         known = ", ".join(GROUPS)
         tables[0].fail("kind", f"limbs that are chains go with the maps {known}, found {map}")
@@ -55,7 +63,9 @@ def read_chains(
     limbs, numbers = copied(listed)
     if len(limbs) > MAX_LIMBS:
         tables[-1].fail("", f"a robot has at most {MAX_LIMBS} limbs, with copies {len(limbs)}")
-    chains = Chains(map, home, tuple(limbs))
+    tail, of_tail = read_tail(tail_tables, parameters, map, limbs)
+    numbers += of_tail
+    chains = Chains(map, home, tuple(limb + tail for limb in limbs), len(tail))
     _check(tables, chains)
     values = {number.name: chains.blank.flat[number.place or 0] for number in chains.numbers}
     stated: set[str] = set()
@@ -73,7 +83,8 @@ def chain_limbs(chains: Chains) -> tuple[Limb, ...]:
     """The limbs as the model has them: what of a chain is that of any limb."""
     made = []
     for limb in chains.limbs:
-        driven = [joint for joint in limb if joint.actuator is not None]
+        own = limb[: len(limb) - chains.tail]
+        driven = [joint for joint in own if joint.actuator is not None]
         actuator = driven[0].actuator if driven else None
         stroke = driven[0].stroke if driven else None
         made.append(Limb(CHAIN, -1 if actuator is None else actuator, 0, {}, stroke=stroke))
@@ -114,6 +125,37 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
     return Listed(table, tuple(joints), values, copies, group, _about(table))
 
 
+def read_tail(
+    tables: Sequence[Table],
+    parameters: Parameters,
+    map: str,
+    limbs: Sequence[tuple[Joint, ...]],
+) -> tuple[tuple[Joint, ...], list[tuple[str, float, Table]]]:
+    """Read the ``[[tail]]`` tables: joints behind the platform, and their numbers by name."""
+    joints: list[Joint] = []
+    numbers: list[tuple[str, float, Table]] = []
+    first = 1 + max(
+        (j.actuator for limb in limbs for j in limb if j.actuator is not None), default=-1
+    )
+    for k, table in enumerate(tables, 1):
+        joint, of_drive = _with_drive(table, _joint(table, parameters, map, joints, TAIL_KEYS))
+        joints.append(joint)
+        if joint.actuator != first + k - 1:
+            table.fail(
+                "" if joint.actuator is None else "actuator",
+                f"joints behind the platform are actuated, their actuators counted on from those of"
+                f" the limbs: this one is {first + k}",
+            )
+        numbers += [(name, value, table) for name, value in of_drive.items()]
+        errors = table.table("errors") if "errors" in table else Table({}, table.source)
+        for error in errors.data:
+            of_tool = error.startswith("tool.") and k == len(tables)
+            unit: Unit = "mm" if error.rpartition(".")[2] in ERRORS[:3] else "rad"
+            name = error if of_tool else f"tail{k}.{error}"
+            numbers.append((name, errors.number(error, unit), table))
+    return tuple(_with_axes(each, joints, k, map) for k, each in enumerate(tables)), numbers
+
+
 def _of_kind(table: Table, parameters: Parameters, map: str, home: FloatArray) -> Listed:
     """A limb of another kind, as the chain that it is."""
     joints, values = joints_of_kind(table, parameters, map, home)
@@ -128,16 +170,23 @@ def _share(table: Table) -> str | None:
     if "share" not in table:
         return None
     share = table.text("share")
-    if not PARAMETER_NAME.fullmatch(share) or share.startswith("limb"):
-        table.fail("share", f"{share!r} is no name of a joint: letters, digits and _, not limb…")
+    if not PARAMETER_NAME.fullmatch(share) or share.startswith(("limb", "tail", "tool")):
+        what = "letters, digits and _, not limb…, tail… or tool…"
+        table.fail("share", f"{share!r} is no name of a joint: {what}")
     return share
 
 
-def _joint(table: Table, parameters: Parameters, map: str, before: Sequence[Joint]) -> Joint:
-    table.only(JOINT_KEYS, "a joint")
+def _joint(
+    table: Table,
+    parameters: Parameters,
+    map: str,
+    before: Sequence[Joint],
+    keys: Sequence[str] = JOINT_KEYS,
+) -> Joint:
+    table.only(keys, "a joint")
     kind: Any = table.choice("kind", KINDS, "kind of joint")
     if "at" in table:
-        at = _at(table, parameters)
+        at = _at(table, parameters, map)
     elif before:
         at = before[-1].at
     elif map == "spherical":
@@ -236,23 +285,27 @@ def _with_axes(table: Table, joints: Sequence[Joint], k: int, map: str) -> Joint
     return replace(joint, axes=(way,) if joint.kind == "P" else across(way))
 
 
-def _at(table: Table, parameters: Parameters) -> FloatArray:
-    """A point, cartesian or polar; names of parameters stand for their values."""
+def _at(table: Table, parameters: Parameters, map: str) -> FloatArray:
+    """A point, cartesian or polar, in the plane without z; names of parameters are their values."""
 
     def value(of: Table, key: str, each: object, unit: Any) -> float:
         return parameters.constant(of, key, each, unit)
 
     given = table["at"]
-    if isinstance(given, list) and len(given) == 3:
-        return np.array([value(table, "at", each, "mm") for each in given])
+    flat = map == "planar"
+    if isinstance(given, list) and len(given) in ((2, 3) if flat else (3,)):
+        return np.array(
+            [value(table, "at", each, "mm") for each in given] + [0.0] * (3 - len(given))
+        )
     if not isinstance(given, Mapping):
         form = "[x, y, z] or { radius = ..., angle = ..., z = ... }"
+        form = "[x, y] or { radius = ..., angle = ... }" if flat else form
         table.fail("at", f"a point is {form}, found {shown(given)}")
     polar = table.table("at")
     polar.only(("radius", "angle", "z"), "a polar point")
     radius = value(polar, "radius", polar["radius"], "mm")
     angle = value(polar, "angle", polar["angle"], "rad")
-    height = value(polar, "z", polar["z"], "mm")
+    height = 0.0 if flat and "z" not in polar else value(polar, "z", polar["z"], "mm")
     return np.array([radius * math.cos(angle), radius * math.sin(angle), height])
 
 

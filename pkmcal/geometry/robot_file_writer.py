@@ -10,7 +10,7 @@ from pkmcal.core.library import AXES, MAPS, POSE
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Cone, Limb, Model
-from pkmcal.geometry.robot_file_chain_writer import chain_tables
+from pkmcal.geometry.robot_file_chain_writer import chain_tables, tail_tables
 from pkmcal.geometry.robot_file_laws import law_table
 from pkmcal.geometry.ties import LimbNumber, Term
 
@@ -24,11 +24,14 @@ def text_of(model: Model) -> str:
         head["closure_tolerance"] = model.closure_tolerance
     blocks = [HEADER, lines(head)]
     blocks += [f"[{key}]\n{lines(table)}" for key, table in _sections(model).items() if table]
+    tail: list[dict[str, Any]] = []
     if model.chains is not None:
         limbs = list(chain_tables(model.chains, model.geometry))
+        tail = list(tail_tables(model.chains, model.geometry))
     else:
         limbs = [_limb(limb, i, model.geometry) for i, limb in enumerate(model.limbs)]
     blocks += [f"[[limb]]\n{lines(limb)}" for limb in limbs]
+    blocks += [f"[[tail]]\n{lines(joint)}" for joint in tail]
     return "\n".join(blocks)
 
 

@@ -75,8 +75,8 @@ def _value(
 
 def passive_coordinate(chains: Chains, i: int, k: int) -> int:
     """Which of the passive coordinates joint k of limb i has, its first part's."""
-    name = chains.limbs[i][k].share or f"limb{i + 1}.joint{k + 1}"
-    return int(chains.layout.coordinate[list(chains.parts).index(name + PARTS[0])])
+    name = chains.name_of(i, k) + PARTS[0]
+    return int(chains.layout.coordinate[list(chains.parts).index(name)])
 
 
 def home_axes(machine: ChainMachine) -> FloatArray:

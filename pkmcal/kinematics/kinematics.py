@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
-from pkmcal.arrays import BoolArray, FloatArray, Unit, as_numbers, as_rows
+from pkmcal.arrays import BoolArray, FloatArray, Unit, as_numbers, as_rows, mm_per_unit
 from pkmcal.core.chains import ChainMachine
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import MAPS, POSE
@@ -27,6 +27,7 @@ from pkmcal.modes.find import AssemblyProblem
 
 Match = bool | str | Sequence[str] | None
 
+_NONE = 1e-6  # of the largest: a singular value that is none
 _FOLLOWS = 0.3  # of what follows the free coordinates most: a coordinate that determines a pose
 
 
@@ -89,21 +90,31 @@ class Kinematics:
 
         Those that the robot file declares to match, or else the free ones. Where base and tool
         frames turn a machine so that these do not determine its pose (a planar machine that stands
-        upright moves along x and z), others take the place of those that hardly follow.
+        upright moves along x and z), others take the place of those that hardly follow. Where
+        limbs leave fewer ways to move, as many that follow the actuators at home.
         """
         names = tuple(self.model.match or self.coordinates)
-        if self.frames.trivial or self.model.match or len(names) == len(POSE):
+        held = self.n_actuators < len(names)
+        if self.model.match or (not held and (self.frames.trivial or len(names) == len(POSE))):
             return names
         own = self.own_home[None]
-        closure = self.machine.closure(self.slots, own, self.machine.inverse(self.slots, own))
-        rates = self.frames.rates_outward(own, self.home[None], closure.pose_by_free)[0]
+        q = self.machine.inverse(self.slots, own)
         scale = np.where(np.arange(len(POSE)) < 3, 1.0, self.length)  # angles as arcs
-        rates *= scale[:, None] / scale[[POSE.index(name) for name in names]]
+        if held:
+            rates = self.machine.forward_jacobian(self.slots, own, q)
+            columns = mm_per_unit(self.model.actuator_units, self.length)
+        else:
+            rates = self.machine.closure(self.slots, own, q).pose_by_free
+            columns = scale[[POSE.index(name) for name in names]]
+        rates = self.frames.rates_outward(own, self.home[None], rates)[0]
+        rates *= scale[:, None] / columns
         if not np.isfinite(rates).all():
             return names
+        sizes = np.linalg.svd(rates, compute_uv=False)
+        freedom = int((sizes > _NONE * sizes[0]).sum()) if held else len(names)
         order = [*names, *(name for name in POSE if name not in names)]
         found: list[str] = []
-        for _ in names:
+        for _ in range(freedom):
             left = np.linalg.norm(rates, axis=1)
             name = next(n for n in order if left[POSE.index(n)] >= _FOLLOWS * left.max())
             found.append(name)

@@ -11,10 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, Unit, mm_per_unit
-from pkmcal.core.chains import ChainMachine
-from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import COORDINATE_UNITS
-from pkmcal.core.machine import Machine
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 
@@ -50,9 +47,11 @@ def surplus(robot: Robot) -> int:
 
     What they read can contradict itself. Closures beyond the free coordinates alone do not make it:
     of an over-constrained machine they are those of passive joints, which give way, and the pose
-    follows from that. None where limbs are chains.
+    follows from that. None where chains share passive joints or carry a tail.
     """
-    return row_roles(robot).surplus if robot.model.chains is None else 0
+    chains = robot.model.chains
+    apart = chains is None or not (chains.layout.shared or chains.tail)
+    return row_roles(robot).surplus if apart else 0
 
 
 def row_roles(robot: Robot) -> RowRoles:
@@ -70,9 +69,13 @@ def row_roles(robot: Robot) -> RowRoles:
     home = robot.home[None]
     slopes = readings(robot, home, robot.inverse(home))[1][0]
     along = passive @ slopes / mm_per_unit(step_units(robot), robot.length)
-    sizes = np.linalg.svd(along / np.linalg.norm(along, axis=1, keepdims=True))[1]
-    rank = int((sizes > _DEPENDENT).sum())
     weighted = [weight != 1.0 for limb in robot.model.limbs for weight in limb.weights]
+    if robot.model.chains is None:
+        along /= np.linalg.norm(along, axis=1, keepdims=True)
+    else:  # rows of chains are combinations of unit wrenches, and may be of none
+        weighted = [False] * len(beside)
+    sizes = np.linalg.svd(along)[1]
+    rank = int((sizes > _DEPENDENT * max(1.0, float(sizes.max(initial=0.0)))).sum())
     gives = np.array([False] * len(differ) + weighted, dtype=bool) | (rank < len(passive))
     owners = [int(of_rows[row.nonzero()[0][0]]) for row in passive[gives]]
     return RowRoles(
@@ -93,13 +96,13 @@ def step_units(robot: Robot) -> list[Unit]:
 def moved(robot: Robot, pose: FloatArray, step: FloatArray) -> FloatArray:
     """Poses (N, 6) after steps (N, m)."""
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    return robot.frames.outward(_of_limbs(robot).moved(own, np.ascontiguousarray(step))[0])
+    return robot.frames.outward(robot.machine.moved(own, np.ascontiguousarray(step))[0])
 
 
 def step_twists(robot: Robot, pose: FloatArray) -> FloatArray:
     """Twist of the platform by a step at poses (N, 6): (N, 6, m)."""
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    twists = _of_limbs(robot).moved(own, np.zeros((len(own), robot.machine.m)))[1]
+    twists = robot.machine.moved(own, np.zeros((len(own), robot.machine.m)))[1]
     return robot.frames.twists_outward(own, twists)
 
 
@@ -110,7 +113,7 @@ def readings(robot: Robot, pose: FloatArray, q: FloatArray) -> tuple[FloatArray,
     other rows, weighted, in mm: (N, rows); and their derivative by a step (N, rows, m).
     """
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    residual, by_step, _ = _of_limbs(robot).readings(robot.slots, own, q)
+    residual, by_step, _ = robot.machine.readings(robot.slots, own, q)
     return residual, by_step
 
 
@@ -122,7 +125,7 @@ def readings_by_numbers(
     chain = robot.geometry.chain[:, places]  # of the limbs' numbers, through their ties
     moving = np.flatnonzero(chain.any(axis=1))
     columns = robot.geometry.slot_index[moving].astype(np.int32)
-    by_number = _of_limbs(robot).readings(robot.slots, own, q, columns)[2]
+    by_number = robot.machine.readings(robot.slots, own, q, columns)[2]
     assert by_number is not None
     if np.array_equal(chain[moving], np.eye(len(places))):
         return by_number
@@ -132,13 +135,10 @@ def readings_by_numbers(
 
 def sphere_actuators(robot: Robot) -> list[int]:
     """Which actuator each row of `readings` is of; -1 for rows beside a limb's own."""
+    if robot.model.chains is not None:
+        return [*range(robot.n_actuators), *[-1] * (robot.machine.rows - robot.n_actuators)]
     of_rows: list[int] = []
     for limb in robot.model.limbs:
         beside = KINDS[limb.kind].all_rows(limb.couple > 0)
         of_rows += [limb.actuator] + [-1] * len(beside)
     return of_rows
-
-
-def _of_limbs(robot: Robot) -> Machine | DrivenMachine:
-    assert not isinstance(robot.machine, ChainMachine)  # `surplus` is 0 otherwise
-    return robot.machine

@@ -14,6 +14,7 @@ from pkmcal.files.reading import LONGEST_NAME
 from pkmcal.measurements.components import KINDS, Kind, noun
 from pkmcal.measurements.tracker import Tracker
 
+_LEAST_SIGMA, _MOST_SIGMA = 1e-100, 1e100  # whose squares are numbers
 _COLDEST = -273.15  # °C
 _ROUNDED = 1e-9  # share by which a covariance may miss symmetry, as what was computed or typed does
 
@@ -102,6 +103,11 @@ def sigma_array(
         )
     if not (sigma > 0).all():
         raise ArgumentError(f"sigma must be positive; found {sigma.min()} (None means not known)")
+    if sigma.min(initial=1.0) < _LEAST_SIGMA or sigma.max(initial=1.0) > _MOST_SIGMA:
+        raise ArgumentError(
+            f"sigma must lie between {_LEAST_SIGMA:g} and {_MOST_SIGMA:g}; found"
+            f" {sigma.min():g} to {sigma.max():g}"
+        )
     return np.array(np.broadcast_to(sigma, shape))
 
 

@@ -13,6 +13,7 @@ from pkmcal.exceptions import FileError
 from pkmcal.files.csv_table import Table
 from pkmcal.measurements.actuator_columns import actuators_in
 from pkmcal.measurements.point_names import split
+from pkmcal.measurements.temperature_columns import WHOLE
 from pkmcal.measurements.time_stamps import seconds, with_date
 
 Join = Literal["auto", "name", "row", "time"]
@@ -72,6 +73,13 @@ def _put(table: Table, log: Table, actuators: Sequence[str], rows: Rows, said: s
         said += f"; {unused} of its {len(log)} rows not used"
     table.take(kept)
     chosen = [row for row in rows if row is not None]
+    own = [name for name in table.columns if name.partition(".")[0] == WHOLE]
+    if own and any(name.partition(".")[0] == WHOLE for name in log.columns):
+        table.notes.append(
+            f"column {table.columns[own[0]].name!r} left out: the temperature in {log.path} is"
+            " taken for the machine's"
+        )
+        table.leave_out(own)
     beside = [
         name
         for name in log.columns

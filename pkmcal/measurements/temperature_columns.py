@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.exceptions import FileError
 from pkmcal.files.csv_table import Table
 
 WHOLE = "temperature"
@@ -32,11 +33,21 @@ def read_temperature(table: Table, actuators: int) -> FloatArray | None:
                 f"column {table.columns[name].name!r} is the temperature of an actuator that the"
                 f" machine has not: it has {actuators}"
             )
-    whole = _celsius(table, WHOLE) if WHOLE in given else np.full(len(table), np.nan)
-    return np.column_stack([_celsius(table, n) if n in given else whole for n in parts])
+    read = {name: values for name in given if (values := _celsius(table, name)) is not None}
+    whole = read.get(WHOLE, np.full(len(table), np.nan))
+    return np.column_stack([read.get(name, whole) for name in parts]) if read else None
 
 
-def _celsius(table: Table, name: str) -> FloatArray:
+def _celsius(table: Table, name: str) -> FloatArray | None:
+    """A column in °C; None, and a note, where it cannot be read: nothing else needs it."""
+    try:
+        return _read(table, name)
+    except FileError as error:
+        table.note(f"temperature left out: {error}")
+        return None
+
+
+def _read(table: Table, name: str) -> FloatArray:
     values, unit = table.numbers(name, *_TO_CELSIUS, "1", blank=True, unseen=True)
     if unit == "1":
         column = table.columns[name]

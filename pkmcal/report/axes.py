@@ -10,6 +10,7 @@ from pkmcal.arrays import FloatArray, IntArray, rms
 from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identification import Identification
 from pkmcal.measurements.iso230 import axis_performance
+from pkmcal.measurements.repeats import targets
 from pkmcal.statistics.linear_fit import numbered
 
 _SIGMAS = 3.0  # of the spread, in ISO 9283's repeatability of an angle
@@ -32,7 +33,7 @@ def axes(found: Identification) -> list[dict[str, Any]]:
             continue
         rows = equations.rows[equations.set_of == i]
         good = np.isfinite(measured.values).all(axis=1) & ~np.isin(rows, found.outliers)
-        run = _runs(equations.pose_of[i], measured.target_index)
+        run = _runs(equations.pose_of[i], targets(measured))
         run[~good] = -1
         first = _deviations(found.fit.start, i, run, measured.kind)
         last = _deviations(found.fit.end, i, run, measured.kind)
@@ -68,10 +69,8 @@ def _mean_size(values: FloatArray, pose: IntArray) -> float:
     return float(np.abs(np.bincount(group, values) / count).mean())
 
 
-def _runs(pose: IntArray, target: IntArray | None) -> IntArray:
+def _runs(pose: IntArray, target: IntArray) -> IntArray:
     """Number of the run of each row (N,): rows of different targets at one pose are one."""
-    if target is None:
-        return np.arange(len(pose))
     order, seen = np.zeros(len(pose), dtype=np.intp), dict[tuple[int, int], int]()
     for row, key in enumerate(zip(pose.tolist(), target.tolist(), strict=True)):
         order[row] = seen.get(key, 0)

@@ -28,11 +28,11 @@ _POSES = 200  # measured poses that can be visited
 def element(found: Identification) -> tuple[str, str]:
     """The element of the report, and the hash by which its policy names the script.
 
-    Nothing, and "none", of a machine that the page cannot hold: the still pictures stay.
+    Both are empty for a machine that the page cannot hold: the still pictures stay.
     """
     robot = found.robot
     if isinstance(robot, Robot) and any(limb.kind == "pulley" for limb in robot.model.limbs):
-        return "", "none"
+        return "", ""
     data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
     data["places"] = _measured(found)
     data["calibration"] = {"points": _points(found), "change": _change(found)}

@@ -92,7 +92,7 @@ def gather(
         "iso9283": contents.iso9283(found),
         "axes": axes(found),
         "certificate": signed,
-        "heat": in_words(found.fit.equations.sets, found.expansion),
+        "heat": in_words(found.fit.equations.sets, found.expansion, found.fit.parameters.robot),
         "accuracy": accuracy,
         "slice": None if isinstance(predicted, str) else predicted[1],
         "no_accuracy": predicted if isinstance(predicted, str) else "",

@@ -14,6 +14,7 @@ _LIMIT = 2.385  # of the Cauchy loss: 95 % as efficient as least squares for Gau
 _ROUNDS, _SETTLED = 60, 1e-4
 _LEAST_FREEDOM = 5  # below, some rows are always met
 _DRAWS = 100
+_RIDGE = 1e-12  # of a normal matrix that is 1 where all rows have full weight
 _ENOUGH = 100.0  # rows' worth of spare equations from which chance no longer moves a ratio much
 _MET = 1e-6  # share of the first scale below which half of the rows are met exactly
 
@@ -53,8 +54,10 @@ def robust_ratio(design: FloatArray, residual: FloatArray, components: IntArray)
             break
         scale = revised
         weights = np.repeat(1.0 / (1.0 + squares / (scale * _LIMIT) ** 2 / components), components)
-        root = np.sqrt(weights)
-        left = residual - design @ np.linalg.lstsq(design * root[:, None], residual * root)[0]
+        weighted = design * weights[:, None]
+        # the ridge is for directions that rows without weight alone determined
+        normal = weighted.T @ design + _RIDGE * np.eye(p)
+        left = residual - design @ np.linalg.solve(normal, weighted.T @ residual)
     return float(np.sqrt(residual @ residual / (m - p)) / scale)
 
 

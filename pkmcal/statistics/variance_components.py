@@ -83,8 +83,10 @@ def variance_components(
     for _ in range(_ROUNDS):
         if here is None:
             return None
-        # Fisher scoring of the logarithms, halved until the likelihood grows
-        matrix = here.information * np.outer(here.theta, here.theta)
+        # Newton's step of the logarithms, or Fisher's far from the top, halved until it climbs
+        matrix = here.curvature
+        if not np.linalg.eigvalsh(matrix)[0] > 0:
+            matrix = here.information * np.outer(here.theta, here.theta)
         step = np.clip(np.linalg.solve(matrix, here.slope), -_STEP, _STEP)
         if np.abs(step).max() < _SETTLED:
             break
@@ -110,11 +112,15 @@ def variance_components(
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """The restricted likelihood at variances theta, and its derivatives to their logarithms."""
+    """The restricted likelihood at variances theta, and its derivatives to their logarithms.
+
+    `curvature` is less the second one, `information` what is expected of it, to the variances.
+    """
 
     theta: FloatArray
     likelihood: float
     slope: FloatArray
+    curvature: FloatArray
     information: FloatArray
     plain: FloatArray
     slopes: FloatArray
@@ -153,7 +159,10 @@ class _Model:
             + float((left / theta).sum() + rest @ rest)
         )
         slope = 0.5 * (left / theta - (self.count - spent))
-        return _Point(theta, likelihood, slope, information, plain, slopes)
+        pulled = (self._pulls - self._inner @ shift) / theta[:, None]
+        curvature = -(pulled @ plain @ pulled.T) - information * np.outer(theta, theta)
+        curvature[every, every] += left / theta - slope
+        return _Point(theta, likelihood, slope, curvature, information, plain, slopes)
 
 
 def told_apart(

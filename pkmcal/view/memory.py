@@ -45,8 +45,8 @@ def chains(machine: ChainMachine, slots: FloatArray) -> tuple[bytes, int]:
     """``pkm_chains`` with offsets as pointers, its arrays, the geometry; and where that is."""
     struct, layout = machine.struct, machine.layout
     head = pack(
-        "<7i4x", struct.map, struct.chains, struct.joints, struct.actuators, struct.passive,
-        struct.shared, struct.numbers,
+        "<8i", struct.map, struct.chains, struct.joints, struct.actuators, struct.passive,
+        struct.shared, struct.numbers, struct.tail,
     )  # fmt: skip
     head += pack("<3di4x", struct.size, struct.length, struct.closure_tolerance, struct.over)
     head += pack("<12d", *struct.home)

@@ -15,6 +15,7 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import good_poses, reach
 
 BEYOND = 0.15  # of a range: sliders go beyond it, so that one sees what stops there
+_SAME = 1e-6  # of the machine's length: a pose that is found again
 _CLOUD = 500  # points, at most
 _DRAWS = 2500
 _ANGLE, _LENGTH = np.radians(30.0), 0.2  # where the machine says nothing: rad, and of its size
@@ -87,11 +88,17 @@ def actuators(
 
 def modes(robot: Robot) -> dict[str, Any]:
     """Every pose at the actuator coordinates of home; none where home is not reached."""
-    q = robot.inverse(robot.home)
+    home = completed(robot, robot.home[None])[0]  # of a calibrated machine some coordinates follow
+    q = robot.inverse(home if np.isfinite(home).all() else robot.home)
     if not np.isfinite(q).all():
         return {"poses": [], "complete": False}
     found = robot.forward_all(q)
-    return {"poses": found.poses.tolist(), "complete": bool(found.complete)}
+    poses = found.poses
+    if robot.model.chains is not None:  # of passive joints that fold over the page knows nothing
+        there = robot.forward(np.repeat(q[None], len(poses), axis=0), poses)
+        off = np.linalg.norm(there.pose[:, :3] - poses[:, :3], axis=1)
+        poses = poses[there.ok & (off < _SAME * robot.length)]
+    return {"poses": poses.tolist(), "complete": bool(found.complete)}
 
 
 def cloud(robot: Robot, ranges: dict[str, tuple[float, float]]) -> FloatArray:

@@ -69,6 +69,17 @@ def test_a_machine_that_does_not_move_is_not_said_to(hexapod: pk.Robot) -> None:
     assert (chances < 0.01).sum() <= 2 and (chances < 0.2).mean() < 0.45
 
 
+@pytest.mark.filterwarnings("ignore:residuals are .* free more parameters")
+def test_two_targets_given_by_their_places_are_no_repeats_of_one(hexapod: pk.Robot) -> None:
+    """Both were read at each pose, always in the same order, and no pose was visited again."""
+    rng = np.random.default_rng(2)
+    q = np.repeat(hexapod.inverse(hexapod_poses(hexapod, 40, rng)), 2, axis=0)
+    places = np.tile([[80.0, 0.0, 30.0], [-60.0, 50.0, 30.0]], (40, 1))
+    true = hexapod.replace({"base1.x": hexapod.geometry["base1.x"] + 2.0})  # is not sought
+    found = of(hexapod, pk.VirtualMachine(true, noise=0.01, seed=3).measure(q, target=places))
+    assert found.drift is None and np.isnan(found.repeatability)
+
+
 def test_a_drift_of_five_deviations_is_found_in_most_cases(hexapod: pk.Robot) -> None:
     chances = np.array([drift_chance(hexapod, seed, 0.05) for seed in range(15)])
     assert (chances < 0.01).sum() >= 10

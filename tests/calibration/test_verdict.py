@@ -174,7 +174,7 @@ def test_outliers_are_named_by_line_and_target(tmp_path: Path) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     found = fitted(arm, pk.read_measurements(path), **UNKNOWN)
     assert found.outliers == (37,)
-    assert "outliers: rows 37: log.csv line 15 (B)" in str(found)
+    assert "outliers: row 37: log.csv line 15 (B)" in str(found)
 
 
 @pytest.mark.parametrize("by", [1, -1, 2])

@@ -198,3 +198,28 @@ def test_a_sigma_that_is_far_too_large_is_said(hexapod: pk.Robot) -> None:
         found = fitted(hexapod, replace(measured, sigma=np.full((20, 3), sigma)))
         assert found.verdict.state == "calibrated"
         assert any("times what sigma says" in text for text in found.verdict.remarks) is said
+
+
+# --- numbers whose squares are none --------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [1e308, 1e-308, 1e200, 1e-200, 10**400])
+def test_priors_and_sigmas_whose_squares_are_no_numbers_are_refused_by_name(
+    hexapod: pk.Robot, value: float
+) -> None:
+    measured = positions(hexapod, hexapod, 10, 0)
+    for prior in (value, {"offset1": value}):
+        with pytest.raises(ValueError, match=r"prior.* must lie between 1e-15 and 1e\+15"):
+            pk.identify(hexapod, measured, "offset*", prior=prior)
+    if isinstance(value, float):
+        with pytest.raises(ValueError, match=r"sigma must lie between 1e-100 and 1e\+100"):
+            replace(measured, sigma=np.full((10, 3), value))
+
+
+def test_the_widest_and_narrowest_priors_are_taken(hexapod: pk.Robot) -> None:
+    measured = positions(hexapod, hexapod.replace({"offset1": 0.4}), 20, 0)
+    free = fitted(hexapod, measured)
+    for wide in (1e15, np.inf):
+        assert fitted(hexapod, measured, prior=wide).values == pytest.approx(free.values, abs=1e-6)
+    narrow = fitted(hexapod, measured, prior=1e-15)
+    assert narrow.values == pytest.approx(narrow.start, abs=1e-12)

@@ -163,7 +163,7 @@ def test_from_two_raw_files_to_a_sheet(
     said = " ".join(result.stdout.split())
     assert said.startswith("Calibrated: ")
     for i, k, _ in GROSS:
-        assert f"line {4 + 3 * i + k}, pose {i} (SMR{k + 1})" in said
+        assert f"line {4 + 3 * i + k}, pose {i + 1} (SMR{k + 1})" in said
     assert "± inf" not in said
     told = json.loads((tmp_path / "sheet" / "report.json").read_text("utf-8"))
     found = told["calibration"]
@@ -171,3 +171,16 @@ def test_from_two_raw_files_to_a_sheet(
     assert len(found["datum"]["names"]) == 12 and len(found["dropped"]) == 2
     assert told["certificate"]["expanded_uncertainty"] > 2.0 * NOISE
     assert 'id="certificate"' in (tmp_path / "sheet" / "report.html").read_text("utf-8")
+
+
+def test_arguments_in_another_order_are_told(run: Any, refused: Any) -> None:
+    run("new", "hexapod", "mine.toml")
+    Path("m.csv").write_text("q1 [mm],z [mm]\n1,2\n")
+    Path("printer.cfg").write_text("[printer]\nkinematics: delta\n")
+    assert refused("calibrate", "m.csv", "mine.toml") == (
+        "m.csv: measurements, where a robot is needed: the robot comes first"
+    )
+    assert refused("calibrate", "hexapod", "mine.toml") == (
+        "mine.toml: a robot file, where measurements are needed"
+    )
+    assert "pkmcal import makes one of it" in refused("calibrate", "printer.cfg", "m.csv")

@@ -12,7 +12,8 @@ import pytest
 
 import pkmcal as pk
 
-from .. import robots
+from .. import generated, robots
+from ..driven import with_laws
 from .c_headers import PARALLEL, STRICT, compiled, needed
 
 FRAMES = {
@@ -90,6 +91,24 @@ def cables() -> pk.Robot:
     return robots.made("translation", {"z": 400.0}, limbs)
 
 
+def rails() -> pk.Robot:
+    """Two rods on every carriage; its screw has a law for each."""
+    table = [[-100.0, 0.0], [50.0, 0.2], [200.0, -0.1]]
+    limbs = [
+        {"kind": "PUS", "base": base + side, "platform": robots.ring(30.0, at) + side}
+        | {"slider": [0, 0, 1], "rod": 340.0, "branch": -1, "actuator": i, "offset": 420.0}
+        | ({"drive": {"table": table}} if first else {"drive": {"quadratic": 1e-5}})
+        | {"stroke": [250.0, 700.0]}
+        for i, at in enumerate((0.0, 120.0, 240.0), 1)
+        for base in [robots.ring(160.0, at)]
+        for side, first in (
+            (robots.ring(20.0, at + 90), True),
+            (robots.ring(-20.0, at + 90), False),
+        )
+    ]
+    return robots.made("spatial", {"z": 100.0}, limbs, match=["x", "y", "z"])
+
+
 CASES = {name: lambda name=name: pk.load(name) for name in PARALLEL}
 CASES |= {
     "mixed, framed": mixed,
@@ -98,7 +117,7 @@ CASES |= {
     "turned": turned,
     "turned, with laws": lambda: turned(harmonics=[{"k": 1.0, "cos": 0.01, "sin": 0.02}]),
     "paired": paired,
-    "paired, with laws": lambda: paired(drive={"quadratic": 1e-3}),
+    "pairs on rails, with laws": rails,
 }
 # every driver, row and pose map
 SOME = [
@@ -111,7 +130,7 @@ SOME = [
     "mixed, framed",
     "drive laws",
     "turned, with laws",
-    "paired, with laws",
+    "pairs on rails, with laws",
 ]
 
 
@@ -124,6 +143,35 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
         return compiled(CASES[case](), tmp_path_factory.mktemp("header"), number)
 
     return of_case
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("kind", ["six", "pairs", "tripod", "planar", "spherical"])
+def test_machines_that_nobody_drew_turn_their_cranks_as_python_does(
+    kind: str, seed: int, tmp_path: Path
+) -> None:
+    """Strokes of any turn, cranks near half a turn, limbs that share one; rotations either way."""
+    rng = np.random.default_rng([seed, generated.KINDS.index(kind), 31])
+    robot = generated.machine(kind, rng, errors=0.3)
+    if seed:
+        robot = with_laws(robot, rng)
+    header = compiled(robot, tmp_path)
+    at = robot.frames.outward(generated.poses(kind, robot, 100, rng))
+    if kind in generated.CONSTRAINED:
+        at = robot.complete(at)
+        at = at[np.isfinite(at).all(axis=1)]
+    other = at.copy()
+    if kind != "planar":
+        other[:, 3:] = other[:, 3:] * [1, -1, 1] + np.pi
+    assert len(at) > 20
+    for poses in (at, other):
+        for name in ("inverse", "jacobian"):
+            status, found = getattr(header, name)(poses)
+            want = getattr(robot, name)(poses)
+            np.testing.assert_array_equal(
+                status == 0, np.isfinite(want.reshape(len(at), -1)).all(1)
+            )
+            np.testing.assert_array_equal(found, want)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -173,7 +221,7 @@ def test_clang_too_has_nothing_to_say(case: str, number: str, tmp_path: Path) ->
     compiled(CASES[case](), tmp_path, number, "clang")  # gcc: in every test here
 
 
-@pytest.mark.parametrize("case", ["mixed, framed", "drive laws", "paired, with laws"])
+@pytest.mark.parametrize("case", ["mixed, framed", "drive laws", "pairs on rails, with laws"])
 def test_cpp_takes_it_too(case: str, tmp_path: Path) -> None:
     needed("g++")
     for number in ("double", "float"):
@@ -233,6 +281,8 @@ def test_machine_with_more_closures_than_coordinates_is_refused(tmp_path: Path) 
 def test_cranks_with_different_gears_on_one_actuator_are_refused(tmp_path: Path) -> None:
     with pytest.raises(pk.ArgumentError, match="share actuator q2 with different gears"):
         pk.export.c_header(paired(gain=2.0), tmp_path / "robot.h")
+    with pytest.raises(pk.ArgumentError, match="share actuator q1 with different gears or drive"):
+        pk.export.c_header(paired(drive={"quadratic": 1e-3}), tmp_path / "robot.h")
     assert not (tmp_path / "robot.h").exists()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,11 @@ every_script = pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: scr
 def stored(script: Path) -> dict[str, Any]:
     found: dict[str, Any] = json.loads(script.with_suffix(".ipynb").read_text(encoding="utf-8"))
     return found
+
+
+def settled(lines: list[str]) -> str:
+    """Without the gap behind the rank, which is rounding's."""
+    return re.sub(r"gap [\d.e+]+", "gap", "".join(lines))
 
 
 def of_code(found: dict[str, Any]) -> list[list[dict[str, Any]]]:
@@ -52,6 +58,6 @@ def test_a_notebook_runs_and_says_what_it_shows(script: Path) -> None:
             elif "text/plain" in one["data"]:
                 for kind in ("text/plain", "text/html"):
                     printed, expected = one["data"].get(kind, []), other["data"].get(kind, [])
-                    assert same("".join(printed), "".join(expected)), kind
+                    assert same(settled(printed), settled(expected)), kind
             else:
                 assert one["data"].keys() == {"image/png"}

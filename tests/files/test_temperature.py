@@ -91,3 +91,19 @@ def test_the_log_of_a_controller_has_the_temperature_too(tmp_path: Path) -> None
     log.write_text("Point,Strut 1 [mm],Temperature\nP1,5,20.4\nP2,6,20.6\n")
     m = pk.read_measurements(points, controller=log)
     np.testing.assert_array_equal(m.temperature, [[20.4] * 3, [20.6] * 3])
+
+
+def test_the_machine_is_as_warm_as_its_log_says(tmp_path: Path) -> None:
+    """What a tracker states is the air's."""
+    points = tmp_path / "points.csv"
+    points.write_text("Point,X [mm],Y [mm],Z [mm],Temperature\nP1,1,2,3,19\nP2,1,2,4,19\n")
+    log = tmp_path / "log.csv"
+    log.write_text("Point,Strut 1 [mm],Temperature\nP1,5,20.4\nP2,6,20.6\n")
+    m = pk.read_measurements(points, controller=log)
+    np.testing.assert_array_equal(m.temperature, [[20.4] * 3, [20.6] * 3])
+    assert any("taken for the machine's" in note for note in m.notes)
+
+
+def test_a_temperature_that_is_no_number_does_not_stand_in_the_way(tmp_path: Path) -> None:
+    m = read(tmp_path, "q1 [mm],z [mm],Temperature\n1,2,warm\n")
+    assert m.temperature is None and "line 2, column 'Temperature': expected a number" in m.notes[0]

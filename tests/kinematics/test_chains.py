@@ -116,6 +116,32 @@ def test_limbs_of_other_kinds_are_chains_too(name: str, tmp_path: Path) -> None:
         assert np.abs(effect - at).max() < 1e-9 * max(1.0, np.abs(at).max()), n
 
 
+@pytest.mark.parametrize("reach", (20.0, 30.0))
+def test_no_row_is_lost_beside_cranks_in_closed_form(reach: float, tmp_path: Path) -> None:
+    """Cold from home to where cranks are nearly stretched: plain Newton loses some rows there."""
+    robot = pk.load("6-rus")
+    chained = loaded(as_chains(robot), tmp_path)
+    random = np.random.default_rng(0)
+    pose = robot.home + np.hstack([random.uniform(-reach, reach, (1500, 3)), np.zeros((1500, 3))])
+    q = robot.inverse(pose)
+    q = q[np.isfinite(q).all(axis=1)]
+    one, other = robot.forward(q), chained.forward(q)
+    assert len(q) > 1200 and one.ok.mean() > 0.95
+    assert other.ok[one.ok].all()
+    assert (other.iterations - 1)[one.ok].mean() < 5.0  # the first is the prediction
+    assert np.abs(one.pose - other.pose)[one.ok].max() < 1e-8
+
+
+def test_rods_of_a_delta_keep_it_parallel() -> None:
+    """The six rods of a rotary delta against one closure an arm, which takes it not to turn."""
+    robot, plain = pk.load("delta-parallelograms"), pk.load("rotary-delta")
+    q = commands(plain, 60, share=2.0)
+    found, exact = robot.forward(q), plain.forward(q)
+    assert plain.model.map == "translation" and found.ok.all() and exact.ok.all()
+    assert np.abs(found.pose - exact.pose).max() < 1e-9
+    assert np.abs(found.pose[:, 3:]).max() < 1e-12
+
+
 def test_the_paper_s_poses_come_out_of_joints(tmp_path: Path) -> None:
     """Paper A's forward kinematics, with d = 292.4: no constraint of it is assumed."""
     text = robot_file.located("2tpr2tps-chains")[0].decode().replace("294.2", "292.4")

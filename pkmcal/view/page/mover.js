@@ -14,9 +14,10 @@ class Mover {
   }
 
   home() {
-    this.own = this.inward(this.data.home)
-    this.q = this.inverse(this.own)
-    this.arrived(this.own, this.q)
+    const own = this.inward(this.data.home)
+    this.arrived(own, this.inverse(own))
+    const found = this.complete(this.data.home) // of a calibrated machine the other coordinates follow
+    if (found) this.arrived(found.own, found.q)
     this.homeQ = this.q
     this.mode = 0
   }

@@ -23,7 +23,7 @@ async function start(root, data) {
   const redraw = () => { if (parts.panel) draw(looks()) }
   const scene = new Scene(canvas, redraw)
   if (data.map === 'planar' || data.map === 'xy') scene.tilt = 1.1
-  const places = ({ list }) => list.flatMap(b => b.rod ?? (b.wide ? [] : b.line) ?? (b.ball ? [b.ball] : []))
+  const places = ({ list }) => list.flatMap(b => b.rod ?? (b.dashed ? [] : b.line) ?? (b.ball ? [b.ball] : []))
   const changed = anew => {
     const found = looks()
     parts.panel.update(found[0])

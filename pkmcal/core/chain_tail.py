@@ -1,0 +1,98 @@
+"""Actuators of machines with joints behind the platform, by Gauss and Newton on `forward`.
+
+Such a pose is that of the tool; where the platform is follows from all actuators at once, so that
+no limb can be taken alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array
+from pkmcal.core import screws
+
+_STEPS = 30
+_SETTLED = 1e-12  # of the size, steps and what is missed
+_REST = 1e-9  # of the size: a step after which what is missed is what the machine cannot reach
+_TURN = 0.6  # rad, and of the length: no step is larger
+_SHARES = (1.0, 0.25, 0.05)  # of a step that leads nowhere
+
+
+def coordinates(
+    forward: Callable[[FloatArray, FloatArray], tuple[FloatArray, Int32Array]],
+    jacobian: Callable[[FloatArray, FloatArray], FloatArray],
+    pose: FloatArray,
+    home: tuple[FloatArray, FloatArray],
+    size: float,
+    arms: FloatArray,
+) -> FloatArray:
+    """Poses (N, 6) to coordinates (N, n) from home; NaN where none is found.
+
+    Where the machine cannot take a pose, the coordinates that come nearest to it.
+
+    Parameters
+    ----------
+    forward : callable
+        Coordinates (N, n) and poses (N, 6) near to poses and status.
+    jacobian : callable
+        Poses and coordinates to twists (N, 6, n) by the actuators.
+    pose : ndarray (N, 6)
+        Where the tool should be.
+    home : tuple of ndarray (6,), (n,)
+        A pose and its coordinates.
+    size : float
+        Of the machine, mm.
+    arms : ndarray (n,)
+        To which way, mm, a unit of each actuator compares; the last is the characteristic length.
+    """
+    length = float(arms[-1])
+    at, q = (np.tile(each, (len(pose), 1)) for each in home)
+    weigh = np.repeat([length, 1.0], 3)[:, None]
+    goal = _frames(np.nan_to_num(pose))
+    active: BoolArray = np.asarray(np.isfinite(pose).all(axis=1))
+    good = np.zeros(len(pose), dtype=bool)
+    for _ in range(_STEPS):
+        rows = np.flatnonzero(active)
+        if not rows.size:
+            break
+        missed = _missed(at[rows], goal[rows])[..., None] * weigh
+        slopes = jacobian(at[rows], q[rows]) * weigh / arms[:-1]
+        known = np.isfinite(slopes).all(axis=(1, 2))
+        active[rows[~known]] = False
+        rows, missed, slopes = rows[known], missed[known], slopes[known]
+        step = (np.linalg.pinv(slopes, rcond=1e-9) @ missed)[..., 0]
+        longest = np.abs(step).max(axis=1, initial=0.0)
+        small = np.abs(missed).max(axis=(1, 2), initial=0.0) <= _SETTLED * size
+        done = (longest <= _SETTLED * size) | (small & (longest <= _REST * size))
+        good[rows[done]] = True
+        active[rows[done]] = False
+        rows, step, longest = rows[~done], step[~done], longest[~done]
+        step *= np.minimum(1.0, _TURN * length / np.maximum(longest, 1e-300))[:, None]
+        for share in _SHARES:
+            there = np.ascontiguousarray(q[rows] + share * step / arms[:-1])
+            found, status = forward(there, np.ascontiguousarray(at[rows]))
+            ok = status == 0
+            q[rows[ok]], at[rows[ok]] = there[ok], found[ok]
+            rows, step = rows[~ok], step[~ok]
+        active[rows] = False
+    q[~good] = np.nan
+    return q
+
+
+def _frames(pose: FloatArray) -> FloatArray:
+    found: FloatArray = screws.joint_motions(
+        np.ascontiguousarray(pose), np.zeros((len(pose), 3))
+    ).reshape(-1, 4, 4)
+    return found
+
+
+def _missed(at: FloatArray, goal: FloatArray) -> FloatArray:
+    """The twist (ω, v) from poses (N, 6) to frames (N, 4, 4): turning, then way of the origin."""
+    here = _frames(at)
+    turn = np.zeros_like(goal)
+    turn[:, :3, :3] = goal[:, :3, :3] @ here[:, :3, :3].swapaxes(1, 2)
+    turn[:, 3, 3] = 1.0
+    log = screws.log(np.ascontiguousarray(turn.reshape(-1, 16)))
+    return np.hstack([log[:, :3], goal[:, :3, 3] - here[:, :3, 3]])

@@ -1,0 +1,162 @@
+"""Joints behind the platform: the tool is where the platform carries a serial arm."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.exceptions import FileError
+from pkmcal.geometry import robot_file
+from pkmcal.screw import from_pose
+from tests.chain_twin import Twin, about, rotation
+from tests.kinematics.test_chain_ranks import strengths
+from tests.kinematics.test_chains import commands, disturbed, loaded
+
+TOOL = 1200.0
+WRIST = [  # point and axis, one after the other crossing
+    ([0.0, 0.0, 1100.0], [0.0, 0.0, 1.0]),
+    ([0.0, 0.0, 1100.0], [0.6, 0.8, 0.0]),
+    ([0.0, 10.0, 1150.0], [0.0, 0.0, 1.0]),
+]
+
+
+def wrist(first: int, joints: int = 3) -> str:
+    return "".join(
+        f'[[tail]]\nkind = "R"\nat = {at}\naxis = {axis}\nactuator = {first + k}\n'
+        for k, (at, axis) in enumerate(WRIST[:joints])
+    )
+
+
+def tricept(joints: int = 3) -> str:
+    text = robot_file.located("tricept")[0].decode()
+    text = text.replace("home = { z = 1000.0 }", f"home = {{ z = {TOOL} }}")
+    return text.replace('match = ["x", "y", "z"]\n', "") + wrist(4, joints)
+
+
+@pytest.mark.parametrize("joints", (1, 2, 3))
+def test_the_tool_goes_with_the_platform_and_the_wrist(joints: int, tmp_path: Path) -> None:
+    """By a Tricept without one, and a product of exponentials."""
+    robot, plain = loaded(tricept(joints), tmp_path), pk.load("tricept")
+    assert robot.n_actuators == 3 + joints
+    q = commands(plain, 20)
+    turned = np.random.default_rng(1).uniform(-0.8, 0.8, (20, joints))
+    found = robot.forward(np.hstack([q, turned]))
+    assert found.ok.all()
+    for pose, carried, angles in zip(found.pose, plain.forward(q).pose, turned, strict=True):
+        T = from_pose(carried) @ np.linalg.inv(from_pose(plain.home))
+        for (at, axis), angle in zip(WRIST, angles, strict=False):
+            T = T @ about(rotation(angle * np.array(axis)), np.array(at))
+        assert np.abs(from_pose(pose) - T @ from_pose(robot.home)).max() < 1e-9
+
+
+def test_errors_of_the_wrist_are_those_of_products_of_exponentials(tmp_path: Path) -> None:
+    robot = disturbed(loaded(tricept(), tmp_path))
+    names = robot.geometry.names
+    assert {"limb1.tail.dx", "limb4.tail.dpsi", "tail2.dx", "tail3.dpsi", "tool.dx"} <= set(names)
+    assert not any(name.startswith(("tail1", "limb1.platform")) for name in names)
+    q = commands(robot, 3)
+    found = robot.forward(q)
+    for row, pose in zip(q, found.pose, strict=True):
+        T, _, missed = Twin(robot).forward(row)
+        assert missed < 1e-9 and np.abs(from_pose(pose) - T).max() < 1e-9
+    columns = [names.index(n) for n in ("limb2.tail.dphi", "tail2.dx", "tool.dtheta", "offset5")]
+    exact = robot.error_twists(found.pose, q)
+    for column in columns:
+        step = 1e-5 * np.eye(len(names))[column]
+        sides = [robot.replace(robot.geometry.values + s * step) for s in (1, -1)]
+        ends = [from_pose(side.forward(q, guess=found.pose).pose) for side in sides]
+        turn = ends[0][:, :3, :3] @ ends[1][:, :3, :3].swapaxes(1, 2)
+        turn = (turn - turn.swapaxes(1, 2))[:, [2, 0, 1], [1, 2, 0]] / 2
+        twist = np.hstack([turn, (ends[0] - ends[1])[:, :3, 3]]) / 2e-5
+        scale = np.array([robot.length] * 3 + [1.0] * 3)
+        assert np.abs((exact[..., column] - twist) * scale).max() < 1e-6
+
+
+def test_actuators_of_a_tool_are_found_from_its_pose(tmp_path: Path) -> None:
+    robot = loaded(tricept(), tmp_path)
+    q = commands(robot, 40)
+    q[:, 3:] += np.random.default_rng(2).uniform([-0.5, 0.1, -0.5], [0.5, 1.1, 0.5], (40, 3))
+    pose = robot.forward(q).pose
+    back = robot.inverse(pose)
+    assert np.isfinite(back).mean() > 0.95
+    known = np.isfinite(back).all(axis=1)
+    again = robot.forward(back[known])
+    assert np.abs(from_pose(again.pose) - from_pose(pose[known])).max() < 1e-8
+    assert np.isnan(robot.inverse([np.nan, 0.0, 1200.0, 0.0, 0.0, 0.0])).all()
+
+
+def test_a_wrist_adds_four_numbers_a_joint(tmp_path: Path) -> None:
+    """As in a serial arm, beside what poses tell of the Tricept."""
+    robot = loaded(tricept(), tmp_path)
+    q = commands(robot, 80, share=3.0)
+    values = strengths(robot, q)
+    count = len(pk.load("tricept").model.free) + 4 * 3
+    assert values[count - 1] > 1e-8 and (values[count:] < 1e-12).all()
+    assert len(robot.model.free) == count
+
+
+def test_a_tail_is_read_back_to_the_last_bit(tmp_path: Path) -> None:
+    robot = disturbed(loaded(tricept(), tmp_path))
+    robot.save(tmp_path / "one.toml")
+    again = pk.load(tmp_path / "one.toml")
+    assert again.geometry.names == robot.geometry.names
+    assert again.geometry.values.tobytes() == robot.geometry.values.tobytes()
+    q = commands(robot, 5)
+    assert again.forward(q).pose.tobytes() == robot.forward(q).pose.tobytes()
+
+
+@pytest.mark.filterwarnings("ignore::pkmcal.CalibrationWarning")  # some are weakly determined
+def test_a_machine_with_a_wrist_calibrates(tmp_path: Path) -> None:
+    robot = loaded(tricept(), tmp_path)
+    true = disturbed(robot, 0.3)
+    random = np.random.default_rng(0)
+    q = commands(robot, 130, share=3.0)
+    q[:, 3:] = random.uniform(-1.2, 1.2, (130, 3))
+    measured = pk.VirtualMachine(true, noise=0.01).measure(q[:70], kind="pose")
+    found = pk.identify(robot, measured)
+    there = true.forward(q[70:]).pose
+
+    def off(other: pk.Robot) -> float:
+        return float(np.abs(other.forward(q[70:]).pose - there)[:, :3].max())
+
+    assert isinstance(found.robot, pk.Robot) and off(found.robot) < 0.1 * off(robot)
+
+
+def test_kinds_of_limbs_carry_a_wrist_too(tmp_path: Path) -> None:
+    """A hexapod on which a spindle turns: its legs are read as chains."""
+    plain = pk.load("hexapod")
+    text = robot_file.located("hexapod")[0].decode()
+    text = re.sub(r"\[(calibration|stated)\]\n(.+\n)*", "", text)
+    numbers = iter(range(1, 7))
+    if "actuator" not in text:
+        text = re.sub(r"\[\[limb\]\]\n", lambda _: f"[[limb]]\nactuator = {next(numbers)}\n", text)
+    robot = loaded(text + wrist(7, 1), tmp_path)
+    q = commands(plain, 10, share=0.5)
+    turned = np.linspace(-2, 2, 10)[:, None]
+    found = robot.forward(np.hstack([q, turned]))
+    T = from_pose(plain.forward(q).pose) @ np.linalg.inv(from_pose(plain.home))
+    axis, at = np.array(WRIST[0][1]), np.array(WRIST[0][0])
+    spun = np.array([about(rotation(float(a) * axis), at) for a in turned[:, 0]])
+    assert np.abs(from_pose(found.pose) - T @ spun @ from_pose(plain.home)).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("actuator = 5", "actuator = 7", "their actuators counted on from those of the limbs"),
+        ("actuator = 5\n", "", "joints behind the platform are actuated"),
+        ('[[tail]]\nkind = "R"', '[[tail]]\nkind = "U"', "has several axes"),
+        ("actuator = 4\n", "actuator = 4\ncone = 3.0\n", "unknown key 'cone'"),
+        ("actuator = 4\n", 'actuator = 4\nerrors = { "dy" = 1.0 }\n', "'tail1.dy' is no error"),
+        ("copies = 3\n", 'copies = 3\nerrors = { "platform.dx" = 1.0 }\n', "is no error"),
+    ],
+)
+def test_what_is_no_tail_is_refused(old: str, new: str, said: str, tmp_path: Path) -> None:
+    text = tricept()
+    assert old in text
+    with pytest.raises(FileError, match=re.escape(said)):
+        loaded(text.replace(old, new, 1), tmp_path)
