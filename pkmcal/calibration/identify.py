@@ -270,7 +270,7 @@ def identify(
     if slack == "keep" and result.outliers:
         with suppress(ArgumentError):  # a robust fit that does not come to an end says nothing
             _, cells = taut(equations, commanded, start)
-    result = replace(result, slack=slack_cables(estimator.equations, estimate.evaluation, cells))
+    result = replace(result, slack=slack_cables(estimator.equations, estimate, cells))
     notes = _warnings(result, estimator, estimate, datasets)
     if slack == "keep" and result.slack:
         notes.append(said_slack(result.slack))
