@@ -12,13 +12,13 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.distances import Distances, distances
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import FEW, LEAST_FREEDOM, Estimate, Estimator
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.labels import Labels, labels
 from pkmcal.calibration.later import Later, OwnNumbers, compared, later
-from pkmcal.calibration.uncertainty import Uncertainty, stated_variances
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM, Estimate, Estimator
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.labels import Labels, labels
+from pkmcal.estimation.uncertainty import Uncertainty, stated_variances
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.distributions import f_tail

@@ -8,10 +8,10 @@ import numpy as np
 
 from pkmcal.arrays import rms
 from pkmcal.calibration.dropped import outlying
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimator
 from pkmcal.calibration.fit import Fit
-from pkmcal.calibration.fit_data import FitData
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import Estimator
+from pkmcal.estimation.fit_data import FitData
 from pkmcal.statistics.robust_scale import median_ratio, ratio_by_chance, robust_ratio
 
 _SUSPECT = 1.25  # ratio of the linear model's noises from which the robust fit is made

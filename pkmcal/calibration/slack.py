@@ -14,11 +14,11 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
-from pkmcal.calibration.begin import estimator_at
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate, Estimator
-from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.display import first_rows
+from pkmcal.estimation.begin import estimator_at
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import Estimate, Estimator
+from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 from pkmcal.statistics.robust_scale import median_ratio
