@@ -101,7 +101,7 @@ _HOMES = {
     "calibration.identify": ("identify",),
     "calibration.law_tests": ("LawTest",),
     "calibration.moved": ("Moved",),
-    "calibration.plan_poses": ("Plan", "plan_poses"),
+    "planning.plan_poses": ("Plan", "plan_poses"),
     "calibration.slack": ("SlackCable",),
     "calibration.verdict": ("Verdict",),
     "checks.check_geometry": ("GeometryCheck", "check_geometry"),
