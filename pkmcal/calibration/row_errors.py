@@ -8,10 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.parameters import Parameters
 from pkmcal.calibration.plausibility import (
     GROSS,
     MISFIT_RATIO,
@@ -19,8 +15,12 @@ from pkmcal.calibration.plausibility import (
     likely_unit_errors,
     other_readings,
 )
-from pkmcal.calibration.readings import of_read
 from pkmcal.display import printable
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.readings import of_read
 from pkmcal.measurements.measurements import Measurements
 
 _SHIFTS = (1, -1, 2, -2)  # rows by which readings are tried

@@ -12,9 +12,6 @@ import typer
 from pkmcal.arguments import did_you_mean, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.optimal_design import CRITERIA
-from pkmcal.calibration.plan_poses import PLANNED, Plan, plan_poses
-from pkmcal.calibration.planned import UNKNOWN
 from pkmcal.cli.geometry_options import free_names, read_prior
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
@@ -30,6 +27,9 @@ from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.command_csv import read_commands, write_commands
 from pkmcal.measurements.components import Kind
 from pkmcal.measurements.pose_csv import read_poses, write_poses
+from pkmcal.planning.optimal_design import CRITERIA
+from pkmcal.planning.plan_poses import PLANNED, Plan, plan_poses
+from pkmcal.planning.planned import UNKNOWN
 from pkmcal.report.as_json import as_json
 
 _DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach

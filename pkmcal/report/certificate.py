@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arrays import FloatArray, rms
-from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.identification import Identification
+from pkmcal.estimation.identifiability import listed
 from pkmcal.files import reading
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table
