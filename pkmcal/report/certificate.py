@@ -110,7 +110,7 @@ def _positive(table: Table, key: str, default: float) -> float:
 
 
 def budget(found: Identification, stated: Statement, predicted: FloatArray) -> Budget:
-    """What a coordinate of the tool's position is uncertain by, anywhere in the workspace.
+    """What a coordinate of the tool's position is uncertain by, over all of the workspace together.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def budget(found: Identification, stated: Statement, predicted: FloatArray) -> B
                 standard(half, "rectangular"),
                 stated.expansion * length,
                 type="B",
-                remark=f"±{half:g} K rectangular, {length:.4g} mm of {stated.expansion:g}/K",
+                remark=f"±{half:g} K rectangular, over {length:.4g} mm at {stated.expansion:g}/K",
             ),
             Contribution(
                 "coefficient of expansion",

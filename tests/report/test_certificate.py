@@ -129,6 +129,18 @@ def test_the_page_begins_with_what_is_stated(folder: Path, found: pk.Identificat
     assert 'id="certificate"' not in plain
 
 
+def test_many_degrees_of_freedom_are_written_out(found: pk.Identification, tmp_path: Path) -> None:
+    """Beside a large uncertainty without any, those of the repeats count for many."""
+    (tmp_path / "stated.toml").write_text("datum = 0.05\n", "utf-8")
+    found.report(tmp_path, certificate=tmp_path / "stated.toml")
+    page = (tmp_path / "report.html").read_text("utf-8")
+    told = json.loads((tmp_path / "report.json").read_text("utf-8"))["certificate"]["dof"]
+    written = re.search(r"% with (\d+) degrees of freedom", page)
+    assert written and told > 1000
+    assert float(written[1]) == pytest.approx(told, rel=5e-3)
+    assert f"<td>{written[1]}</td>" in page
+
+
 def test_the_data_are_what_the_schema_says(folder: Path) -> None:
     jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads(files("pkmcal.report").joinpath("schema.json").read_text("utf-8"))
