@@ -110,6 +110,7 @@ class Plan(Result):
             )
         ]
         count = _poses(len(self))
+        tour = f"{self.travel:.4g}" if self.travel < 1e4 else f"{self.travel:.0f}"
         several = len(set(self.kinds)) > 1
         if several:
             heads.append("measure")
@@ -118,7 +119,7 @@ class Plan(Result):
         yield (
             f"predicted error {self.predicted:.3g} mm rms; {count} at random"
             f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g};"
-            f" a tour of {self.travel:.4g} mm"
+            f" a tour of {tour} mm"
         )
         if self.own_frame:
             yield "in the machine's own frame: nothing that is read says where it stands"
