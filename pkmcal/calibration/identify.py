@@ -332,7 +332,9 @@ def _remedy(result: Identification) -> str:
     """Advise on residuals far above sigma; repeats decide between its two causes."""
     scatter = result.fit.uncertainty.repeats().scatter
     if scatter**2 > _NOISY:
-        return f"repeats of a pose scatter {scatter:.3g} times as much as it, state the true sigma"
+        cause = f"repeats of a pose scatter {scatter:.3g} times as much as it"
+        first = ": look at the outliers; without any," if result.outliers else ","
+        return f"{cause}{first} state the true sigma"
     cure = "free more parameters"
     if not np.isfinite(scatter):
         cure += ", or state the true sigma"
