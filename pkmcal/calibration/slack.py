@@ -21,6 +21,7 @@ from pkmcal.estimation.estimator import Estimate, Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.statistics.robust_scale import median_ratio
 
 Slack = Literal["keep", "drop"]
@@ -120,7 +121,7 @@ def _without_each(
         )
         off, _ = other.closures.residual(there.machines, there.states)
         longer[:, k] = -off[poses, k]
-    return gain, longer
+    return gain, longer * np.sign(_slopes(equations, evaluation))[poses]
 
 
 def _squares(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
@@ -157,12 +158,15 @@ def taut(
 
 
 def _longer(equations: Equations, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
-    """Closures read less needed (K, equations), whitened, and their degrees of freedom."""
+    """By how much cables read longer than needed (K, equations), whitened, and redundancy."""
     root = np.sqrt(np.repeat(estimate.weights, equations.components))
     sizes, axes = np.linalg.eigh(estimate.covariance)
     taken = root[:, None] * estimate.jacobian @ (axes * np.sqrt(np.maximum(sizes, 0.0)))
     every = np.ones(len(estimate.weights))  # what a robust loss sets aside is looked at as well
-    return equations.closure_residuals(estimate.evaluation, estimate.state.noise, every, taken)
+    off, redundancy = equations.closure_residuals(
+        estimate.evaluation, estimate.state.noise, every, taken
+    )
+    return off * np.sign(_slopes(equations, estimate.evaluation)), redundancy
 
 
 def slack_cables(
@@ -175,7 +179,9 @@ def slack_cables(
     keys = [(cell.pose, cell.closures[0]) for cell in cells]
     without = equations.without_closures(keys, evaluation)
     without.warm_start(evaluation)
-    off = -without.closures_off(without.at(evaluation.theta, estimate.state.noise))
+    there = without.at(evaluation.theta, estimate.state.noise)
+    per_mm = equations.closures.lengths(there.machines)
+    off = -without.closures_off(there) / per_mm * _slopes(equations, there)
     pose_of, actuator = np.concatenate(equations.pose_of), equations.closures.actuators
     cables = [
         SlackCable(
@@ -207,9 +213,34 @@ def _pulling(equations: Equations) -> BoolArray:
     robot = equations.parameters.robot
     if not isinstance(robot, Robot) or robot.model.chains is not None:
         return np.zeros(equations.closures.equations, dtype=bool)
-    limbs = robot.model.limbs
-    cables = [
-        all(KINDS[limb.kind].cable for limb in limbs if limb.actuator == a)
-        for a in range(robot.n_actuators)
-    ]
-    return np.array([a >= 0 and cables[a] for a in equations.closures.actuators], dtype=bool)
+    home = robot.inverse(robot.home)[None]
+    slope = robot.machine.slopes(robot.slots, home)[0]
+    cables = np.array([KINDS[limb.kind].cable for limb in robot.model.limbs])
+    of_limbs = _of_limbs(robot)
+    pulling = [
+        bool(cables[mine].all()) and abs(np.sign(slope[mine]).sum()) == mine.sum()
+        for mine in (of_limbs == a for a in range(robot.n_actuators))
+    ]  # an actuator that lets one cable out and takes another in says nothing by its sign
+    return np.array([a >= 0 and pulling[a] for a in equations.closures.actuators], dtype=bool)
+
+
+def _slopes(equations: Equations, evaluation: Evaluation) -> FloatArray:
+    """By how much cables lengthen with what is read (K, equations), negative for reversed ones."""
+    actuators = equations.closures.actuators
+
+    def slopes(robot: Calibratable, poses: IntArray) -> FloatArray:
+        found = np.ones((len(poses), len(actuators)))
+        if not isinstance(robot, Robot) or robot.model.chains is not None:
+            return found
+        slope = robot.machine.slopes(robot.slots, equations.actuators[poses])
+        for k, a in enumerate(actuators):
+            if a >= 0:
+                found[:, k] = slope[:, _of_limbs(robot) == a].mean(axis=1)
+        return found
+
+    return evaluation.machines.joined(slopes)
+
+
+def _of_limbs(robot: Robot) -> IntArray:
+    """The actuator of each limb."""
+    return np.array([limb.actuator for limb in robot.model.limbs])

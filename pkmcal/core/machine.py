@@ -325,7 +325,7 @@ class Machine(CoreMachine):
 
 def _by_row(slots: FloatArray) -> int:
     """Stride of geometries: one for all rows (limbs, SLOTS), or one for each (N, limbs, SLOTS)."""
-    return int(slots[0].size) if slots.ndim == 3 else 0
+    return slots.shape[1] * slots.shape[2] if slots.ndim == 3 else 0
 
 
 def with_errors(

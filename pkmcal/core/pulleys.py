@@ -73,7 +73,7 @@ class PulleyMachine(Machine):
         """Look at the cables over pulleys at poses (N, 6) as given."""
         n, k = len(pose), len(self._over)
         mine = np.broadcast_to(slots[..., self._over, :], (n, k, slots.shape[-1]))
-        mine = mine.reshape(n * k, -1)
+        mine = mine.reshape(n * k, slots.shape[-1])
         each = np.repeat(pose, k, axis=0)
         end, by_twist, _ = instruments.points(each, np.ascontiguousarray(mine[:, 3:6]), self.isa)
         own, joint = np.ascontiguousarray(mine[:, _OWN]), end - mine[:, 0:3]
@@ -161,6 +161,8 @@ class PulleyMachine(Machine):
         at = self._on_map(np.broadcast_to(guess, (n, 6)))
         going, limit = np.arange(n), _SETTLED * self.struct.size
         for _ in range(_STEPS):
+            if not len(going):
+                break
             own = slots[going] if slots.ndim == 3 else slots
             limbs, _cables = self._limbs_at(own, at[going])
             found, failed, steps, left = super().forward(limbs, q[going], at[going], threads)
@@ -173,8 +175,6 @@ class PulleyMachine(Machine):
             status[going[ended]], residual[going[ended]] = failed[ended], left[ended]
             pose[going[done]] = found[done]
             going = going[~ended]
-            if not len(going):
-                break
         if shape is None or len(shape) == 1:
             return pose, status, iterations, residual
         parts = (status.reshape(shape), iterations.reshape(shape), residual.reshape(shape))

@@ -57,6 +57,8 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
     robot = parameters.robot
     if not unidentifiable.shape[1] or not isinstance(robot, Robot):
         return Gauges((), unidentifiable)
+    if robot.model.chains is not None:  # whose numbers are errors of joints, not places of points
+        return Gauges((), unidentifiable)
     moves = _motions(robot)
     numbers = moves.reshape(-1, moves.shape[2])[robot.geometry.slot_index]
     chain = robot.geometry.chain[:, parameters.places]

@@ -117,6 +117,8 @@ def prior_functions(
             continue
         rows = _rows(key, robot.geometry, start)
         known, sigma = _stated(key, stated)
+        if len(rows) > 1 and known is not None and known <= 0.0:
+            raise ArgumentError(f"prior of {key}: a length must be above 0 mm, found {known:g}")
         theirs: list[PriorFunction] = []
         slopes: list[FloatArray] = []
         for session, mine in columns.items():
@@ -170,9 +172,12 @@ def terms(key: str, text: str) -> Iterator[tuple[float, str]]:
     for operator, term in zip(["+", *parts[1::2]], parts[::2], strict=True):
         factor, _, name = term.rpartition("*")
         try:
-            yield sign * float(operator + (factor.strip() or "1")), name.strip()
+            times = sign * float(operator + (factor.strip() or "1"))
         except ValueError:
-            raise ArgumentError(f"prior of {key}: {factor.strip()!r} is no factor") from None
+            times = np.nan
+        if not np.isfinite(times):
+            raise ArgumentError(f"prior of {key}: {factor.strip()!r} is no factor")
+        yield times, name.strip()
         sign = 1.0
 
 

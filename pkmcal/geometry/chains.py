@@ -157,6 +157,7 @@ class Chains:
         made: list[LimbNumber] = []
         places = self._places
         seen: set[str] = set()
+        ends: set[int] = set()
         for i, names in enumerate(self.members):
             ball = _ends_in_ball(self.limbs[i])
             for name in names:
@@ -167,7 +168,8 @@ class Chains:
                 name = f"limb{i + 1}.joint{len(self.limbs[i])}"
                 made += _errors(name, ERRORS[:3], i, places[name])
             name = self.end_of(i)
-            if places[name] not in {n.place for n in made}:
+            if places[name] not in ends:
+                ends.add(places[name])
                 made += _errors(name, ERRORS[:3] if ball else BY_MAP[self.map], i, places[name])
             for a, (first, joint) in enumerate(self.actuated):
                 if first == i:
@@ -202,6 +204,15 @@ class Chains:
             ends[f"limb{i + 1}.platform"] = ends[f"limb{first + 1}.platform"]
         return ends
 
+    def _soft(self, part: Part) -> float:
+        """How much a part yields: nothing behind the platform, and a ball before it as one."""
+        limb = self.limbs[part.limb]
+        behind = [id(joint) for joint in limb[len(limb) - self.tail :]]
+        if id(part.joint) in behind:
+            return 0.0
+        last = self.tail > 0 and part.joint is limb[-1 - self.tail]
+        return 0.0 if last and part.joint.ball and not part.errors else part.joint.soft
+
     def _law_numbers(self, a: int) -> tuple[LawNumber, ...]:
         joint = self.actuated[a][1]
         return () if joint.law is None else joint.law.numbers(a + 1, joint.unit)
@@ -229,9 +240,11 @@ class Chains:
 
         Of the joints at the base, and then of all, where the ends are in one point.
         """
-        ends = np.array([limb[-1].at for limb in self.limbs])
+        ends = np.array([limb[-1 - self.tail].at for limb in self.limbs])
         first = np.array([limb[0].at for limb in self.limbs])
-        every = np.array([joint.at for limb in self.limbs for joint in limb])
+        every = np.array([
+            joint.at for limb in self.limbs for joint in limb[: len(limb) - self.tail]
+        ])  # fmt: skip
         for points in (ends, first, every):
             spread = points - points.mean(axis=0)
             radius = float(np.sqrt((spread**2).sum(axis=1).mean()))
@@ -304,7 +317,7 @@ class Chains:
             place=ints([places[part.name] for part in every]),
             axes=np.array([frame_of(part.axis) for part in every]),
             point=np.array([part.joint.at for part in every]),
-            soft=np.array([part.joint.soft for part in every]),
+            soft=np.array([self._soft(part) for part in every]),
             drive_place=ints([places[f"drive{a + 1}"] for a in range(self.n_actuators)]),
             zero=zero,
             near=np.array(middle),

@@ -34,7 +34,7 @@ JOINT_KEYS = (
     "kind", "at", "axis", "axes", "actuator", "share", "home_value", "stroke", "cone", "soft",
     "offset", "gain", "drive",
 )  # fmt: skip
-TAIL_KEYS = (*(key for key in JOINT_KEYS if key not in ("axes", "share", "cone")), "errors")
+TAIL_KEYS = (*(key for key in JOINT_KEYS if key not in ("axes", "share", "cone", "soft")), "errors")
 AXES = {"R": 1, "P": 1, "C": 1, "U": 2, "S": 3}
 FORMS = {1: "one axis, `axis = [x, y, z]`", 2: "two `axes`", 3: "three `axes`, or none of a ball"}
 

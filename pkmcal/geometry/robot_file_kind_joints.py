@@ -44,6 +44,8 @@ def joints_of_kind(
 
     `home` is the platform's pose (6,). Names under ``[parameters]`` stand for their values.
     """
+    if table.data.get("kind") == "pulley":
+        table.fail("kind", "what a pulley winds up is no joint: it does not go beside chains")
     limb, entries, of_law = read_limb(table, table.integer("actuator", 1) - 1, parameters)
     if "actuator" not in table:
         table.fail("", "the key 'actuator' is missing: beside chains every limb states its own")

@@ -117,6 +117,9 @@ def tensions(
         raise ArgumentError(f"robot: {robot.name} has no cables")
     rows, shape = as_rows("poses", poses, 6)
     pull, point = as_rows("force", force, 3)[0][0], as_rows("at", at, 3)[0][0]
+    for name, vector in (("force", pull), ("at", point)):
+        if not np.isfinite(vector).all():
+            raise ArgumentError(f"{name} must be finite, found {vector.tolist()}")
     low = number("least", least, least=0.0)
     high = np.inf if most == np.inf else number("most", most, above=low)
     slopes, load, spheres = _balance(robot, rows, pull, point)

@@ -117,6 +117,27 @@ def test_a_calibration_by_actuators_alone_is_that_of_limbs_in_closed_form(
     assert other.redundancy == pytest.approx(one.redundancy)
 
 
+def test_what_readings_of_actuators_leave_open_is_said(tmp_path: Path) -> None:
+    """Where the machine stands and where the platform's frame is: three and three, in the plane."""
+    ends = [(-600, -500, -80, 60), (620, -480, 90, 70), (580, 510, 80, -70), (-610, 530, -90, -60)]
+    limbs = "".join(
+        f'[[limb]]\nkind = "chain"\njoints = [{{ kind = "R", at = [{x}, {y}] }}, {{ kind = "P",'
+        f' actuator = {k} }}, {{ kind = "R", at = [{u}, {v}] }}]\n'
+        for k, (x, y, u, v) in enumerate(ends, 1)
+    )
+    head = 'name = "four legs"\nunits = { length = "mm", angle = "deg" }\n[pose]\n'
+    head += 'map = "planar"\nhome = {}\n'
+    robot = loaded(head + limbs, tmp_path)
+    random = np.random.default_rng(5)
+    way = np.array([250.0, 250.0, 0.0, 0.0, 0.0, 0.4])
+    read = robot.inverse(random.uniform(-1, 1, (60, 6)) * way)
+    read += random.normal(0, 0.01, read.shape)
+    measured = pk.Measurements(read, None, "closure", actuator_sigma=0.01)
+    found = pk.identify(robot, measured, ["limb*.joint1.d[xy]", "limb*.platform.d[xy]"])
+    assert len(found.free) == 16 and found.rank == 10
+    assert np.isinf(found.stderr).all()
+
+
 def test_a_tricept_with_a_fourth_leg_calibrates_itself(tmp_path: Path) -> None:
     """Its column holds, four legs read: one equation a row, and no instrument."""
     text = robot_file.located("tricept")[0].decode()

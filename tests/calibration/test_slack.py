@@ -162,6 +162,24 @@ def test_a_reading_that_is_too_short_is_no_slack_cable(eight: pk.Robot) -> None:
     assert 7 in found.outliers
 
 
+def test_readings_may_count_backwards_and_in_other_units(eight: pk.Robot, tmp_path: Path) -> None:
+    """Drums wound the other way and winches in steps: slack is in mm of cable."""
+    _, q, _ = drawn(CORNERS, 11, 30, 0.2)
+    gain = np.array([1.0, -1.0, 0.01, -20.0, 1.0, -1.0, 2.0, -0.5])
+    path = tmp_path / "counts.toml"
+    machine_on(CORNERS, path)
+    head, *limbs = path.read_text().split("[[limb]]\n")
+    each = (f"[[limb]]\ngain = {g}\n{limb}" for g, limb in zip(gain, limbs, strict=True))
+    path.write_text(head + "".join(each))
+    sigma = np.tile(NOISE / np.abs(gain), (len(q), 1))
+    log = pk.Measurements(q / gain, None, "closure", actuator_sigma=sigma)
+    found = pk.identify(pk.load(path), log, FREE, fix=HELD, slack="drop")
+    plain = fitted(eight, q, "drop")
+    assert len(plain.slack) == 6 and cells(found) == cells(plain)
+    for one, other in zip(found.slack, plain.slack, strict=True):
+        assert abs(one.longer - other.longer) < 1e-5
+
+
 def test_with_one_cable_more_than_needed_it_cannot_be_told_which(tmp_path: Path) -> None:
     """All that is left of such a row is one number, whose sign names the cables that it may be."""
     corners = CORNERS[[0, 1, 2, 3]] * [1, 1, 0] + [0, 0, 2500.0]

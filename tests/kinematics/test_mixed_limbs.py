@@ -170,6 +170,13 @@ normal = [0, 1, 0]
 rod = 500.0
 branch = 1
 """
+PULLEY = """kind = "pulley"
+actuator = 1
+base = [200.0, 0.0, 0.0]
+platform = [100.0, 0.0, 0.0]
+swivel = [0, 0, 1]
+radius = 30.0
+"""
 
 
 @pytest.mark.parametrize(
@@ -184,6 +191,7 @@ branch = 1
             "offset1 is 1 here and 0 in a limb before",
         ),
         (PRS, "planar", "list the joints of a limb PRS as a chain"),
+        (PULLEY, "spatial", "it does not go beside chains"),
         (PRS, "spherical", "list the joints of a limb PRS as a chain"),
         (PRS + CONES, "spatial", "its R has it"),
         (PRS + "weights = [0.5]", "spatial", "joints yield by their `soft`"),

@@ -256,6 +256,16 @@ def test_an_end_within_the_groove_is_out_of_reach(three: pk.Robot) -> None:
     assert not three.feasible(inside).ok
 
 
+def test_no_poses_are_no_rows(eight: pk.Robot) -> None:
+    none = np.zeros((0, 6))
+    assert eight.inverse(none).shape == (0, 8) and eight.forward(np.zeros((0, 8))).pose.shape == (
+        0,
+        6,
+    )
+    assert eight.jacobian(none).shape == (0, 8, 6) and len(eight.error_jacobian(none)) == 0
+    assert pk.tensions(eight, none).tension.shape == (0, 8)
+
+
 def test_a_written_file_reads_back_to_the_bit(eight: pk.Robot, tmp_path: Path) -> None:
     eight.save(tmp_path / "again.toml")
     again = pk.load(tmp_path / "again.toml")

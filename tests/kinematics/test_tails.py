@@ -100,6 +100,42 @@ def test_a_wrist_adds_four_numbers_a_joint(tmp_path: Path) -> None:
     assert len(robot.model.free) == count
 
 
+@pytest.mark.parametrize("name", ("exechon", "tripteron", "2tpr2tps-chains"))
+def test_limbs_that_yield_do_not_feel_what_the_platform_carries(name: str, tmp_path: Path) -> None:
+    """Over-constrained, with errors: the platform is where it is without a tail."""
+    plain = pk.load(name)
+    text = re.sub("match = .*\n", "", robot_file.located(name)[0].decode())
+    robot = loaded(text + wrist(plain.n_actuators + 1, 1), tmp_path)
+    assert robot.length == plain.length
+    random = np.random.default_rng(3)
+    common = [n for n in plain.geometry.names if ".joint" in n and n in robot.geometry.names]
+    size = [0.1 if n[-1] in "xyz" else 2e-4 for n in common]
+    errors = dict(zip(common, size * random.normal(0, 1, len(common)), strict=True))
+    q = commands(plain, 6, share=0.3)
+    turned = np.linspace(-0.5, 0.5, 6)[:, None]
+    carried = plain.replace(errors).forward(q)
+    found = robot.replace(errors).forward(np.hstack([q, turned]))
+    assert carried.ok.all() and found.ok.all() and carried.residual.min() > 0.01
+    axis, at = np.array(WRIST[0][1]), np.array(WRIST[0][0])
+    spun = np.array([about(rotation(float(a) * axis), at) for a in turned[:, 0]])
+    T = from_pose(carried.pose) @ np.linalg.inv(from_pose(plain.home))
+    # the equilibrium is of first order in what the limbs miss, and seen from another point
+    assert np.abs(from_pose(found.pose) - T @ spun @ from_pose(plain.home)).max() < 1e-5
+
+
+def test_a_spherical_machine_carries_a_joint(tmp_path: Path) -> None:
+    plain = pk.load("agile-eye")
+    tail = '[[tail]]\nkind = "R"\naxis = [0.6, 0.0, 0.8]\nactuator = 4\n'
+    robot = loaded(robot_file.located("agile-eye")[0].decode() + tail, tmp_path)
+    q = commands(plain, 5, share=0.3)
+    turned = np.linspace(-0.5, 0.5, 5)
+    found = robot.forward(np.column_stack([q, turned])).pose
+    for pose, carried, angle in zip(found, plain.forward(q).pose, turned, strict=True):
+        T = from_pose(carried) @ np.linalg.inv(from_pose(plain.home))
+        T = T @ about(rotation(angle * np.array([0.6, 0.0, 0.8])), np.zeros(3))
+        assert np.abs(from_pose(pose) - T @ from_pose(robot.home)).max() < 1e-12
+
+
 def test_a_tail_is_read_back_to_the_last_bit(tmp_path: Path) -> None:
     robot = disturbed(loaded(tricept(), tmp_path))
     robot.save(tmp_path / "one.toml")
@@ -152,6 +188,7 @@ def test_kinds_of_limbs_carry_a_wrist_too(tmp_path: Path) -> None:
         ("actuator = 5\n", "", "joints behind the platform are actuated"),
         ('[[tail]]\nkind = "R"', '[[tail]]\nkind = "U"', "has several axes"),
         ("actuator = 4\n", "actuator = 4\ncone = 3.0\n", "unknown key 'cone'"),
+        ("actuator = 4\n", "actuator = 4\nsoft = 3.0\n", "unknown key 'soft'"),
         ("actuator = 4\n", 'actuator = 4\nerrors = { "dy" = 1.0 }\n', "'tail1.dy' is no error"),
         ("copies = 3\n", 'copies = 3\nerrors = { "platform.dx" = 1.0 }\n', "is no error"),
     ],

@@ -152,5 +152,11 @@ def test_what_has_no_cables_is_refused() -> None:
     with pytest.raises(pk.ArgumentError, match="chains of joints, no cables"):
         pk.tensions(pk.load("tricept"), [0, 0, 1000, 0, 0, 0])
     sled = pk.load("examples/belts/robot.toml")
+    for more, said in (
+        ({"force": (np.nan, 0, 0)}, "force must be finite, found"),
+        ({"at": (np.inf, 0, 0)}, "at must be finite, found"),
+    ):
+        with pytest.raises(pk.ArgumentError, match=said):
+            pk.tensions(sled, sled.home, **more)  # type: ignore[arg-type]
     with pytest.raises(pk.ArgumentError, match="most must be above 5"):
         pk.tensions(sled, sled.home, least=5.0, most=4.0)
