@@ -17,7 +17,8 @@ _SLIDES = 0.3  # of the arm's length
 def data(arm: SerialArm) -> dict[str, Any]:
     """All that the page needs of an arm, as JSON has it; mm and rad."""
     turning = np.array([unit == "rad" for unit in arm.actuator_units])
-    start = np.where(turning, _BENT, 0.0)
+    limits = arm.limits()
+    start = np.clip(np.where(turning, _BENT, 0.0), limits[:, 0], limits[:, 1])
     ends = np.where(turning, np.pi, _SLIDES * arm.length)
     size = float(np.ptp(np.vstack([np.zeros(3), arm.points, arm.home[:3, 3]]), axis=0).max())
     size = max(size, arm.length)
@@ -36,8 +37,10 @@ def data(arm: SerialArm) -> dict[str, Any]:
         "poses": reach,
         "reach": reach,
         "actuators": [
-            {"unit": unit, "range": [-end, end], "stroke": None}
-            for unit, end in zip(arm.actuator_units, ends.tolist(), strict=True)
+            _slider(unit, end, low, high)
+            for unit, end, (low, high) in zip(
+                arm.actuator_units, ends.tolist(), limits.tolist(), strict=True
+            )
         ],
         "joints": [
             {"kind": "P" if kind == "prismatic" else "R", "name": name}
@@ -46,3 +49,10 @@ def data(arm: SerialArm) -> dict[str, Any]:
         "geometry": memory.ARM_ERRORS,
         "machine": memory.arm(arm),
     }
+
+
+def _slider(unit: str, end: float, low: float, high: float) -> dict[str, Any]:
+    """As far as a slider goes, to its joint's limits at least, where both are known."""
+    if not np.isfinite([low, high]).all():
+        return {"unit": unit, "range": [-end, end], "stroke": None}
+    return {"unit": unit, "range": [min(-end, low), max(end, high)], "stroke": [low, high]}

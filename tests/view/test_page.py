@@ -304,3 +304,29 @@ def test_the_webassembly_is_what_the_sources_give() -> None:
     if "is needed" in done.stderr:
         pytest.skip(done.stderr.strip())
     assert done.returncode == 0, done.stderr
+
+
+def test_limits_of_an_arm_are_those_of_its_urdf_file(tmp_path: Path) -> None:
+    """Joints start within them; beyond, the page says so. The last joint is free."""
+    joint = (
+        '<joint name="j{0}" type="{1}"><parent link="l{2}"/><child link="l{0}"/>'
+        '<origin xyz="0.1 0 0.3"/><axis xyz="{3}"/>{4}</joint>'
+    )
+    limit = '<limit lower="-4.0" upper="0.1" effort="1" velocity="1"/>'
+    joints = joint.format(1, "revolute", 0, "0 0 1", limit)
+    joints += joint.format(2, "revolute", 1, "0 1 0", limit)
+    joints += joint.format(3, "continuous", 2, "0 1 0", "") + joint.format(
+        4, "fixed", 3, "1 0 0", ""
+    )
+    links = "".join(f'<link name="l{i}"/>' for i in range(5))
+    (tmp_path / "arm.urdf").write_text(f'<robot name="arm">{links}{joints}</robot>', "utf-8")
+    arm = pk.load(tmp_path / "arm.urdf")
+    drawn = page.machine(arm)["actuators"]
+    assert [each["stroke"] for each in drawn] == [[-4.0, 0.1], [-4.0, 0.1], None]
+    assert drawn[0]["range"] == [-4.0, np.pi]
+    moves = [["moveActuator", 1, 0.5], ["moveActuator", 1, -3.9], ["moveActuator", 2, 3.0]]
+    (states,) = pages.said(tmp_path, [arm], [moves])
+    assert states[0]["q"][:2] == [0.1, 0.1]
+    told = ["joint 2: limits exceeded" in state["text"] for state in states]
+    assert told == [False, True, False, False]
+    assert "within all limits" in states[0]["text"]

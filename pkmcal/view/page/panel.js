@@ -81,7 +81,7 @@ class Panel {
     const slides = arm && joints.some(joint => joint.kind === 'P')
     made('h3', side, { text: arm ? (slides ? 'Move the joints' : 'Turn the joints') : surplus ? 'Actuators' : 'Move the actuators' })
     const what = arm ? 'The tool follows' : surplus ? 'There are more of them than ways to move: none moves alone, all follow' : 'The platform follows'
-    made('p', side, { className: 'hint', text: `${what}${stated ? '; shaded: the stroke' : ''}.` })
+    made('p', side, { className: 'hint', text: `${what}${stated ? `; shaded: ${arm ? 'within its limits' : 'the stroke'}` : ''}.` })
     this.q = actuators.map(({ unit, range, stroke }, a) => slider(side, {
       name: `q${a + 1}`, title: joints?.[a].name ?? `actuator ${a + 1}`, unit, range, allowed: stroke, disabled: surplus,
       moved: value => { this.mover.moveActuator(a, value); this.changed() },
@@ -141,7 +141,10 @@ class Panel {
     const singular = !(near > 0.1)
     const over = limits ? mover.pastDeadPoint() : []
     if (over.length) found.push(`${counted('actuator', over)}: the limb has passed a dead point (another working mode)`)
-    const good = !limits ? 'in reach' : hasLimits(data) ? 'within all limits' : 'in reach; no limits are stated'
+    const stated = !limits && data.actuators.some(({ stroke }) => stroke)
+    const beyond = limits ? [] : data.actuators.flatMap(({ stroke }, a) => (stroke && !(Math.min(mover.q[a] - stroke[0], stroke[1] - mover.q[a]) >= INSIDE) ? [a + 1] : []))
+    if (beyond.length) found.push(`${counted('joint', beyond)}: limits exceeded`)
+    const good = !limits ? (stated ? 'within all limits' : 'in reach') : hasLimits(data) ? 'within all limits' : 'in reach; no limits are stated'
     this.state.textContent = mover.stopped || found.join('; ') || (singular ? 'near a singularity' : good)
     this.state.classList.toggle('bad', Boolean(mover.stopped || found.length || singular))
     this.bar.style.width = `${Math.max(1.5, Math.min(100, 60 * near)) || 1.5}%`
