@@ -28,8 +28,6 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.calibration.identify import identify as identify
     from pkmcal.calibration.law_tests import LawTest as LawTest
     from pkmcal.calibration.moved import Moved as Moved
-    from pkmcal.calibration.plan_poses import Plan as Plan
-    from pkmcal.calibration.plan_poses import plan_poses as plan_poses
     from pkmcal.calibration.slack import SlackCable as SlackCable
     from pkmcal.calibration.verdict import Verdict as Verdict
     from pkmcal.checks.check_geometry import GeometryCheck as GeometryCheck
@@ -86,6 +84,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.moves.events import Event as Event
     from pkmcal.moves.move import Move as Move
     from pkmcal.moves.move import MoveSample as MoveSample
+    from pkmcal.planning.plan_poses import Plan as Plan
+    from pkmcal.planning.plan_poses import plan_poses as plan_poses
     from pkmcal.view.show import show as show
 
 _HOMES = {
@@ -101,7 +101,7 @@ _HOMES = {
     "calibration.identify": ("identify",),
     "calibration.law_tests": ("LawTest",),
     "calibration.moved": ("Moved",),
-    "calibration.plan_poses": ("Plan", "plan_poses"),
+    "planning.plan_poses": ("Plan", "plan_poses"),
     "calibration.slack": ("SlackCable",),
     "calibration.verdict": ("Verdict",),
     "checks.check_geometry": ("GeometryCheck", "check_geometry"),

@@ -79,14 +79,15 @@ def mm_per_unit(units: Sequence[str], length: float) -> FloatArray:
 
 
 def wrapped(angles: FloatArray) -> FloatArray:
-    """Angles in rad the short way round, from -π to π.
+    """Angles in rad the short way round, from -π to π; NaN for infinite ones.
 
     Examples
     --------
     >>> wrapped(np.array([0.5, 2 * np.pi - 0.5])).round(12)
     array([ 0.5, -0.5])
     """
-    return np.asarray(angles - 2 * np.pi * np.rint(angles / (2 * np.pi)))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(angles - 2 * np.pi * np.rint(angles / (2 * np.pi)))
 
 
 def first_largest(values: FloatArray, alike: float) -> int:

@@ -1,4 +1,4 @@
-"""Fixtures that tests of several rooms share: the command line, run in this process."""
+"""Fixtures that tests of several rooms share: the command line, run in this process; machines."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
+import pkmcal as pk
 from pkmcal.cli.verbs import app
 
 # No test is of wall time: other work may take all cores.
@@ -42,3 +43,14 @@ def refused(run: Callable[..., Any]) -> Callable[..., str]:
         return match[1]
 
     return message
+
+
+@pytest.fixture(scope="session")
+def hexapod() -> pk.Robot:
+    return pk.load("hexapod")
+
+
+@pytest.fixture(scope="session")
+def paper() -> pk.Robot:
+    """The 2TPR&2TPS of the paper."""
+    return pk.load("2tpr2tps")

@@ -519,7 +519,7 @@ def test_the_arguments_that_are_to_fit_do(name: str) -> None:
 def test_every_public_call_is_among_them() -> None:
     results = {  # made by calls, not by users
         *("Allocation", "ArmInverse", "Assemblies", "Bootstrap", "Certificate", "Compensation"),
-        *("CircularTest", "Datum", "Drift", "LawTest", "ScrewTable"),
+        *("CircularTest", "Datum", "Drift", "LawTest", "ScrewTable", "SlackCable", "Tensions"),
         *(
             "CorrectedProgram",
             "LocatedAnchors",

@@ -21,13 +21,13 @@ import numpy as np
 from pkmcal import arguments, display
 from pkmcal.arguments import checked_seed, instance, whole
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.labels import labels
-from pkmcal.calibration.least_squares import Search
 from pkmcal.display import Table
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.labels import labels
+from pkmcal.estimation.least_squares import Search
 from pkmcal.exceptions import ArgumentError
 from pkmcal.result import Result
 

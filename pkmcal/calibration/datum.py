@@ -17,10 +17,10 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, first_largest
-from pkmcal.calibration.estimator import Estimate, Estimator
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.identifiability import decompose, listed
-from pkmcal.calibration.parameters import Asked, Parameters
+from pkmcal.estimation.estimator import Estimate, Estimator
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.identifiability import decompose, listed
+from pkmcal.estimation.parameters import Asked, Parameters
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.screw import from_pose

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.expansion import temperatures
 from pkmcal.calibration.fit import Fit
-from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.holdout import HeldOut
 from pkmcal.display import chance_text
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.expansion import temperatures
+from pkmcal.estimation.fit_data import FitData
 from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.drift_test import trend

@@ -9,12 +9,12 @@ import numpy as np
 
 from pkmcal.arguments import shown
 from pkmcal.arrays import BoolArray
-from pkmcal.calibration.begin import estimator_at
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate, Estimator
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.outliers import outliers
+from pkmcal.estimation.begin import estimator_at
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import Estimate, Estimator
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.fit_data import FitData
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 
 Drop = Literal["outliers"] | Sequence[int] | None

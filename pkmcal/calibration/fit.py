@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.identifiability import decompose
-from pkmcal.calibration.parameters import Parameters
-from pkmcal.calibration.uncertainty import Uncertainty
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import Estimate
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.identifiability import decompose
+from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.uncertainty import Uncertainty
 
 _LEAST = 1e-6  # share of a combination that is more than rounding
 

@@ -9,16 +9,16 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit, rms
 from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.dropped import outlying
-from pkmcal.calibration.estimator import Estimate, Estimator
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.gauges import MIRROR, Gauges, gauges, mirror_fits
-from pkmcal.calibration.identifiability import (
+from pkmcal.estimation.estimator import Estimate, Estimator
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.gauges import MIRROR, Gauges, gauges, mirror_fits
+from pkmcal.estimation.identifiability import (
     as_sum,
     held_errors,
     observability,
     sparse_basis,
 )
-from pkmcal.calibration.uncertainty import Uncertainty
+from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
 from pkmcal.statistics.prior_test import LEAST_FREEDOM, PriorTest, data_alone, prior_test

@@ -12,13 +12,13 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.distances import Distances, distances
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import FEW, LEAST_FREEDOM, Estimate, Estimator
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.labels import Labels, labels
 from pkmcal.calibration.later import Later, OwnNumbers, compared, later
-from pkmcal.calibration.uncertainty import Uncertainty, stated_variances
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM, Estimate, Estimator
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.labels import Labels, labels
+from pkmcal.estimation.uncertainty import Uncertainty, stated_variances
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.distributions import f_tail
@@ -156,7 +156,7 @@ def evaluate(
     spare = float((1.0 - points.taken[good[row]]).sum()) if good.any() else float("nan")
     usable = uncertainty.known and spare >= LEAST_FREEDOM
     test = _test(points, named, good[row], uncertainty) if usable else None
-    odd = good & _odd(points, row, count, uncertainty, test)
+    odd = good & _odd(points, row, count, uncertainty)
     return HeldOut(
         rms_before=equations.rms(before),
         rms=equations.rms(after),
@@ -262,7 +262,6 @@ def _odd(
     row: IntArray,
     count: int,
     uncertainty: Uncertainty,
-    test: HoldoutTest | None,
 ) -> BoolArray:
     """Which rows (N,) are further off than noise and covariance explain.
 
@@ -271,7 +270,7 @@ def _odd(
     odd = np.zeros(count, dtype=bool)
     if not uncertainty.known or not len(row):
         return odd
-    freedom = np.inf if test is None or uncertainty.fit.freedom < FEW else test.freedom[1]
+    freedom = uncertainty.fit.freedom if uncertainty.fit.freedom >= FEW else np.inf
     own = np.maximum(points.own, _NOTHING * float(np.median(points.own)))
     order, lengths = np.argsort(row, kind="stable"), np.bincount(row, minlength=count)
     first = np.cumsum(lengths) - lengths

@@ -16,8 +16,6 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
 from pkmcal.calibration.drift import Drift, drift
-from pkmcal.calibration.estimator import FEW
-from pkmcal.calibration.expansion import in_words
 from pkmcal.calibration.law_tests import LawTest, law_tests
 from pkmcal.calibration.moved import Moved, moved
 from pkmcal.calibration.parts import Parts
@@ -25,6 +23,8 @@ from pkmcal.calibration.robust_check import robust_check
 from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.verdict import Verdict, judge
 from pkmcal.display import Table
+from pkmcal.estimation.estimator import FEW
+from pkmcal.estimation.expansion import in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_machine

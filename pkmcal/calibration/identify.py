@@ -11,8 +11,6 @@ import numpy as np
 
 from pkmcal.arguments import word, words
 from pkmcal.arms.arm import SerialArm
-from pkmcal.calibration.begin import begun, estimator_at
-from pkmcal.calibration.datasets import as_fit_data, as_fitted, by_set, informative
 from pkmcal.calibration.datum import DATUMS, NO_DATUM, DatumRule
 from pkmcal.calibration.datum import datum as choose_datum
 from pkmcal.calibration.dropped import (
@@ -23,12 +21,7 @@ from pkmcal.calibration.dropped import (
     robust_outliers,
     without,
 )
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import LEAST_FREEDOM, Estimate, Estimator
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.expansion import Coefficients, expansion_of
 from pkmcal.calibration.fit import Fit
-from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.fit_statistics import (
     SearchRecord,
     identifiability,
@@ -37,12 +30,8 @@ from pkmcal.calibration.fit_statistics import (
     repeats,
     tested_prior,
 )
-from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.loss import LIMITS, LossName
-from pkmcal.calibration.mode_slips import in_other_modes
-from pkmcal.calibration.parameters import Asked, Bounds, Known, Prior
 from pkmcal.calibration.plausibility import (
     beyond_strokes,
     contradicted_prior,
@@ -54,10 +43,21 @@ from pkmcal.calibration.plausibility import (
 )
 from pkmcal.calibration.row_errors import likely_mistakes
 from pkmcal.calibration.row_names import row_names
-from pkmcal.calibration.set_noise import unlike_noise
 from pkmcal.calibration.slack import SLACK, Cell, Slack, said_slack, slack_cables, taut
-from pkmcal.calibration.starts import known_distances
-from pkmcal.calibration.uncertainty import Uncertainty, uncertainty, unlike_components
+from pkmcal.estimation.begin import begun, estimator_at
+from pkmcal.estimation.datasets import as_fit_data, as_fitted, by_set, informative
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import LEAST_FREEDOM, Estimate, Estimator
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.expansion import Coefficients, expansion_of
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.loss import LIMITS, LossName
+from pkmcal.estimation.mode_slips import in_other_modes
+from pkmcal.estimation.parameters import Asked, Bounds, Known, Prior
+from pkmcal.estimation.set_noise import unlike_noise
+from pkmcal.estimation.starts import known_distances
+from pkmcal.estimation.uncertainty import Uncertainty, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_given, as_machine
@@ -270,7 +270,7 @@ def identify(
     if slack == "keep" and result.outliers:
         with suppress(ArgumentError):  # a robust fit that does not come to an end says nothing
             _, cells = taut(equations, commanded, start)
-    result = replace(result, slack=slack_cables(estimator.equations, estimate.evaluation, cells))
+    result = replace(result, slack=slack_cables(estimator.equations, estimate, cells))
     notes = _warnings(result, estimator, estimate, datasets)
     if slack == "keep" and result.slack:
         notes.append(said_slack(result.slack))
@@ -300,7 +300,7 @@ def _warnings(
     notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
     notes += shrunk(equations, fit.start, fit.end)
-    notes += unlike_noise(equations, fit.uncertainty.slips)
+    notes += unlike_noise(equations, fit.uncertainty.slips, bool(result.outliers))
     notes += beyond_strokes(equations, fit.start, fit.end)
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():
@@ -332,7 +332,9 @@ def _remedy(result: Identification) -> str:
     """Advise on residuals far above sigma; repeats decide between its two causes."""
     scatter = result.fit.uncertainty.repeats().scatter
     if scatter**2 > _NOISY:
-        return f"repeats of a pose scatter {scatter:.3g} times as much as it, state the true sigma"
+        cause = f"repeats of a pose scatter {scatter:.3g} times as much as it"
+        first = ": look at the outliers; without any," if result.outliers else ","
+        return f"{cause}{first} state the true sigma"
     cure = "free more parameters"
     if not np.isfinite(scatter):
         cure += ", or state the true sigma"

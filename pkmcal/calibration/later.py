@@ -12,17 +12,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.free_parameters import parameters
-from pkmcal.calibration.least_squares import Search
-from pkmcal.calibration.loss import Loss
-from pkmcal.calibration.mode_slips import in_their_modes, start_in_modes
-from pkmcal.calibration.parameters import Parameters
-from pkmcal.calibration.sessions import NONE
-from pkmcal.calibration.uncertainty import Uncertainty
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import Estimate
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.least_squares import Search
+from pkmcal.estimation.loss import Loss
+from pkmcal.estimation.mode_slips import in_their_modes, start_in_modes
+from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.sessions import NONE
+from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.statistics.linear_fit import ROUNDING
 
 

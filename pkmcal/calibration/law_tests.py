@@ -10,8 +10,8 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray
 from pkmcal.calibration.fit_statistics import ParameterTable
-from pkmcal.calibration.uncertainty import Uncertainty
 from pkmcal.display import chance_text
+from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.statistics.distributions import f_tail
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.calibration.estimator import Estimate
-from pkmcal.calibration.identifiability import CLEAR, listed
-from pkmcal.calibration.uncertainty import Uncertainty
+from pkmcal.estimation.estimator import Estimate
+from pkmcal.estimation.identifiability import CLEAR, listed
+from pkmcal.estimation.uncertainty import Uncertainty
 
 _DRAWS = 8
 _BY_PRIOR = 0.5  # share of what is known of a combination from which a prior determines it

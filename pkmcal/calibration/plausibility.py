@@ -10,12 +10,12 @@ import numpy as np
 
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, largest_first, mm_per_unit, rms
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.identifiability import listed
-from pkmcal.calibration.parameters import Parameters
 from pkmcal.display import chance_text, first_rows, printable
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.identifiability import listed
+from pkmcal.estimation.parameters import Parameters
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements

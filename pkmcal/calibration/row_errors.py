@@ -8,10 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.evaluation import Evaluation
-from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.parameters import Parameters
 from pkmcal.calibration.plausibility import (
     GROSS,
     MISFIT_RATIO,
@@ -19,12 +15,17 @@ from pkmcal.calibration.plausibility import (
     likely_unit_errors,
     other_readings,
 )
-from pkmcal.calibration.readings import of_read
 from pkmcal.display import printable
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.readings import of_read
 from pkmcal.measurements.measurements import Measurements
 
 _SHIFTS = (1, -1, 2, -2)  # rows by which readings are tried
 _LEAST_ROWS = 6
+_LEAST_SHARE = 0.25  # of the rows, for which a moved reading is there
 _MOST_TARGETS = 4  # whose orders are tried
 
 
@@ -44,14 +45,14 @@ def likely_mistakes(
             continue
         present = _median(data, parameters)
         units = parameters.robot.actuator_units
-        single = [*other_readings(data.measured, units), *_readings(data.measured)]
+        single = [*other_readings(data.measured, units), *_readings(data)]
         alone = min(_median(replace(data, measured=m), parameters) for _, m in single)
         if present <= size or alone <= size:
             continue
         trials = {
             f"{first} and {second}": _median(replace(data, measured=other), parameters)
             for first, exchanged in exchanges(data.measured)
-            for second, other in _shifted(exchanged)
+            for second, other in _shifted(replace(data, measured=exchanged))
         }
         words = min(trials, key=lambda text: trials[text], default="")
         if words and trials[words] < MISFIT_RATIO * min(alone, present):
@@ -73,7 +74,7 @@ def likely_row_errors(datasets: Sequence[FitData], parameters: Parameters) -> li
         present = _median(data, parameters)
         trials = {
             words: _median(replace(data, measured=other), parameters)
-            for words, other in _readings(data.measured)
+            for words, other in _readings(data)
         }
         if not trials:
             continue
@@ -100,22 +101,22 @@ def _median(data: FitData, parameters: Parameters) -> float:
     return float(np.median(np.where(np.isfinite(off), off, np.inf))) if read.any() else np.inf
 
 
-def _shifted(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
-    """Read measurements with values moved along the rows."""
-    names = measured.target_names or ("1",)
-    step, count = len(names), len(measured)
+def _shifted(data: FitData) -> Iterator[tuple[str, Measurements]]:
+    """Read measurements with values moved along the rows, as they were numbered before any left.
+
+    Rows that were held out or left out, and targets that were not seen, leave gaps.
+    """
+    measured = data.measured
+    step = len(measured.target_names or ("1",))
     what = "row" if step == 1 else "pose"
-    rows = np.arange(count)
+    least = max(_LEAST_ROWS, round(_LEAST_SHARE * len(measured)))
     for shift in _SHIFTS:
-        by = abs(shift) * step
-        if count - by < max(_LEAST_ROWS, count // 2):
-            continue
-        early, late = rows[:-by], rows[by:]
-        kept, read = (early, late) if shift > 0 else (late, early)
-        if (
-            measured.target_index is not None
-            and (measured.target_index[kept] != measured.target_index[read]).any()
-        ):
+        moved = data.rows + shift * step
+        _, kept, read = np.intersect1d(moved, data.rows, return_indices=True)
+        if measured.target_index is not None:
+            same = measured.target_index[kept] == measured.target_index[read]
+            kept, read = kept[same], read[same]
+        if len(kept) < least:
             continue
         values = measured.values[read]
         sigma = None if measured.sigma is None else measured.sigma[read]
@@ -126,9 +127,10 @@ def _shifted(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
         )
 
 
-def _readings(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+def _readings(data: FitData) -> Iterator[tuple[str, Measurements]]:
     """Read measurements with values moved along the rows and with targets exchanged."""
-    yield from _shifted(measured)
+    yield from _shifted(data)
+    measured = data.measured
     names = measured.target_names or ("1",)
     step = len(names)
     if measured.target is None or measured.target_index is None or step > _MOST_TARGETS:

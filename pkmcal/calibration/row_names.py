@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from pkmcal.calibration.fit_data import FitData
 from pkmcal.display import printable
+from pkmcal.estimation.fit_data import FitData
 
 _MOST = 6  # places that are listed
 

@@ -14,11 +14,11 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
-from pkmcal.calibration.begin import estimator_at
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.estimator import Estimate, Estimator
-from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.display import first_rows
+from pkmcal.estimation.begin import estimator_at
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import Estimate, Estimator
+from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
@@ -170,13 +170,18 @@ def _longer(equations: Equations, estimate: Estimate) -> tuple[FloatArray, Float
 
 
 def slack_cables(
-    equations: Equations, evaluation: Evaluation, cells: Sequence[Cell]
+    equations: Equations, estimate: Estimate, cells: Sequence[Cell]
 ) -> tuple[SlackCable, ...]:
-    """What cells are in words and mm, the longest first."""
+    """What cells are in words and mm, at poses found without them, the longest first."""
     if not cells:
         return ()
-    per_mm = equations.closures.lengths(evaluation.machines)
-    off = -equations.closures_off(evaluation) / per_mm * _slopes(equations, evaluation)
+    evaluation = estimate.evaluation
+    keys = [(cell.pose, cell.closures[0]) for cell in cells]
+    without = equations.without_closures(keys, evaluation)
+    without.warm_start(evaluation)
+    there = without.at(evaluation.theta, estimate.state.noise)
+    per_mm = equations.closures.lengths(there.machines)
+    off = -without.closures_off(there) / per_mm * _slopes(equations, there)
     pose_of, actuator = np.concatenate(equations.pose_of), equations.closures.actuators
     cables = [
         SlackCable(

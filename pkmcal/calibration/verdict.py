@@ -9,8 +9,6 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.drift import Drift
-from pkmcal.calibration.estimator import FEW, LEAST_FREEDOM
-from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.linearity import Weak, beyond_linear
 from pkmcal.calibration.moved import Moved
 from pkmcal.calibration.parts import Parts
@@ -19,6 +17,8 @@ from pkmcal.calibration.row_errors import likely_row_errors
 from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.slack import listed_slack
 from pkmcal.display import chance_text, decimals, displayed, fixed, printable
+from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM
+from pkmcal.estimation.identifiability import listed
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import spare
 from pkmcal.statistics.distributions import chi2_tail, deviation_interval

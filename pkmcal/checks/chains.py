@@ -68,7 +68,19 @@ def strokes(robot: Robot) -> Iterator[Finding]:
             )
 
 
-CHAIN_CHECKS = (outside_workspace, mobility, home_values, strokes, turning, singular)
+def axes_in_line(robot: Robot) -> Iterator[Finding]:
+    """Home at which the actuators move the tool in fewer ways than nearby."""
+    home, near = (_ways(robot, q) for _, q in (_home(robot), _away(robot)))
+    if home < near:
+        yield Finding(
+            "singular",
+            (),
+            f"home is singular: the actuators move the tool in {home} ways there, nearby in {near}",
+            "choose a home pose in which the wrist is bent; inverse() starts there",
+        )
+
+
+CHAIN_CHECKS = (outside_workspace, mobility, home_values, strokes, turning, singular, axes_in_line)
 
 
 def surplus(robot: Robot) -> str:
@@ -95,6 +107,16 @@ def _away(robot: Robot) -> tuple[FloatArray, FloatArray]:
     there = q + step * random.uniform(-1, 1, q.shape)
     found, status, _, _ = robot.machine.forward(robot.slots, there, own[0], 1)
     return (found, there) if status[0] == 0 else (own, q)
+
+
+def _ways(robot: Robot, q: FloatArray) -> int:
+    """In how many ways the actuators move the tool; 0 where that is not defined."""
+    twists = robot.actuator_twists(robot.forward(q).pose, q)[0]
+    twists[3:] /= robot.length
+    if not np.isfinite(twists).all():
+        return 0
+    sigma = np.linalg.svd(twists, compute_uv=False)
+    return int((sigma > _NONE * sigma[0]).sum())
 
 
 def _free_ways(robot: Robot, own: FloatArray, q: FloatArray) -> FloatArray:

@@ -14,8 +14,6 @@ import typer
 import pkmcal as pk
 from pkmcal.arguments import word
 from pkmcal.calibration.datum import DATUMS
-from pkmcal.calibration.loss import LIMITS
-from pkmcal.calibration.parameters import KNOWN, Known
 from pkmcal.cli.geometry_options import (
     free_names,
     matching,
@@ -41,6 +39,8 @@ from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
 from pkmcal.cli.sessions import in_sessions
 from pkmcal.display import printable
+from pkmcal.estimation.loss import LIMITS
+from pkmcal.estimation.parameters import KNOWN, Known
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import Input
 from pkmcal.measurements.calibratable import Calibratable, as_machine

@@ -6,8 +6,8 @@ import re
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase
 
-from pkmcal.calibration.prior_functions import terms
 from pkmcal.core.library import POSE
+from pkmcal.estimation.prior_functions import terms
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.units import UNITS
 from pkmcal.measurements.calibratable import Calibratable

@@ -12,9 +12,6 @@ import typer
 from pkmcal.arguments import did_you_mean, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.optimal_design import CRITERIA
-from pkmcal.calibration.plan_poses import PLANNED, Plan, plan_poses
-from pkmcal.calibration.planned import UNKNOWN
 from pkmcal.cli.geometry_options import free_names, read_prior
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Free, Json, Prior, RobotOrArm, Seed
@@ -22,7 +19,7 @@ from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
 from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.box import Box
+from pkmcal.geometry.box import Box, in_box
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
@@ -30,6 +27,9 @@ from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.command_csv import read_commands, write_commands
 from pkmcal.measurements.components import Kind
 from pkmcal.measurements.pose_csv import read_poses, write_poses
+from pkmcal.planning.optimal_design import CRITERIA
+from pkmcal.planning.plan_poses import PLANNED, Plan, plan_poses
+from pkmcal.planning.planned import UNKNOWN
 from pkmcal.report.as_json import as_json
 
 _DRAWN, _SHARE = 500, 0.9  # candidates where none are given, and how far out they reach
@@ -122,6 +122,11 @@ def plan(
     box = _box(machine, within or [])
     if isinstance(machine, Robot):
         machine = machine.within(box)
+        if poses is None and not in_box(box, machine.home):
+            raise ArgumentError(
+                f"--within {','.join(within or [])}: leaves out the home of {machine.name}, around"
+                " which poses are drawn; give those to choose from with --poses"
+            )
     seen = as_machine(machine)
     chosen = free_names(seen, free)
     candidates = _drawn(machine, box, seed) if poses is None else _places(machine, read.file(poses))

@@ -13,10 +13,10 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array
 from pkmcal.core import screws
 
-_STEPS = 100
+_STEPS = 30
 _SETTLED = 1e-12  # of the size, steps and what is missed
 _REST = 1e-9  # of the size: a step after which what is missed is what the machine cannot reach
-_TURN = 0.3  # rad, and of the length: no step is larger
+_TURN = 0.6  # rad, and of the length: no step is larger
 _SHARES = (1.0, 0.25, 0.05)  # of a step that leads nowhere
 
 

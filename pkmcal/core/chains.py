@@ -11,7 +11,7 @@ from pkmcal.arrays import FloatArray, Int32Array, IntArray
 from pkmcal.core import screws
 from pkmcal.core.chain_readings import readings
 from pkmcal.core.chain_tail import coordinates
-from pkmcal.core.core_machine import CoreMachine
+from pkmcal.core.core_machine import CoreMachine, known_rows
 from pkmcal.core.library import COORDINATE_UNITS, ISA, MAPS, call, pointer
 from pkmcal.core.machine import CLOSURE_TOLERANCE, Closure, Machine
 from pkmcal.core.path_differences import actuator_rates, platform_motion
@@ -182,10 +182,10 @@ class ChainMachine(CoreMachine):
         Angles as `pkmcal.core.machine.Machine.inverse` gives them.
         """
         if self.layout.tail < self.actuators:
-            return self.nearest_turns(slots, self._with_tail(slots, pose), near)
+            return known_rows(self.nearest_turns(slots, self._with_tail(slots, pose), near))
         q = np.empty((len(pose), self.actuators))
         call("chain_inverse", self.struct, len(pose), slots, 0, pose, q, isa=self.isa)
-        return self.nearest_turns(slots, q, near)
+        return known_rows(self.nearest_turns(slots, q, near))
 
     def _with_tail(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """`inverse` of a machine with joints behind the platform."""

@@ -31,6 +31,12 @@ def whole_turn(gains: FloatArray) -> float:
     return float((1 + int(np.argmax(whole))) * 2 * np.pi / abs(gains[0]))
 
 
+def known_rows(q: FloatArray) -> FloatArray:
+    """Rows (N, n) of which nothing is known where one number is not; in place."""
+    q[~np.isfinite(q).all(axis=1)] = np.nan
+    return q
+
+
 class CoreMachine(ABC):
     """A machine in the core: its struct, and calls that differ in the name of the C call alone.
 
@@ -128,9 +134,10 @@ class CoreMachine(ABC):
         if not angles.any():
             return q
         about = self.reference(slots) if near is None else near
-        off, turn = q[:, angles] - about[..., angles], turns[angles]
         out: FloatArray = q.copy()
-        out[:, angles] -= turn * np.rint(off / turn)
+        with np.errstate(invalid="ignore"):  # infinite coordinates are nowhere
+            off, turn = q[:, angles] - about[..., angles], turns[angles]
+            out[:, angles] -= turn * np.rint(off / turn)
         return out
 
     def forward(

@@ -14,7 +14,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, Int32Array
 from pkmcal.core.chains import AnyMachine, ChainMachine
-from pkmcal.core.core_machine import CoreMachine, whole_turn
+from pkmcal.core.core_machine import CoreMachine, known_rows, whole_turn
 from pkmcal.core.drive_turns import agreed_turns
 from pkmcal.core.laws import Drive, Laws, Ways
 from pkmcal.core.library import rows
@@ -125,7 +125,8 @@ class DrivenMachine(CoreMachine):
             return out
         there = self.laws.ways(slots, out, approach).way  # of all that share, as the first has it
         angle = np.array([drive.angle for drive in self.laws.drives])
-        turned = way + 2 * np.pi * np.rint((there - way) / (2 * np.pi))
+        with np.errstate(invalid="ignore"):  # ways that are infinite
+            turned = way + 2 * np.pi * np.rint((there - way) / (2 * np.pi))
         return self._mean(self.laws.readings(slots, np.where(angle, turned, way), approach))
 
     def _mean(self, each: FloatArray) -> FloatArray:
@@ -184,7 +185,7 @@ class DrivenMachine(CoreMachine):
     ) -> FloatArray:
         """Poses (N, 6) to readings (N, n)."""
         way = self.inner.inverse(self._bare(slots), pose)
-        return self.at_drives(slots, self._turned(slots, way, near))
+        return known_rows(self.at_drives(slots, self._turned(slots, way, near)))
 
     def forward(
         self,
@@ -258,7 +259,9 @@ class DrivenMachine(CoreMachine):
         """The closure rows and their derivatives at poses (N, 6) and readings (N, n)."""
         ways = self.ways(slots, q)
         found = self.inner.closure(self._bare(slots), pose, ways.way)
-        return found._replace(by_q=self._sum(found.by_q * ways.slope[:, None]))
+        with np.errstate(invalid="ignore"):  # ways that are infinite
+            by_q = self._sum(found.by_q * ways.slope[:, None])
+        return found._replace(by_q=by_q)
 
     def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators, as `pkmcal.core.machine.Machine.rates`."""

@@ -167,7 +167,8 @@ class Machine(CoreMachine):
     def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """q̃ of each limb (N, limbs) at actuator coordinates (N, n)."""
         of_limbs = list(self.struct.actuator[0 : self.struct.limbs])
-        found: FloatArray = slots[:, _GAIN] * q[:, of_limbs] + slots[:, _OFFSET]
+        with np.errstate(over="ignore"):  # beyond all numbers: infinite
+            found: FloatArray = slots[:, _GAIN] * q[:, of_limbs] + slots[:, _OFFSET]
         return found
 
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:

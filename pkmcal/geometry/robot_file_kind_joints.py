@@ -22,7 +22,8 @@ from pkmcal.geometry.robot_file_limbs import Entry, Parameters, read_limb
 from pkmcal.screw import from_pose
 
 _OFF = 1e-6  # of its length: what a limb may miss at home, and a direction in the plane
-_ROWS = ("base_plane", "platform_plane", "couple", "hinge_plane")  # that joints are known for
+_DRIVERS = ("length", "slider", "crank")  # and rows that joints are known for
+_ROWS = ("base_plane", "platform_plane", "couple", "hinge_plane")
 _Z = np.array([0.0, 0.0, 1.0])
 
 
@@ -53,7 +54,8 @@ def joints_of_kind(
     parameters.constants.update(parameters.units)
     kind, number = KINDS[limb.kind], limb.actuator + 1
     beside = set(kind.all_rows(limb.couple > 0.0))
-    if map == "spherical" or not beside <= set(_ROWS) or (map == "planar" and beside):
+    known = kind.driver in _DRIVERS and beside <= set(_ROWS)
+    if map == "spherical" or not known or (map == "planar" and beside):
         table.fail("kind", f"with the map {map}, list the joints of a limb {limb.kind} as a chain")
     at = _at_home(table, limb, entries, home)
     if map == "planar":

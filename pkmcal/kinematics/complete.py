@@ -183,17 +183,19 @@ def _to_map(
         own[:, fixed] = closure.pose[:, fixed]
         seen = _seen(frames, own, matched, wanted)
         missing = _off(seen, matched, wanted)
-        if not np.nanmax(np.abs(missing), initial=0.0) > SETTLED * machine.struct.size:
+        off = np.abs(missing).max(axis=1, initial=0.0) > SETTLED * machine.struct.size
+        if not off.any():
             break
         keep = _kept_by_free(closure, frames, own, seen, free, matched)
-        good = np.isfinite(keep).all(axis=(1, 2)) & np.isfinite(missing).all(axis=1)
+        good = off & np.isfinite(keep).all(axis=(1, 2)) & np.isfinite(missing).all(axis=1)
         step = np.linalg.pinv(keep[good]) @ missing[good][..., None]
         own[np.flatnonzero(good)[:, None], free] -= step[..., 0]
 
 
 def _off(pose: FloatArray, matched: Sequence[int], wanted: FloatArray) -> FloatArray:
     """Matched coordinates of poses (N, 6) less those wanted, angles the short way round."""
-    off = np.asarray(pose[:, matched] - wanted)
+    with np.errstate(invalid="ignore"):  # what is infinite is kept nowhere
+        off = np.asarray(pose[:, matched] - wanted)
     angles = np.array(matched) >= 3
     off[:, angles] = wrapped(off[:, angles])
     return off

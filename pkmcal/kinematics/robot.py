@@ -172,7 +172,8 @@ class Robot(Kinematics, Result):
         if q is not None:
             there = self.drives(q)
             angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
-            drive = np.where(angle, there + wrapped(drive - there), drive)
+            with np.errstate(invalid="ignore"):  # infinite coordinates
+                drive = np.where(angle, there + wrapped(drive - there), drive)
         size = self.machine.struct.size
         return feasibility(self.model.limbs, drive, on_base, on_platform, size)
 

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pkmcal.arguments import word
+from pkmcal.arguments import number, word
 from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.core.library import POSE
 from pkmcal.display import POSE_HEADER, Table, displayed, long_table, pose_cells
@@ -29,7 +29,6 @@ from pkmcal.moves.time_laws import (
     Polynomial,
     jerk_limited,
     limit,
-    positive_duration,
     seconds,
 )
 from pkmcal.result import Result
@@ -296,7 +295,7 @@ def move(
     word("space", space, ("pose", "coordinates", "joint"))
     word("law", law, (*_LAWS, "jerk-limited"))
     if duration is not None:
-        positive_duration(duration)
+        number("duration", duration, above=0)
     n = robot.n_actuators
     limits = {
         name: limit(name, value, n)

@@ -12,8 +12,6 @@ from pkmcal.arguments import number
 from pkmcal.arrays import FloatArray, as_numbers
 from pkmcal.exceptions import ArgumentError
 
-_SHORTEST, _LONGEST = 1e-9, 1e12  # s
-
 Sample = tuple[FloatArray, FloatArray, FloatArray]
 
 # s(τ) from 0 to 1 over τ = t/duration, lowest power first
@@ -134,27 +132,11 @@ def quintic(start: ArrayLike, end: ArrayLike, duration: float) -> Polynomial:
     return _polynomial(start, end, duration, QUINTIC)
 
 
-def positive_duration(duration: float) -> float:
-    """A duration whose rates are numbers.
-
-    Raises
-    ------
-    TypeError, ValueError
-        No number, or none of a move.
-    """
-    checked = number("duration", duration, above=0)
-    if not _SHORTEST <= checked <= _LONGEST:
-        raise ArgumentError(
-            f"duration must lie between {_SHORTEST:g} and {_LONGEST:g} s, found {checked:g}"
-        )
-    return checked
-
-
 def _polynomial(
     start: ArrayLike, end: ArrayLike, duration: float, coefficients: tuple[float, ...]
 ) -> Polynomial:
     first, last = ends(start, end)
-    return Polynomial(first, last, positive_duration(duration), coefficients)
+    return Polynomial(first, last, number("duration", duration, above=0), coefficients)
 
 
 def ends(start: ArrayLike, end: ArrayLike) -> tuple[FloatArray, FloatArray]:

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, rms
-from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identification import Identification
+from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.measurements.iso230 import axis_performance
 from pkmcal.measurements.repeats import targets
 from pkmcal.statistics.linear_fit import numbered

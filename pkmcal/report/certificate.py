@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arrays import FloatArray, rms
-from pkmcal.calibration.identifiability import listed
 from pkmcal.calibration.identification import Identification
+from pkmcal.estimation.expansion import temperatures
+from pkmcal.estimation.identifiability import listed
+from pkmcal.exceptions import ArgumentError
 from pkmcal.files import reading
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table
@@ -25,6 +27,7 @@ _TEXTS = (
 _INSTRUMENT = ("name", "serial", "certificate", "expanded", "factor")
 _TEMPERATURE = ("mean", "uncertainty", "expansion", "expansion_uncertainty")
 _REFERENCE = 20.0  # °C, of ISO 1
+_ROUNDED = 0.1  # K, to which temperatures are stated
 
 
 @dataclass(frozen=True)
@@ -110,7 +113,7 @@ def _positive(table: Table, key: str, default: float) -> float:
 
 
 def budget(found: Identification, stated: Statement, predicted: FloatArray) -> Budget:
-    """What a coordinate of the tool's position is uncertain by, anywhere in the workspace.
+    """What a coordinate of the tool's position is uncertain by, over all of the workspace together.
 
     Parameters
     ----------
@@ -120,7 +123,13 @@ def budget(found: Identification, stated: Statement, predicted: FloatArray) -> B
         What is known beside the measurements.
     predicted : ndarray (N,)
         Standard deviation of the tool's position at poses of the workspace, mm.
+
+    Raises
+    ------
+    ValueError
+        What is stated of temperatures contradicts the measurements or the calibration.
     """
+    _same_heat(found, stated)
     lines = []
     if np.isfinite(stated.expanded):
         remark = f"U = {stated.expanded:g} mm, k = {stated.factor:g}"
@@ -149,7 +158,7 @@ def budget(found: Identification, stated: Statement, predicted: FloatArray) -> B
                 standard(half, "rectangular"),
                 stated.expansion * length,
                 type="B",
-                remark=f"±{half:g} K rectangular, {length:.4g} mm of {stated.expansion:g}/K",
+                remark=f"±{half:g} K rectangular, over {length:.4g} mm at {stated.expansion:g}/K",
             ),
             Contribution(
                 "coefficient of expansion",
@@ -165,6 +174,25 @@ def budget(found: Identification, stated: Statement, predicted: FloatArray) -> B
         remark = f"by definition: {len(held)} numbers are held ({listed(held)})"
     lines.append(Contribution("datum", stated.datum, type="B", remark=remark))
     return Budget(tuple(lines))
+
+
+def _same_heat(found: Identification, stated: Statement) -> None:
+    """Refuse another temperature than was measured, another expansion than was calibrated with."""
+    read, mean = temperatures(found.fit.equations.sets), stated.temperature
+    room = max(stated.temperature_uncertainty, _ROUNDED)
+    if read and (mean < read[0] - room or mean > read[1] + room):
+        raise ArgumentError(
+            f"certificate: [temperature] mean: states {mean:g} °C, measured were"
+            f" {read[0]:.4g} to {read[1]:.4g} °C"
+        )
+    used, per_kelvin = sorted(found.expansion.values()), stated.expansion
+    room = stated.expansion_uncertainty
+    if used and (per_kelvin < used[0] - room or per_kelvin > used[-1] + room):
+        given = " to ".join(f"{value:g}" for value in sorted({used[0], used[-1]}))
+        raise ArgumentError(
+            f"certificate: [temperature] expansion: states {per_kelvin:g}/K, calibrated was with"
+            f" {given}/K"
+        )
 
 
 def _misfit(found: Identification) -> list[Contribution]:

@@ -10,11 +10,11 @@ import numpy as np
 from pkmcal import display
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, largest_first, propagate, rms
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.fit_data import FitData
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
 from pkmcal.display import printable
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.fit_data import FitData
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import reach, sample_poses, workspace
 from pkmcal.measurements.calibratable import as_machine

@@ -6,7 +6,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.parameters import Parameters
+from pkmcal.estimation.parameters import Parameters
 from pkmcal.measurements.calibratable import as_given
 from pkmcal.view.skeleton import Skeleton, skeleton
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from pkmcal import display
 from pkmcal.arms.arm import SerialArm
-from pkmcal.calibration.expansion import in_words, temperatures
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.row_names import row_names
 from pkmcal.display import printable
+from pkmcal.estimation.expansion import in_words, temperatures
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import checksums, comment, version
 from pkmcal.report import certificate, contents, machine_view

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.evaluation import Evaluation
 from pkmcal.calibration.identification import Identification
 from pkmcal.core import instruments
+from pkmcal.estimation.evaluation import Evaluation
 
 
 def residual_vectors(found: Identification, at: Evaluation) -> FloatArray:

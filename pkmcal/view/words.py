@@ -32,14 +32,22 @@ def of_robot(robot: Robot) -> str:
     if chains is None:
         kinds = [(_some(KINDS[kind].what, n), kind) for kind, n in _counted(robot)]
     else:
-        letters = ["".join(_letter(j.kind, j.actuator) for j in limb) for limb in chains.limbs]
+        own = [limb[: len(limb) - chains.tail] for limb in chains.limbs]
+        letters = ["".join(_letter(j.kind, j.actuator) for j in limb) for limb in own]
         kinds = [(f"{_count(n)} chain{'s' * (n > 1)} of joints", kind)
                  for kind, n in Counter(letters).items()]  # fmt: skip
     limbs = " and ".join(f"{some} ({kind})" for some, kind in kinds)
+    moved = "it"
+    if chains is not None and chains.tail:
+        last = "".join(_letter(j.kind, j.actuator) for j in chains.limbs[0][-chains.tail :])
+        joints = "joint carries" if chains.tail == 1 else "joints carry"
+        limbs += f"; behind it {_count(chains.tail)} more {joints} the tool ({last})"
+        moved = "the tool"
     if chains is not None:
         limbs += ", underlined the joints that are driven"
     n = robot.n_actuators
-    return f"A platform on {limbs}. {_count(n).capitalize()} actuators {_ways(robot.moved)}."
+    ways = _ways(robot.moved, moved)
+    return f"A platform on {limbs}. {_count(n).capitalize()} actuators {ways}."
 
 
 def of_arm(arm: SerialArm) -> str:
@@ -72,14 +80,14 @@ def _some(what: str, n: int) -> str:
     return f"{_count(n)} {_PLURALS[start]}{rest}"
 
 
-def _ways(moved: Sequence[str]) -> str:
+def _ways(moved: Sequence[str], what: str) -> str:
     lengths = [name for name in moved if name in POSE[:3]]
     angles = [name for name in moved if name in POSE[3:]]
     ways = []
     if lengths:
-        ways.append(f"move it along {', '.join(lengths)}")
+        ways.append(f"move {what} along {', '.join(lengths)}")
     if angles:
         about = ", ".join(POSE[POSE.index(name) - 3] for name in angles)
         letters = ", ".join(SYMBOLS[name] for name in angles)
-        ways.append(f"turn it about {about} ({letters})")
+        ways.append(f"turn {'it' if ways else what} about {about} ({letters})")
     return " and ".join(ways)

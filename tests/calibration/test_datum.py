@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
-from pkmcal.calibration.identifiability import decompose
+from pkmcal.estimation.identifiability import decompose
 from pkmcal.measurements.calibratable import as_machine
 
 from .. import workspaces

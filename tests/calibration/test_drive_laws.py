@@ -201,7 +201,7 @@ def test_a_smooth_table_is_found_where_nothing_was_measured_between() -> None:
 
 def test_scale_alone_is_no_news_to_a_machine_of_spools() -> None:
     """Belts that say nothing of their scale: radius and build-up grow with all anchors."""
-    from pkmcal.calibration.gauges import _motions
+    from pkmcal.estimation.gauges import _motions
 
     law = {"spool": 40.0, "buildup": 0.05, "backlash": 0.1, "harmonics": [{"k": 1.0, "cos": 0.2}]}
     robot = hexapod(*[{"drive": law, "gain": 0.025, "stroke": [500.0, 1300.0]}] * 6)

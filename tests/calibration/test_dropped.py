@@ -65,7 +65,7 @@ def test_outliers_among_held_out_rows_are_left_out_too() -> None:
     assert kept == set(range(60)) - set(GROSS)
     with pytest.warns(pk.CalibrationWarning):
         plain = pk.identify(robot, measured, holdout=0.4)
-    assert set(plain.holdout_outliers) & set(GROSS), "one of them was drawn to be held out"
+    assert set(plain.holdout.rows.tolist()) & set(GROSS), "one of them was drawn to be held out"
     assert found.holdout_rms < 1.5 * found.holdout_expected
 
 

@@ -107,7 +107,8 @@ def test_without_sigma_the_residual_scales_the_covariance(hexapod: Robot) -> Non
     rng = np.random.default_rng(12)
     q = hexapod.inverse(hexapod_poses(hexapod, 60, rng))
     true = hexapod.replace({"base1.x": 305.9, "offset2": -0.4})
-    measured = VirtualMachine(true, noise=0.03).measure(q)
+    # of this seed x, y and z are not told apart by chance
+    measured = VirtualMachine(true, noise=0.03, seed=2).measure(q)
     free = ["base1.*", "offset*"]
     stated = identify(hexapod, measured, free=free)
     unstated = identify(hexapod, dataclasses.replace(measured, sigma=None), free=free)

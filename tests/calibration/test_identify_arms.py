@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.free_parameters import parameters
 from pkmcal.calibration.identify import identify
-from pkmcal.calibration.parameters import Asked
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.parameters import Asked
 from pkmcal.measurements.calibratable import ArmMachine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine

@@ -9,12 +9,12 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.free_parameters import parameters
-from pkmcal.calibration.hand_eye import of_frame_and_tool, of_tool
-from pkmcal.calibration.parameters import Asked
-from pkmcal.calibration.starts import with_starts
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.hand_eye import of_frame_and_tool, of_tool
+from pkmcal.estimation.parameters import Asked
+from pkmcal.estimation.starts import with_starts
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 

@@ -192,6 +192,33 @@ def test_readings_beside_the_wrong_rows_are_found(
     assert f"each reading belongs to the row {abs(by)} {where} it" in text
 
 
+@pytest.mark.parametrize("holdout", [0.2, 0.5])
+def test_they_are_found_although_rows_are_missing(
+    hexapod: pk.Robot, true: pk.Robot, holdout: float
+) -> None:
+    """Rows that are held out leave gaps, over which rows are no neighbours."""
+    measured = session(hexapod, true, 40, 5)
+    wrong = replace(measured, values=np.roll(measured.values, 1, axis=0))
+    try:
+        found = fitted(hexapod, wrong, free="offset*", holdout=holdout, **UNKNOWN)
+        text = "; ".join(found.verdict.reasons)
+    except ValueError as error:
+        text = str(error)
+    assert "each reading belongs to the row 1 before it" in text
+
+
+def test_they_are_found_although_a_target_was_not_seen() -> None:
+    """The rows after it have another place among the targets."""
+    arm, _, measured = of_arm(30, 6)
+    late = replace(measured, values=np.roll(measured.values, 3, axis=0))
+    seen = np.delete(np.arange(len(late)), [16, 40])
+    try:
+        text = "; ".join(fitted(arm, late.select(seen), **UNKNOWN).verdict.reasons)
+    except ValueError as error:
+        text = str(error)
+    assert "each reading belongs to the pose 1 before it" in text
+
+
 def test_exchanged_targets_are_found() -> None:
     arm, _, measured = of_arm(30, 6)
     assert measured.target_index is not None

@@ -140,8 +140,14 @@ def test_exchanged_struts_are_named(run: Any, command: list[Any], hexapod: Path)
     assert "if q3 and q4 are exchanged" in result.stderr
 
 
-def test_a_log_that_is_a_row_late_is_named(run: Any, command: list[Any], hexapod: Path) -> None:
-    result = run(*command, "--controller", hexapod / "late.csv", "--join", "row", *EXCHANGED)
+@pytest.mark.parametrize(
+    "options", [(), ("--holdout", "0.2", "--drop-outliers", "--datum", "auto")], ids=str
+)
+def test_a_log_that_is_a_row_late_is_named(
+    run: Any, command: list[Any], hexapod: Path, options: tuple[str, ...]
+) -> None:
+    late = ("--controller", hexapod / "late.csv", "--join", "row", *EXCHANGED)
+    result = run(*command, *late, *options)
     assert result.exit_code != 0
     said = result.stdout + result.stderr
     assert "belongs to the pose 1 " in " ".join(said.split())

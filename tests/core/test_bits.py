@@ -157,6 +157,13 @@ def law(call: str) -> Case:
     return lambda isa, part: [*library.rows(call, given[part], isa=isa)]
 
 
+def pulley(isa: int, part: slice) -> list[np.ndarray]:
+    """Of ends outside of the wheels, and of some inside, which no cable leaves."""
+    own = np.random.default_rng(32).uniform([10, -0.1, -0.1], [60, 0.1, 0.1], (ROWS, 3))
+    frame = MOTIONS.reshape(ROWS, 4, 4)[:, :3, :3].reshape(ROWS, 9)
+    return [*library.rows("pulley", own[part], frame[part], POINTS[part], isa=isa)]
+
+
 CASES: dict[str, Case] = {
     "law_drive": law("law_drive"),
     "law_drive_inverse": law("law_drive_inverse"),
@@ -168,6 +175,7 @@ CASES: dict[str, Case] = {
     "between": between,
     "touched_points": touched_points,
     "tilts": tilts,
+    "pulley": pulley,
     "tpr2tps_lengths": lambda isa, part: closed_forms(isa, part, tpr2tps_lengths, (4,)),
     "tpr2tps_jacobian": lambda isa, part: closed_forms(isa, part, tpr2tps_jacobian, (4, 4)),
     "closure_cost": closure_cost,

@@ -183,7 +183,7 @@ def test_copies_of_a_chain_have_its_law(tmp_path: Path) -> None:
 
 
 EXPORTS = {
-    "c_header": "hexapod", "mjcf": "hexapod", "klipper": "linear-delta", "reprap": "linear-delta",
+    "mjcf": "hexapod", "klipper": "linear-delta", "reprap": "linear-delta",
     "marlin": "linear-delta",
 }  # fmt: skip
 

@@ -12,6 +12,7 @@ import pkmcal as pk
 from pkmcal.exceptions import FileError
 from pkmcal.geometry import robot_file
 from pkmcal.screw import from_pose
+from pkmcal.view.words import of_robot
 from tests.chain_twin import Twin, about, rotation
 from tests.kinematics.test_chain_ranks import strengths
 from tests.kinematics.test_chains import commands, disturbed, loaded
@@ -145,6 +146,7 @@ def test_a_tail_is_read_back_to_the_last_bit(tmp_path: Path) -> None:
     assert again.forward(q).pose.tobytes() == robot.forward(q).pose.tobytes()
 
 
+@pytest.mark.filterwarnings("ignore::pkmcal.CalibrationWarning")  # some are weakly determined
 def test_a_machine_with_a_wrist_calibrates(tmp_path: Path) -> None:
     robot = loaded(tricept(), tmp_path)
     true = disturbed(robot, 0.3)
@@ -196,3 +198,28 @@ def test_what_is_no_tail_is_refused(old: str, new: str, said: str, tmp_path: Pat
     assert old in text
     with pytest.raises(FileError, match=re.escape(said)):
         loaded(text.replace(old, new, 1), tmp_path)
+
+
+def test_a_home_with_the_axes_of_the_wrist_in_line_is_found(tmp_path: Path) -> None:
+    """Its first axis is its third at home, nowhere else; if that is elsewhere, it never is."""
+    assert pk.check_geometry(loaded(tricept(), tmp_path)).ok
+    aligned = tricept().replace("[0.0, 10.0, 1150.0]", "[0.0, 0.0, 1150.0]")
+    found = pk.check_geometry(loaded(aligned, tmp_path))
+    assert [each.kind for each in found.findings] == ["singular"]
+    assert "home is singular: the actuators move the tool in 5 ways there, nearby in 6" in str(
+        found
+    )
+    straight, _, last = aligned.rpartition("axis = [0.0, 0.0, 1.0]")
+    bent = f"{straight}axis = [0.8, -0.6, 0.0]{last}"
+    assert pk.check_geometry(loaded(bent, tmp_path)).ok
+
+
+def test_the_page_says_which_joints_are_behind_the_platform(tmp_path: Path) -> None:
+    said = of_robot(loaded(tricept(), tmp_path)).replace("\N{COMBINING LOW LINE}", "_")
+    assert said.startswith(
+        "A platform on three chains of joints (UP_S) and one chain of joints (UP); behind it three"
+        " more joints carry the tool (R_R_R_), underlined"
+    )
+    assert said.endswith(
+        "Six actuators move the tool along x, y, z and turn it about x, y, z (α, β, γ)."
+    )

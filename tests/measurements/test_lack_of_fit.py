@@ -71,6 +71,18 @@ def test_a_model_that_misses_is_told_from_an_instrument_that_scatters(hexapod: R
     assert re.search(r"repeats of a pose scatter \d.* times as much as it, state the true", text)
 
 
+def test_gross_errors_are_no_reason_to_state_another_sigma(hexapod: Robot) -> None:
+    """A repeat that is off scatters as well."""
+    true = with_errors(hexapod, 0.5, np.random.default_rng(1))
+    measured = repeated(true, hexapod, 30, 1)
+    values = measured.values.copy()
+    values[[10, 51]] += [5.0, 0.0, -3.0]
+    found = fitted(hexapod, dataclasses.replace(measured, values=values), prior=0.5)
+    assert found.outliers == (10, 51)
+    told = [text for text in found.warnings if "repeats of a pose scatter" in text]
+    assert len(told) == 1 and ": look at the outliers; without any, state the true" in told[0]
+
+
 def test_scatter_is_the_noise_where_no_sigma_is_stated(hexapod: Robot) -> None:
     """With as many parameters as poses tell, the repeats alone say what the noise is."""
     rng = np.random.default_rng(3)

@@ -20,7 +20,7 @@ from pkmcal.measurements.measurements import Measurements
 from .kinds import ARTEFACTS, OF_ORIENTATIONS, PUBLIC, needed, takes_target, width
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
-POSITIVE = st.floats(1e-300, 1e300)
+POSITIVE = st.floats(1e-90, 1e90)  # a sigma beyond 1e-100 to 1e100 is refused
 
 
 def read(tmp_path: Path, text: str, robot: Any = None) -> Measurements:

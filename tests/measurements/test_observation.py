@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.free_parameters import parameters
-from pkmcal.calibration.parameters import Asked
-from pkmcal.calibration.starts import with_starts
 from pkmcal.core import instruments
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.parameters import Asked
+from pkmcal.estimation.starts import with_starts
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import difference, predict

@@ -9,10 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
-from pkmcal.calibration.equations import Equations
-from pkmcal.calibration.fit_data import FitData
-from pkmcal.calibration.free_parameters import parameters
-from pkmcal.calibration.parameters import Asked
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.parameters import Asked
 from pkmcal.measurements import orientation
 from pkmcal.measurements.observation import corrected, difference
 

@@ -129,6 +129,44 @@ def test_the_page_begins_with_what_is_stated(folder: Path, found: pk.Identificat
     assert 'id="certificate"' not in plain
 
 
+def test_many_degrees_of_freedom_are_written_out(found: pk.Identification, tmp_path: Path) -> None:
+    """Beside a large uncertainty without any, those of the repeats count for many."""
+    (tmp_path / "stated.toml").write_text("datum = 0.05\n", "utf-8")
+    found.report(tmp_path, certificate=tmp_path / "stated.toml")
+    page = (tmp_path / "report.html").read_text("utf-8")
+    told = json.loads((tmp_path / "report.json").read_text("utf-8"))["certificate"]["dof"]
+    written = re.search(r"% with (\d+) degrees of freedom", page)
+    assert written and told > 1000
+    assert float(written[1]) == pytest.approx(told, rel=5e-3)
+    assert f"<td>{written[1]}</td>" in page
+
+
+@pytest.mark.parametrize(
+    "text, message",
+    [
+        ("mean = 21.4\nexpansion = 12e-6\nexpansion_uncertainty = 1e-6", None),
+        ("mean = 22.4\nuncertainty = 0.5\nexpansion = 11.5e-6", None),
+        ("mean = 22.4\nexpansion = 11.5e-6", r"mean: states 22\.4 °C, measured were 21 to 22 °C"),
+        ("mean = 21.4\nexpansion = 23e-6", r"states 2\.3e-05/K, calibrated was with 1\.15e-05/K"),
+    ],
+)
+def test_it_states_no_other_temperature_than_was_calibrated_with(
+    text: str, message: str | None, tmp_path: Path
+) -> None:
+    robot = pk.load("hexapod")
+    q = robot.inverse(workspaces.poses("hexapod", 12, 1))
+    values = robot.forward(q).pose[:, :3] + np.random.default_rng(1).normal(0, NOISE, (12, 3))
+    measured = pk.Measurements(q, values, temperature=np.linspace(21.0, 22.0, 12))
+    found = pk.identify(robot, measured, free="offset*", expansion=11.5e-6)
+    (tmp_path / "stated.toml").write_text(f"[temperature]\n{text}\n", "utf-8")
+    stated = certificate.read(tmp_path / "stated.toml")
+    if message is None:
+        certificate.budget(found, stated, np.empty(0))
+    else:
+        with pytest.raises(ValueError, match=message):
+            certificate.budget(found, stated, np.empty(0))
+
+
 def test_the_data_are_what_the_schema_says(folder: Path) -> None:
     jsonschema = pytest.importorskip("jsonschema")
     schema = json.loads(files("pkmcal.report").joinpath("schema.json").read_text("utf-8"))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.loss import Loss, LossName
+from pkmcal.estimation.loss import Loss, LossName
 from pkmcal.statistics.covariance import covariance
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import LinearFit

@@ -1,0 +1,41 @@
+"""Where a calibration begins: its equations at the nominal machine, frames laid on the readings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import Estimator
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.loss import LossName
+from pkmcal.estimation.mode_slips import start_in_modes
+from pkmcal.estimation.parameters import Parameters
+from pkmcal.exceptions import ArgumentError
+
+
+def begun(
+    datasets: Sequence[FitData], chosen: Parameters, unread: int
+) -> tuple[Equations, Equations, Evaluation]:
+    """The equations, the same with commanded poses, and where these start."""
+    equations = Equations(datasets, chosen, unread)
+    commanded = equations.commanded()
+    return equations, commanded, start_in_modes(commanded)
+
+
+def estimator_at(
+    equations: Equations, commanded: Equations, start: Evaluation, loss: LossName
+) -> Estimator:
+    """The estimator at its start.
+
+    Raises
+    ------
+    ValueError
+        Rows that were not reached.
+    """
+    if not start.ok and commanded is equations:
+        raise ArgumentError(commanded.failures(start))
+    own = equations.begin(commanded, start)
+    if not own.ok:
+        raise ArgumentError(equations.failures(own))
+    return Estimator(equations, own, loss)

@@ -1,0 +1,153 @@
+"""Measurements as `identify` is given them, with what is unknown of each set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import PurePath
+
+import numpy as np
+
+from pkmcal.arguments import instance, word
+from pkmcal.estimation.closures import has_equations
+from pkmcal.estimation.expansion import Expansion
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.parameters import KNOWN, Known
+from pkmcal.estimation.sessions import in_sessions, set_names
+from pkmcal.estimation.starts import with_starts
+from pkmcal.exceptions import ArgumentError
+from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.measurements.components import KINDS
+from pkmcal.measurements.measurements import Measurements
+
+Said = Mapping[str, Known | Sequence[Known]]  # of "frame", "target" and "attachment"
+
+
+def as_fit_data(
+    robot: Calibratable,
+    measurements: Measurements | Sequence[Measurements],
+    said: Said,
+    sessions: bool,
+    expansion: Expansion | None = None,
+) -> list[FitData]:
+    """The sets of measurements with what is unknown of each.
+
+    Parameters
+    ----------
+    robot : Calibratable
+        The machine.
+    measurements : Measurements or sequence of them
+        As given.
+    said : mapping
+        What `identify` was told of "frame", "target" and "attachment".
+    sessions : bool
+        Whether every row is to have a session.
+    expansion : Expansion, optional
+        How the machine grows with its temperature.
+    """
+    sets = list(measurements) if isinstance(measurements, Iterable) else [measurements]
+    for measured in sets:
+        _check(robot, measured, "measurements")
+    if not sets:
+        raise ArgumentError("measurements: none given")
+    if sessions:
+        sets = in_sessions(sets)
+    datasets, first = [], 0
+    unknown = zip(*(_unknown(name, given, len(sets)) for name, given in said.items()), strict=True)
+    for measured, flags, name in zip(sets, unknown, set_names(sets), strict=True):
+        of_frame, of_target, of_attachment = flags
+        rows = np.arange(first, first + len(measured))
+        datasets.append(
+            FitData(measured, rows, of_frame, of_target, of_attachment, name, expansion=expansion)
+        )
+        first += len(measured)
+    known = [data.measured.actuator_sigma is not None for data in datasets]
+    if any(known) and not all(known):
+        raise ArgumentError("measurements: state actuator_sigma of all sets, or of none")
+    if any(data.unknown_frame for data in datasets) and not any(data.framed for data in datasets):
+        raise ArgumentError("frame: distances do not depend on it, it cannot be unknown")
+    distances = any(KINDS[data.measured.kind].point == "base" for data in datasets)
+    if any(data.unknown_attachment for data in datasets) and not distances:
+        raise ArgumentError("attachment: distances alone have one, it cannot be unknown")
+    return with_starts(robot, datasets)
+
+
+def informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[FitData], int]:
+    """Leave rows out that say nothing: unread, where poses follow from the actuators exactly.
+
+    And count them.
+    """
+    if has_equations(machine, [data.measured.actuator_sigma for data in datasets]):
+        return datasets, 0
+    kept, unread = [], 0
+    for data in datasets:
+        values = data.measured.values.reshape(len(data.measured), -1)
+        read = np.asarray(np.isfinite(values).any(axis=1))
+        unread += int((~read).sum())
+        if read.all():
+            kept.append(data)
+        elif read.any():
+            kept.append(data.select(read))
+    if not kept:
+        raise ArgumentError(
+            f"measurements: nothing was read but the actuators; poses of {machine.name} follow from"
+            " these, which then say nothing of its geometry: measure poses, points, heights or"
+            " distances"
+        )
+    return kept, unread
+
+
+def as_fitted(
+    robot: Calibratable, holdout: Measurements, datasets: Sequence[FitData], sessions: bool
+) -> tuple[FitData, int]:
+    """Hold other measurements out, with what is unknown of the fitted set of their kind.
+
+    And with the noise of its actuators, where their own is not stated. With `sessions`, rows that
+    state none are of that of their file if it was fitted, else of another.
+    """
+    _check(robot, holdout, "holdout")
+    fitted = dict.fromkeys(name for data in datasets for name in data.measured.sessions)
+    if sessions and holdout.session is None:
+        file = PurePath(holdout.file).stem
+        holdout = in_sessions([holdout], () if file in fitted else fitted, "holdout")[0]
+    alike = [i for i, data in enumerate(datasets) if data.measured.kind == holdout.kind]
+    alike.sort(key=lambda i: not {*datasets[i].measured.sessions} & {*holdout.sessions})
+    i = alike[0] if alike else 0
+    of_actuators = datasets[i].measured.actuator_sigma
+    if holdout.actuator_sigma is None and of_actuators is not None:
+        holdout = replace(holdout, actuator_sigma=np.sqrt(np.mean(of_actuators**2, axis=0)))
+    data = replace(datasets[i], measured=holdout, rows=np.arange(len(holdout)))
+    return with_starts(robot, [data])[0], i
+
+
+def by_set(said: Said) -> frozenset[str]:
+    """What each set has for itself: the roles of which several sets were called unknown apart."""
+    each = {name: given for name, given in said.items() if not isinstance(given, str)}
+    found = {
+        name
+        for name, given in each.items()
+        if isinstance(given, Iterable) and list(given).count("unknown") > 1
+    }
+    of_target = {"anchor", "tool", "mounting"} if "target" in found else set()
+    return frozenset(found | of_target)
+
+
+def _check(robot: Calibratable, measured: Measurements, argument: str) -> None:
+    n = instance(argument, measured, Measurements).actuators.shape[1]
+    if n != robot.n_actuators:
+        raise ArgumentError(
+            f"{argument}: {robot.name} has {robot.n_actuators} actuators, found {n} per row"
+        )
+    if measured.actuator_units not in (None, robot.actuator_units):
+        raise ArgumentError(
+            f"{argument}: the actuators of {robot.name} are in {', '.join(robot.actuator_units)},"
+            f" found {', '.join(measured.actuator_units or ())}"
+        )
+
+
+def _unknown(argument: str, given: str | Sequence[str], count: int) -> list[bool]:
+    alone = isinstance(given, str) or not isinstance(given, Iterable)
+    said = [given] * count if alone else list(given)
+    if len(said) != count:
+        raise ArgumentError(f"{argument}: one word for each of {count} sets, found {len(said)}")
+    return [word(argument, each, KNOWN) == "unknown" for each in said]

@@ -1,0 +1,499 @@
+"""The equations of a calibration: measured less predicted, whitened, and their Jacobian.
+
+What the estimator works on are `Equations.residual` (M,) and `Equations.by_parameters` (M, n): the
+equations that are left when every pose has taken those that determine it (`elimination`). On a
+machine whose poses follow exactly from its actuators no pose takes any, and they are the readings
+themselves, set by set and row by row.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
+from pkmcal.core.library import STATUS
+from pkmcal.estimation import joint_angles
+from pkmcal.estimation.closures import RowStates
+from pkmcal.estimation.elimination import Blocks, Shares
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.first_frames import aligned
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.readings import ROUNDING, Readings, of_read
+from pkmcal.estimation.session_machines import (
+    Machines,
+    SessionClosures,
+    closures_of_sessions,
+    commanded_closures,
+)
+from pkmcal.estimation.sessions import NONE
+from pkmcal.exceptions import ArgumentError
+from pkmcal.measurements import orientation
+from pkmcal.measurements.observation import by_difference, corrected, distance_per_point
+from pkmcal.result import failed_rows
+
+# Whose, where, with which noise, and what `_system` says there; copies have another "whose".
+_Last = tuple["Equations", Evaluation, FloatArray, tuple[FloatArray, FloatArray]]
+
+
+class Equations(Readings):
+    """The stacked residual equations of all measurements, and their Jacobian.
+
+    Parameters
+    ----------
+    datasets : sequence of FitData
+        The rows to fit; rows with the same actuators are solved once.
+    parameters : Parameters
+        The parameter vector.
+    unread : int
+        How many rows were left out because nothing was read there.
+
+    Attributes
+    ----------
+    closures : SessionClosures
+        What the closures say of the poses.
+    components : ndarray of int (U,)
+        Equations of each unit. A unit is what counts together: a row where poses follow from the
+        actuators, else all that was read at one pose, less what determines that pose.
+    unit_of_row : ndarray of int (N,)
+        Of each row of the sets; -1 where none of its equations is left.
+    pose_of_unit : ndarray of int (U,)
+        The pose of each unit: rows of one pose have its errors in common.
+    idle : int
+        How many rows or poses say nothing: unread, or all that was read determines their pose.
+    unstated : ndarray of bool (G,)
+        Whose deviation is not known, of each group of equations with a noise of its own: the sets,
+        then the actuators where they have equations.
+    """
+
+    def __init__(
+        self, datasets: Sequence[FitData], parameters: Parameters, unread: int = 0
+    ) -> None:
+        super().__init__(datasets, parameters)
+        self.datasets, self._unread = tuple(datasets), unread
+        guess = np.tile(parameters.robot.home, (len(self.actuators), 1))
+        for i, (measured, place) in enumerate(zip(self.sets, self.pose_of, strict=True)):
+            elsewhere = self._framed[i] or self.columns_of(i, "tool") is not None
+            if measured.kind in ("pose", "position") and not elsewhere:
+                read = np.isfinite(measured.values).all(axis=1)
+                guess[place[read], :3] = measured.values[read, :3]
+                if measured.kind == "pose":
+                    guess[place[read], 3:] = orientation.shortest(measured.values[read, 3:])
+        unknown = np.zeros(len(guess), dtype=np.int32)
+        self._states = RowStates(guess, self.actuators, unknown)
+        self._last: _Last | None = None
+        self._no_sigma = np.array([
+            m.sigma is None and bool(np.isfinite(m.values).any()) for m in self.sets
+        ])  # fmt: skip
+        sigma = self.actuator_sigma
+        machines = range(len(self.machine_columns))
+        self._own = tuple(np.flatnonzero(self.machine_of_pose == s) for s in machines)
+        closures = closures_of_sessions(parameters.robot, self._own, self.actuators, sigma)
+        self._slack = np.zeros((len(guess), closures.equations), dtype=bool)
+        self._if_taut = self.actuators
+        self._take(closures, sigma is None)
+
+    def _take(self, closures: SessionClosures, estimated: bool) -> None:
+        """Build the units for these closures; `estimated`: their deviations are not known."""
+        self.closures = closures
+        if closures.unknowns:
+            if any(growth is not None for growth in self._growth):
+                raise ArgumentError(
+                    "expansion: needs poses that follow from the actuators: no actuator_sigma, and"
+                    " no surplus actuators; found others"
+                )
+            for m in self.sets:
+                follows = m.joint and joint_angles.follows_pose(self.parameters.robot, m.joint)
+                if m.kind in ("between", "angle") and not follows:
+                    raise ArgumentError(
+                        f"measurements: readings of kind {m.kind!r} need poses that follow from the"
+                        " actuators: no actuator_sigma, and no surplus actuators"
+                    )
+        of_row, pose_of_row = self.count, np.concatenate(self.pose_of)
+        if not closures.unknowns:
+            self.unstated: BoolArray = self._no_sigma
+            self.components: IntArray = of_row[of_row > 0]
+            self.pose_of_unit: IntArray = pose_of_row[of_row > 0]
+            self.unit_of_row: IntArray = np.where(of_row > 0, np.cumsum(of_row > 0) - 1, -1)
+            self._family_of_unit = self.set_of[of_row > 0]
+            self.idle = self._unread + int((of_row == 0).sum())
+            return
+        self.unstated = np.append(self._no_sigma, estimated)
+        poses = len(self.actuators)
+        own = np.nonzero(~self._slack)[0]
+        pose_of_equation = np.concatenate([own, np.repeat(pose_of_row, of_row)])
+        self._group_of_equation = np.concatenate([
+            np.full(len(own), len(self.sets)),
+            np.repeat(self.set_of, of_row),
+        ])  # fmt: skip
+        self._blocks = Blocks(pose_of_equation, poses, closures.unknowns)
+        self.components, self.pose_of_unit = self._blocks.components, self._blocks.pose_of_unit
+        unit_of_pose = np.full(poses, -1)
+        unit_of_pose[self.pose_of_unit] = np.arange(len(self.pose_of_unit))
+        self.unit_of_row = unit_of_pose[pose_of_row]
+        self._family_of_unit = np.zeros(len(self.components), dtype=np.intp)
+        self.idle = self._blocks.idle
+
+    def commanded(self) -> Equations:
+        """The same with poses that follow from the actuators as they read."""
+        if not self.closures.unknowns:
+            return self
+        other = copy.copy(self)
+        other._slack = self._slack[:, :0]
+        other._take(commanded_closures(self._own, self._if_taut), estimated=False)
+        return other
+
+    def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
+        """Evaluate where the same with commanded poses has been started."""
+        self.parameters, self._states = commanded.parameters, start.states
+        if self.closures.unknowns:  # closures that contradict each other may still have a best pose
+            self.start_from(np.flatnonzero(start.status), self.parameters.robot.home)
+        return start if commanded is self else self.at(start.theta)
+
+    @property
+    def sigma_stated(self) -> bool:
+        """Whether any noise is stated, of what was read or of the actuators."""
+        of_actuators = self.closures.unknowns and not self.unstated[-1]
+        of_read = [m.sigma is not None and bool(np.isfinite(m.values).any()) for m in self.sets]
+        return bool(of_actuators) or any(of_read)
+
+    @property
+    def family_of_unit(self) -> IntArray:
+        """Family of each unit (U,): the set, or one for all where poses mix the groups' noise."""
+        return self._family_of_unit
+
+    @property
+    def family_of_group(self) -> IntArray:
+        """The same of each group (G,)."""
+        groups = np.arange(len(self.unstated))
+        return np.zeros_like(groups) if self.closures.unknowns else groups
+
+    def at(self, theta: FloatArray, noise: FloatArray | None = None) -> Evaluation:
+        """Evaluate at `theta` (n,), every pose where it fits best what was read of it.
+
+        `noise` (G,) multiplies the stated deviations of each group, as in `whitened`.
+        """
+        p = self.parameters
+        robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
+        machines = Machines(tuple(robots), self._own, self.approach)
+        states = self.closures.settled(machines, self._states)
+        if self.closures.unknowns:
+            factors = np.ones(len(self.unstated)) if noise is None else noise
+
+            def system(states: RowStates) -> tuple[FloatArray, FloatArray]:
+                return self._system(machines, states, theta, factors)
+
+            states = self._blocks.best(self.closures, machines, states, system)
+        predicted = self.predicted(states.pose, theta)
+        residuals = self.residuals(predicted)
+        return Evaluation(
+            theta, machines, states.pose, states.actuators, states.status, predicted, residuals
+        )
+
+    def _system(
+        self, machines: Machines, states: RowStates, theta: FloatArray, noise: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
+        off, by_unknown = self.closures.residual(machines, states)
+        off /= noise[-1]
+        by_unknown /= noise[-1]
+        equation, by_unknown = self._told(off), self._told(by_unknown)
+        if not self.count.any():
+            return equation, by_unknown
+        twists = self.closures.twists(machines, states)
+        predicted = self.predicted(states.pose, theta)
+        residuals = self.residuals(predicted)
+        by_pose = [
+            by_difference(m.kind, seen.by_twist @ twists[place], residual)
+            for m, seen, place, residual in zip(
+                self.sets, predicted, self.pose_of, residuals, strict=True
+            )
+        ]
+        return (
+            np.concatenate([equation, -self.whitened(residuals, noise)]),
+            np.concatenate([by_unknown, self.whitened(by_pose, noise)]),
+        )
+
+    def _at(self, evaluation: Evaluation, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The system at an evaluation; the last one is kept, which a step asks for three times."""
+        last = self._last
+        mine = last is not None and last[0] is self and last[1] is evaluation
+        if last is not None and mine and np.array_equal(last[2], noise):
+            return last[3]
+        self._last = None
+        found = self._system(evaluation.machines, evaluation.states, evaluation.theta, noise)
+        self._last = self, evaluation, noise, found
+        return found
+
+    def residual(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """Measured less predicted (M,), whitened: what is left when poses have taken their part."""
+        if not self.closures.unknowns:
+            return self.whitened(evaluation.residuals, noise)
+        off, by_unknown = self._at(evaluation, noise)
+        return -self._blocks.left(by_unknown, off)
+
+    def squares(self, residual: FloatArray) -> FloatArray:
+        """Squared length of the residuals (M,) of each unit, (U,)."""
+        first = np.cumsum(self.components) - self.components
+        squares: FloatArray = np.add.reduceat(residual**2, first)
+        return squares
+
+    def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """Derivative (M, n) of what is predicted by the parameters; of what is left likewise."""
+        readings = self.whitened(self.jacobian(evaluation), noise)
+        if not self.closures.unknowns:
+            return readings
+        p, (_, by_unknown) = self.parameters, self._at(evaluation, noise)
+        of_closures = self.closures.by_numbers(
+            evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
+        )
+        of_closures /= noise[-1]
+        by_all = self._told(of_closures)
+        if len(readings):
+            by_all = np.concatenate([by_all, readings])
+        return self._blocks.left(by_unknown, by_all)
+
+    @property
+    def slack_cells(self) -> list[tuple[int, int]]:
+        """Closures that are left out, of slack cables: their poses and numbers."""
+        pose, closure = np.nonzero(self._slack)
+        return list(zip(pose.tolist(), closure.tolist(), strict=True))
+
+    def _told(self, part: FloatArray) -> FloatArray:
+        """Equations of closures (K, equations, ...) that count, one after another."""
+        whole = part.reshape(-1, *part.shape[2:])
+        return whole[~self._slack.reshape(-1)] if self._slack.any() else whole
+
+    def closure_residuals(
+        self, evaluation: Evaluation, noise: FloatArray, weights: FloatArray, taken: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Closures read less needed (K, equations), whitened, and their degrees of freedom.
+
+        None of those that do not count. Arguments are those of `by_groups`.
+        """
+        off, by_unknown = self._at(evaluation, noise)
+        own = int((~self._slack).sum())
+        longer, freedom = np.zeros((2, *self._slack.shape))
+        longer[~self._slack] = -off[:own]
+        freedom[~self._slack] = self._blocks.redundancy(by_unknown, weights, taken)[:own]
+        if self._slack.any():
+            whole, _ = self.closures.residual(evaluation.machines, evaluation.states)
+            longer[self._slack] = -whole[self._slack] / noise[-1]
+        return longer, freedom
+
+    def without_closures(
+        self, cells: Sequence[tuple[int, int]], evaluation: Evaluation
+    ) -> Equations:
+        """The same without some closures, by pose and number: of cables that are slack.
+
+        Where poses are to follow from the actuators these read what they would at `evaluation`.
+        """
+        other = copy.copy(self)
+        other._slack = np.zeros_like(self._slack)
+        other._slack[tuple(np.array(cells, dtype=np.intp).reshape(-1, 2).T)] = True
+        needed = self.closures_off(evaluation) / self.closures.lengths(evaluation.machines)
+        other._if_taut = self.actuators.copy()
+        for pose, cell in zip(*np.nonzero(other._slack), strict=True):
+            other._if_taut[pose, self.closures.actuators[cell]] += needed[pose, cell]
+        other._take(self.closures, bool(self.unstated[-1]))
+        return other
+
+    def start_from(self, rows: IntArray, poses: FloatArray) -> None:
+        """Start the forward kinematics of some distinct rows of actuators from poses (s, 6)."""
+        guess = self._states.pose.copy()
+        guess[rows] = poses
+        self._states = replace(self._states, pose=guess)
+
+    def redrawn(
+        self,
+        at: Evaluation,
+        noise: FloatArray,
+        left: FloatArray,
+        prior_centre: FloatArray,
+        drawn: FloatArray | None = None,
+    ) -> tuple[Equations, Evaluation]:
+        """The same with other readings, and evaluated where these have been drawn.
+
+        Parameters
+        ----------
+        at : Evaluation
+            Where the machine is taken to be.
+        noise : ndarray (G,)
+            See `whitened`.
+        left : ndarray (M,)
+            What its readings leave there, as `residual`.
+        drawn : ndarray (s,), optional
+            That of `Parameters`.
+        prior_centre : ndarray (n,)
+            Another centre of the prior.
+        """
+        other, errors, unknowns = copy.copy(self), left, self.closures.unknowns
+        if unknowns:
+            off, by_unknown = self._at(at, noise)
+            errors = self._blocks.spread(by_unknown, left)
+            change, own = np.zeros(self._slack.shape), int((~self._slack).sum())
+            change[~self._slack] = -noise[-1] * (errors + off)[:own]
+            other.closures = self.closures.shifted(change)
+            errors = errors[own:]
+        residuals = tuple(self.unwhiten(errors, noise[: len(self.sets)]))
+        other.sets = tuple(
+            replace(m, values=corrected(m.kind, seen.values, residual).reshape(m.values.shape))
+            for m, seen, residual in zip(self.sets, at.predicted, residuals, strict=True)
+        )
+        other.parameters = replace(self.parameters, start=prior_centre, drawn=drawn)
+        other.warm_start(at)
+        if unknowns:
+            return other, other.at(at.theta, noise)
+        return other, replace(at, residuals=residuals)
+
+    def reweighted(self, deviations: Sequence[FloatArray]) -> Equations:
+        """The same where the components (k,) of each set have other relative deviations."""
+        other = copy.copy(self)
+        pairs = zip(self._whiten, deviations, strict=True)
+        other._whiten = [white / relative for white, relative in pairs]
+        other.deviations = tuple(deviations)
+        return other
+
+    def start(self, near: FloatArray | None = None, own: BoolArray | None = None) -> Evaluation:
+        """Evaluate at the present parameters, unknown frames aligned with the readings.
+
+        Rows that fail from a measured pose are tried from home, those that then miss grossly in
+        every assembly mode. `near` (n,) are other parameters to start from, of which only `own`
+        (n,) are aligned.
+        """
+        theta = self.parameters.start.copy() if near is None else near.copy()
+        evaluation = self.at(theta)
+        if not evaluation.ok:
+            self.start_from(np.flatnonzero(evaluation.status), self.parameters.robot.home)
+            evaluation = self.at(theta)
+        if not evaluation.ok:
+            return evaluation
+        before = self.parameters
+        self.parameters, theta = aligned(self, evaluation, own)
+        if self.parameters is before and np.array_equal(theta, evaluation.theta):
+            return evaluation
+        return self.at(theta)
+
+    def warm_start(self, evaluation: Evaluation) -> None:
+        """Start the forward kinematics of later calls of `at` from its poses."""
+        self._states = evaluation.states.chosen(evaluation.status == 0, self._states)
+
+    def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
+        """Derivative of the predicted values of each set to the parameters, (N, k, n).
+
+        With the opposite sign that of the residuals.
+        """
+        p, numbers = self.parameters, self.spread.columns.shape[1]
+        by_geometry = self.closures.twists_by_numbers(
+            evaluation.machines, evaluation.states, p.places
+        )
+        parts = []
+        for i, seen in enumerate(evaluation.predicted):
+            rows, k = seen.values.shape
+            part = np.zeros((rows, k, numbers))
+            if by_geometry is not None:
+                part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
+                if seen.by_other is not None:
+                    there = by_geometry[self.other_of[i]]
+                    part[:, :, : len(p.places)] += seen.by_other @ there
+            direct = self.by_numbers(i, evaluation.pose, evaluation.theta)
+            if direct is not None:
+                part[:, :, : len(p.places)] += direct
+            if seen.by_frame is not None and p.frame is not None:
+                part[:, :, p.frame : p.frame + 6] = seen.by_frame
+            for name, mine in self._numbers[i].items():
+                row, slot = np.nonzero(mine != NONE)
+                part[row, :, mine[row, slot]] += seen.by[name][row, :, slot]
+            wide = self.spread.of_rows(part, i)
+            parts.append(by_difference(self.sets[i].kind, wide, evaluation.residuals[i]))
+        return parts
+
+    def by_groups(
+        self,
+        evaluation: Evaluation,
+        noise: FloatArray,
+        weights: FloatArray,
+        residual: FloatArray,
+        taken: FloatArray,
+    ) -> Shares:
+        """Squares and degrees of freedom of each group.
+
+        Parameters
+        ----------
+        evaluation : Evaluation
+            The equations there.
+        noise : ndarray (G,)
+            See `whitened`.
+        weights : ndarray (U,)
+            Of the units.
+        residual : ndarray (M,)
+            Whitened and weighted.
+        taken : ndarray (M, r)
+            Weighted Jacobian in directions in which the parameters' covariance is 1: the squares
+            of a row are the leverage of its equation.
+        """
+        count = len(self.unstated)
+        if not self.closures.unknowns:
+            group = np.repeat(self._family_of_unit, self.components)
+            every = np.repeat(weights, self.components)
+            left = every - (taken**2).sum(axis=1)
+            freedom = np.bincount(group, left, count).astype(np.float64)
+            squares = np.bincount(group, residual**2, count).astype(np.float64)
+            return Shares(squares, freedom, np.diag(freedom))
+        _, by_unknown = self._at(evaluation, noise)
+        group = self._group_of_equation
+        return self._blocks.by_groups(by_unknown, group, weights, residual, taken)
+
+    def rounding(self, noise: FloatArray) -> float:
+        """Length of the whitened rounding errors of what is predicted."""
+        readings = super().rounding(noise)
+        sigma = self.closures.sigma
+        if sigma is None:
+            return readings
+        size = ROUNDING * float(np.abs(self.actuators).max())
+        return float(np.hypot(readings, size / noise[-1] * np.linalg.norm(1.0 / sigma)))
+
+    def distances(self, evaluation: Evaluation) -> FloatArray:
+        """How far off each measured point is, mm, in the order of the sets."""
+        return np.concatenate([
+            distance_per_point(of_read(m, r), m.units, self.parameters.robot.length)
+            for m, r in zip(self.sets, evaluation.residuals, strict=True)
+        ])  # fmt: skip
+
+    def rms(self, evaluation: Evaluation) -> float:
+        """Root mean square of `distances` over the rows that were reached; NaN without any."""
+        off = self.distances(evaluation)
+        return rms(off[np.isfinite(off)])
+
+    def progress(self, evaluation: Evaluation) -> float:
+        """`rms`, or `closure_rms` where nothing but the actuators was read."""
+        return self.rms(evaluation) if self.count.any() else self.closure_rms(evaluation)
+
+    def closure_rms(self, evaluation: Evaluation) -> float:
+        """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
+        found = self.closures_off(evaluation)[evaluation.status == 0]
+        return rms(found[~self._slack[evaluation.status == 0]])
+
+    def worst_closures(self, evaluation: Evaluation) -> FloatArray:
+        """The largest of them at each pose (K,); NaN where they hold."""
+        off = np.abs(self.closures_off(evaluation))
+        off[self._slack] = 0.0
+        return off.max(axis=1) if off.shape[1] else np.full(len(off), np.nan)
+
+    def closures_off(self, evaluation: Evaluation) -> FloatArray:
+        """What actuators would read at the poses less what they read (K, equations), mm."""
+        sigma, machines = self.closures.sigma, evaluation.machines
+        off, _ = self.closures.residual(machines, evaluation.states)
+        return off if sigma is None else off * sigma * self.closures.lengths(machines)
+
+    def status(self, evaluation: Evaluation) -> Int32Array:
+        """Of the forward kinematics, for each row."""
+        return np.concatenate([evaluation.status[place] for place in self.pose_of])
+
+    def failures(self, evaluation: Evaluation) -> str:
+        """Say which rows failed and why; empty where the forward kinematics solved all."""
+        return failed_rows(self.status(evaluation), STATUS, self.rows, most=10)

@@ -1,0 +1,352 @@
+"""The estimator: noise, rank and covariance around the least squares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
+from pkmcal.estimation.elimination import Shares
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.identifiability import (
+    Decomposed,
+    Directions,
+    decompose,
+    directions,
+)
+from pkmcal.estimation.least_squares import Search
+from pkmcal.estimation.loss import Loss, LossName
+from pkmcal.exceptions import ArgumentError
+from pkmcal.statistics import prior_test
+from pkmcal.statistics.linear_fit import column_basis, triangle
+from pkmcal.statistics.robust_scale import median_ratio
+
+_ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
+_LEAST_FALL = 0.1  # of a mean square, which a step of scoring does not go below
+_LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
+LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
+FEW = 5.0  # below which residuals hardly show it
+LEAST_REDUNDANCY = 2.0  # the same of one group of several that share poses
+
+
+@dataclass(frozen=True, eq=False)
+class IterationState:
+    """What one least-squares solve takes as given, and what is revised before the next.
+
+    Attributes
+    ----------
+    noise : ndarray (G,)
+        Factor on the stated deviations of each group of equations (the sets, then the actuators
+        where poses have unknowns); where none is stated, the deviation in mm.
+    loss : Loss
+        How rows count.
+    measured : Directions
+        Identifiable from the measurements alone.
+    determined : Directions
+        Identifiable from measurements and prior.
+    fitted : Directions
+        Determined to the machine's size or better; the rest is kept at its start.
+    """
+
+    noise: FloatArray
+    loss: Loss
+    measured: Directions
+    determined: Directions
+    fitted: Directions
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The equations and their statistics at the solution.
+
+    All of it is of the M equations that are left when poses have taken their part: noise is 1 in
+    each, and those of different poses are independent. Nothing else of poses and closures is to be
+    known to judge a fit: `Equations.pose_of_unit` says which units are of one pose.
+
+    Attributes
+    ----------
+    evaluation : Evaluation
+        The equations there.
+    state : IterationState
+        Noise, loss and identifiable directions.
+    residual : ndarray (M,)
+        Measured less predicted, whitened.
+    jacobian : ndarray (M, n)
+        Scaled and whitened.
+    weights : ndarray (U,)
+        Of each unit (`Equations.components`); 1 unless the loss is robust.
+    prior : ndarray (p, n)
+        A row for each prior, scaled, in units of its deviation.
+    covariance : ndarray (n, n)
+        Scaled; nothing along combinations that are not determined.
+    shares : Shares
+        Of each group, the sum of squared residuals and what it says of the noise.
+    """
+
+    evaluation: Evaluation
+    state: IterationState
+    residual: FloatArray
+    jacobian: FloatArray
+    weights: FloatArray
+    prior: FloatArray
+    covariance: FloatArray
+    shares: Shares
+
+    @property
+    def freedom(self) -> FloatArray:
+        """Equations of each group less the poses and parameters they went into, (G,)."""
+        return self.shares.freedom
+
+
+class Estimator:
+    """Weighted least squares, iterated with the noise and rank that they imply.
+
+    Parameters
+    ----------
+    equations : Equations
+        What is fitted.
+    start : Evaluation
+        Where the search starts, and what unidentifiable combinations keep.
+    loss : str
+        A name in `loss.LIMITS`.
+    """
+
+    def __init__(self, equations: Equations, start: Evaluation, loss: LossName) -> None:
+        self.equations, self.start, self.loss = equations, start, loss
+        self.search = Search(equations, start)
+        self.scale = self.search.scale
+        self._priors = len(self.search.prior(start.theta))
+        self.unstated = equations.unstated
+        self._at_first: FloatArray | None = None
+        self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
+
+    @property
+    def least_freedom(self) -> float:
+        """Degrees of freedom from which the noise of a group is estimated."""
+        return LEAST_REDUNDANCY if self.equations.closures.unknowns else LEAST_FREEDOM
+
+    def unknown_noise(self, estimate: Estimate) -> BoolArray:
+        """Groups (G,) whose noise is neither stated nor can be estimated: too little is left.
+
+        Where poses have unknowns it is what is left at equal noise of all groups: one that turns
+        out small beside the others has little left, but is known to be small.
+        """
+        freedom = estimate.freedom if self._at_first is None else self._at_first
+        return self.unstated & (freedom < self.least_freedom)
+
+    def solve(self, near: Evaluation | None = None) -> Estimate:
+        """Estimate the parameters and, where no sigma is stated, the noise of each group.
+
+        The search begins at `near`, or else at the start.
+        """
+        state = self._state(self._first_noise(), self._first_loss(), None)
+        if not state.fitted.rank:
+            names = ", ".join(self.equations.parameters.names)
+            raise ArgumentError(f"they depend on none of {names}")
+        u = np.zeros(len(self.scale))
+        if near is not None:
+            self.equations.warm_start(near)
+            u = (near.theta - self.start.theta) / self.scale
+        for _ in range(_ROUNDS):
+            # rows that nothing contradicts pin what is not determined
+            kept = state.fitted.unidentifiable
+            pins = state.fitted.singular[0] * kept.T
+            u = self.search.best(u, state.noise, state.loss, pins)
+            u = u - kept @ (kept.T @ u)
+            estimate = self._estimate(u, state)
+            if self.equations.closures.unknowns and self._at_first is None:
+                self._at_first = estimate.freedom
+            revised = self._revised(estimate)
+            settled = self._settled(state, revised)
+            state = revised
+            if settled:
+                break
+        if self.loss == "linear" and not self.unstated.any():
+            return replace(estimate, state=state)  # nothing that it was made with has changed
+        return self._estimate(u, state)
+
+    # between the least squares ------------------------------------------------------------------
+
+    def _loss(self, name: LossName, width: FloatArray) -> Loss:
+        of_units = width[self.equations.family_of_unit]
+        return Loss(name, self.equations.components, of_units)
+
+    def _first_noise(self) -> FloatArray:
+        """1 mm where it is not stated; with a prior what the data alone show at the start.
+
+        Noise and prior could else excuse each other: much of one leaves little of the other.
+        """
+        ones = np.ones(len(self.unstated))
+        if not self._priors or self.loss != "linear":
+            return ones
+        jacobian = self.search.jacobian(self.start, ones)
+        residual = self.equations.residual(self.start, ones)
+        alone = self._alone(self.start, ones, jacobian, residual)
+        return ones if alone is None else self._kept(ones * self._scored(alone)[0], ones)
+
+    def _alone(
+        self,
+        evaluation: Evaluation,
+        noise: FloatArray,
+        jacobian: FloatArray,
+        residual: FloatArray,
+    ) -> Shares | None:
+        """What no parameters explain in each group, without the prior's help.
+
+        None where too few equations are left to show it.
+        """
+        basis = column_basis(jacobian)
+        left = residual - basis @ (basis.T @ residual)
+        every = np.ones(len(self.equations.components))
+        shares = self.equations.by_groups(evaluation, noise, every, left, basis)
+        few = (shares.freedom[self.unstated] < LEAST_FREEDOM).any()
+        return None if few or shares.freedom.sum() < prior_test.LEAST_FREEDOM else shares
+
+    def _kept(self, noise: FloatArray, stated: FloatArray) -> FloatArray:
+        """Estimated noise of groups where none is stated, else what multiplies the stated one."""
+        return np.where(self.unstated, np.maximum(noise, _LEAST_NOISE), stated)
+
+    def _first_loss(self) -> Loss:
+        """Limits wide enough for the nominal machine, and no wider than gross errors allow."""
+        ones = np.ones(len(self.unstated))
+        if self.loss == "linear":
+            return self._loss("linear", ones)
+        medians = self._medians(self.equations.residual(self.start, ones))
+        return self._loss(self.loss, np.maximum(np.sqrt(medians), 1.0))
+
+    def _medians(self, residual: FloatArray) -> FloatArray:
+        """Variance (F,) that whitened residuals (M,) of each family show by their median."""
+        squares, components = self.equations.squares(residual), self.equations.components
+        family_of = self.equations.family_of_unit
+        return np.array([
+            median_ratio(squares[family_of == f], components[family_of == f])
+            for f in range(int(family_of.max()) + 1)
+        ])  # fmt: skip
+
+    def _state(
+        self, noise: FloatArray, loss: Loss, evaluation: Evaluation | None
+    ) -> IterationState:
+        """Split the directions for this noise, before (`evaluation` None) or after a fit."""
+        size = self.start.robot.length
+        noise_known = evaluation is not None or not self.unstated.any()
+        worst = size if noise_known else np.inf
+        if self._first is None or (noise != self._first[0]).any():
+            self._first = noise, self._decomposed(self.start, noise)
+        _, first = self._first
+        now = (None, None) if evaluation is None else self._decomposed(evaluation, noise)
+        measured = directions(first[0], now[0], size)
+        determined = directions(first[1], now[1], size)
+        return IterationState(
+            noise, loss, measured, determined, directions(first[1], now[1], size, worst)
+        )
+
+    def _decomposed(
+        self, evaluation: Evaluation, noise: FloatArray
+    ) -> tuple[Decomposed, Decomposed]:
+        """Decompose without and with the prior."""
+        jacobian = self.search.jacobian(evaluation, noise)
+        data = decompose(jacobian)
+        if not self._priors:
+            return data, data
+        return data, decompose(np.vstack([jacobian, self.search.prior(evaluation.theta)]))
+
+    def _revised(self, estimate: Estimate) -> IterationState:
+        """Estimate unstated noise and limits of the loss, and split the directions anew."""
+        factor, of_families = self._spread(estimate)
+        noise = self._kept(estimate.state.noise * factor, estimate.state.noise)
+        # while the model is still far off, outliers are units further off than most
+        family_of = self.equations.family_of_group
+        families = range(len(of_families))
+        none_stated = np.array([bool(self.unstated[family_of == f].all()) for f in families])
+        width = np.where(none_stated, 1.0, np.maximum(of_families, 1.0))
+        return self._state(noise, self._loss(self.loss, width), estimate.evaluation)
+
+    def _spread(self, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
+        """Deviation of the whitened residuals of each group (G,), and of each family (F,)."""
+        if self.loss != "linear":
+            return self._scored(estimate.shares, self._medians(estimate.residual))
+        alone = None
+        if self._priors:
+            alone = self._alone(
+                estimate.evaluation, estimate.state.noise, estimate.jacobian, estimate.residual
+            )
+        return self._scored(estimate.shares if alone is None else alone)
+
+    def _scored(
+        self, shares: Shares, medians: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Deviation that the shares show of each group (G,), and of each family (F,).
+
+        1 without freedom. `medians` (F,) are the variances of families that medians show, of
+        robust losses.
+        """
+        family_of = self.equations.family_of_group
+        squares, freedom, information = shares
+        factor, of_families = np.ones(len(freedom)), np.ones(int(family_of.max()) + 1)
+        for f in range(len(of_families)):
+            mine = np.flatnonzero(family_of == f)
+            left = float(freedom[mine].sum())
+            if left < LEAST_FREEDOM:
+                continue
+            variance = together = float(squares[mine].sum()) / left
+            if medians is not None:
+                of_family = self.equations.family_of_unit == f
+                count = float(self.equations.components[of_family].sum())
+                variance = float(medians[f]) * count / left
+            of_families[f] = np.sqrt(variance)
+            known = mine[self.unstated[mine] & (freedom[mine] >= self.least_freedom)]
+            if len(mine) == 1:
+                known = mine
+            # a step of Fisher's scoring of the restricted likelihood: of one group, its mean square
+            excess = np.linalg.solve(
+                information[np.ix_(known, known)], squares[known] - freedom[known]
+            )
+            common = variance / together if together > 0 else 1.0
+            least = _LEAST_FALL * squares[known] / freedom[known]
+            factor[known] = np.sqrt(common * np.maximum(1.0 + excess, least))
+        return factor, of_families
+
+    def _settled(self, old: IterationState, new: IterationState) -> bool:
+        if old.fitted.rank != new.fitted.rank:
+            return False
+        if self.loss == "linear" and not self._priors and len(self.unstated) == 1:
+            return True  # the noise does not move the solution
+        if not np.allclose(old.noise, new.noise, rtol=1e-3, atol=_LEAST_NOISE):
+            return False
+        return self.loss == "linear" or np.allclose(old.loss.width, new.loss.width, rtol=1e-3)
+
+    def scaled_jacobian(self, evaluation: Evaluation) -> FloatArray:
+        """Scaled Jacobian (M, n), not whitened: mm per mm, angles as their arc.
+
+        Where poses have unknowns it is that of what is left of all equations, whitened as stated.
+        """
+        if self.equations.closures.unknowns:
+            return self.search.jacobian(evaluation, np.ones(len(self.unstated)))
+        parts = []
+        for part, measured in zip(
+            self.equations.jacobian(evaluation), self.equations.sets, strict=True
+        ):
+            arcs = mm_per_unit(measured.units, self.start.robot.length)
+            parts.append((part * arcs[:, None]).reshape(-1, part.shape[2]))
+        jacobian: FloatArray = np.concatenate(parts)[self.equations.present] * self.scale
+        return jacobian
+
+    def _estimate(self, u: FloatArray, state: IterationState) -> Estimate:
+        evaluation = self.search.at(u, state.noise)
+        jacobian = self.search.jacobian(evaluation, state.noise)
+        residual = self.equations.residual(evaluation, state.noise)
+        weights = state.loss.weights(residual)
+        root = np.sqrt(np.repeat(weights, self.equations.components))
+        weighted = root[:, None] * jacobian
+        basis, prior = state.determined.identifiable, self.search.prior(evaluation.theta)
+        _, singular, rows = np.linalg.svd(
+            triangle(np.vstack([weighted, prior])) @ basis, full_matrices=False
+        )
+        half = basis @ (rows.T / singular)
+        taken = weighted @ half[:, : state.fitted.rank]
+        shares = self.equations.by_groups(evaluation, state.noise, weights, root * residual, taken)
+        return Estimate(
+            evaluation, state, residual, jacobian, weights, prior, half @ half.T, shares
+        )

@@ -1,0 +1,57 @@
+"""The equations of a calibration at one parameter vector: poses, predictions, residuals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.estimation.closures import RowStates
+from pkmcal.estimation.session_machines import Machines
+from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.measurements.observation import Predicted
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The equations evaluated at one parameter vector.
+
+    Attributes
+    ----------
+    theta : ndarray (n,)
+        The parameters, mm and rad.
+    machines : Machines
+        With their geometry.
+    pose : ndarray (K, 6)
+        Where the machine is at each distinct row of actuators; NaN where it cannot be.
+    actuators : ndarray (K, n)
+        Where the actuators are there; what they read unless their noise is stated.
+    status : ndarray of int (K,)
+        Of the forward kinematics.
+    predicted : tuple of Predicted
+        Of each set of measurements.
+    residuals : tuple of ndarray (N, k)
+        Measured less predicted of each set, mm and rad.
+    """
+
+    theta: FloatArray
+    machines: Machines
+    pose: FloatArray
+    actuators: FloatArray
+    status: Int32Array
+    predicted: tuple[Predicted, ...]
+    residuals: tuple[FloatArray, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether the forward kinematics solved every row."""
+        return not self.status.any()
+
+    @property
+    def robot(self) -> Calibratable:
+        """The machine; that of the last session where some of its numbers are of sessions."""
+        return self.machines.robots[-1]
+
+    @property
+    def states(self) -> RowStates:
+        """Where the machine is at each distinct row of actuators."""
+        return RowStates(self.pose, self.actuators, self.status)

@@ -1,0 +1,214 @@
+"""Where the search for unknown frames, targets and tools starts: see `alignment` and `hand_eye`.
+
+Targets in known frames follow from the poses. Then frame by frame; what several frames have in
+common is placed with the first of them. Frames in which points were read come first, then tools,
+with their frame where it is not laid yet.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.core import instruments
+from pkmcal.core.poses import compose, invert
+from pkmcal.estimation.alignment import PointPairs, of_heights, of_points, of_poses
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.hand_eye import of_frame_and_tool, of_tool
+from pkmcal.estimation.parameters import Parameters
+
+if TYPE_CHECKING:
+    from pkmcal.estimation.readings import Readings
+
+Rows = dict[int, IntArray]  # of a frame, in each set
+
+
+def aligned(
+    readings: Readings, evaluation: Evaluation, own: BoolArray | None = None
+) -> tuple[Parameters, FloatArray]:
+    """Parameters whose frames lie nearest to the readings, and their values (n,).
+
+    Parameters
+    ----------
+    readings : Readings
+        What was read.
+    evaluation : Evaluation
+        Where the machine is with the present parameters.
+    own : ndarray of bool (n,), optional
+        Which parameters may be changed; all by default.
+    """
+    parameters, theta = readings.parameters, evaluation.theta.copy()
+    free = np.ones(len(parameters), dtype=bool) if own is None else own.copy()
+    frames, tools = readings.frames, readings.tools
+    _with_known_frame(readings, evaluation, theta, free)
+    by_points = [
+        first
+        for first, rows in frames.items()
+        if any(readings.sets[i].kind == "position" for i in rows)
+    ]
+    for first in dict.fromkeys([*by_points, *tools, *frames]):
+        if not free[first]:
+            continue
+        if first in tools:
+            laid = _with_tool(readings, evaluation, first, parameters, theta, free)
+        else:
+            laid = {first: _aligned(readings, evaluation, frames[first], parameters, theta, free)}
+        for each, motion in laid.items():
+            parameters, theta = parameters.aligned(theta, each, motion)
+            free[each : each + 6] = False
+    return parameters, theta
+
+
+def _with_known_frame(
+    readings: Readings, evaluation: Evaluation, theta: FloatArray, free: BoolArray
+) -> None:
+    """Place targets that are free and were read in a known frame: they are then not free.
+
+    At the medians, which a few rows that are solved in another assembly mode do not move.
+    """
+    framed = {i for rows in readings.frames.values() for i in rows}
+    seen = [i for i, m in enumerate(readings.sets) if m.kind == "position" and i not in framed]
+    every = {i: np.arange(len(readings.sets[i])) for i in seen}
+    columns = {i: _sought(readings, i, rows, free)[:, 0] for i, rows in every.items()}
+    for first in np.unique(np.concatenate([np.empty(0, np.intp), *columns.values()])).tolist():
+        if first < 0:
+            continue
+        shifts = []
+        for i, rows in every.items():
+            mine = rows[columns[i] == first]
+            places, turn = _points(readings, evaluation, i, mine, theta)
+            off = readings.sets[i].values[mine] - places
+            shifts.append((turn.transpose(0, 2, 1) @ off[:, :, None])[:, :, 0])
+        read = np.concatenate(shifts)
+        read = read[np.isfinite(read).all(axis=1)]
+        if len(read):
+            _shift(readings, theta, free, first, np.median(read, axis=0))
+
+
+def _shift(
+    readings: Readings, theta: FloatArray, free: BoolArray, first: int, shift: FloatArray
+) -> None:
+    """Move a target within its bounds; it is then not free."""
+    mine, (lower, upper) = slice(first, first + 3), readings.parameters.bounds
+    theta[mine] = np.clip(theta[mine] + shift, lower[mine], upper[mine])
+    free[mine] = False
+
+
+def _with_tool(
+    readings: Readings,
+    evaluation: Evaluation,
+    tool: int,
+    parameters: Parameters,
+    theta: FloatArray,
+    free: BoolArray,
+) -> dict[int, FloatArray]:
+    """A tool (6,) by its first parameter, with the frame it was measured in where that is free."""
+    groups: dict[int | None, list[tuple[int, IntArray]]] = {}
+    for i, rows in readings.tools[tool].items():
+        framed = {f: own[i] for f, own in readings.frames.items() if i in own}
+        if not framed:
+            groups.setdefault(None, []).append((i, rows))
+        for f, own in framed.items():
+            if len(some := np.intersect1d(rows, own)):
+                groups.setdefault(f, []).append((i, some))
+    known = [each for each in groups if each is None or not free[each]]
+    frame = (known or list(groups))[0]
+    values = np.concatenate([readings.sets[i].values[rows] for i, rows in groups[frame]])
+    pose = np.concatenate([evaluation.pose[readings.pose_of[i][rows]] for i, rows in groups[frame]])
+    if frame is None:
+        return {tool: of_tool(values, pose)}
+    if free[frame]:
+        base, carried = of_frame_and_tool(values, pose)
+        return {frame: base, tool: carried}
+    base = _motion(parameters, theta, frame)
+    return {tool: of_tool(compose(invert(base), np.ascontiguousarray(values)), pose)}
+
+
+def _motion(parameters: Parameters, theta: FloatArray, first: int) -> FloatArray:
+    """A frame or tool (6,) by its first parameter."""
+    near = np.ascontiguousarray(theta[None, first : first + 6])
+    motion: FloatArray = compose(parameters.origin[first], near)[0]
+    return motion
+
+
+def _seen(
+    readings: Readings,
+    evaluation: Evaluation,
+    i: int,
+    rows: IntArray,
+    parameters: Parameters,
+    theta: FloatArray,
+) -> FloatArray:
+    """What rows of set `i` read in the base frame, (N, k), tools where they are laid."""
+    columns = readings.columns_of(i, "tool")
+    if columns is None:
+        return evaluation.predicted[i].values[rows]
+    pose = evaluation.pose[readings.pose_of[i][rows]]
+    for first in np.unique(columns[rows, 0]).tolist():
+        mine = columns[rows, 0] == first
+        pose[mine] = compose(pose[mine], _motion(parameters, theta, first))
+    return pose
+
+
+def _aligned(
+    readings: Readings,
+    evaluation: Evaluation,
+    rows: Rows,
+    parameters: Parameters,
+    theta: FloatArray,
+    free: BoolArray,
+) -> FloatArray:
+    """The frame (6,) nearest to the readings; targets that are free are moved and then not free."""
+    kinds = {
+        kind: sets
+        for kind in ("position", "pose", "height", "orientation", "tilt")
+        if (sets := [i for i in rows if readings.sets[i].kind == kind])
+    }
+    of_points_in = kinds.get("position", [])
+    if not of_points_in:
+        kind = next(iter(kinds))
+        values = np.concatenate([readings.sets[i].values[rows[i]] for i in kinds[kind]])
+        if kind == "tilt":  # as level as the robot file says
+            return np.zeros(6)
+        if kind != "height":
+            seen = [_seen(readings, evaluation, i, rows[i], parameters, theta) for i in kinds[kind]]
+            whole = np.zeros((2, len(values), 6))
+            whole[:, :, 6 - values.shape[1] :] = values, np.concatenate(seen)
+            read, predicted = whole[:, np.isfinite(values).all(axis=1)]
+            return of_poses(read, predicted)
+        parts = [_points(readings, evaluation, i, rows[i], theta) for i in kinds[kind]]
+        return of_heights(values, np.concatenate([places for places, _ in parts]))
+    columns = np.concatenate([_sought(readings, i, rows[i], free) for i in of_points_in])
+    sought, target = np.unique(columns[:, 0], return_inverse=True)
+    parts = [_points(readings, evaluation, i, rows[i], theta) for i in of_points_in]
+    pairs = PointPairs(
+        values=np.concatenate([readings.sets[i].values[rows[i]] for i in of_points_in]),
+        point=np.concatenate([places for places, _ in parts]),
+        turn=np.concatenate([turn for _, turn in parts]),
+        target=target.reshape(-1) - int(sought[0] < 0),
+    )
+    frame, shifts = of_points(pairs)
+    for first, shift in zip(sought[sought >= 0].tolist(), shifts, strict=True):
+        _shift(readings, theta, free, first, shift)
+    return frame
+
+
+def _sought(readings: Readings, i: int, rows: IntArray, free: BoolArray) -> IntArray:
+    """Parameters (N, 3) of the target of each row of set `i`; -1 where it is not free."""
+    columns = readings.columns_of(i, "target")
+    if columns is None:
+        return np.full((len(rows), 3), -1)
+    mine = columns[rows]
+    return np.where(free[mine], mine, -1)
+
+
+def _points(
+    readings: Readings, evaluation: Evaluation, i: int, rows: IntArray, theta: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Where targets of rows of set `i` are in the base frame (N, 3), and how they are turned."""
+    target = readings.arguments_of(i, theta)["target"]
+    pose = evaluation.pose[readings.pose_of[i][rows]]
+    places, _, turn = instruments.points(pose, np.ascontiguousarray(target[rows]))
+    return places, turn

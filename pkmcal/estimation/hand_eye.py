@@ -1,0 +1,76 @@
+"""Where a tool is on the platform, and the instrument's frame with it: where their search starts.
+
+What was measured is M = F P T: the frame F, the platform's pose P, the tool T. The rotations follow
+from a singular value decomposition (M. Shah, Solving the robot-world/hand-eye calibration problem
+using the Kronecker product, Journal of Mechanisms and Robotics 5 (2013) 031007), the places
+linearly. What poses that turn too little do not determine stays where it is: a tool that is not
+turned against the platform.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.estimation.alignment import (
+    TILT,
+    centred,
+    frame_of,
+    inverse_above,
+    nearest_rotations,
+)
+from pkmcal.measurements import orientation
+
+_ALIKE = 1e-4  # share by which singular values differ of turnings that poses do not tell apart
+_ROUNDS = 30  # of turning frame and tool in turn
+
+
+def of_tool(measured: FloatArray, pose: FloatArray) -> FloatArray:
+    """Pose (6,) of a tool on the platform, by poses (N, 6) of both in one frame."""
+    m, p, at, origin = _motions(measured, pose)
+    turn = nearest_rotations(_mean(p.transpose(0, 2, 1) @ m))
+    place = _mean((p.transpose(0, 2, 1) @ (at - origin)[:, :, None])[:, :, 0])
+    return frame_of(turn, place)
+
+
+def of_frame_and_tool(measured: FloatArray, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Poses (6,) of the base in the instrument's frame and of a tool on the platform.
+
+    Parameters
+    ----------
+    measured : ndarray (N, 6)
+        Of the tool, in the instrument's frame.
+    pose : ndarray (N, 6)
+        Of the platform, in the base frame.
+    """
+    m, p, at, origin = _motions(measured, pose)
+    # M Tᵀ Pᵀ = F, so that Σ P ⊗ M takes Tᵀ to N times F
+    both = np.einsum("nij,nkl->ikjl", p, m).reshape(9, 9)
+    _, singular, right = np.linalg.svd(both)
+    alike = right[singular > (1.0 - _ALIKE) * singular[0]]
+    unturned = alike.T @ (alike @ np.eye(3).ravel())  # what they leave of no turning
+    kept = len(alike) > 1 and np.linalg.norm(unturned) > _ALIKE
+    back = (unturned if kept else right[0]).reshape(3, 3).T  # Tᵀ but for its size and sign
+    back = nearest_rotations(back if np.linalg.det(back) > 0 else -back)
+    for _ in range(_ROUNDS):
+        turn = nearest_rotations(_mean(m @ back @ p.transpose(0, 2, 1)))
+        back = nearest_rotations(_mean(m.transpose(0, 2, 1) @ turn @ p))
+    lever = centred(p).reshape(-1, 3)
+    off = at @ turn - origin
+    place = inverse_above(lever, TILT * np.sqrt(len(p))) @ centred(off).ravel()
+    where = turn @ _mean(off - p @ place)
+    return frame_of(turn, where), frame_of(back.T, place)
+
+
+def _motions(
+    measured: FloatArray, pose: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Rotations (N, 3, 3) of both and their places (N, 3), of rows that have both."""
+    known = np.isfinite(measured).all(axis=1) & np.isfinite(pose).all(axis=1)
+    turned, own = (orientation.rotations(each[known, 3:]) for each in (measured, pose))
+    return turned, own, measured[known, :3], pose[known, :3]
+
+
+def _mean(rows: FloatArray) -> FloatArray:
+    mean: FloatArray = rows.mean(axis=0)
+    return mean

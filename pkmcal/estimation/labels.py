@@ -1,0 +1,105 @@
+"""What each equation of a calibration belongs to: set, row, pose, target and component.
+
+Where poses follow from the actuators the equations are readings. Where poses have unknowns an
+equation is a mixture of all that was read at a pose, closures included: of such a unit only the
+pose is known, and no two equations have the same component.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, IntArray
+from pkmcal.estimation.equations import Equations
+from pkmcal.measurements import repeats
+from pkmcal.statistics.linear_fit import numbered
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """What each of M equations belongs to, by number.
+
+    Attributes
+    ----------
+    set_of, row, pose, target, component : ndarray of int (M,)
+        Rows count through all sets; a pose is that of `poses_of_rows`; components of the same name
+        have the same number. Of mixtures, the row is the unit, and the set the first.
+    length : ndarray of bool (M,)
+        Whether it is in mm; of a pose the position. Where angles alone were read they count, as
+        arcs. Of mixtures none is.
+    """
+
+    set_of: IntArray
+    row: IntArray
+    pose: IntArray
+    target: IntArray
+    component: IntArray
+    length: BoolArray
+
+
+def poses_of_rows(equations: Equations) -> IntArray:
+    """Number of the pose of each row (N,): by `Measurements.group`, else by actuators.
+
+    Rows at the same actuators are one pose in all sets.
+    """
+    pose = equations.command_of_pose[np.concatenate(equations.pose_of)]
+    for k, measured in enumerate(equations.sets):
+        if measured.group is not None:
+            pose[equations.set_of == k] = measured.pose_index + pose.max() + 1
+    return numbered(pose)
+
+
+def labels(equations: Equations) -> Labels:
+    """Label the equations."""
+    return _of_mixtures(equations) if equations.closures.unknowns else _of_readings(equations)
+
+
+def _of_readings(equations: Equations) -> Labels:
+    names: dict[str, int] = {}
+    targets, components, lengths, rows = [], [], [], []
+    first = 0
+    for m in equations.sets:
+        targets.append(np.repeat(repeats.targets(m), len(m.components)))
+        numbers = [names.setdefault(name, len(names)) for name in m.components]
+        components.append(np.tile(np.array(numbers, dtype=np.intp), len(m)))
+        counted = [unit == "mm" or "mm" not in m.units for unit in m.units]
+        lengths.append(np.tile(np.array(counted, dtype=bool), len(m)))
+        rows.append(np.repeat(np.arange(first, first + len(m)), len(m.components)))
+        first += len(m)
+    read = equations.present
+    row = np.concatenate(rows)[read]
+    return Labels(
+        set_of=equations.set_of[row],
+        row=row,
+        pose=poses_of_rows(equations)[row],
+        target=np.concatenate(targets)[read],
+        component=np.concatenate(components)[read],
+        length=np.concatenate(lengths)[read],
+    )
+
+
+def _of_mixtures(equations: Equations) -> Labels:
+    unit = np.repeat(np.arange(len(equations.components)), equations.components)
+    pose = _poses_of_units(equations)[unit]
+    order = np.argsort(pose, kind="stable")
+    count = np.bincount(pose)
+    component = np.empty_like(unit)
+    component[order] = np.arange(len(unit)) - np.repeat(np.cumsum(count) - count, count)
+    nothing = np.zeros_like(unit)
+    return Labels(nothing, unit, pose, nothing, component, np.zeros(len(unit), dtype=bool))
+
+
+def _poses_of_units(equations: Equations) -> IntArray:
+    """Number of the pose of each unit (U,): units whose rows share a pose are of one."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    unit, pose = equations.unit_of_row, poses_of_rows(equations)
+    used = unit >= 0
+    units = len(equations.components)
+    shape = (units + int(pose.max()) + 1,) * 2
+    joined = coo_array((np.ones(int(used.sum())), (unit[used], units + pose[used])), shape)
+    _, group = connected_components(joined, directed=False)
+    return numbered(group[:units])

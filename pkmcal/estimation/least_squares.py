@@ -1,0 +1,209 @@
+"""The search for the parameters that fit best: least squares through scipy, step by step."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.loss import Loss
+from pkmcal.exceptions import ArgumentError
+
+_FTOL = 1e-12  # of the cost: 1e-5 of a standard deviation
+
+
+class Search:
+    """Least squares in scaled parameters, u = (θ - θ0)/scale.
+
+    Parameters
+    ----------
+    equations : Equations
+        What is fitted.
+    start : Evaluation
+        θ0, where all rows are reached.
+    columns : ndarray of int, optional
+        The parameters that are found, n of them; all by default. The others stay at θ0.
+
+    Attributes
+    ----------
+    scale : ndarray (n,)
+        That of `Parameters`.
+    evaluations : int
+        How often the machine was solved for all rows.
+    converged : bool
+        Whether the last search did.
+    history : list of float
+        Misfit of the rows that were reached at the start and after every step taken, rms in mm; of
+        the closures where nothing else was read.
+    """
+
+    def __init__(
+        self, equations: Equations, start: Evaluation, columns: IntArray | None = None
+    ) -> None:
+        parameters = equations.parameters
+        self._found: IntArray | slice = slice(None) if columns is None else columns
+        self.equations, self.start = equations, start
+        self.scale = parameters.scale[self._found]
+        self._stated = parameters.prior_rows(start.theta)[:, self._found].any(axis=1)
+        lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
+        bounded = bool(np.isfinite([lower, upper]).any())
+        self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
+        self._method: Literal["trf", "lm"] = "trf" if bounded else "lm"
+        ones = np.ones(len(equations.unstated))
+        self._last: tuple[FloatArray, FloatArray, Evaluation]
+        self._last = (np.zeros(len(self.scale)), ones, start)
+        self._last_jacobian: tuple[Evaluation, FloatArray, FloatArray] | None = None
+        self._refused = np.zeros(len(equations.components), dtype=bool)
+        self.evaluations = 0
+        self.converged = False
+        self.history: list[float] = []
+
+    def at(self, u: FloatArray, noise: FloatArray) -> Evaluation:
+        """The equations at scaled parameters (n,), poses found with this noise (G,)."""
+        same = not self.equations.closures.unknowns or np.array_equal(noise, self._last[1])
+        if not (same and np.array_equal(u, self._last[0])):
+            there = self.equations.at(self._theta(u), noise)
+            self._last = (u.copy(), noise, there)
+            self.evaluations += 1
+        return self._last[2]
+
+    def prior(self, theta: FloatArray) -> FloatArray:
+        """A row (p, n) for each prior at all parameters `theta`, in units of its deviation."""
+        rows: FloatArray = self.equations.parameters.prior_rows(theta)[self._stated]
+        found: FloatArray = rows[:, self._found]
+        return found
+
+    def _theta(self, u: FloatArray) -> FloatArray:
+        theta: FloatArray = self.start.theta.copy()
+        theta[self._found] += self.scale * u
+        return theta
+
+    def jacobian(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """Derivative (M, n) of the predicted values, scaled and whitened.
+
+        The last one is kept until another is asked for.
+
+        Raises
+        ------
+        ValueError
+            It does not exist, at a singularity of the machine.
+        """
+        found = _finite(self._taken(evaluation, noise))
+        self._last_jacobian = evaluation, noise, found
+        return found
+
+    def _taken(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """The same, finite or not, and not kept: a search holds copies of its own."""
+        last, self._last_jacobian = self._last_jacobian, None
+        if last is not None and last[0] is evaluation and np.array_equal(last[1], noise):
+            return last[2]
+        del last
+        found: FloatArray = self.equations.by_parameters(evaluation, noise)[:, self._found]
+        found *= self.scale
+        return found
+
+    def best(self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray) -> FloatArray:
+        """Where the cost is least, from `u` (n,).
+
+        Rows that the machine cannot reach bar the way of a step. Where that happened, the search
+        goes round: first without those rows, then from there with all of them.
+
+        Parameters
+        ----------
+        u : ndarray (n,)
+            Where to start.
+        noise : ndarray (G,)
+            See `Equations.whitened`.
+        loss : Loss
+            How rows count.
+        pins : ndarray (d, n)
+            Rows that hold the combinations that measurements and prior do not identify.
+        """
+        equations = self.equations
+        self._refused[:] = False
+        everything = np.zeros_like(self._refused)
+        straight, cost = self._minimum(u, noise, loss, pins, everything)
+        barred = self._refused.copy()
+        if not barred.any() or barred.all():
+            return straight
+        converged, here = self.converged, self.at(straight, noise)
+        around, _ = self._minimum(u, noise, loss, pins, barred)
+        if self.at(around, noise).ok:
+            around, other = self._minimum(around, noise, loss, pins, everything)
+            if other < cost:
+                return around
+        self.converged, self._last = converged, (straight, noise, here)
+        equations.warm_start(here)
+        return straight
+
+    def _minimum(
+        self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray, aside: BoolArray
+    ) -> tuple[FloatArray, float]:
+        """A minimum of the cost of the rows not set aside, and the cost."""
+        from scipy.optimize import least_squares
+
+        equations = self.equations
+        parameters = equations.parameters
+        without = np.repeat(aside, equations.components)
+
+        last: tuple[Evaluation, FloatArray] | None = None
+
+        def data(evaluation: Evaluation) -> FloatArray:
+            nonlocal last
+            if last is None or last[0] is not evaluation:
+                whitened = equations.residual(evaluation, noise)
+                whitened[without] = 0.0
+                last = evaluation, whitened
+            return last[1]
+
+        # a cost that nothing lowers: by less than rounding it need not fall
+        floor = equations.rounding(noise) / np.sqrt(_FTOL)
+        first = data(self.at(u, noise))
+        worse = 10.0 * (1.0 + np.abs(first).max())
+
+        def residual(u: FloatArray) -> FloatArray:
+            evaluation = self.at(u, noise)
+            pulled = parameters.prior_left(evaluation.theta)[self._stated]
+            held = np.concatenate([-pulled, pins @ u])
+            missed = (evaluation.status[equations.pose_of_unit] != 0) & ~aside
+            if missed.any():  # worse than any step that is taken
+                self._refused |= missed
+                return np.full(len(first) + len(held) + 1, worse + floor)
+            return np.concatenate([-loss.residual(data(evaluation)), held, [floor]])
+
+        def jacobian(u: FloatArray) -> FloatArray:
+            evaluation = self.at(u, noise)
+            equations.warm_start(evaluation)  # the step to it was taken
+            self.history.append(equations.progress(evaluation))
+            by_u = self._taken(evaluation, noise)
+            if aside.any():
+                by_u = np.where(without[:, None], 0.0, by_u)
+            by_u = loss.jacobian(data(evaluation), _finite(by_u))
+            return np.vstack([by_u, self.prior(evaluation.theta), pins, np.zeros(len(u))])
+
+        found = least_squares(
+            residual,
+            u,
+            jacobian,
+            bounds=self._bounds,
+            method=self._method,
+            x_scale=1.0,
+            ftol=_FTOL,
+            xtol=1e-10,
+            gtol=1e-15,
+            max_nfev=200,
+        )
+        self.converged = bool(found.status > 0)
+        return found.x, float(found.cost)
+
+
+def _finite(jacobian: FloatArray) -> FloatArray:
+    if not np.isfinite(jacobian).all():
+        raise ArgumentError(
+            "no geometry near the present one agrees: the fit runs into poses"
+            " where the actuators do not hold the machine (type-2 singular)"
+        )
+    return jacobian

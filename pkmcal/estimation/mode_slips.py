@@ -1,0 +1,106 @@
+"""Rows that were solved in another assembly mode than the one they were measured in.
+
+Forward kinematics starts from what was measured, or from home, and may end in another mode. Such a
+row misses grossly, and there is a mode that does not: so rows that miss grossly are tried in every
+mode. A reading that is wrong itself has no such mode.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arguments import instance
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, largest_first
+from pkmcal.display import first_rows
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.kinematics.robot import Robot
+
+_GROSS = 6.0  # times the median misfit from which a row is tried in other modes
+_LEAST = 1e-3  # mm; misfits of measurements without noise
+_HALF = 0.5  # of the misfit that another mode may leave
+_FITTING = 4.0  # times what is gross, beyond which no mode fits
+_NEIGHBOURS = 6  # rows from whose poses a machine is solved whose modes are not known
+_ALIKE = 1e-6  # share of the spread by which rows differ that are not equally far
+_MOST = 0.5  # share of the poses that may miss grossly: of more, something else is wrong
+
+
+def in_their_modes(equations: Equations, evaluation: Evaluation) -> Evaluation:
+    """The equations with rows that miss grossly solved in the mode that fits them, if one does."""
+    better, poses = _better(equations, evaluation)
+    if not len(better):
+        return evaluation
+    equations.start_from(better, poses)
+    return equations.at(evaluation.theta)
+
+
+def start_in_modes(
+    equations: Equations, near: FloatArray | None = None, own: BoolArray | None = None
+) -> Evaluation:
+    """`Equations.start`, once more where rows of other modes had laid unknown frames."""
+    start = equations.start(near, own)
+    if in_their_modes(equations, start) is not start:
+        start = equations.start(near, own)
+    return start
+
+
+def in_other_modes(equations: Equations, evaluation: Evaluation) -> list[str]:
+    """Say which rows fit another assembly mode than the one they were solved in."""
+    better, _ = _better(equations, evaluation)
+    rows = equations.rows[np.isin(np.concatenate(equations.pose_of), better)].tolist()
+    if not rows:
+        return []
+    many = f"{len(rows)} rows fit" if len(rows) > 1 else "1 row fits"
+    return [
+        f"{many} another assembly mode than the one that the fit has for it"
+        f" (rows {first_rows(rows, 10)}): the result is not to be trusted; state home nearer to the"
+        " measured poses, or leave these rows out"
+    ]
+
+
+def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, FloatArray]:
+    """Distinct rows of actuators (s,) that another mode fits better, and their poses there."""
+    machines, pose = evaluation.machines, evaluation.pose
+    none = np.empty(0, dtype=np.intp), np.empty((0, 6))
+    if not isinstance(evaluation.robot, Robot):
+        return none  # an arm has one pose
+    misfit = equations.misfit(pose, evaluation.theta)
+    solved, read = np.isfinite(misfit), ~np.isnan(misfit)
+    if not solved.any():
+        return none
+    limit = max(_GROSS * float(np.median(misfit[solved])), _LEAST)
+    gross = np.flatnonzero(read & ~(misfit <= limit))
+    if not 0 < len(gross) <= _MOST * np.count_nonzero(read):
+        return none
+    least, best = np.where(solved, misfit, np.inf), pose.copy()
+    modes = [
+        _modes(
+            instance("robot", machines.at(k), Robot), equations.actuators, pose, k, misfit <= limit
+        )
+        for k in gross.tolist()
+    ]
+    for j in range(max(map(len, modes))):
+        trial = pose.copy()
+        for k, of_row in zip(gross, modes, strict=True):
+            trial[k] = of_row[j] if j < len(of_row) else np.nan
+        now = equations.misfit(trial, evaluation.theta)
+        nearer = now < least
+        least, best = np.where(nearer, now, least), np.where(nearer[:, None], trial, best)
+    fits = (least < _HALF * np.where(solved, misfit, np.inf)) & (least <= _FITTING * limit)
+    better = gross[fits[gross]]
+    return better, best[better]
+
+
+def _modes(
+    robot: Robot, actuators: FloatArray, pose: FloatArray, k: int, sound: BoolArray
+) -> FloatArray:
+    """Poses (j, 6) that the machine may have at the actuators of row `k`."""
+    found = robot.forward_all(actuators[k])
+    if found.complete or not sound.any():
+        return found.poses
+    there = np.flatnonzero(sound)
+    spread = np.maximum(np.ptp(actuators, axis=0), np.finfo(float).tiny)
+    apart = np.linalg.norm((actuators[there] - actuators[k]) / spread, axis=1)
+    near = there[largest_first(-apart, _ALIKE)[:_NEIGHBOURS]]
+    solved = robot.forward(np.tile(actuators[k], (len(near), 1)), pose[near])
+    return np.vstack([found.poses, solved.pose[solved.ok]])

@@ -1,0 +1,267 @@
+"""The parameter vector of a calibration: geometry, instrument frame, targets and attachments.
+
+What one row depends on, its *numbers*, and what the search finds, the *parameters*, are the same
+unless some numbers are found anew in each session or set: see `sessions`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.core.poses import compose, compose_rates
+from pkmcal.estimation.fit_data import Dependence, FitData
+from pkmcal.estimation.prior_functions import PriorFunction
+from pkmcal.estimation.sessions import NONE, Scope, Spread, label
+from pkmcal.estimation.smoothness import smoothness_rows
+from pkmcal.measurements.calibratable import Calibratable
+
+Prior = float | Mapping[str, float | tuple[float, float]] | None
+Known = Literal["known", "unknown"]
+KNOWN: tuple[Known, ...] = ("known", "unknown")
+Bounds = Mapping[str, tuple[float, float]] | None
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What `identify` was asked for: its arguments of the same names.
+
+    Attributes
+    ----------
+    free, prior, bounds
+        Of `identify`.
+    per_session : tuple of str
+        Names or wildcards.
+    by_set : frozenset of str
+        Of "frame", "target", "attachment" and "anchor", what each set has for itself.
+    fix : tuple of str
+        Names or wildcards of numbers of the geometry that are held.
+    held_points : frozenset of (str, str)
+        Unknown points that are held where the user puts them, by role and name.
+    """
+
+    free: str | Sequence[str] | None = None
+    prior: Prior = None
+    bounds: Bounds = None
+    per_session: tuple[str, ...] = ()
+    by_set: frozenset[str] = frozenset()
+    fix: tuple[str, ...] = ()
+    held_points: frozenset[tuple[str, str]] = frozenset()
+
+
+@dataclass(frozen=True, eq=False)
+class Parameters:
+    """The parameter vector: numbers of the geometry first, then frames and what readings depend on.
+
+    Attributes
+    ----------
+    names, units : tuple of str, n
+        Units "mm", "rad" or "1".
+    start : ndarray (n,)
+        Present values.
+    scale : ndarray (n,)
+        What moves the machine by about 1 mm: 1 mm, 1 mm / length, 1 mm / travel.
+    prior : ndarray (n,)
+        Standard deviation around the present value; inf where there is none.
+    lower, upper : ndarray (n,)
+        Bounds; infinite where there are none.
+    number_of : ndarray of int (n,)
+        Which number of a row each parameter is.
+    scope : tuple of str, m
+        Of each number of a row, whether it is common to all.
+    column : mapping
+        The parameter that a number is, by the number and what stands behind its @.
+    sessions : tuple of str
+        For each of which some numbers were found; empty where all are common.
+    places : ndarray of int
+        Places in the geometry's values of the first numbers.
+    frame : int or None
+        Number of frame.x; None where the frame is known.
+    found_along : mapping
+        First number of each point, zero or artefact that is found along, by role
+        (`Dependence.role`) and name.
+    origin : mapping
+        Where the six parameters of a frame or tool count from, by the first: the base in the
+        instrument's frame, or the tool on the platform, is at this pose (6,) followed by them. Near
+        it they are small, and their angles regular.
+    robot : Calibratable
+        The machine they belong to.
+    asked : Asked
+        What they were made of.
+    functions : tuple of PriorFunction
+        What is known of functions of numbers.
+    drawn : ndarray (s,) or None
+        By how much functions of numbers and bends of tables of drive laws are off what is stated of
+        them, in standard deviations, where that is not 0: in replicates of the bootstrap.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    start: FloatArray
+    scale: FloatArray
+    prior: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    number_of: IntArray
+    scope: tuple[Scope, ...]
+    column: Mapping[tuple[int, str], int]
+    sessions: tuple[str, ...]
+    places: IntArray
+    frame: int | None
+    found_along: Mapping[tuple[str, str], int]
+    origin: Mapping[int, FloatArray]
+    robot: Calibratable
+    asked: Asked
+    functions: tuple[PriorFunction, ...] = ()
+    drawn: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds."""
+        return self.lower, self.upper
+
+    def prior_rows(self, theta: FloatArray) -> FloatArray:
+        """A row (p, n) for each prior at `theta`: its scaled derivative over its deviation.
+
+        First of parameters, then of functions, then of bends of tables.
+        """
+        return np.vstack([self._of_parameters, self.off_functions(theta)[1] * self.scale])
+
+    def prior_left(self, theta: FloatArray) -> FloatArray:
+        """What the prior misses (p,) at `theta`, in standard deviations."""
+        left: FloatArray = self._of_parameters @ ((self.start - theta) / self.scale)
+        drawn = 0.0 if self.drawn is None else self.drawn
+        return np.concatenate([left, drawn - self.off_functions(theta)[0]])
+
+    def off_functions(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """How far functions and bends are off what is stated (s,), in deviations; by θ (s, n)."""
+        rows, constant = self._smooth
+        off: FloatArray = rows @ theta + constant
+        if not self.functions:
+            return off, rows
+        found = [each.at(theta, self.robot, self.places) for each in self.functions]
+        sigma = np.array([each.sigma for each in self.functions])
+        stated = np.array([each.value for each in self.functions])
+        own = (np.array([value for value, _ in found]) - stated) / sigma
+        by_theta = np.array([slope for _, slope in found]) / sigma[:, None]
+        return np.concatenate([own, off]), np.vstack([by_theta, rows])
+
+    @property
+    def prior_names(self) -> list[str]:
+        """What each of `prior_rows` is of."""
+        stated = [n for n, s in zip(self.names, self.prior, strict=True) if np.isfinite(s)]
+        stated += [each.name for each in self.functions]
+        return stated + [
+            f"the smoothness at {self.names[np.abs(row).argmax()]}"
+            for row in self._smooth[0] * self.scale
+        ]
+
+    @cached_property
+    def _of_parameters(self) -> FloatArray:
+        sigma = self.prior / self.scale
+        stated = np.flatnonzero(np.isfinite(sigma))
+        rows: FloatArray = np.eye(len(sigma))[stated] / sigma[stated, None]
+        return rows
+
+    @cached_property
+    def _smooth(self) -> tuple[FloatArray, FloatArray]:
+        columns = [self.geometry_of(name) for name in self.sessions or (None,)]
+        return smoothness_rows(self.robot, self.places, columns, len(self))
+
+    @property
+    def geometry(self) -> slice:
+        """The parameters that are of the geometry: the first ones."""
+        return slice(0, int(np.count_nonzero(self.number_of < len(self.places))))
+
+    @property
+    def motions(self) -> tuple[int, ...]:
+        """The first parameter of each frame and each tool."""
+        numbers = [n for n in (self.frame, self.found_along.get(("tool", ""))) if n is not None]
+        return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
+
+    def spread(self, datasets: Sequence[FitData]) -> Spread:
+        """Which parameters hold in the rows of these sets."""
+        place: dict[tuple[str, str], int] = {}
+        part_of = []
+        for data in datasets:
+            session = data.measured.session if "session" in self.scope else None
+            behind = data.set_name if "set" in self.scope else ""
+            names, mine = [""], np.zeros(len(data.measured), dtype=np.intp)
+            if session is not None:
+                names, mine = (each.tolist() for each in np.unique(session, return_inverse=True))
+            parts = [place.setdefault((name, behind), len(place)) for name in names]
+            part_of.append(np.array(parts, dtype=np.intp)[mine])
+        columns = np.array([
+            [
+                self.column.get((number, label(scope, *part)), NONE)
+                for number, scope in enumerate(self.scope)
+            ]
+            for part in place
+        ])  # fmt: skip
+        return Spread(columns, tuple(part_of), len(self))
+
+    def geometry_of(self, session: str | None = None) -> IntArray:
+        """Parameters (g,) of the geometry in a session; in the last one by default."""
+        last = self.sessions[-1] if self.sessions else ""
+        name = last if session is None else session
+        return np.array([
+            self.column[number, label(self.scope[number], name, "")]
+            for number in range(len(self.places))
+        ])  # fmt: skip
+
+    def values_at(self, theta: FloatArray, columns: IntArray | None = None) -> FloatArray:
+        """The geometry's values (p,) for `theta` (n,), of a machine whose numbers are `columns`.
+
+        By default that of the last session.
+        """
+        values: FloatArray = self.robot.geometry.values.copy()
+        values[self.places] = theta[self.geometry_of() if columns is None else columns]
+        return values
+
+    def aligned(
+        self, theta: FloatArray, first: int, frame: FloatArray
+    ) -> tuple[Parameters, FloatArray]:
+        """Put a frame or tool at `frame` (6,) and count from there.
+
+        Unless a prior or bound is stated. `first` is its first parameter.
+        """
+        mine, theta = slice(first, first + 6), theta.copy()
+        stated = np.isfinite([self.prior[mine], self.lower[mine], self.upper[mine]]).any()
+        theta[mine] = frame if stated else 0.0
+        origin = {**self.origin, first: np.zeros(6) if stated else frame}
+        return replace(self, origin=origin), theta
+
+    def reported(self, theta: FloatArray) -> FloatArray:
+        """The parameters (n,) with the numbers of frames and tools counted from zero."""
+        out: FloatArray = theta.copy()
+        for first in self.motions:
+            mine = slice(first, first + 6)
+            out[mine] = compose(self.origin[first], np.ascontiguousarray(theta[None, mine]))[0]
+        return out
+
+    def reported_rates(self, theta: FloatArray) -> FloatArray:
+        """Derivative (n, n) of `reported` to the parameters (n,)."""
+        rates = np.eye(len(self))
+        for first in self.motions:
+            mine, nowhere = slice(first, first + 6), np.zeros(6)
+            at, origin = np.ascontiguousarray(theta[None, mine]), self.origin[first]
+            whole = compose(origin, at)
+            rates[mine, mine] = compose_rates(origin, at, nowhere, whole)[0]
+        return rates
+
+    def numbers_of(self, dependence: Dependence) -> IntArray:
+        """Numbers of an argument in each row, (N, w); `NONE` where one of it is given."""
+        numbers = np.full(dependence.given.shape, NONE, dtype=np.intp)
+        for i, (name, mine) in enumerate(dependence.sought.items()):
+            rows = np.flatnonzero(dependence.index == i)
+            first = self.found_along[dependence.role, name]
+            numbers[rows[:, None], mine.slots] = first + np.arange(len(mine.slots))
+        return numbers

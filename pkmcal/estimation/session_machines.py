@@ -1,0 +1,218 @@
+"""The machine of each session at its own poses, and the closures there.
+
+Where no number of the geometry is found anew in each session there is one machine, at all poses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, Int32Array, IntArray
+from pkmcal.estimation.closures import Closures, Commanded, RowStates, closures_of
+from pkmcal.estimation.sessions import spread
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.calibratable import Calibratable
+
+AnyArray = TypeVar("AnyArray", FloatArray, Int32Array)
+
+
+@dataclass(frozen=True, eq=False)
+class Machines:
+    """The machines of a calibration.
+
+    Attributes
+    ----------
+    robots : tuple of Calibratable
+        One, or one for each session.
+    rows : tuple of ndarray of int
+        The poses that are its own, of each.
+    approach : ndarray (K, n) or None
+        From where the actuators came.
+    """
+
+    robots: tuple[Calibratable, ...]
+    rows: tuple[IntArray, ...]
+    approach: FloatArray | None = None
+
+    @cached_property
+    def approaching(self) -> tuple[Calibratable, ...]:
+        """The machines, each with actuators that come from where they came at its poses."""
+        return tuple(
+            _approaching(r, self.approach, own)
+            for r, own in zip(self.robots, self.rows, strict=True)
+        )
+
+    def at(self, k: int) -> Calibratable:
+        """The machine of pose `k`."""
+        robot = next(r for r, own in zip(self.robots, self.rows, strict=True) if k in own)
+        return _approaching(robot, self.approach, np.intp(k))
+
+    def joined(self, function: Callable[[Calibratable, IntArray], FloatArray]) -> FloatArray:
+        """What a function of a machine and its poses gives, pose by pose."""
+        parts = [function(r, own) for r, own in zip(self.approaching, self.rows, strict=True)]
+        return _joined(parts, self.rows)
+
+    def actuator_twists(self, states: RowStates) -> FloatArray:
+        """Derivative (K, 6, n) of the platform's twist to each actuator coordinate."""
+        return self.joined(
+            lambda robot, own: robot.actuator_twists(states.pose[own], states.actuators[own])
+        )
+
+
+class SessionClosures:
+    """What the closures of each session's machine say of its poses; see `Closures`.
+
+    Parameters
+    ----------
+    parts : sequence of Closures
+        Of each machine.
+    rows : sequence of ndarray of int
+        The poses that are its own.
+
+    Attributes
+    ----------
+    unknowns, equations : int
+        Of each pose, the same in all sessions.
+    actuators : tuple of int, equations
+        Whose reading each equation is of; -1 of none.
+    sigma : ndarray (K, equations) or None
+        Standard deviations of the equations.
+    """
+
+    def __init__(self, parts: Sequence[Closures], rows: Sequence[IntArray]) -> None:
+        self._parts, self._rows = tuple(parts), tuple(rows)
+        self.unknowns, self.equations = parts[0].unknowns, parts[0].equations
+        if any((p.unknowns, p.equations) != (self.unknowns, self.equations) for p in parts):
+            raise ArgumentError(
+                "measurements: state actuator_sigma of the same actuators in all sessions"
+            )
+        self.actuators = parts[0].actuators
+        stated = [part.sigma for part in parts if part.sigma is not None]
+        self.sigma = _joined(stated, self._rows) if stated else None
+
+    def settled(self, machines: Machines, states: RowStates) -> RowStates:
+        """The states of machines with other numbers, near those given."""
+        return self._states([
+            part.settled(robot, own) for part, robot, own in self._each(machines, states)
+        ])  # fmt: skip
+
+    def moved(self, machines: Machines, states: RowStates, step: FloatArray) -> RowStates:
+        """States after steps (K, unknowns) of the unknowns."""
+        steps = [step[rows] for rows in self._rows]
+        return self._states([
+            part.moved(robot, own, mine)
+            for (part, robot, own), mine in zip(self._each(machines, states), steps, strict=True)
+        ])  # fmt: skip
+
+    def residual(self, machines: Machines, states: RowStates) -> tuple[FloatArray, FloatArray]:
+        """The equations (K, equations), whitened, and their derivative by the unknowns."""
+        found = [part.residual(robot, own) for part, robot, own in self._each(machines, states)]
+        off, by_unknown = zip(*found, strict=True)
+        return _joined(off, self._rows), _joined(by_unknown, self._rows)
+
+    def shifted(self, by: FloatArray) -> SessionClosures:
+        """The same with whitened equations (K, equations) that are larger: of other readings."""
+        parts = [part.shifted(by[own]) for part, own in zip(self._parts, self._rows, strict=True)]
+        return SessionClosures(parts, self._rows)
+
+    def lengths(self, machines: Machines) -> FloatArray:
+        """Factors (equations,) to mm of the equations times their sigma."""
+        return self._parts[0].lengths(machines.robots[0])
+
+    def twists(self, machines: Machines, states: RowStates) -> FloatArray:
+        """How the platform moves with the unknowns: twists (K, 6, unknowns)."""
+        found = [part.twists(robot, own) for part, robot, own in self._each(machines, states)]
+        return _joined(found, self._rows)
+
+    def by_numbers(
+        self, machines: Machines, states: RowStates, places: IntArray, columns: IntArray, size: int
+    ) -> FloatArray:
+        """Derivative of the equations by the parameters, (K, equations, size).
+
+        `columns` (S, g) are the parameters that numbers of the geometry are, of each machine.
+        """
+        found = [
+            part.by_numbers(robot, own, places) for part, robot, own in self._each(machines, states)
+        ]
+        nowhere = [np.zeros(len(rows), dtype=np.intp) for rows in self._rows]
+        wide = [
+            spread(part, columns[[s]], rows, size)
+            for s, (part, rows) in enumerate(zip(found, nowhere, strict=True))
+        ]
+        return _joined(wide, self._rows)
+
+    def twists_by_numbers(
+        self, machines: Machines, states: RowStates, places: IntArray
+    ) -> FloatArray | None:
+        """How the platform moves with numbers of its machine, unknowns held, (K, 6, g).
+
+        None: it does not.
+        """
+        found = [
+            part.twists_by_numbers(robot, own, places)
+            for part, robot, own in self._each(machines, states)
+        ]
+        held = [part for part in found if part is not None]
+        return _joined(held, self._rows) if held else None
+
+    def _each(
+        self, machines: Machines, states: RowStates
+    ) -> list[tuple[Closures, Calibratable, RowStates]]:
+        own = [states] if len(self._rows) == 1 else [_some(states, rows) for rows in self._rows]
+        return list(zip(self._parts, machines.approaching, own, strict=True))
+
+    def _states(self, parts: Sequence[RowStates]) -> RowStates:
+        if len(parts) == 1:
+            return parts[0]
+        return RowStates(
+            _joined([part.pose for part in parts], self._rows),
+            _joined([part.actuators for part in parts], self._rows),
+            _joined([part.status for part in parts], self._rows),
+        )
+
+
+def _approaching(
+    robot: Calibratable, approach: FloatArray | None, rows: IntArray | np.intp
+) -> Calibratable:
+    if approach is None or not isinstance(robot, Robot):
+        return robot
+    return robot.approaching(approach[rows])
+
+
+def commanded_closures(rows: Sequence[IntArray], read: FloatArray) -> SessionClosures:
+    """Poses that follow from what the actuators read."""
+    return SessionClosures([Commanded(each) for each in _apart(read, rows)], rows)
+
+
+def closures_of_sessions(
+    robot: Calibratable, rows: Sequence[IntArray], read: FloatArray, sigma: FloatArray | None
+) -> SessionClosures:
+    """What the closures say of poses at what the actuators read (K, n); see `closures_of`."""
+    sigmas = [None] * len(rows) if sigma is None else _apart(sigma, rows)
+    pairs = zip(_apart(read, rows), sigmas, strict=True)
+    return SessionClosures([closures_of(robot, *pair) for pair in pairs], rows)
+
+
+def _apart(whole: FloatArray, rows: Sequence[IntArray]) -> list[FloatArray]:
+    """The rows of each machine; a single one has them all."""
+    return [whole] if len(rows) == 1 else [whole[own] for own in rows]
+
+
+def _some(states: RowStates, rows: IntArray) -> RowStates:
+    return RowStates(states.pose[rows], states.actuators[rows], states.status[rows])
+
+
+def _joined(parts: Sequence[AnyArray], rows: Sequence[IntArray]) -> AnyArray:
+    """Rows of all parts, each where it is said to be."""
+    if len(parts) == 1:
+        return parts[0]
+    whole = np.empty((sum(map(len, rows)), *parts[0].shape[1:]), dtype=parts[0].dtype)
+    for part, own in zip(parts, rows, strict=True):
+        whole[own] = part
+    return whole

@@ -1,0 +1,59 @@
+"""Whether sets of measurements have the noise that was stated for each of them.
+
+A common slip is a matter of scale; sets that slipped apart are weighted wrongly against each other,
+and the classical covariance, which trusts the weights, is then wrong too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimator import FEW, Estimate, Estimator
+from pkmcal.statistics.distributions import chi2_tail
+from pkmcal.statistics.robust_scale import median_ratio
+
+_CHANCE = 0.01  # of residuals as far from what was stated, on either side
+_APART = 1.2  # ratio of deviations from which it matters
+
+
+def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
+    """Deviation of the residuals of each set in units of its stated sigma; 1 where that holds.
+
+    1 where fewer than `FEW` degrees of freedom show it. All 1 where sigma is nowhere stated, where
+    all sets slipped alike, for robust losses, and where equations are mixtures of readings.
+    """
+    equations = estimator.equations
+    ratios = np.ones(len(equations.sets))
+    if equations.closures.unknowns or estimator.loss != "linear":
+        return ratios
+    squares, freedom = (part[: len(ratios)] for part in estimate.shares[:2])
+    unstated = estimator.unstated[: len(ratios)]
+    common = 1.0 if unstated.any() else float(squares.sum() / max(freedom.sum(), 1e-9))
+    rows, set_of = equations.squares(estimate.residual), equations.set_of
+    for i in np.flatnonzero(~unstated & (freedom >= FEW)):
+        above = chi2_tail(float(squares[i]) / common, float(freedom[i]))
+        components = equations.components[set_of == i]
+        median = median_ratio(rows[set_of == i], components) * components.sum() / freedom[i]
+        half = np.sqrt(median / common)  # of the rows: outliers are no slip
+        if min(above, 1.0 - above) < _CHANCE / 2.0 and max(half, 1.0 / half) > _APART:
+            ratios[i] = np.sqrt(squares[i] / freedom[i])
+    return ratios if ratios.max() > _APART * ratios.min() else np.ones_like(ratios)
+
+
+def unlike_noise(equations: Equations, ratios: FloatArray, with_outliers: bool) -> list[str]:
+    """Name the sets whose sigma is wrong beside that of the others."""
+    names = [
+        "touch_distances" if m.kind == "touch-distance" else f"measurements {i + 1}"
+        for i, m in enumerate(equations.sets)
+    ]
+    wrong = [i for i, ratio in enumerate(ratios) if max(ratio, 1.0 / ratio) > _APART]
+    if not wrong:
+        return []
+    parts = " and ".join(f"{names[i]} are {ratios[i]:.2g}" for i in wrong)
+    return [
+        f"the residuals of {parts} times what sigma says: the sets are weighted wrongly beside each"
+        " other; state the true sigma, or none"
+        + (", or look at the outliers first" if with_outliers else "")
+    ]

@@ -1,0 +1,228 @@
+"""Optimal design by exchange: which rows of a large Jacobian to keep.
+
+SciPy has no design by exchange. Everything is in coordinates in which all candidates have unit
+information about every combination of parameters: that of a choice is between 0 and 1, unitless.
+
+An exchange ends in a local optimum, and of nearly equal candidates rounding would decide in which.
+So what differs by less than `_ALIKE` is equal, of equals the first is taken, and the exchange
+starts more than once and keeps the best.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray, first_largest
+from pkmcal.estimation.identifiability import decompose
+from pkmcal.exceptions import ArgumentError
+from pkmcal.statistics.linear_fit import ROUNDING
+
+Criterion = Literal["prediction", "D", "A"]
+
+CRITERIA: tuple[Criterion, ...] = ("prediction", "D", "A")
+
+_TRIED = 12  # members that matter least, one of which must want to be exchanged
+_ALIKE = 1e-6  # share by which an exchange must gain; rounding moves gains by up to 1e-7
+_STARTS = (1e-2, 1.0, 1e-4)  # candidates' worth of information that growing begins with
+_ROUNDED = 1e-9  # share by which a predicted error may exceed the one that was asked for
+_NOTHING = 1e-12  # share of the information of all candidates that is none
+
+
+class Design:
+    """Candidates with their information, and the points to predict with it.
+
+    Parameters
+    ----------
+    blocks : ndarray (N, k, n)
+        Derivative of what is measured at each candidate by the parameters, both scaled by their
+        standard deviations.
+    prior : ndarray (p, n)
+        Rows that are there whatever is chosen.
+    aims : ndarray (T, 3, n)
+        Derivative of the points to predict, mm.
+    criterion : str
+        One of `CRITERIA`.
+    worst : float
+        Scaled deviation from which a combination counts as unidentifiable while poses are chosen.
+    sort : ndarray of int (N,), optional
+        Of which sort each candidate is, from 0; a choice has so many of each.
+
+    Attributes
+    ----------
+    unidentifiable : ndarray (n, d)
+        Orthonormal combinations of parameters that not even all candidates identify.
+    """
+
+    def __init__(
+        self,
+        blocks: FloatArray,
+        prior: FloatArray,
+        aims: FloatArray,
+        criterion: Criterion,
+        worst: float,
+        sort: IntArray | None = None,
+    ) -> None:
+        self._sort = np.zeros(len(blocks), dtype=np.intp) if sort is None else sort
+        n = blocks.shape[2]
+        singular, basis = decompose(np.vstack([blocks.reshape(-1, n), prior]))
+        rank = int(np.count_nonzero(singular > ROUNDING * singular[0]))
+        if not rank:
+            raise ArgumentError(
+                "candidates: what would be measured there depends on no parameter that is free"
+            )
+        unit = basis[:, :rank] / singular[:rank]
+        self.unidentifiable = basis[:, rank:]
+        self._determinant = criterion == "D"
+        self._blocks = blocks @ unit
+        self._prior = (prior @ unit).T @ (prior @ unit)
+        metric = unit.T @ unit  # of the scaled parameters
+        self._ridge = metric / worst**2
+        aimed = (aims @ unit).reshape(-1, rank)
+        self._errors = aimed.T @ aimed / len(aims)
+        self._cost = metric if criterion == "A" else self._errors
+
+    def predicted(self, chosen: IntArray) -> float:
+        """Root mean square error (mm) at the aims if these candidates are measured."""
+        information, directions = np.linalg.eigh(self._information(chosen))
+        errors = np.einsum("ij,ik,kj->j", directions, self._errors, directions)
+        known = information > _NOTHING
+        if (errors[~known] > _NOTHING * errors.sum()).any():
+            return float("inf")
+        return float(np.sqrt((errors[known] / information[known]).sum()))
+
+    def at_random(self, chosen: IntArray, draws: int) -> float:
+        """Median of `predicted` over choices at random, of as many of each sort."""
+        random = np.random.default_rng(0)
+        counts = np.bincount(self._sort[chosen])
+        drawn = []
+        for _ in range(draws):
+            order = random.permutation(len(self._blocks))
+            each = [order[self._sort[order] == s][:count] for s, count in enumerate(counts)]
+            drawn.append(self.predicted(np.concatenate(each)))
+        return float(np.median(drawn))
+
+    def grown(self, *counts: int) -> IntArray:
+        """The best candidates that exchanges find, in order: so many of each sort."""
+        total = sum(counts)
+        grown = [list(itertools.islice(self._growing(worth, counts), total)) for worth in _STARTS]
+        ridge = self._lacking(grown[0])
+        found = [self._exchanged(chosen, ridge) for chosen in grown]
+        costs = np.array([self._log_cost(chosen, ridge) for chosen in found])
+        return found[first_largest(-costs, _ALIKE)]
+
+    def reaching(self, error: float) -> IntArray:
+        """As few candidates as predict an error (mm) that all together do."""
+        error *= 1.0 + _ROUNDED
+        found = []
+        for worth in _STARTS:
+            growing, chosen = self._growing(worth), list[int]()
+            while self.predicted(np.array(chosen, dtype=np.intp)) > error:
+                chosen.append(next(growing))
+            found.append(self._reduced(chosen, error))
+        return min(found, key=len)
+
+    def _worth(self, candidates: float) -> FloatArray:
+        """Information of so many candidates, alike in all directions."""
+        worth: FloatArray = candidates / len(self._blocks) * np.eye(self._blocks.shape[2])
+        return worth
+
+    def _lacking(self, chosen: list[int]) -> FloatArray:
+        """What stands for the information that a choice lacks.
+
+        Choices too small to identify everything differ in what they identify only if the rest is
+        not unknown beyond all measure.
+        """
+        information = self._information(np.array(chosen, dtype=np.intp))
+        if np.linalg.eigvalsh(information)[0] < _NOTHING:
+            return np.asarray(self._ridge + self._worth(min(_STARTS)))
+        return np.asarray(self._ridge)
+
+    def _growing(self, worth: float, counts: Sequence[int] = ()) -> Iterator[int]:
+        """Candidates one by one, always the one that helps most those that entered before.
+
+        At most `counts` of each sort.
+        """
+        ridge, chosen = self._ridge + self._worth(worth), list[int]()
+        most = sum(counts) if counts else len(self._blocks)
+        while len(chosen) < most:
+            gains = self._gains(chosen, ridge)
+            if counts:
+                entered = np.bincount(self._sort[chosen], minlength=len(counts))
+                gains[(entered >= counts)[self._sort]] = -np.inf
+            chosen.append(first_largest(gains, _ALIKE * gains.max()))
+            yield chosen[-1]
+
+    def _reduced(self, chosen: list[int], error: float) -> IntArray:
+        """Fewer that still predict an error (mm)."""
+        ridge = self._lacking(chosen)
+        best = self._exchanged(chosen, ridge)
+        while len(best) > 1:
+            least = self._least(best.tolist(), ridge)[0]
+            fewer = self._exchanged([j for j in best.tolist() if j != least], ridge)
+            if self.predicted(fewer) > error:
+                break
+            best = fewer
+        return best
+
+    def _exchanged(self, chosen: list[int], ridge: FloatArray) -> IntArray:
+        """Members that matter least make room for the best of all, until none has to."""
+        exchanged = True
+        while exchanged:
+            exchanged = False
+            for i in self._least(chosen, ridge):
+                others = [j for j in chosen if j != i]
+                gains = self._gains(others, ridge)
+                gains[self._sort != self._sort[i]] = -np.inf
+                best = first_largest(gains, _ALIKE * gains.max())
+                if gains[best] > (1.0 + _ALIKE) * gains[i]:
+                    chosen, exchanged = [*others, best], True
+                    break
+        return np.sort(np.array(chosen, dtype=np.intp))
+
+    def _least(self, chosen: list[int], ridge: FloatArray) -> list[int]:
+        """The `_TRIED` members that matter least, in order; of equals the first."""
+        at = np.sort(np.array(chosen, dtype=np.intp))
+        losses = self._changes(self._blocks[at], at, -1.0, ridge)
+        order: list[int] = []
+        while len(order) < min(_TRIED, len(at)):
+            least = first_largest(-losses, _ALIKE * abs(losses.min()))
+            order.append(int(at[least]))
+            losses[least] = np.inf
+        return order
+
+    def _information(self, chosen: IntArray) -> FloatArray:
+        rows = self._blocks[chosen].reshape(-1, self._blocks.shape[2])
+        information: FloatArray = rows.T @ rows + self._prior
+        return information
+
+    def _gains(self, chosen: list[int], ridge: FloatArray) -> FloatArray:
+        """What each candidate (N,) would add to these; nothing for themselves."""
+        at = np.sort(np.array(chosen, dtype=np.intp))
+        gains = self._changes(self._blocks, at, 1.0, ridge)
+        gains[at] = -np.inf
+        return gains
+
+    def _log_cost(self, chosen: IntArray, ridge: FloatArray) -> float:
+        """Logarithm of what the criterion makes least."""
+        information = self._information(chosen) + ridge
+        if self._determinant:
+            return -float(np.linalg.slogdet(information)[1])
+        cost = float(np.trace(np.linalg.solve(information, self._cost)))
+        return float(np.log(max(cost, np.finfo(float).tiny)))
+
+    def _changes(
+        self, blocks: FloatArray, chosen: IntArray, sign: float, ridge: FloatArray
+    ) -> FloatArray:
+        """By how much the criterion changes if a block is added to the chosen ones, or removed."""
+        covariance = np.linalg.inv(self._information(chosen) + ridge)
+        through = blocks @ covariance
+        own = np.eye(blocks.shape[1]) + sign * (through @ blocks.transpose(0, 2, 1))
+        if self._determinant:
+            changes: FloatArray = sign * np.linalg.slogdet(own)[1]
+            return changes
+        spread = through @ self._cost @ through.transpose(0, 2, 1)
+        return np.asarray(np.trace(np.linalg.solve(own, spread), axis1=1, axis2=2))

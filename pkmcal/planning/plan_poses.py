@@ -1,0 +1,363 @@
+"""Which poses to measure, so that a calibration knows best where the machine goes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal.arguments import number, whole, word
+from pkmcal.arms.arm import SerialArm
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows, mm_per_unit
+from pkmcal.core.library import POSE
+from pkmcal.display import Table, fixed
+from pkmcal.estimation.parameters import Parameters, Prior
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.perturbed import ideal
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.calibratable import Calibratable, as_machine
+from pkmcal.measurements.components import Kind
+from pkmcal.measurements.tracker import Tracker
+from pkmcal.planning.optimal_design import CRITERIA, Criterion
+from pkmcal.planning.planned import (
+    Unknown,
+    design_of,
+    equations_of,
+    information,
+    planned,
+    together,
+)
+from pkmcal.planning.tour import short_tour
+from pkmcal.result import Result
+
+PLANNED: tuple[Kind, ...] = ("position", "pose", "height", "distance", "orientation", "closure")
+
+_DRAWS = 25  # of poses at random, to compare a plan with
+_ERROR = 0.5  # mm; what numbers may be off by that have no prior
+_TIMES, _MACHINES = 2.0, 16  # so many machines with so many times these errors must get there
+_FOUND = 1e-6  # mm, rad: how near to a pose forward kinematics must end
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Plan(Result):
+    """Poses to measure.
+
+    Attributes
+    ----------
+    robot : Robot or SerialArm
+        The machine they are for.
+    indices : ndarray of int (count,)
+        Which of the candidates, in the order of a short tour from home.
+    poses : ndarray (count, 6)
+        mm and rad.
+    actuators : ndarray (count, n)
+        What leads there, mm and rad.
+    predicted : float
+        Root mean square over the targets of how far off a machine calibrated at these poses will
+        be, √trace(J C Jᵀ), mm.
+    at_random : float
+        The same for as many candidates drawn at random, median of 25 draws.
+    all_candidates : float
+        The same for all candidates that keep the machine's limits.
+    left_out : int
+        How many candidates break limits, are not found by forward kinematics from home, or are so
+        near a singularity that errors of the geometry bar the way there.
+    parameters : tuple of str
+        What the calibration is to find.
+    travel : float
+        Length of the tour, mm: of each move what the actuator travels that has farthest to go,
+        angles as arcs.
+    own_frame : bool
+        Whether predicted errors are those in the machine's own frame, because nothing that is read
+        says where it stands.
+    kinds : tuple of str, count
+        What to measure at each pose.
+    """
+
+    robot: Robot | SerialArm
+    indices: IntArray
+    poses: FloatArray
+    actuators: FloatArray
+    predicted: float
+    at_random: float
+    all_candidates: float
+    left_out: int
+    parameters: tuple[str, ...]
+    travel: float = float("nan")
+    own_frame: bool = False
+    kinds: tuple[Kind, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.indices)
+
+    def _parts(self) -> Iterator[str | Table]:
+        left_out = f"; {self.left_out} candidates left out" if self.left_out else ""
+        if isinstance(self.robot, SerialArm):  # several postures have one pose
+            names: Sequence[str] = [f"q{i + 1}" for i in range(self.robot.n_joints)]
+            given, units = self.actuators, self.robot.actuator_units
+        else:
+            names, given, units = POSE, self.poses, ("mm",) * 3 + ("rad",) * 3
+        turning = np.array([unit == "rad" for unit in units])
+        heads = ["candidate"]
+        heads += [f"{n} [{'deg' if t else 'mm'}]" for n, t in zip(names, turning, strict=True)]
+        rows = [
+            [str(index), *(fixed(float(value), 3) for value in row)]
+            for index, row in zip(
+                self.indices, np.where(turning, np.degrees(given), given), strict=True
+            )
+        ]
+        count = _poses(len(self))
+        tour = f"{self.travel:.4g}" if self.travel < 1e4 else f"{self.travel:.0f}"
+        several = len(set(self.kinds)) > 1
+        if several:
+            heads.append("measure")
+            rows = [[*row, kind] for row, kind in zip(rows, self.kinds, strict=True)]
+        yield f"{self.robot.name}: measure {count} for {len(self.parameters)} parameters{left_out}"
+        yield (
+            f"predicted error {self.predicted:.3g} mm rms; {count} at random"
+            f" {self.at_random:.3g}, all candidates {self.all_candidates:.3g};"
+            f" a tour of {tour} mm"
+        )
+        if self.own_frame:
+            yield "in the machine's own frame: nothing that is read says where it stands"
+        if not np.isfinite(self.predicted):
+            yield "too few to identify all of them"
+        yield Table(heads, rows)
+
+
+def plan_poses(
+    robot: Robot | SerialArm,
+    candidates: ArrayLike,
+    count: int | None = None,
+    *,
+    accuracy: float | None = None,
+    targets: ArrayLike | None = None,
+    criterion: Criterion = "prediction",
+    kind: Kind | Mapping[Kind, int] = "position",
+    target: ArrayLike | Mapping[Kind, ArrayLike] | None = None,
+    noise: float | Tracker | Mapping[Kind, float | Tracker] = 0.02,
+    free: str | Sequence[str] | None = None,
+    prior: Prior = None,
+    unknown: Unknown | Sequence[Unknown] = (),
+    actuator_noise: ArrayLike | None = None,
+) -> Plan:
+    """Choose poses to measure among candidates, by exchange.
+
+    Poses enter one by one, always the one that helps most; then each in turn makes room for the
+    best of all candidates, until none wants to be exchanged.
+
+    Parameters
+    ----------
+    robot : Robot or SerialArm
+        The nominal machine, or as last calibrated.
+    candidates : array_like (N, 6), for a serial arm (N, n)
+        Poses that could be measured, mm and rad; of an arm its joint coordinates. Those that break
+        the machine's limits are left out, and those that machines with twice the errors of the
+        prior (0.5 mm without one) do not reach. A pose that its closures do not allow is completed
+        (`Robot.complete`). An arm's file has no limits: offer what it may take.
+    count : int, optional
+        How many to choose.
+    accuracy : float, optional
+        Instead of `count`: as few as predict this error at the targets, mm.
+    targets : array_like (T, 6), for a serial arm (T, n), optional
+        The poses where the machine is to be accurate; by default the candidates. Accurate at the
+        origin of its platform or tool, wherever `target` is measured.
+    criterion : {"prediction", "D", "A"}
+        What is made least: the predicted error at the targets, the volume of the parameters'
+        confidence region (largest det of the information), or the sum of their variances, scaled
+        to mm at the machine.
+    kind : {"position", "pose", "height", "distance", "orientation", "closure"}
+        What will be measured; see `Measurements`. "closure" is nothing but the actuators, of a
+        machine that has more of them than ways to move. Of several kinds how many poses of each,
+        instead of `count`: ``{"position": 20, "distance": 10}``.
+    target : array_like (3,) or (k, 3), or a mapping of kinds to them, optional
+        The measured point of the platform, mm, or several that are measured at every pose. For
+        distances the fixed points of the base.
+    noise : float or Tracker, or a mapping of kinds to them
+        Of the instrument, as `VirtualMachine` takes it.
+    free, prior
+        As `identify` takes them.
+    unknown : str or sequence of str
+        What `identify` will have to find along: "frame", "target".
+    actuator_noise : float or array_like (n,), optional
+        Standard deviation of what the actuators read, mm or rad; see `Measurements`. Machines with
+        more actuators than ways to move need it, for their actuators are measured, too.
+
+    Returns
+    -------
+    Plan
+        ``.indices``, ``.poses``, ``.actuators`` and the ``.predicted`` error.
+
+    Raises
+    ------
+    ValueError, TypeError
+        An argument that does not fit; no candidate within limits; a wanted accuracy that not even
+        all candidates reach; unidentifiable parameters that move the targets.
+
+    Notes
+    -----
+    V. V. Fedorov, Theory of Optimal Experiments, Academic Press 1972. The predicted error is that
+    of optimal design for prediction (I- or V-optimality) over the targets.
+
+    Examples
+    --------
+    >>> import pkmcal as pk
+    >>> robot = pk.load("hexapod")
+    >>> plan = pk.plan_poses(robot, pk.sample_poses(robot, 100), count=20, kind="pose")
+    >>> len(plan), plan.predicted < plan.at_random
+    (20, True)
+    """
+    word("criterion", criterion, CRITERIA)
+    counts = _counts(kind, count, accuracy)
+    kinds = list(counts)
+    machine = as_machine(robot)
+    poses, q, inside, offered = _within_limits(machine, candidates)
+    aims = (poses, q) if targets is None else _aims(machine, targets)
+    distinct, place = np.unique(q, axis=0, return_inverse=True)
+    sets = [
+        planned(machine, distinct, each, _of("target", target, each, kinds),
+                _of("noise", noise, each, kinds), actuator_noise)
+        for each in kinds
+    ]  # fmt: skip
+    equations = equations_of(machine, sets, free, prior, unknown)
+    parameters = equations[0].parameters
+    safe = _safe(parameters, poses, q)
+    rows = place.reshape(-1)[safe]
+    blocks = together([information(each, len(distinct))[rows] for each in equations])
+    sort = np.repeat(np.arange(len(kinds)), len(rows))
+    design, own_frame = design_of(parameters, blocks, sort, *aims, criterion)
+    poses, q, inside = poses[safe], q[safe], inside[safe]
+    everything = design.predicted(np.arange(len(blocks)))
+    if accuracy is None:
+        of = "kind" if isinstance(kind, Mapping) else "count"
+        each = [whole(of, n, 1, len(q), ", the candidates") for n in counts.values()]
+        found = design.grown(*each)
+    else:
+        found = design.reaching(_accuracy(accuracy, everything, len(q)))
+    chosen = found % len(q)
+    arcs = mm_per_unit(machine.actuator_units, machine.length)
+    order, travel = short_tour(q[chosen] * arcs, _at_home(machine) * arcs)
+    found, chosen = found[order], chosen[order]
+    return Plan(
+        robot=robot,
+        indices=inside[chosen],
+        poses=poses[chosen],
+        actuators=q[chosen],
+        predicted=design.predicted(found),
+        at_random=design.at_random(found, _DRAWS),
+        all_candidates=everything,
+        left_out=offered - len(inside),
+        parameters=parameters.names,
+        travel=travel,
+        own_frame=own_frame,
+        kinds=tuple(kinds[sort[i]] for i in found),
+    )
+
+
+def _counts(
+    kind: Kind | Mapping[Kind, int], count: object, accuracy: object
+) -> dict[Kind, int | None]:
+    """How many poses of each kind; None where an accuracy decides."""
+    if isinstance(kind, Mapping):
+        if not kind or count is not None or accuracy is not None:
+            raise ArgumentError(
+                "kind: a mapping says how many poses of each kind, and goes without count and"
+                f" accuracy; found {kind!r}"
+            )
+        return {word("kind", each, PLANNED): n for each, n in kind.items()}
+    word("kind", kind, PLANNED)
+    if (count is None) == (accuracy is None):
+        raise ArgumentError(
+            "give either count, how many poses, or accuracy, the error wanted in mm"
+        )
+    return {kind: count}  # type: ignore[dict-item]
+
+
+def _of(name: str, given: Any, kind: Kind, kinds: Sequence[Kind]) -> Any:
+    """What was given of one kind: one for all, or by kind."""
+    if not isinstance(given, Mapping):
+        return given
+    for each in given:
+        if each not in kinds:
+            raise ArgumentError(f"{name}: the plan has {', '.join(kinds)}; found {each!r}")
+    if not given or (kind not in given and name == "noise"):
+        raise ArgumentError(f"{name}: of {kind} not stated; found {given!r}")
+    return given.get(kind)
+
+
+def _at_home(robot: Calibratable) -> FloatArray:
+    """Actuator coordinates (n,) at home; of an arm zero."""
+    if not isinstance(robot, Robot):
+        return np.zeros(robot.n_actuators)
+    q: FloatArray = robot.commanded(robot.home)[1][0]
+    return q
+
+
+def _poses(count: int) -> str:
+    return f"{count} pose{'s' * (count != 1)}"
+
+
+def _commanded(name: str, robot: Calibratable, places: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Poses and actuators of poses, or of an arm's joint coordinates; NaN where there are none."""
+    if isinstance(robot, Robot):
+        there, q, _ = ideal(robot, as_rows(name, places, 6)[0])
+    else:
+        there, q, _ = robot.commanded(as_rows(name, places, robot.n_actuators)[0])
+    return there, q
+
+
+def _aims(robot: Calibratable, targets: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    there, q = _commanded("targets", robot, targets)
+    unreached = np.flatnonzero(~np.isfinite(there).all(axis=1))
+    if len(unreached):
+        raise ArgumentError(f"targets: {robot.name} has no such pose (row {unreached[0]})")
+    return there, q
+
+
+def _within_limits(
+    robot: Calibratable, candidates: ArrayLike
+) -> tuple[FloatArray, FloatArray, IntArray, int]:
+    """Poses and actuators of the candidates that can be measured, which ones, and of how many."""
+    there, q = _commanded("candidates", robot, candidates)
+    good = np.asarray(np.isfinite(there).all(axis=1))
+    if isinstance(robot, Robot):  # the file of an arm has no limits
+        good[good] = robot.feasible(there[good]).ok
+    # `identify` starts from home, too, and must find them
+    good[good] = np.abs(robot.forward(q[good]).pose - there[good]).max(axis=1) < _FOUND
+    inside = np.flatnonzero(good)
+    if not len(inside):
+        raise ArgumentError(
+            f"candidates: none of {len(there)} is within the limits of {robot.name}"
+        )
+    return there[inside], q[inside], inside, len(there)
+
+
+def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:
+    """Which candidates machines with errors reach, too: none beside a singularity."""
+    k = len(chosen.places)
+    sigma = np.minimum(chosen.prior, _ERROR * chosen.scale)[:k]
+    random, values = np.random.default_rng(0), chosen.robot.geometry.values
+    safe = np.ones(len(q), dtype=bool)
+    for _ in range(_MACHINES):
+        erroneous = values.copy()
+        erroneous[chosen.places] += _TIMES * sigma * random.standard_normal(k)
+        machine = chosen.robot.with_values(erroneous)
+        safe[safe] = machine.forward(q[safe], guess=poses[safe]).ok
+    if not safe.any():
+        raise ArgumentError(
+            "candidates: all are so near a singularity that errors bar the way there"
+        )
+    return safe
+
+
+def _accuracy(accuracy: object, best: float, candidates: int) -> float:
+    wanted = number("accuracy", accuracy, above=0)
+    if not wanted > best:
+        raise ArgumentError(
+            f"accuracy: all {candidates} candidates together predict {best:.3g} mm, found"
+            f" {wanted:g}; offer other candidates, a better instrument or a prior"
+        )
+    return wanted

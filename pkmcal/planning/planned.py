@@ -1,0 +1,160 @@
+"""What poses to be measured would bring to a calibration, before anything is measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from pkmcal.arguments import word, words
+from pkmcal.arrays import FloatArray, IntArray, as_rows
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.identifiability import as_sum, sparse_basis
+from pkmcal.estimation.parameters import Asked, Parameters, Prior
+from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics import pose_steps
+from pkmcal.kinematics.robot import Robot
+from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.measurements.components import Kind
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.tracker import Tracker
+from pkmcal.measurements.virtual_machine import VirtualMachine
+from pkmcal.planning.optimal_design import Criterion, Design
+from pkmcal.statistics.linear_fit import column_basis
+
+Unknown = Literal["frame", "target"]
+UNKNOWN: tuple[Unknown, ...] = ("frame", "target")
+
+_UNIDENTIFIABLE = 1e-3  # mm a target moves per mm along an unidentifiable combination
+
+
+def planned(
+    robot: Calibratable,
+    q: FloatArray,
+    kind: Kind,
+    target: ArrayLike | None,
+    noise: float | Tracker,
+    actuator_noise: ArrayLike | None,
+) -> Measurements:
+    """What would be measured, the rows of a pose one after another."""
+    surplus = isinstance(robot, Robot) and pose_steps.surplus(robot) > 0
+    if surplus and actuator_noise is None:
+        raise ArgumentError(
+            f"actuator_noise: {robot.name} has more actuators than ways to move, which are"
+            " measured, too: state how well they are read"
+        )
+    several = None if target is None else as_rows("target", target, 3)[0]
+    count = 1 if several is None else len(several)
+    rows = np.repeat(q, count, axis=0)
+    if kind == "closure":
+        if not surplus:
+            raise ArgumentError(
+                f"kind: poses of {robot.name} follow from its actuators, which alone say nothing of"
+                " its geometry: measure something else"
+            )
+        measured = Measurements(rows, None, kind, actuator_units=robot.actuator_units)
+    else:
+        places = None if several is None else np.tile(several, (len(q), 1))
+        measured = VirtualMachine(robot, noise).measure(rows, kind, places)
+        if measured.sigma is None:
+            raise ArgumentError(
+                f"noise must be above 0, found {noise}: without it any poses will do"
+            )
+        if several is not None:
+            index = np.tile(np.arange(count), len(q))
+            measured = replace(measured, target=several, target_index=index)
+    if actuator_noise is None:
+        return measured
+    return replace(measured, actuator_sigma=np.asarray(actuator_noise, dtype=np.float64))
+
+
+def equations_of(
+    robot: Calibratable,
+    sets: Sequence[Measurements],
+    free: str | Sequence[str] | None,
+    prior: Prior,
+    unknown: str | Sequence[str],
+) -> list[Equations]:
+    """The equations that each set has in the calibration to come of all."""
+    sought = words("unknown", unknown)
+    for each in sought:
+        word("unknown", each, UNKNOWN)
+    datasets = [
+        FitData(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
+        for measured in sets
+    ]
+    chosen = parameters(robot, datasets, Asked(free, prior))
+    return [Equations([data], chosen) for data in datasets]
+
+
+def information(equations: Equations, poses: int) -> FloatArray:
+    """What each pose brings (N, k, n): derivatives of its equations, whitened and scaled."""
+    commanded = equations.commanded()
+    at = equations.begin(commanded, commanded.start())
+    rows = equations.by_parameters(at, np.ones(len(equations.unstated)))
+    rows *= equations.parameters.scale
+    first = np.arange(0, len(equations.unit_of_row), len(equations.unit_of_row) // poses)
+    if not equations.closures.unknowns:  # rows are units, in their order
+        return rows.reshape(poses, -1, rows.shape[1])
+    units: FloatArray = rows.reshape(len(equations.components), -1, rows.shape[1])
+    return units[equations.unit_of_row[first]]
+
+
+def together(parts: Sequence[FloatArray]) -> FloatArray:
+    """Blocks (N, k, n) of several sets as one, with rows of zeros where one has fewer equations."""
+    most = max(part.shape[1] for part in parts)
+    padded = [np.pad(part, ((0, 0), (0, most - part.shape[1]), (0, 0))) for part in parts]
+    return np.concatenate(padded)
+
+
+def design_of(
+    chosen: Parameters,
+    blocks: FloatArray,
+    sort: IntArray,
+    aims: FloatArray,
+    aims_at: FloatArray,
+    criterion: Criterion,
+) -> tuple[Design, bool]:
+    """The design, and whether its errors are in the machine's own frame."""
+    k = len(chosen.places)
+    twists = chosen.robot.error_twists(aims, aims_at)
+    by_geometry = twists[:, 3:, chosen.places] * chosen.scale[:k]
+    aimed = np.concatenate([by_geometry, np.zeros((len(aims), 3, len(chosen) - k))], axis=2)
+    if not np.isfinite(blocks).all() or not np.isfinite(aimed).all():
+        raise ArgumentError(
+            "candidates or targets: one is singular, where nothing holds the platform"
+        )
+
+    def design(aimed: FloatArray) -> Design:
+        rows = chosen.prior_rows(chosen.start)
+        return Design(blocks, rows, aimed, criterion, chosen.robot.length, sort)
+
+    made = design(aimed)
+    moved = aimed.reshape(-1, len(chosen)) @ made.unidentifiable
+    if np.abs(moved).max(initial=0.0) <= _UNIDENTIFIABLE:
+        return made, False
+    rigid = column_basis(_rigid_motions(aims[:, :3]))
+    within = rigid.T @ moved
+    if np.abs(moved - rigid @ within).max() <= _UNIDENTIFIABLE * np.abs(moved).max():
+        ways, sizes, _ = np.linalg.svd(within)
+        frame = rigid @ ways[:, : np.count_nonzero(sizes > _UNIDENTIFIABLE * sizes[0])]
+        flat = aimed.reshape(len(moved), -1)
+        return design((flat - frame @ (frame.T @ flat)).reshape(aimed.shape)), True
+    basis = sparse_basis(made.unidentifiable, chosen.names)
+    raise ArgumentError(
+        f"candidates: not even all of them identify {as_sum(basis[:, 0], chosen.names)}, which"
+        " moves the targets; offer others, free fewer parameters or state a prior"
+    )
+
+
+def _rigid_motions(points: FloatArray) -> FloatArray:
+    """How points (T, 3) move as one body, (3 T, 6): shifts, then turns about their middle."""
+    away = (points - points.mean(axis=0))[:, None]
+    turns = np.cross(np.eye(3)[None], away).transpose(0, 2, 1)
+    shifts = np.broadcast_to(np.eye(3), turns.shape)
+    return np.concatenate([shifts, turns], axis=2).reshape(-1, 6)

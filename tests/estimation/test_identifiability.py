@@ -1,0 +1,129 @@
+"""Identifiability: ranks of the published machine, and combinations as sums."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.calibration.identify import identify
+from pkmcal.estimation.identifiability import as_sum, listed, observability, sparse_basis
+from pkmcal.measurements.virtual_machine import VirtualMachine
+
+from ..simulated import tilted_poses
+
+# The ranks of the 28 error columns at 30 poses, tilted or with alpha = beta = 0 as published.
+RANKS = [
+    ("pose", True, 26),
+    ("position", True, 25),
+    ("height", True, 24),
+    ("pose", False, 14),
+    ("position", False, 13),
+    ("height", False, 9),
+]
+
+
+@pytest.mark.filterwarnings("ignore:.*the machine's size:UserWarning")
+@pytest.mark.parametrize(("kind", "tilted", "rank"), RANKS)
+def test_rank_of_the_28_errors(kind: str, tilted: bool, rank: int) -> None:
+    robot = pk.load("2tpr2tps")
+    poses = tilted_poses(robot, 40, np.random.default_rng(4))
+    if not tilted:
+        poses[:, [0, 3, 4]] = 0.0
+    poses = poses[robot.feasible(poses).ok][:30]
+    found = identify(robot, VirtualMachine(robot).measure(robot.inverse(poses), kind=kind))
+    assert found.rank == rank
+    assert found.gap > 1e6
+    assert len(found.unidentifiable) == 28 - rank
+
+
+def test_unidentifiable_combinations_move_no_measured_point() -> None:
+    robot = pk.load("2tpr2tps")
+    poses = tilted_poses(robot, 30, np.random.default_rng(5))
+    q = robot.inverse(poses)
+    found = identify(robot, VirtualMachine(robot).measure(q))
+    assert "platform3.x" in found.unidentifiable
+    assert "platform4.x" in found.unidentifiable
+    moved = robot.replace({"platform3.x": 5e-4, "platform4.x": -7e-4})  # mm; to first order
+    np.testing.assert_allclose(moved.forward(q).pose, robot.forward(q).pose, atol=1e-8)
+
+
+def test_a_turned_delta_is_named_by_its_towers() -> None:
+    robot = pk.load("examples/linear-delta/robot.toml")
+    rng = np.random.default_rng(6)
+    poses = np.zeros((20, 6))
+    poses[:, :2], poses[:, 2] = rng.uniform(-80, 80, (20, 2)), 10.0
+    measured = VirtualMachine(robot).measure(robot.inverse(poses), kind="height")
+    found = identify(robot, measured, free=[*robot.model.free, "angle3"])
+    assert found.unidentifiable == ("angle1 + … + angle3",)
+    unknown = dict(zip(found.free, np.isinf(found.stderr), strict=True))
+    assert [name for name, inf in unknown.items() if inf] == ["angle1", "angle2", "angle3"]
+
+
+def test_a_base_moved_with_the_frame_is_named() -> None:
+    robot = pk.load("hexapod")
+    rng = np.random.default_rng(7)
+    poses = robot.home + rng.uniform(-1, 1, (30, 6)) * [100, 100, 80, 0.3, 0.3, 0.3]
+    measured = VirtualMachine(robot).measure(robot.inverse(poses), kind="pose")
+    found = identify(robot, measured, free=["base*.x"], frame="unknown")
+    assert found.rank == 11
+    assert found.unidentifiable == ("base1.x + … + base6.x − frame.x",)
+
+
+def test_what_is_unidentifiable_keeps_its_value() -> None:
+    robot = pk.load("2tpr2tps")
+    poses = tilted_poses(robot, 30, np.random.default_rng(8))
+    true = robot.replace({"offset1": 0.4, "platform3.x": 0.5})
+    found = identify(robot, VirtualMachine(true, noise=0).measure(robot.inverse(poses)))
+    values = dict(zip(found.free, found.values, strict=True))
+    assert values["platform3.x"] == pytest.approx(0.0, abs=1e-12)
+    # the smallest change that explains the measurements is no larger than the true one
+    assert np.linalg.norm(found.values - found.start) <= np.hypot(0.4, 0.5)
+
+
+def test_observability_indices_of_known_singular_values() -> None:
+    rng = np.random.default_rng(9)
+    left, _ = np.linalg.qr(rng.normal(size=(20, 3)))
+    right, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    found = observability(left @ np.diag([8.0, 4.0, 2.0]) @ right.T, poses=16, rank=3)
+    assert found == pytest.approx({"O1": 1.0, "O2": 0.25, "O3": 2.0, "O4": 0.5, "O5": 8 / 7})
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ([1, 0, 0, 0], "base1.x"),
+        ([1, 1, 1, 0], "base1.x + … + base3.x"),
+        ([1, 1, -1, 0], "base1.x + base2.x − base3.x"),
+        ([-1, -1, -1, 1], "offset1 − base1.x − … − base3.x"),
+        ([1, 0, -0.5, 0.25], "base1.x + 0.25 offset1 − 0.5 base3.x"),
+    ],
+)
+def test_combinations_as_sums(values: list[float], text: str) -> None:
+    names = ["base1.x", "base2.x", "base3.x", "offset1"]
+    assert as_sum(np.array(values), names) == text
+
+
+def test_names_that_count_on_are_shortened() -> None:
+    names = ["base1.z", "base2.z", "base3.z", "base4.z", "rod1", "rod3"]
+    assert listed(names) == "base1.z … base4.z, rod1, rod3"
+
+
+def test_sparse_basis_spans_the_same_combinations() -> None:
+    rng = np.random.default_rng(10)
+    names = [
+        f"{point}{i}.{axis}" for point in ("base", "platform") for i in (1, 2) for axis in "xy"
+    ]
+    open_ones, _ = np.linalg.qr(rng.normal(size=(8, 3)))
+    basis = sparse_basis(open_ones, names)
+    assert basis.shape == (8, 3)
+    np.testing.assert_allclose(open_ones @ (open_ones.T @ basis), basis, atol=1e-9)
+    assert np.linalg.matrix_rank(basis) == 3
+
+
+def test_numbers_of_one_set_up_are_one_kind_however_many_they_are() -> None:
+    """With an offset six touched places rise, or a base joint moves."""
+    names = ["offset1", "base1.x", *(f"touch.{place}.z" for place in "ABCDEF")]
+    risen, moved = [1.0, 0, *[1] * 6], [1.0, 1, *[0] * 6]
+    basis = sparse_basis(np.linalg.qr(np.column_stack([risen, moved])).Q, names)
+    assert sorted(map(tuple, np.abs(basis.T).round(9))) == sorted(map(tuple, [risen, moved]))

@@ -1,0 +1,74 @@
+"""Exchange algorithm: against all choices where these can be counted, and its bookkeeping."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+from pkmcal.planning.optimal_design import CRITERIA, Design
+
+PRIOR = np.diag([0.1, 0.2, 0.3, 0.4])
+
+
+def candidates(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """What 12 candidates tell of four parameters, two numbers each, and 5 aims."""
+    rng = np.random.default_rng(seed)
+    return rng.normal(size=(12, 2, 4)) * rng.uniform(0.3, 3, (12, 1, 1)), rng.normal(size=(5, 3, 4))
+
+
+def covariance(blocks: np.ndarray, prior: np.ndarray) -> np.ndarray:
+    rows = np.vstack([blocks.reshape(-1, 4), prior])
+    return np.linalg.inv(rows.T @ rows)
+
+
+def error(blocks: np.ndarray, prior: np.ndarray, aims: np.ndarray) -> float:
+    spread = covariance(blocks, prior)
+    return float(np.sqrt(np.einsum("nij,jk,nik->n", aims, spread, aims).mean()))
+
+
+def test_predicted_error_is_that_of_the_information() -> None:
+    blocks, aims = candidates(0)
+    design = Design(blocks, PRIOR, aims, "prediction", 1e9)
+    for chosen in ([0], [2, 5], range(12)):
+        at = np.array(chosen)
+        assert design.predicted(at) == pytest.approx(error(blocks[at], PRIOR, aims), rel=1e-9)
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+@pytest.mark.parametrize("seed", range(8))
+def test_choice_is_the_best_of_all_or_hardly_worse(criterion: str, seed: int) -> None:
+    blocks, aims = candidates(seed)
+    costs = {
+        "prediction": lambda at: error(blocks[at], PRIOR, aims) ** 2,
+        "A": lambda at: np.trace(covariance(blocks[at], PRIOR)),
+        "D": lambda at: np.linalg.det(covariance(blocks[at], PRIOR)),
+    }
+    every = (np.array(at) for at in itertools.combinations(range(12), 4))
+    least = min(costs[criterion](at) for at in every)
+    chosen = Design(blocks, PRIOR, aims, criterion, 1e9).grown(4)
+    assert len(set(chosen)) == 4 and (np.diff(chosen) > 0).all()
+    assert costs[criterion](chosen) <= 1.02 * least
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_fewest_candidates_for_an_error_are_found(seed: int) -> None:
+    blocks, aims = candidates(seed)
+    wanted = 1.3 * error(blocks, PRIOR, aims)
+    chosen = Design(blocks, PRIOR, aims, "prediction", 1e9).reaching(wanted)
+    assert error(blocks[chosen], PRIOR, aims) <= wanted
+    fewer = itertools.combinations(range(12), len(chosen) - 1)
+    assert all(error(blocks[list(at)], PRIOR, aims) > 0.99 * wanted for at in fewer)
+
+
+def test_what_nothing_tells_is_named_and_does_not_count() -> None:
+    blocks, aims = candidates(1)
+    blocks[:, :, 3] = blocks[:, :, 2]  # only the sum of the last two is seen
+    none = np.zeros((0, 4))
+    design = Design(blocks, none, aims, "prediction", 1e9)
+    np.testing.assert_allclose(
+        np.abs(design.unidentifiable[:, 0]), [0, 0, 0.5**0.5, 0.5**0.5], atol=1e-9
+    )
+    assert design.predicted(np.array([3])) == float("inf")  # two equations for three parameters
+    assert np.isfinite(design.predicted(np.array([3, 4])))
