@@ -35,6 +35,7 @@ JOINT_KEYS = (
     "offset", "gain", "drive",
 )  # fmt: skip
 TAIL_KEYS = (*(key for key in JOINT_KEYS if key not in ("axes", "share", "cone", "soft")), "errors")
+_IN_PLANE = 1e-6  # what an axis may be out of the plane
 AXES = {"R": 1, "P": 1, "C": 1, "U": 2, "S": 3}
 FORMS = {1: "one axis, `axis = [x, y, z]`", 2: "two `axes`", 3: "three `axes`, or none of a ball"}
 
@@ -333,6 +334,29 @@ def _check_alike(table: Table, number: int, one: Joint, other: Joint) -> None:
         table.fail("joints", f"actuator {number} has two drive laws: one for all its joints")
 
 
+def _check_group(table: Table, chains: Chains) -> None:
+    """Refuse joints that move what they carry out of the plane, or away from the point."""
+    for i, limb in enumerate(chains.limbs):
+        for k, joint in enumerate(limb):
+            out = _out_of_group(joint, chains.map)
+            if out:
+                table.fail("joints", f"{chains.name_of(i, k)}: with the map {chains.map}, {out}")
+
+
+def _out_of_group(joint: Joint, map: str) -> str:
+    if map == "spherical" and joint.kind in "PC":
+        return f"nothing slides, found a joint {joint.kind}"
+    if map == "planar":
+        if joint.kind not in "RP":
+            return f"joints are R and P, found {joint.kind}"
+        axis = joint.axes[0] / np.linalg.norm(joint.axes[0])
+        if joint.kind == "R" and np.linalg.norm(axis[:2]) > _IN_PLANE:
+            return f"joints turn about z, found the axis {shown(joint.axes[0].tolist())}"
+        if joint.kind == "P" and abs(axis[2]) > _IN_PLANE:
+            return f"joints slide across z, found the axis {shown(joint.axes[0].tolist())}"
+    return ""
+
+
 def _check(tables: Sequence[Table], chains: Chains) -> None:
     """Refuse what the core cannot take, and actuators that are not counted on."""
     last = tables[-1]
@@ -357,6 +381,7 @@ def _check(tables: Sequence[Table], chains: Chains) -> None:
     layout = chains.layout
     if layout.shared > MAX_SHARED:
         last.fail("joints", f"limbs share at most {MAX_SHARED} passive axes, found {layout.shared}")
+    _check_group(last, chains)
     group = GROUPS[chains.map]
     for i, (names, limb) in enumerate(zip(chains.members, chains.limbs, strict=True)):
         ball = limb[-1].ball

@@ -156,3 +156,30 @@ def test_machines_on_the_page_are_as_it_says(block: str, tmp_path: Path) -> None
     found = robot.forward(robot.inverse(robot.home))
     assert found.ok and np.abs(found.pose - robot.home).max() < 1e-9
     assert "no problems found" in str(pk.check_geometry(robot))
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "said"),
+    [
+        (
+            "five-bar",
+            "[208.0, 144.0, 0.0]",
+            "[208.0, 144.0, 0.0], axis = [1, 0, 1]",
+            "turn about z",
+        ),
+        ("five-bar", 'kind = "R", at = [208.0', 'kind = "U", at = [208.0', "are R and P, found U"),
+        (
+            "five-bar",
+            "]\n\n[[limb]]",
+            ']\n[[tail]]\nkind = "P"\nat = [0, 0]\naxis = [0, 0, 1]\nactuator = 3\n\n[[limb]]',
+            "slide across z",
+        ),
+        ("agile-eye", '"R", axis = [0, 0, 1]', '"C", axis = [0, 0, 1]', "nothing slides"),
+    ],
+)
+def test_joints_move_as_the_pose_map_does(name: str, old: str, new: str, said: str) -> None:
+    """Out of the plane there is no error, no pose and no word of it."""
+    text = text_of(name)
+    assert old in text
+    with pytest.raises(FileError, match=f"with the map (planar|spherical), .*{said}"):
+        read(text.replace(old, new, 1))
