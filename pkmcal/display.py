@@ -44,6 +44,18 @@ def fixed(value: float, places: int) -> str:
     return text.lstrip("-") if float(text) == 0 else text
 
 
+def rounded(value: float, places: int) -> str:
+    """As `fixed`; a value that tens or hundreds would make 0 has two significant digits.
+
+    Examples
+    --------
+    >>> rounded(12.345, 1), rounded(12.345, -2), rounded(0.0, -2)
+    ('12.3', '12', '0')
+    """
+    lost = places < 0 and math.isfinite(value) and value != 0 and float(fixed(value, places)) == 0
+    return fixed(value, decimals(value) if lost else places)
+
+
 def with_uncertainty(value: float, sigma: float) -> str:
     """A value with its standard deviation, the latter to two significant digits.
 
@@ -68,7 +80,7 @@ def with_uncertainty(value: float, sigma: float) -> str:
     if not math.isfinite(sigma) or sigma == 0:
         return f"{value:.6g} ± {abs(sigma):.6g}"
     places = decimals(sigma)
-    return f"{fixed(value, places)} ± {fixed(abs(sigma), places)}"
+    return f"{rounded(value, places)} ± {fixed(abs(sigma), places)}"
 
 
 def displayed(value: float, unit: str) -> tuple[float, str]:

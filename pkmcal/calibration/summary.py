@@ -193,7 +193,7 @@ def parameter_rows(table: ParameterTable) -> Iterator[str | Table]:
         text = display.with_uncertainty(number, deviation)
         if not np.isfinite(deviation):
             text = f"{display.fixed(number, places)} ± {deviation:g}"
-        rows.append([label, text, display.fixed(change, places)])
+        rows.append([label, text, display.rounded(change, places)])
     one = Table(["parameter", "value ± 95 %" if wide else "value", "change"], rows, left=1)
     width = max(map(len, str(one).splitlines())) + _BETWEEN
     columns = min((_WIDTH + _BETWEEN) // width, -(-len(rows) // _SHORT))
