@@ -95,7 +95,7 @@ def tensions(
     Raises
     ------
     ValueError, TypeError
-        A machine without cables, a wrong shape, or no numbers.
+        A machine without cables, a wrong shape, no numbers, or neither a force nor a least tension.
 
     Examples
     --------
@@ -121,6 +121,10 @@ def tensions(
         if not np.isfinite(vector).all():
             raise ArgumentError(f"{name} must be finite, found {vector.tolist()}")
     low = number("least", least, least=0.0)
+    if low == 0.0 and not pull.any():
+        raise ArgumentError(
+            "least must be above 0 where no force acts: no tension at all balances it"
+        )
     high = np.inf if most == np.inf else number("most", most, above=low)
     slopes, load, spheres = _balance(robot, rows, pull, point)
     found = np.full((len(rows), len(cables)), np.nan)

@@ -143,7 +143,7 @@ def test_beyond_the_largest_tension_and_out_of_reach(tmp_path: Path) -> None:
         [(a, np.zeros(3)) for a in ANCHORS], "pulley", "radius = 50.0\nswivel = [0, 0, 1]\n",
     )  # fmt: skip
     at_the_middle = [*(ANCHORS[0] + [50.0, 0, 0]), 0, 0, 0]
-    assert pk.tensions(pulleys, at_the_middle).status == 3
+    assert pk.tensions(pulleys, at_the_middle, least=1.0).status == 3
 
 
 def test_what_has_no_cables_is_refused() -> None:
@@ -158,5 +158,7 @@ def test_what_has_no_cables_is_refused() -> None:
     ):
         with pytest.raises(pk.ArgumentError, match=said):
             pk.tensions(sled, sled.home, **more)  # type: ignore[arg-type]
+    with pytest.raises(pk.ArgumentError, match="least must be above 0 where no force acts"):
+        pk.tensions(sled, [1500, 2500, 0, 0, 0, 0])
     with pytest.raises(pk.ArgumentError, match="most must be above 5"):
         pk.tensions(sled, sled.home, least=5.0, most=4.0)
