@@ -57,7 +57,8 @@ def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -
     chi2 = misfit.chi2_per_dof
     if np.isfinite(chi2):
         shown = f"{chi2:.2f}" if chi2 < 100 else f"{chi2:.2g}"
-        facts.append(f"chi²/dof {shown} (1 ± {np.sqrt(2 / misfit.dof):.2f} expected)")
+        expected = f"1 ± {np.sqrt(2 / misfit.dof):.2f} expected, dof {_count(misfit.dof)}"
+        facts.append(f"chi²/dof {shown} ({expected})")
     facts += _noise(misfit)
     misses = repeats.lack_of_fit_chance < SIGNIFICANT
     if np.isfinite(repeats.repeatability):
@@ -69,6 +70,10 @@ def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -
         facts.append(text)
     facts.append(" ".join(f"{key} {value:.2g}" for key, value in observability.items()))
     return filled("", "; ".join(facts))
+
+
+def _count(dof: float) -> str:
+    return f"{dof:.3g}" if dof < 100 else f"{dof:.0f}"
 
 
 def _noise(misfit: Misfit) -> Iterator[str]:
@@ -89,7 +94,8 @@ def _noise(misfit: Misfit) -> Iterator[str]:
         ]
         yield f"noise {', '.join(parts)}"
     elif estimated:
-        yield f"noise {', '.join(estimated)} mm, estimated from the residuals"
+        how = f"estimated from the residuals (dof {_count(misfit.dof)})"
+        yield f"noise {', '.join(estimated)} mm, {how}"
     if not misfit.told_apart:
         return
     for names, deviations in zip(misfit.components, misfit.component_noise, strict=True):
@@ -154,12 +160,16 @@ def own_numbers(holdout: HeldOut) -> Table:
         unit = holdout.units[name]
         number, shown = display.displayed(value, unit)
         deviation, _ = display.displayed(sigma, unit)
-        label = f"{name} [{shown}]" if shown != "mm" else name
+        label = _with_unit(name, shown)
         text = display.with_uncertainty(number, deviation)
         if not np.isfinite(deviation):
             text = f"{display.fixed(number, 4)} ± {deviation:g}"
         rows.append([label, text])
     return Table(["found for the points held out", "value"], rows, left=1)
+
+
+def _with_unit(name: str, unit: str) -> str:
+    return name if unit == "1" else f"{name} [{unit}]"
 
 
 def bounds(names: Sequence[str]) -> str:
@@ -189,7 +199,7 @@ def parameter_rows(table: ParameterTable) -> Iterator[str | Table]:
         deviation, _ = display.displayed(float(sigma), unit)
         change, _ = display.displayed(float(value - start), unit)
         places = display.decimals(deviation) if np.isfinite(deviation) else 4
-        label = f"{name} [{shown_unit}]" if shown_unit != "mm" else name
+        label = _with_unit(name, shown_unit)
         text = display.with_uncertainty(number, deviation)
         if not np.isfinite(deviation):
             text = f"{display.fixed(number, places)} ± {deviation:g}"
