@@ -160,16 +160,12 @@ def own_numbers(holdout: HeldOut) -> Table:
         unit = holdout.units[name]
         number, shown = display.displayed(value, unit)
         deviation, _ = display.displayed(sigma, unit)
-        label = _with_unit(name, shown)
+        label = f"{name} [{shown}]"
         text = display.with_uncertainty(number, deviation)
         if not np.isfinite(deviation):
             text = f"{display.fixed(number, 4)} ± {deviation:g}"
         rows.append([label, text])
     return Table(["found for the points held out", "value"], rows, left=1)
-
-
-def _with_unit(name: str, unit: str) -> str:
-    return name if unit == "1" else f"{name} [{unit}]"
 
 
 def bounds(names: Sequence[str]) -> str:
@@ -199,7 +195,7 @@ def parameter_rows(table: ParameterTable) -> Iterator[str | Table]:
         deviation, _ = display.displayed(float(sigma), unit)
         change, _ = display.displayed(float(value - start), unit)
         places = display.decimals(deviation) if np.isfinite(deviation) else 4
-        label = _with_unit(name, shown_unit)
+        label = f"{name} [{shown_unit}]"
         text = display.with_uncertainty(number, deviation)
         if not np.isfinite(deviation):
             text = f"{display.fixed(number, places)} ± {deviation:g}"

@@ -53,7 +53,7 @@ def test_the_change_of_every_parameter_is_shown_and_the_table_fits_the_terminal(
     found = pk.identify(robot, measured, free="*")
     lines = found.summary().splitlines()
     assert max(map(len, lines)) <= 100
-    shown = re.findall(r"(\S+\d\S*)(?: \[1\])? +(\S+ ± \S+) +(-?\d\S*)", "\n".join(lines))
+    shown = re.findall(r"(\S+\d\S*) \[(?:mm|1)\] +(\S+ ± \S+) +(-?\d\S*)", "\n".join(lines))
     change = {name: number for name, _, number in shown}
     assert len(found.free) == 32 and set(change) == set(found.free)
     for name, value in zip(found.free, found.values, strict=True):

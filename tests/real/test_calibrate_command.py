@@ -60,4 +60,4 @@ def test_three_rods_more_fit_better_but_are_hardly_known(calibrate: Any, as_json
     assert found["rms"] <= 0.0311
     sigmas = [found["parameters"][f"rod{i}"]["stderr"] for i in (1, 2, 3)]
     assert sigmas == pytest.approx([1.37] * 3, abs=0.03)
-    assert re.search(r"rod1 +334\.7 ± 1\.4", calibrate("--free", RODS))
+    assert re.search(r"rod1 \[mm\] +334\.7 ± 1\.4", calibrate("--free", RODS))
