@@ -110,6 +110,8 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
         if k + 1 > MAX_CHAIN:
             each.fail("", f"a chain has at most {MAX_CHAIN} axes")
     joints = [_with_axes(each, joints, k, map) for k, each in enumerate(listed)]
+    if "soft" in listed[-1] and joints[-1].ball:  # the core takes it as 1
+        listed[-1].fail("soft", "the ball that ends a limb is always 1: state the other joints'")
     for k, joint in enumerate(joints):
         if joint.share and not _alike(known.setdefault(joint.share, joint), joint):
             listed[k].fail("share", f"{joint.share!r} is another joint in a limb before")
