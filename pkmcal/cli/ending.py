@@ -89,9 +89,9 @@ def _of_program(error: BaseException) -> str:
     """What was raised, and the last line of the package on the way there."""
     package = Path(__file__).parents[1]
     lines = [
-        f"{Path(frame.filename).relative_to(package).as_posix()}:{frame.lineno}"
-        for frame in traceback.extract_tb(error.__traceback__)
-        if Path(frame.filename).is_relative_to(package)
+        f"{file.relative_to(package).as_posix()}:{line}"
+        for frame, line in traceback.walk_tb(error.__traceback__)  # whatever limit is set
+        if (file := Path(frame.f_code.co_filename)).is_relative_to(package)
     ]
     where = f" ({lines[-1]})" if lines else ""
     return f"{type(error).__name__}: {error}{where}"
