@@ -17,7 +17,7 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.drift_test import trend
-from pkmcal.statistics.linear_fit import numbered
+from pkmcal.statistics.linear_fit import means, numbered
 
 CHANCE = 0.01  # below which repeats drift
 _HOUR = 3600.0  # s
@@ -144,11 +144,10 @@ def _tested(parts: Sequence[tuple[FitData, FloatArray]], odd: Collection[int]) -
     visit = _visits(rows)
     if not len(visit):
         return None
-    apart = rows.values - _means(rows.values, numbered(rows.pose, rows.target))
+    place = numbered(rows.pose, rows.target)
+    apart = rows.values - means(rows.values, place)[place]
     first = np.unique(visit, return_index=True)[1]
-    found = trend(
-        _mean_of(apart, visit), rows.pose[first], _mean_of(rows.time[:, None], visit)[:, 0]
-    )
+    found = trend(means(apart, visit), rows.pose[first], means(rows.time[:, None], visit)[:, 0])
     if found is None:
         return None
     pose = rows.pose[first]
@@ -217,18 +216,6 @@ def _visits(rows: _Rows) -> IntArray:
 def _bursts(pose: IntArray) -> Iterator[range]:
     edges = np.flatnonzero(np.diff(pose, prepend=-1, append=-1))
     yield from (range(a, b) for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
-
-
-def _means(values: FloatArray, key: IntArray) -> FloatArray:
-    """The mean of each row's key, (N, k)."""
-    return _mean_of(values, key)[key]
-
-
-def _mean_of(values: FloatArray, key: IntArray) -> FloatArray:
-    """Means by key, (keys, k)."""
-    sums = np.stack([np.bincount(key, column) for column in values.T], axis=1)
-    means: FloatArray = sums / np.bincount(key)[:, None]
-    return means
 
 
 def _unused(sets: Sequence[FitData]) -> tuple[float, float]:

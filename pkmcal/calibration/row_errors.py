@@ -57,8 +57,7 @@ def likely_mistakes(
         words = min(trials, key=lambda text: trials[text], default="")
         if words and trials[words] < MISFIT_RATIO * min(alone, present):
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
-            both.append(f"{which}off by {_off(present)} as given, but by {_off(trials[words])} if"
-                        f" {words}")  # fmt: skip
+            both.append(which + _better(present, trials[words], words))
     return both or found
 
 
@@ -81,9 +80,12 @@ def likely_row_errors(datasets: Sequence[FitData], parameters: Parameters) -> li
         words = min(trials, key=lambda text: trials[text])
         if trials[words] < MISFIT_RATIO * present:
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
-            found.append(f"{which}off by {_off(present)} as given, but by {_off(trials[words])} if"
-                         f" {words}")  # fmt: skip
+            found.append(which + _better(present, trials[words], words))
     return found
+
+
+def _better(given: float, otherwise: float, words: str) -> str:
+    return f"off by {_off(given)} as given, but by {_off(otherwise)} if {words}"
 
 
 def _off(value: float) -> str:

@@ -180,8 +180,7 @@ def slack_cables(
     without = equations.without_closures(keys, evaluation)
     without.warm_start(evaluation)
     there = without.at(evaluation.theta, estimate.state.noise)
-    per_mm = equations.closures.lengths(there.machines)
-    off = -without.closures_off(there) / per_mm * _slopes(equations, there)
+    off = -without.readings_off(there) * _slopes(equations, there)
     pose_of, actuator = np.concatenate(equations.pose_of), equations.closures.actuators
     cables = [
         SlackCable(

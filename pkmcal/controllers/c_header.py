@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -69,8 +70,13 @@ def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double")
     """
     require_parallel(robot)
     path = as_path("path", path)
+    write_whole(path, text_of(robot, prefix_of(path), number))
+
+
+def prefix_of(path: Path) -> str:
+    """What names in C begin with, after the name of a file."""
     name = re.sub(r"\W", "_", path.stem, flags=re.ASCII)
-    write_whole(path, text_of(robot, f"robot_{name}" if name[:1].isdigit() else name, number))
+    return f"robot_{name}" if name[:1].isdigit() else name
 
 
 def text_of(robot: Robot, prefix: str, number: Number) -> str:

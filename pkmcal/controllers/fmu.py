@@ -18,14 +18,16 @@ import numpy as np
 
 from pkmcal.arguments import path as as_path
 from pkmcal.controllers.arm_tree import xml_of
+from pkmcal.controllers.c_header import prefix_of
 from pkmcal.controllers.c_header import text_of as header_of
 from pkmcal.controllers.rendering import rendered
-from pkmcal.core.library import POSE
+from pkmcal.core.library import COORDINATE_UNITS, POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import version
 from pkmcal.kinematics.robot import Robot, require_parallel
 
+_HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
 _DATE = (1980, 1, 1, 0, 0, 0)  # of files in the archive: the same robot is the same bytes
 
 
@@ -63,8 +65,7 @@ def fmu(robot: Robot, path: str | PathLike[str]) -> None:
     """
     require_parallel(robot)
     path = as_path("path", path)
-    name = re.sub(r"\W", "_", path.stem, flags=re.ASCII)
-    name = f"robot_{name}" if name[:1].isdigit() else name
+    name = prefix_of(path)
     header = header_of(robot, name, "double")
     if not np.isfinite(robot.inverse(robot.home)).all():
         raise ArgumentError(f"robot: {robot.name} cannot reach its home pose")
@@ -112,7 +113,7 @@ def _description(robot: Robot, name: str, token: str) -> str:
         count += 1
 
     q = [(f"q{i}", unit) for i, unit in enumerate(robot.actuator_units, 1)]
-    pose = [(axis, "mm" if i < 3 else "rad") for i, axis in enumerate(POSE)]
+    pose = list(COORDINATE_UNITS.items())
     at_home = dict(zip(POSE, robot.home.tolist(), strict=True))
     needed = dict(zip((each for each, _ in q), robot.inverse(robot.home).tolist(), strict=True))
     add("Float64", "time", "independent", variability="continuous", unit="s")
@@ -135,7 +136,7 @@ def _description(robot: Robot, name: str, token: str) -> str:
         for i, of in outputs:
             depends = " ".join(map(str, of))
             Xml.SubElement(structure, tag, valueReference=str(i), dependencies=depends)
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + xml_of(top)
+    return _HEAD + xml_of(top)
 
 
 def _build(name: str) -> str:
@@ -144,4 +145,4 @@ def _build(name: str) -> str:
     built = Xml.SubElement(top, "BuildConfiguration", modelIdentifier=name)
     sources = Xml.SubElement(built, "SourceFileSet", language="C99")
     Xml.SubElement(sources, "SourceFile", name="fmu.c")
-    return '<?xml version="1.0" encoding="UTF-8"?>\n' + xml_of(top)
+    return _HEAD + xml_of(top)

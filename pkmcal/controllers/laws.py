@@ -31,11 +31,10 @@ def require_no_laws(robot: Robot, holder: str) -> None:
 
 def require_no_pulleys(robot: Robot, holder: str) -> None:
     """Refuse a robot with cables over pulleys, naming the first."""
-    for i, limb in enumerate(robot.model.limbs, 1):
-        if limb.kind == "pulley":
-            raise ArgumentError(
-                f"robot: limb {i} of {robot.name} runs over a pulley, which {holder} cannot hold"
-            )
+    for i in robot.model.pulleys:
+        raise ArgumentError(
+            f"robot: limb {i + 1} of {robot.name} runs over a pulley, which {holder} cannot hold"
+        )
 
 
 def said(law: Law) -> str:

@@ -50,7 +50,7 @@ def coordinates(
     length = float(arms[-1])
     at, q = (np.tile(each, (len(pose), 1)) for each in home)
     weigh = np.repeat([length, 1.0], 3)[:, None]
-    goal = _frames(np.nan_to_num(pose))
+    goal = screws.frames(np.nan_to_num(pose))
     active: BoolArray = np.asarray(np.isfinite(pose).all(axis=1))
     good = np.zeros(len(pose), dtype=bool)
     for _ in range(_STEPS):
@@ -81,16 +81,9 @@ def coordinates(
     return q
 
 
-def _frames(pose: FloatArray) -> FloatArray:
-    found: FloatArray = screws.joint_motions(
-        np.ascontiguousarray(pose), np.zeros((len(pose), 3))
-    ).reshape(-1, 4, 4)
-    return found
-
-
 def _missed(at: FloatArray, goal: FloatArray) -> FloatArray:
     """The twist (ω, v) from poses (N, 6) to frames (N, 4, 4): turning, then way of the origin."""
-    here = _frames(at)
+    here = screws.frames(at)
     turn = np.zeros_like(goal)
     turn[:, :3, :3] = goal[:, :3, :3] @ here[:, :3, :3].swapaxes(1, 2)
     turn[:, 3, 3] = 1.0

@@ -84,10 +84,10 @@ def platform_motion(
     """
     changes, step = _path(q1, q2, scale)
     poses = [forward(np.ascontiguousarray(q + change)) for change in changes]
-    still = _frames(pose)
+    still = screws.frames(pose)
     turned = []
     for each in poses:
-        between = _frames(each) @ np.linalg.inv(still)
+        between = screws.frames(each) @ np.linalg.inv(still)
         log = screws.log(np.ascontiguousarray(between.reshape(-1, 16)))
         turned.append(np.hstack([log[:, :3], each[:, :3]]))
     twist, rate = _differences(np.array(turned), step)
@@ -139,13 +139,6 @@ def _differences(values: FloatArray, step: FloatArray) -> tuple[FloatArray, Floa
     first = np.einsum("s,snk->nk", _FIRST, values) / step[:, None]
     second = np.einsum("s,snk->nk", _SECOND, values) / step[:, None] ** 2
     return first, second
-
-
-def _frames(pose: FloatArray) -> FloatArray:
-    found: FloatArray = screws.joint_motions(
-        np.ascontiguousarray(pose), np.zeros((len(pose), 3))
-    ).reshape(-1, 4, 4)
-    return found
 
 
 def _vee(matrix: FloatArray) -> FloatArray:

@@ -44,6 +44,12 @@ def joint_motions(errors: FloatArray, points: FloatArray, isa: int | None = None
     return rows("joint_motions", errors, points, isa=isa)[0].reshape(-1, 16)
 
 
+def frames(pose: FloatArray) -> FloatArray:
+    """Poses (N, 6) to matrices (N, 4, 4): those of joint errors at the origin."""
+    points = np.zeros((len(pose), 3))
+    return joint_motions(np.ascontiguousarray(pose), points).reshape(-1, 4, 4)
+
+
 class Links(NamedTuple):
     """What is between the joints of an arm: shared by all rows, or of each row.
 

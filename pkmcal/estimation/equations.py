@@ -201,7 +201,7 @@ class Equations(Readings):
         off, by_unknown = self.closures.residual(machines, states)
         off /= noise[-1]
         by_unknown /= noise[-1]
-        equation, by_unknown = self._told(off), self._told(by_unknown)
+        equation, by_unknown = self._counted(off), self._counted(by_unknown)
         if not self.count.any():
             return equation, by_unknown
         twists = self.closures.twists(machines, states)
@@ -252,7 +252,7 @@ class Equations(Readings):
             evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
         )
         of_closures /= noise[-1]
-        by_all = self._told(of_closures)
+        by_all = self._counted(of_closures)
         if len(readings):
             by_all = np.concatenate([by_all, readings])
         return self._blocks.left(by_unknown, by_all)
@@ -263,7 +263,7 @@ class Equations(Readings):
         pose, closure = np.nonzero(self._slack)
         return list(zip(pose.tolist(), closure.tolist(), strict=True))
 
-    def _told(self, part: FloatArray) -> FloatArray:
+    def _counted(self, part: FloatArray) -> FloatArray:
         """Equations of closures (K, equations, ...) that count, one after another."""
         whole = part.reshape(-1, *part.shape[2:])
         return whole[~self._slack.reshape(-1)] if self._slack.any() else whole
@@ -295,7 +295,7 @@ class Equations(Readings):
         other = copy.copy(self)
         other._slack = np.zeros_like(self._slack)
         other._slack[tuple(np.array(cells, dtype=np.intp).reshape(-1, 2).T)] = True
-        needed = self.closures_off(evaluation) / self.closures.lengths(evaluation.machines)
+        needed = self.readings_off(evaluation)
         other._if_taut = self.actuators.copy()
         for pose, cell in zip(*np.nonzero(other._slack), strict=True):
             other._if_taut[pose, self.closures.actuators[cell]] += needed[pose, cell]
@@ -484,11 +484,14 @@ class Equations(Readings):
         off[self._slack] = 0.0
         return off.max(axis=1) if off.shape[1] else np.full(len(off), np.nan)
 
+    def readings_off(self, evaluation: Evaluation) -> FloatArray:
+        """What actuators would read at the poses less what they read (K, equations)."""
+        off, _ = self.closures.residual(evaluation.machines, evaluation.states)
+        return off if self.closures.sigma is None else off * self.closures.sigma
+
     def closures_off(self, evaluation: Evaluation) -> FloatArray:
-        """What actuators would read at the poses less what they read (K, equations), mm."""
-        sigma, machines = self.closures.sigma, evaluation.machines
-        off, _ = self.closures.residual(machines, evaluation.states)
-        return off if sigma is None else off * sigma * self.closures.lengths(machines)
+        """The same in mm."""
+        return self.readings_off(evaluation) * self.closures.lengths(evaluation.machines)
 
     def status(self, evaluation: Evaluation) -> Int32Array:
         """Of the forward kinematics, for each row."""

@@ -112,6 +112,11 @@ def towards(limb: tuple[Joint, ...], k: int) -> FloatArray | None:
     return None
 
 
+def error_unit(name: str) -> Unit:
+    """Unit of a joint error, from its name: the displacements are in mm."""
+    return "mm" if name.rpartition(".")[2] in ERRORS[:3] else "rad"
+
+
 def ball_axes(limb: tuple[Joint, ...], k: int) -> tuple[FloatArray, ...]:
     """Of a ball that is not the last joint: along the limb and across it, never near its lock."""
     way = towards(limb, k)

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Unit
+from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import ChainLayout
 from pkmcal.display import Table, fixed
 from pkmcal.geometry.chain_joints import (
@@ -23,6 +23,7 @@ from pkmcal.geometry.chain_joints import (
     Joint,
     Part,
     ball_axes,
+    error_unit,
     frame_of,
 )
 from pkmcal.geometry.laws import LawNumber, gain_unit
@@ -328,10 +329,11 @@ class Chains:
 def _errors(name: str, errors: tuple[str, ...], limb: int, place: int) -> list[LimbNumber]:
     found = []
     for error in errors:
-        unit: Unit = "mm" if error in ERRORS[:3] else "rad"
         slot = name.partition(".")[2] or name
         at = place + ERRORS.index(error)
-        found.append(LimbNumber(f"{name}.{error}", unit, limb, f"{slot}.{error}", None, at))
+        found.append(
+            LimbNumber(f"{name}.{error}", error_unit(error), limb, f"{slot}.{error}", None, at)
+        )
     return found
 
 

@@ -205,6 +205,11 @@ class Model:
             for i, limb in enumerate(self.limbs, 1)
         )  # fmt: skip
 
+    @property
+    def pulleys(self) -> tuple[int, ...]:
+        """Limbs, counted from 0, that run over a pulley."""
+        return tuple(i for i, limb in enumerate(self.limbs) if limb.kind == "pulley")
+
     def doubts(self) -> list[tuple[int, str]]:
         """Drive laws without an inverse over their stroke: limbs, counted from 0, and why."""
         if not self.driven:

@@ -8,11 +8,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from pkmcal.arrays import FloatArray
 from pkmcal.files.toml_table import Table
 from pkmcal.geometry.chain_joints import Joint
+from pkmcal.screw import exp
 
 _DRIVEN = re.compile(r"(offset|gain|drive)(\d+)((?:\..*)?)")  # numbers of actuators
 
@@ -95,7 +94,7 @@ def _copy(
         return shared[joint.share, copy]
     found = joint
     if copies > 1:
-        R = _turned(turn[0], 2.0 * math.pi * copy / copies) if copy else np.eye(3)
+        R = exp([*(2.0 * math.pi * copy / copies * turn[0]), 0.0, 0.0, 0.0])[:3, :3]
         found = replace(
             joint,
             at=R @ (joint.at - turn[1]) + turn[1],
@@ -106,11 +105,4 @@ def _copy(
         )
     if joint.share:
         shared[joint.share, copy] = found
-    return found
-
-
-def _turned(axis: FloatArray, angle: float) -> FloatArray:
-    x, y, z = axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    found: FloatArray = np.eye(3) + math.sin(angle) * K + (1.0 - math.cos(angle)) * (K @ K)
     return found

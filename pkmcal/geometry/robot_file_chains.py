@@ -9,21 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Unit
+from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import (
     GROUPS,
     MAX_CHAIN,
-    MAX_CHAIN_ROWS,
-    MAX_JOINTS,
-    MAX_NUMBERS,
-    MAX_SHARED,
 )
-from pkmcal.core.library import MAPS, MAX_LIMBS
+from pkmcal.core.library import MAX_LIMBS
 from pkmcal.files.toml_table import Table, shown
-from pkmcal.geometry.chain_joints import ERRORS, KINDS, Joint, across, towards
+from pkmcal.geometry.chain_joints import KINDS, Joint, across, error_unit, towards
 from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.laws import gain_unit
 from pkmcal.geometry.model import CHAIN, Limb
+from pkmcal.geometry.robot_file_chain_checks import check
 from pkmcal.geometry.robot_file_chain_copies import Listed, copied
 from pkmcal.geometry.robot_file_kind_joints import joints_of_kind
 from pkmcal.geometry.robot_file_laws import read_law
@@ -35,7 +32,6 @@ JOINT_KEYS = (
     "offset", "gain", "drive",
 )  # fmt: skip
 TAIL_KEYS = (*(key for key in JOINT_KEYS if key not in ("axes", "share", "cone", "soft")), "errors")
-_IN_PLANE = 1e-6  # what an axis may be out of the plane
 AXES = {"R": 1, "P": 1, "C": 1, "U": 2, "S": 3}
 FORMS = {1: "one axis, `axis = [x, y, z]`", 2: "two `axes`", 3: "three `axes`, or none of a ball"}
 
@@ -67,7 +63,7 @@ def read_chains(
     tail, of_tail = read_tail(tail_tables, parameters, map, limbs)
     numbers += of_tail
     chains = Chains(map, home, tuple(limb + tail for limb in limbs), len(tail))
-    _check(tables, chains)
+    check(tables, chains)
     values = {number.name: chains.blank.flat[number.place or 0] for number in chains.numbers}
     stated: set[str] = set()
     for name, value, table in numbers:
@@ -119,8 +115,7 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
     if "errors" in table:
         errors = table.table("errors")
         for name in errors.data:
-            unit: Unit = "mm" if name.rpartition(".")[2] in ERRORS[:3] else "rad"
-            values[name] = errors.number(name, unit)
+            values[name] = errors.number(name, error_unit(name))
     copies = table.integer("copies", 1)
     if copies < 1:
         table.fail("copies", f"must be 1 or more, found {copies}")
@@ -153,9 +148,8 @@ def read_tail(
         errors = table.table("errors") if "errors" in table else Table({}, table.source)
         for error in errors.data:
             of_tool = error.startswith("tool.") and k == len(tables)
-            unit: Unit = "mm" if error.rpartition(".")[2] in ERRORS[:3] else "rad"
             name = error if of_tool else f"tail{k}.{error}"
-            numbers.append((name, errors.number(error, unit), table))
+            numbers.append((name, errors.number(error, error_unit(error)), table))
     return tuple(_with_axes(each, joints, k, map) for k, each in enumerate(tables)), numbers
 
 
@@ -323,91 +317,3 @@ def _about(table: Table) -> tuple[FloatArray, FloatArray]:
         np.array(about.vector("axis")),
         np.array([about.as_number("at", each, "mm") for each in point]),
     )
-
-
-def _check_alike(table: Table, number: int, one: Joint, other: Joint) -> None:
-    """Refuse two joints of one actuator that it would have to move differently."""
-    if one.unit != other.unit:
-        table.fail("joints", f"actuator {number} turns one joint and slides another")
-    if abs(one.home_value - other.home_value) > 1e-9 * (1.0 + abs(one.home_value)):
-        values = f"{one.home_value:g} in one limb and {other.home_value:g} in another"
-        table.fail("joints", f"actuator {number} reads at home {values}")
-    if one.law != other.law:
-        table.fail("joints", f"actuator {number} has two drive laws: one for all its joints")
-
-
-def _check_group(table: Table, chains: Chains) -> None:
-    """Refuse joints that move what they carry out of the plane, or away from the point."""
-    for i, limb in enumerate(chains.limbs):
-        for k, joint in enumerate(limb):
-            out = _out_of_group(joint, chains.map)
-            if out:
-                table.fail("joints", f"{chains.name_of(i, k)}: with the map {chains.map}, {out}")
-
-
-def _out_of_group(joint: Joint, map: str) -> str:
-    if map == "spherical" and joint.kind in "PC":
-        return f"nothing slides, found a joint {joint.kind}"
-    if map == "planar":
-        if joint.kind not in "RP":
-            return f"joints are R and P, found {joint.kind}"
-        axis = joint.axes[0] / np.linalg.norm(joint.axes[0])
-        if joint.kind == "R" and np.linalg.norm(axis[:2]) > _IN_PLANE:
-            return f"joints turn about z, found the axis {shown(joint.axes[0].tolist())}"
-        if joint.kind == "P" and abs(axis[2]) > _IN_PLANE:
-            return f"joints slide across z, found the axis {shown(joint.axes[0].tolist())}"
-    return ""
-
-
-def _check(tables: Sequence[Table], chains: Chains) -> None:
-    """Refuse what the core cannot take, and actuators that are not counted on."""
-    last = tables[-1]
-    if chains.n_actuators < 1:
-        last.fail("joints", "no joint has an actuator")
-    used = {joint.actuator for limb in chains.limbs for joint in limb if joint.actuator is not None}
-    first: dict[int, Joint] = {}
-    for limb in chains.limbs:
-        for joint in limb:
-            if joint.actuator is not None:
-                one = first.setdefault(joint.actuator, joint)
-                _check_alike(last, joint.actuator + 1, one, joint)
-    for a in range(chains.n_actuators):
-        if a not in used:
-            last.fail(
-                "joints", f"found {chains.n_actuators} actuators, but no joint has actuator {a + 1}"
-            )
-    if chains.n_actuators > MAX_LIMBS:
-        last.fail("joints", f"a machine has at most {MAX_LIMBS} actuators")
-    if len(chains.parts) > MAX_JOINTS or chains.count > MAX_NUMBERS:
-        last.fail("joints", f"a machine has at most {MAX_JOINTS} axes, found {len(chains.parts)}")
-    layout = chains.layout
-    if layout.shared > MAX_SHARED:
-        last.fail("joints", f"limbs share at most {MAX_SHARED} passive axes, found {layout.shared}")
-    _check_group(last, chains)
-    group = GROUPS[chains.map]
-    for i, (names, limb) in enumerate(zip(chains.members, chains.limbs, strict=True)):
-        ball = limb[-1].ball
-        if not 1 <= len(names) <= MAX_CHAIN:
-            last.fail(
-                "joints", f"limb {i + 1} has {len(names)} axes, 1 to {MAX_CHAIN} are possible"
-            )
-        if ball and group != 6:
-            last.fail("joints", f"limb {i + 1}: a ball is no joint of the map {chains.map}")
-        if chains.dependent(i):
-            last.fail(
-                "joints",
-                f"at home passive joints of limb {i + 1} can move while the platform stands still:"
-                " write one S of a rod as a U, or take home away from a dead point of the limb",
-            )
-    if layout.rows > MAX_CHAIN_ROWS:
-        last.fail(
-            "joints", f"the limbs close {layout.rows} rows, at most {MAX_CHAIN_ROWS} are possible"
-        )
-    need = len(MAPS[chains.map]) + layout.shared
-    if layout.rows < need:
-        n = chains.n_actuators
-        last.fail(
-            "joints",
-            f"{n} actuator{'s' * (n > 1)}, {n + need - layout.rows} ways to move: the limbs leave"
-            f" {layout.rows} closures for {need} unknowns with the actuators held",
-        )

@@ -383,8 +383,7 @@ class Kinematics:
     def passive_names(self) -> tuple[str, ...]:
         """Passive joints, in the order of `Forward.passive`: of chains, and swivels of pulleys."""
         if self.model.chains is None:
-            limbs = enumerate(self.model.limbs, 1)
-            return tuple(f"swivel{i}" for i, limb in limbs if limb.kind == "pulley")
+            return tuple(f"swivel{i + 1}" for i in self.model.pulleys)
         names = list(self.model.chains.parts)
         coordinate = self.model.chains.layout.coordinate
         order = sorted(range(len(names)), key=lambda k: int(coordinate[k]))

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import number
 from pkmcal.arrays import FloatArray, Int32Array, IntArray, as_rows
 from pkmcal.core import instruments
-from pkmcal.core.chains import ChainMachine
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
@@ -110,7 +109,7 @@ def tensions(
     array([5., 5., 5., 5.])
     """
     require_parallel(robot)
-    if robot.model.chains is not None or isinstance(robot.machine, ChainMachine):
+    if robot.model.chains is not None:
         raise ArgumentError(f"robot: {robot.name} has chains of joints, no cables")
     cables = np.array([KINDS[limb.kind].cable for limb in robot.model.limbs])
     if not cables.any():

@@ -19,10 +19,9 @@ _NONE = 1e-12  # share of a variance that is none
 
 def rotations(angles: FloatArray) -> FloatArray:
     """R = Rz(γ) Ry(β) Rx(α), (N, 3, 3), of angles (N, 3)."""
-    errors = np.zeros((len(angles), 6))
-    errors[:, 3:] = angles
-    motions = screws.joint_motions(errors, np.zeros((len(angles), 3))).reshape(-1, 4, 4)
-    turns: FloatArray = motions[:, :3, :3]
+    poses = np.zeros((len(angles), 6))
+    poses[:, 3:] = angles
+    turns: FloatArray = screws.frames(poses)[:, :3, :3]
     return turns
 
 

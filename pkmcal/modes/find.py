@@ -93,8 +93,7 @@ class Found(NamedTuple):
 
 def frames_of(poses: FloatArray) -> FloatArray:
     """R row by row and p, (N, 12), of poses (N, 6)."""
-    motions = screws.joint_motions(np.ascontiguousarray(poses), np.zeros((len(poses), 3)))
-    motions = motions.reshape(-1, 4, 4)
+    motions = screws.frames(poses)
     frames: FloatArray = np.hstack([motions[:, :3, :3].reshape(-1, 9), motions[:, :3, 3]])
     return frames
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.statistics.distributions import t_tail
+from pkmcal.statistics.linear_fit import means, numbered
 
 LEAST = 3  # degrees of freedom: below, nothing short of a jump would show
 
@@ -59,15 +60,11 @@ def trend(values: FloatArray, pose: IntArray, time: FloatArray) -> Trend | None:
     >>> still.chance > 0.5, moving.chance < 0.001
     (True, True)
     """
-    count = np.bincount(pose)
-    whole = np.column_stack([values, time])
-    means = np.zeros((len(count), whole.shape[1]))
-    np.add.at(means, pose, whole)
-    means /= np.maximum(count, 1)[:, None]
-    apart = values - means[pose, :-1]
-    since = time - means[pose, -1]
+    place, whole = numbered(pose), np.column_stack([values, time])
+    whole -= means(whole, place)[place]
+    apart, since = whole[:, :-1], whole[:, -1]
     spread = float(since @ since)
-    freedom = len(values) - int((count > 0).sum()) - 1
+    freedom = len(values) - len(np.unique(pose)) - 1
     if freedom < LEAST or not spread > 0:
         return None
     slope = since @ apart / spread

@@ -131,6 +131,11 @@ def numbered(*keys: IntArray) -> IntArray:
     return numbered(first * (int(second.max()) + 1) + second)
 
 
+def means(rows: FloatArray, key: IntArray) -> FloatArray:
+    """Means of rows (M, k) that have the same key (M,), one of 0, 1 …, in its order."""
+    return sums(rows, key) / np.bincount(key)[:, None]
+
+
 def sums(rows: FloatArray, key: IntArray) -> FloatArray:
     """Sums of rows (M, ...) that have the same key (M,), in its order."""
     order = np.argsort(key, kind="stable")

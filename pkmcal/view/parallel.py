@@ -11,7 +11,6 @@ from pkmcal.core.chains import ChainMachine
 from pkmcal.core.library import MAPS, POSE, SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.core.poses import invert
-from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Cone
@@ -33,7 +32,7 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
     model = robot.model
     machine, slots = drives.within(robot)
     laws = drives.laws(robot)
-    if isinstance(machine, PulleyMachine):
+    if model.pulleys:
         raise ArgumentError(f"robot: {model.name} has pulleys, which the page cannot hold")
     size = float(machine.struct.size)
     if isinstance(machine, Machine):
