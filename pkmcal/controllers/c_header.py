@@ -15,6 +15,7 @@ from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import c_source
 from pkmcal.controllers.c_source import Number
+from pkmcal.controllers.laws import require_no_tackles
 from pkmcal.controllers.rendering import rendered
 from pkmcal.core.drive_turns import AGREE, MOST_TURNS, PER_TURN
 from pkmcal.core.driven import DrivenMachine
@@ -89,6 +90,7 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
     machine = robot.machine
     if robot.model.chains is not None:
         raise ArgumentError(f"robot: {robot.name} has chains of joints; a header holds other limbs")
+    require_no_tackles(robot, "a header")
     if machine.rows != machine.m:
         raise ArgumentError(
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"

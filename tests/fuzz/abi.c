@@ -326,6 +326,7 @@ static void of_rows(ptrdiff_t n, unsigned strange, int isas)
              D(3, 3 * n));
     EACH_ISA(pulley, n, a, three, motion, 0, c, D(0, n), D(1, 3 * n), D(2, 3 * n), D(3, 9 * n), D(4, n),
              D(5, 3 * n), D(6, 3 * n));
+    EACH_ISA(strand, n, c, D(0, n), D(1, 3 * n), D(2, 9 * n));
     EACH_ISA(tpr2tps_lengths, n, a, b, D(0, 4 * n));
     EACH_ISA(tpr2tps_jacobian, n, a, b, D(0, 16 * n));
     EACH_ISA(exp, n, a, D(0, 16 * n));
