@@ -304,8 +304,8 @@ CALLS: dict[str, Call] = {
     "plot": (FOUND.plot, {"path": "residuals.png"}, {"path": "path"}),
     "report": (
         FOUND.report,
-        {"folder": "report"},
-        {"folder": "path", "files": "text"},
+        {"folder": "report", "pdf": False},
+        {"folder": "path", "files": "text", "pdf": "flag"},
     ),
     "bootstrap": (
         pk.bootstrap,
