@@ -332,6 +332,7 @@ CALLS: dict[str, Call] = {
             "free": "names",
             "prior": "one or by name",
             "unknown": "names",
+            "travel_weight": "number",
         },
     ),
     "plan_poses, accuracy": (

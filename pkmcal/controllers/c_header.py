@@ -15,15 +15,17 @@ from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import c_source
 from pkmcal.controllers.c_source import Number
-from pkmcal.controllers.laws import require_no_pulleys
 from pkmcal.controllers.rendering import rendered
+from pkmcal.core.drive_turns import AGREE, MOST_TURNS, PER_TURN
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.laws import MOST_STEPS, ROUNDING, LawNumbers
 from pkmcal.core.library import AXES, DRIVERS, MAPS, ROWS, SLOTS
 from pkmcal.core.poses import invert
+from pkmcal.core.pulleys import OWN_SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.model import Limb
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 # benchmarks of the hexapod: docs/controllers.md says how
@@ -33,6 +35,8 @@ _MEASURED = (
 )
 _ENUMERATORS = tuple(slot.upper().replace(".", "_") for slot in SLOTS)
 _GAIN = SLOTS.index("gain")
+_GROOVE = [SLOTS.index(slot) for slot in OWN_SLOTS]
+_NEARER, _TIE = 1e-12, 1e-15  # of turns that agree, as agreed_turn of csrc/inverse.h has them
 _UNUSED_FRAME = np.zeros(9)
 
 
@@ -83,7 +87,6 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
     """The header whose names begin with `prefix`."""
     word("number", number, ("double", "float"))
     machine = robot.machine
-    require_no_pulleys(robot, "a header")
     if robot.model.chains is not None:
         raise ArgumentError(f"robot: {robot.name} has chains of joints; a header holds other limbs")
     if machine.rows != machine.m:
@@ -91,24 +94,29 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"
             " a header holds machines with as many of both"
         )
-    _require_turns(robot)
     return rendered("robot.h.jinja", _contents(robot, prefix, number))
 
 
-def _require_turns(robot: Robot) -> None:
-    """Refuse cranks that share an actuator whose whole turn may leave one of them elsewhere."""
-    for a in range(robot.n_actuators):
-        sharing = [
-            (KINDS[limb.kind].actuator_unit, abs(g[_GAIN]))
-            for limb, g in zip(robot.model.limbs, robot.slots, strict=True)
-            if limb.actuator == a
-        ]
-        geared = len(set(sharing)) > 1 or (len(sharing) > 1 and robot.model.driven)
-        if "rad" in dict(sharing) and geared:
-            raise ArgumentError(
-                f"robot: limbs of {robot.name} share actuator q{a + 1} with different gears or"
-                " drive laws; which of its turns they agree on is more than a header finds"
-            )
+def _geared(robot: Robot) -> list[bool]:
+    """Which limbs are the first of an actuator whose whole turns may leave another elsewhere.
+
+    As `pkmcal.core` finds the turn that suits all: with laws always, else where gears differ.
+    """
+    angles = [KINDS[limb.kind].actuator_unit == "rad" for limb in robot.model.limbs]
+    actuators = [limb.actuator for limb in robot.model.limbs]
+    gears = [abs(g[_GAIN]) if angle else None for angle, g in zip(angles, robot.slots, strict=True)]
+    found = []
+    for i, actuator in enumerate(actuators):
+        sharing = [j for j, other in enumerate(actuators) if other == actuator]
+        differ = robot.model.driven or len({gears[j] for j in sharing}) > 1
+        found.append(angles[i] and len(sharing) > 1 and sharing[0] == i and differ)
+    return found
+
+
+def _driver(limb: Limb) -> str:
+    """The core's driver of a limb: a cable over a pulley is one of limbs between two points."""
+    driver = KINDS[limb.kind].driver
+    return "length" if driver == "pulley" else driver
 
 
 def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
@@ -116,13 +124,14 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
     machine, model = robot.machine, robot.model
     limbs = model.limbs
     map, m, n = model.map, machine.m, machine.actuators
-    kinds = [KINDS[limb.kind] for limb in limbs]
-    drivers = [driver for driver in DRIVERS if driver in {kind.driver for kind in kinds}]
+    of_limb = [_driver(limb) for limb in limbs]
+    drivers = [driver for driver in DRIVERS if driver in of_limb]
     rows = _rows(robot)
     actuators = [limb.actuator for limb in limbs]
     lengths = sum(name in "xyz" for name in MAPS[map])
     laws = _laws(robot)
     turning = [bool(each) for each in machine.struct.angle[0 : len(limbs)]]
+    geared, over = _geared(robot), [i in model.pulleys for i in range(len(limbs))]
     needed = _needed(robot, drivers, [row["name"] for row in rows])
     needed += _LAWS[: 2 if laws else 0] + _LAWS[2:3] * _any(laws, "waves")
     functions = c_source.with_callees(needed + _LAWS[3:] * _any(laws, "points"))
@@ -173,7 +182,7 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
         "branch": several([float(limb.branch) for limb in limbs]),
         "rows": rows,
         "drivers": [{"name": driver} for driver in drivers],
-        "driver": whole(drivers.index(kind.driver) for kind in kinds),
+        "driver": whole(drivers.index(driver) for driver in of_limb),
         "shared": n < len(limbs),
         "which": f"{prefix}_actuator[i]" if n < len(limbs) else "i",
         "actuator": whole(actuators),
@@ -185,6 +194,20 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
             machine.struct.near[i] if turns else 0.0 for i, turns in enumerate(turning)
         ),
         "turn": one(2.0 * np.pi),
+        "geared": whole(geared) if any(geared) else "",
+        "about": several(_about(robot)) if laws and any(geared) else "",
+        "most_turns": MOST_TURNS,
+        "agree": one(AGREE if wide else 3e-4),
+        "per_turn": one(PER_TURN),
+        "nearer": one(_NEARER),
+        "tie": one(_TIE),
+        "pulleys": any(over),
+        "all_pulleys": all(over),
+        "over": whole(over),
+        "groove": [
+            several(g[_GROOVE] if has else 0.0 * g[_GROOVE])
+            for g, has in zip(robot.slots, over, strict=True)
+        ],
         "beta": MAPS[map].index("beta") if machine.turns_freely else None,
         "laws": [
             {
@@ -238,6 +261,7 @@ def _needed(robot: Robot, drivers: Sequence[str], rows: Sequence[str]) -> list[s
     needed += [f"map_{map}_{part}" for part in _MAP_PARTS]
     needed += ["limb_joint", "limb_drive", "limb_command", "sphere_row"]
     needed += [f"{driver}_{part}" for driver in drivers for part in _DRIVER_PARTS]
+    needed += ["pulley"] if robot.model.pulleys else []
     return needed + [f"{row}_row" for row in rows]
 
 
@@ -262,6 +286,15 @@ def _laws(robot: Robot) -> list[LawNumbers]:
     for d, why in machine.laws.doubts(robot.slots).items():
         raise ArgumentError(f"robot: limb {d + 1} of {robot.name}: its drive law: {why}")
     return machine.laws.numbers_of(robot.slots)
+
+
+def _about(robot: Robot) -> FloatArray:
+    """The ways of the drives near which angles are given."""
+    machine = robot.machine
+    assert isinstance(machine, DrivenMachine)
+    reference = machine.reference(robot.slots)
+    about: FloatArray = machine.laws.ways(robot.slots, reference[None]).way[0]
+    return about
 
 
 def _any(laws: list[LawNumbers], part: str) -> bool:
@@ -309,7 +342,7 @@ def prepared(robot: Robot) -> tuple[list[FloatArray], ...]:
     """
     first, second, frames, axes = [], [], [], []
     for limb, g in zip(robot.model.limbs, robot.slots.tolist(), strict=True):
-        driver = KINDS[limb.kind].driver
+        driver = _driver(limb)
         names = dict(zip(_ENUMERATORS, range(len(SLOTS)), strict=True))
         given = {"g": g, **names, "F": limb.frame.ravel().tolist()}
         one, other = c_source.evaluate(f"{driver}_directions", given, ("first", "second"))
@@ -320,7 +353,8 @@ def prepared(robot: Robot) -> tuple[list[FloatArray], ...]:
                 own[place] = c_source.evaluate(f"{axis}_axis", given | frame, ("axis",))[0]
         first.append(np.array(one))
         second.append(np.array(other))
-        frames.append(limb.frame.ravel() if driver != "length" else _UNUSED_FRAME)
+        turned = driver != "length" or limb.kind == "pulley"
+        frames.append(limb.frame.ravel() if turned else _UNUSED_FRAME)
         axes.append(own)
     return first, second, frames, axes
 
@@ -346,7 +380,8 @@ def _constants(number: Number) -> dict[str, float]:
 def _inverse_calls(robot: Robot) -> list[str]:
     calls = ["pose_frame"]
     for limb in robot.model.limbs:
-        calls += ["limb_joint", f"{KINDS[limb.kind].driver}_inverse", "limb_command"]
+        calls += ["limb_joint", f"{_driver(limb)}_inverse", "limb_command"]
+        calls += ["limb_joint", "pulley"] if limb.kind == "pulley" else []
     return calls
 
 
@@ -355,6 +390,7 @@ def _step_calls(robot: Robot, rows: list[dict[str, Any]]) -> list[str]:
     calls = [f"map_{map}_frame", f"map_{map}_retract"]
     for limb in robot.model.limbs:
         own = KINDS[limb.kind].all_rows(limb.couple > 0)
+        calls += ["limb_joint", "pulley"] if limb.kind == "pulley" else []
         for row in ("sphere", *(row["name"] for row in rows if row["name"] in own)):
             calls += [f"{row}_row", f"map_{map}_pull"]
     return calls

@@ -54,7 +54,7 @@ def _text(header: str) -> str:
 def functions() -> dict[str, CFunction]:
     """Every function of the generated headers that concerns one pose of one machine, by name."""
     found = {}
-    for header in ("posemaps.h", "frames.h", "limbs.h", "laws.h"):
+    for header in ("posemaps.h", "frames.h", "limbs.h", "laws.h", "pulleys.h"):
         for match in _FUNCTION.finditer(_text(header)):
             counts = _OPERATIONS.search(match["comment"])
             if counts is None:

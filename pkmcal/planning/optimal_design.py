@@ -127,6 +127,22 @@ class Design:
             found.append(self._reduced(chosen, error))
         return min(found, key=len)
 
+    def exchanged_for(self, chosen: IntArray, member: int) -> FloatArray:
+        """What the criterion is with each candidate (N,) in place of a member.
+
+        Logarithm of a standard deviation, of the prediction or of the scaled parameters; infinite
+        for the other members and for candidates of another sort.
+        """
+        others = chosen[chosen != member]
+        ridge = self._lacking(chosen.tolist())
+        gains = self._gains(others.tolist(), ridge)
+        gains[self._sort != self._sort[member]] = -np.inf
+        cost = self._log_cost(others, ridge)
+        if self._determinant:
+            deviations: FloatArray = (cost - gains) / (2 * len(ridge))
+            return deviations
+        return np.asarray(np.log(np.maximum(np.exp(cost) - gains, np.finfo(float).tiny)) / 2.0)
+
     def _worth(self, candidates: float) -> FloatArray:
         """Information of so many candidates, alike in all directions."""
         worth: FloatArray = candidates / len(self._blocks) * np.eye(self._blocks.shape[2])

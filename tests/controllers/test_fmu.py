@@ -14,13 +14,14 @@ import pytest
 import pkmcal as pk
 
 from .c_headers import STRICT, needed
-from .test_c_header import lawful
+from .test_c_header import lawful, pulleys
 
 POSE = ("x", "y", "z", "alpha", "beta", "gamma")
 CASES = {
     "hexapod": lambda: pk.load("hexapod"),
     "rotary-delta": lambda: pk.load("rotary-delta"),
     "drive laws": lawful,
+    "pulleys": pulleys,
 }
 
 

@@ -22,6 +22,7 @@ import pkmcal as pk
 
 from .. import robots
 from .c_headers import PARALLEL
+from .test_c_header import geared, pulleys
 
 MODULES = Path("/usr/lib/linuxcnc/modules")
 SESSION = Path(__file__).with_name("linuxcnc_session.py")
@@ -43,6 +44,8 @@ CASES["curved laws"] = lambda: robots.hexapod(
     {"drive": {"harmonics": [{"k": 0.2, "cos": 0.05, "sin": -0.03}]}, "stroke": [300.0, 1500.0]},
     {"drive": {"table": [[300.0, 0.0], [800.0, 0.3], [900.0, 0.1]]}, "stroke": [300.0, 1500.0]},
 )
+CASES["pulleys"] = pulleys
+CASES["geared"] = lambda: geared(0.5)
 CASES["framed"] = lambda: robots.hexapod({"offset": 12.0, "gain": -1.01}, frames=FRAMES)
 
 
