@@ -29,7 +29,10 @@ def test_scales_and_gears_are_no_counts_and_steps_are() -> None:
     assert reading_units(legs) == ("mm", "mm", "counts", "mm", "mm", "mm")
 
 
-def test_steps_of_a_printer_are_no_mm(run: Any, tmp_path: Path) -> None:
+def test_steps_of_a_printer_are_no_mm(
+    run: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
     assert run("import", PRINTER, "--out", "in").exit_code == 0
     said = run("inverse", "in/robot.toml", "0,0,10,0,0,0", "--out", "out").stdout
     assert "q1 [counts]" in said and "[mm]" not in said
