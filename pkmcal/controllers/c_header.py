@@ -14,6 +14,7 @@ from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import c_chains, c_limbs, c_source
 from pkmcal.controllers.c_source import Number
+from pkmcal.controllers.laws import require_no_tackles
 from pkmcal.controllers.rendering import rendered
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.laws import MOST_STEPS, ROUNDING, LawNumbers
@@ -85,6 +86,7 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
     """The header whose names begin with `prefix`."""
     word("number", number, ("double", "float"))
     machine = robot.machine
+    require_no_tackles(robot, "a header")
     if machine.rows != machine.m:
         raise ArgumentError(
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"

@@ -144,10 +144,11 @@ def design_of(
         frame = rigid @ ways[:, : np.count_nonzero(sizes > _UNIDENTIFIABLE * sizes[0])]
         flat = aimed.reshape(len(moved), -1)
         return design((flat - frame @ (frame.T @ flat)).reshape(aimed.shape)), True
-    basis = sparse_basis(made.unidentifiable, chosen.names)
+    first = sparse_basis(made.unidentifiable, chosen.names)[:, 0]
+    unknown = as_sum(first, chosen.names, chosen.units, chosen.scale)
     raise ArgumentError(
-        f"candidates: not even all of them identify {as_sum(basis[:, 0], chosen.names)}, which"
-        " moves the targets; offer others, free fewer parameters or state a prior"
+        f"candidates: not even all of them identify {unknown}, which moves the targets;"
+        " offer others, free fewer parameters or state a prior"
     )
 
 
