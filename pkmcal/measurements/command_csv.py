@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 
+import numpy as np
+
 from pkmcal.arrays import FloatArray
 from pkmcal.files.column_names import known_as
 from pkmcal.files.csv_table import Table
@@ -42,6 +44,7 @@ def write_commands(
     path: str | PathLike[str],
     units: Sequence[str],
     commands: FloatArray,
+    columns: dict[str, FloatArray] | None = None,
     *,
     comment: str = "",
 ) -> None:
@@ -55,6 +58,8 @@ def write_commands(
         "mm" or "rad".
     commands : ndarray (N, n)
         mm and rad.
+    columns : dict of str to ndarray (N,), optional
+        Others beside them, by heading, which says the unit.
     comment : str, optional
         Lines for its head, each with its ``#``.
 
@@ -63,5 +68,7 @@ def write_commands(
     OSError
         The folder does not exist or cannot be written.
     """
-    headings = [f"q{i + 1} [{unit}]" for i, unit in enumerate(units)]
-    write_csv(path, headings, (map(repr, row) for row in commands.tolist()), comment=comment)
+    others = columns or {}
+    headings = [*(f"q{i + 1} [{unit}]" for i, unit in enumerate(units)), *others]
+    rows = np.column_stack([commands, *others.values()]).tolist()
+    write_csv(path, headings, (map(repr, row) for row in rows), comment=comment)
