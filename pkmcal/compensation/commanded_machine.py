@@ -86,9 +86,10 @@ class CommandedMachine:
     def _readings(self, command: FloatArray) -> FloatArray:
         """The actuator coordinates to which the controller drives on a command."""
         if self.joints:
-            return command / self._degrees
-        own = self._poses(command, self._controller)
-        return self._controller.inverse(own, match=self._match)
+            found: FloatArray = command / self._degrees
+            return found
+        poses = self._poses(command, self._controller)
+        return self._controller.inverse(poses, match=self._match)
 
     def bends(self, begin: FloatArray, end: FloatArray) -> tuple[IntArray, FloatArray]:
         """Where on the ways between commands (N, axes) a drive is at a node of its table.
