@@ -230,6 +230,7 @@ class Identification(Parts, Result):
         files: Mapping[str, bytes] | None = None,
         *,
         certificate: str | PathLike[str] | None = None,
+        pdf: bool = False,
     ) -> list[Path]:
         """Write the whole calibration as ``report.html``, one file that needs nothing else.
 
@@ -245,6 +246,8 @@ class Identification(Parts, Result):
             A TOML file with machine, serial, customer, operator, date, instrument, temperature and
             method: the report then begins with a certificate that states the expanded uncertainty
             with its budget, and has room for signatures.
+        pdf : bool
+            Whether ``report.pdf`` is printed as well, on A4, by a Chromium that is installed.
 
         Returns
         -------
@@ -253,6 +256,8 @@ class Identification(Parts, Result):
 
         Raises
         ------
+        ValueError
+            A mistake in the file of the certificate; no Chromium for the PDF.
         OSError
             The folder cannot be written.
         """
@@ -264,7 +269,8 @@ class Identification(Parts, Result):
                 f"files must map names to bytes, found {arguments.shown(files)}"
             )
         stated = None if certificate is None else certificates.read(certificate)
-        return report.write(self, arguments.path("folder", folder), files or {}, stated)
+        place, with_pdf = arguments.path("folder", folder), arguments.flag("pdf", pdf)
+        return report.write(self, place, files or {}, stated, with_pdf=with_pdf)
 
     def summary(self) -> str:
         """Everything a person should know, on one screen."""
