@@ -258,6 +258,7 @@ def as_data(
     stated: Statement,
     predicted: FloatArray,
     positions: FloatArray,
+    left_out: int = 0,
 ) -> dict[str, Any]:
     """The certificate as JSON files hold it.
 
@@ -267,6 +268,8 @@ def as_data(
         As `budget` takes them.
     positions : ndarray (N, 3)
         Of the tool at the poses of `predicted`, mm.
+    left_out : int
+        How many poses were drawn at which nothing is predicted.
     """
     made = budget(found, stated, predicted)
     worst = None
@@ -291,6 +294,7 @@ def as_data(
         "coverage": made.coverage,
         "dof": made.dof,
         "poses": len(predicted),
+        "poses_left_out": left_out,
         "worst": worst,
         "budget": [
             {

@@ -85,10 +85,11 @@ def gather(
     accuracy = None if isinstance(predicted, str) else predicted[0]
     signed = None
     if stated is not None:
-        sure, where = np.empty(0), np.empty((0, 3))
+        sure, where, unsure = np.empty(0), np.empty((0, 3)), 0
         if accuracy is not None:
             sure, where = accuracy.predicted, accuracy.positions[np.isfinite(accuracy.accuracy)]
-        signed = certificate.as_data(found, stated, sure, where)
+            unsure = len(accuracy.accuracy) - len(sure)
+        signed = certificate.as_data(found, stated, sure, where, unsure)
     return {
         "state": state,
         "verdict": sentence,

@@ -139,7 +139,8 @@ def test_the_worst_pose_is_stated_beside_the_workspace(
     page = (folder / "report.html").read_text("utf-8")
     sample = pk.sample_poses(found.robot, 500, share=0.9)
     accuracy = found.accuracy(sample)
-    assert told["poses"] == 500
+    assert told["poses"] == 500 and told["poses_left_out"] == 0
+    assert "nothing can be predicted" not in page
     assert told["worst"]["position"] == pytest.approx(sample[np.argmax(accuracy), :3])
     others = told["standard_uncertainty"] ** 2 - np.mean(accuracy**2) / 3
     expected = 2 * np.sqrt(others + accuracy.max() ** 2 / 3)
