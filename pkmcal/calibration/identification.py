@@ -17,6 +17,7 @@ from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
 from pkmcal.calibration.drift import Drift, drift
 from pkmcal.calibration.law_tests import LawTest, law_tests
+from pkmcal.calibration.measuring_order import MeasuringOrder, measuring_order
 from pkmcal.calibration.moved import Moved, moved
 from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import robust_check
@@ -53,7 +54,7 @@ class Identification(Parts, Result):
         looked for where held-out points contradict the fit.
         """
         robust = robust_check(self.fit) if self.loss == "linear" else None
-        return judge(self, robust, self.moved, self.drift)
+        return judge(self, robust, self.moved, self.drift, self.measuring_order)
 
     @cached_property
     def moved(self) -> tuple[Moved, ...]:
@@ -73,6 +74,11 @@ class Identification(Parts, Result):
     def drift(self) -> Drift | None:
         """Whether repeated poses moved with time; None where too few were repeated to say."""
         return drift(self.fit, self.holdout, {*self.outliers, *self.holdout.odd})
+
+    @cached_property
+    def measuring_order(self) -> MeasuringOrder | None:
+        """Whether residuals follow the order of measuring; None where too few can say."""
+        return measuring_order(self.fit, self.outliers)
 
     @cached_property
     def law_tests(self) -> tuple[LawTest, ...]:

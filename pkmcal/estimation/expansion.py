@@ -97,6 +97,7 @@ def expansion_of(robot: Calibratable, given: Coefficients) -> Expansion | None:
     coefficient, column = np.zeros(len(numbers)), np.zeros(len(numbers), dtype=np.intp)
     for i, number in enumerate(numbers):
         part = number.slot.partition(".")[0]
+        part = "base" if part.startswith("over") else part
         if part in _PARTS:
             coefficient[i], column[i] = of.get(part, 0.0), _PARTS.index(part)
             continue

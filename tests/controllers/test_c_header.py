@@ -375,12 +375,6 @@ def test_turns_of_a_crank_are_those_of_its_stroke(library: Any) -> None:
     assert (status == 0).all() and found.min() > 12.0 and found.max() < 16.0
 
 
-def test_machine_of_chains_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(pk.ArgumentError, match="chains of joints; a header holds other limbs"):
-        pk.export.c_header(pk.load("trivariant"), tmp_path / "robot.h")
-    assert not (tmp_path / "robot.h").exists()
-
-
 def test_names_come_from_the_file(tmp_path: Path) -> None:
     needed("gcc")
     pk.export.c_header(pk.load("2tpr2tps"), tmp_path / "2tpr-2tps.h")
