@@ -178,8 +178,12 @@ def _series(datasets: Sequence[FitData]) -> tuple[IntArray, tuple[str, ...]]:
     names: list[str] = []
     for i, data in enumerate(datasets):
         m = data.measured
+        if m.session is None and m.touched is None:
+            found.append(np.full(len(m), len(names), dtype=np.intp))
+            names.append(printable(m.file or f"measurements {i + 1}"))
+            continue
         columns = [each.tolist() for each in (m.session, m.touched) if each is not None]
-        labels = list(zip(*columns, strict=True)) or [(m.file or f"measurements {i + 1}",)] * len(m)
+        labels = list(zip(*columns, strict=True))
         numbers = {each: len(names) + k for k, each in enumerate(dict.fromkeys(labels))}
         found.append(np.array([numbers[each] for each in labels], dtype=np.intp))
         names += [printable(", ".join(each)) for each in numbers]
