@@ -135,7 +135,7 @@ class Design:
         """
         others = chosen[chosen != member]
         ridge = self._lacking(chosen.tolist())
-        gains = self._gains(others.tolist(), ridge)
+        gains = self._gains(others.tolist(), ridge, self._all)
         gains[self._sort != self._sort[member]] = -np.inf
         cost = self._log_cost(others, ridge)
         if self._determinant:
