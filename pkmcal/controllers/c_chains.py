@@ -53,6 +53,7 @@ def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any],
     unknowns = max(robot.machine.m + passive, 6)
     says = {
         "chains": len(joints),
+        "over": False,
         "limbs": n,  # drives
         "members": members,
         "first": whole(layout.first),
