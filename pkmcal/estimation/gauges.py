@@ -12,8 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.core.library import SLOTS
+from pkmcal.estimation.chain_gauges import frame_motions
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.parameters import Parameters
@@ -24,6 +25,7 @@ MIRROR = "its mirror image fits as well: which of the two it is, the robot file 
 _OUTSIDE = 1e-6  # share of a motion outside what may move that does not count
 _ALIKE = 1e-6  # share by which costs differ that are the same
 _AXES = ("x", "y", "z")
+_HOW = ("moved along", "turned about")
 _SCALE = 6  # column of the motions that is the common scale
 _SCALED = [SLOTS.index(name) for name in SLOTS if "tilt" not in name]  # gains too
 
@@ -58,7 +60,9 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
     if not unidentifiable.shape[1] or not isinstance(robot, Robot):
         return Gauges((), unidentifiable)
     if robot.model.chains is not None:  # whose numbers are errors of joints, not places of points
-        return Gauges((), unidentifiable)
+        found, alone = frame_motions(parameters, robot, unidentifiable)
+        rest = np.linalg.svd(found, full_matrices=True)[0][:, found.shape[1] :]
+        return Gauges(tuple(_chain_texts(alone, found.shape[1])), unidentifiable @ rest)
     moves = _motions(robot)
     numbers = moves.reshape(-1, moves.shape[2])[robot.geometry.slot_index]
     chain = robot.geometry.chain[:, parameters.places]
@@ -112,19 +116,39 @@ def _texts(free: FloatArray) -> list[str]:
     if len(alone) < free.shape[1]:  # turned about an anchor that is held, say
         held = free.shape[1] - len(alone)
         texts.append(f"the anchors may be moved as one body in {held} more way{'s' * (held > 1)}")
-    shifts = [_AXES[k] for k in alone if k < 3]
-    turns = [_AXES[k - 3] for k in alone if 3 <= k < _SCALE]
-    words = [f"moved along {_listed(shifts)}"] if shifts else []
-    words += [f"turned about {_listed(turns)}"] if turns else []
-    if words:
+    if words := _moved(np.isin(np.arange(_SCALE), alone)):
         texts.insert(
-            0,
-            f"the base frame may be {' and '.join(words)}: nothing that was measured says where it"
-            " stands",
+            0, f"the base frame may be {words}: nothing that was measured says where it stands"
         )
     if _SCALE in alone:
         texts.append("the common scale: all lengths and gains may grow by the same factor")
     return texts
+
+
+def _chain_texts(alone: BoolArray, count: int) -> list[str]:
+    """Motions (12,) of base and platform in words, of `count` in all."""
+    said = (
+        ("the base frame may be {}: nothing that was measured says where it stands", alone[:6]),
+        (
+            "the platform's frame may be {}: nothing that was measured says where on the platform"
+            " it is",
+            alone[6:],
+        ),
+    )
+    texts = [text.format(words) for text, these in said if (words := _moved(these))]
+    more = count - int(alone.sum())
+    if more > 0:
+        texts.append(
+            f"base or platform may be moved as one body in {more} more way{'s' * (more > 1)}"
+        )
+    return texts
+
+
+def _moved(free: BoolArray) -> str:
+    """Shifts and turns (6,) in words; empty where there are none."""
+    names = [[_AXES[k % 3] for k in part if free[k]] for part in (range(3), range(3, 6))]
+    words = [f"{how} {_listed(these)}" for how, these in zip(_HOW, names, strict=True) if these]
+    return " and ".join(words)
 
 
 def _listed(names: list[str]) -> str:
