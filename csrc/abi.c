@@ -63,6 +63,69 @@ int pkm_prepared(const pkm_machine *machine)
     return seen == (UINT64_C(1) << rows) - 1 ? rows : 0;
 }
 
+/* Which of its kinds a joint of a chain is: of an actuator, passive and shared, passive and its own. */
+static int chain_joint_fits(const pkm_chains *machine, int joint)
+{
+    const int a = machine->actuator[joint], c = machine->coordinate[joint], place = machine->place[joint];
+    return a >= -1 && a < machine->actuators && c >= -1 && c < machine->passive && (a < 0) != (c < 0)
+           && place >= 0 && place <= machine->numbers - 6;
+}
+
+/* The rows that chain l leaves, or -1; counts in `uses` in how many chains each joint is. */
+static int chain_rows_left(const pkm_chains *machine, int l, int *uses)
+{
+    const int ball = machine->ball[l] != 0, group = machine->map == MAP_SPATIAL ? 6 : 3;
+    const int first = machine->first[l], end = machine->first[l + 1], of_end = ball ? 3 : 6;
+    int rows = ball ? 3 : group;
+    uint8_t here[PKM_MAX_JOINTS] = {0};
+    if (ball && group != 6) return -1;
+    if (machine->end_place[l] < 0 || machine->end_place[l] > machine->numbers - of_end) return -1;
+    if (ball && (machine->ball_place[l] < 0 || machine->ball_place[l] > machine->numbers - 3)) return -1;
+    for (int j = first; j < end; j++) {
+        const int joint = machine->member[j];
+        if (joint < 0 || joint >= machine->joints || here[joint]++) return -1;
+        uses[joint]++;
+        rows -= machine->coordinate[joint] >= machine->shared;
+    }
+    return rows;
+}
+
+int pkm_chain_count(const pkm_chains *machine)
+{
+    const int free = machine->map == MAP_SPATIAL ? 6 : 3;
+    int rows = 0, uses[PKM_MAX_JOINTS] = {0}, moved[PKM_MAX_LIMBS] = {0}, of[PKM_MAX_JOINTS] = {0};
+    if ((machine->map != MAP_SPATIAL && machine->map != MAP_PLANAR && machine->map != MAP_SPHERICAL)
+        || machine->chains < 1 || machine->chains > PKM_MAX_LIMBS || machine->joints < 1
+        || machine->joints > PKM_MAX_JOINTS || machine->actuators < 1
+        || machine->actuators > PKM_MAX_LIMBS || machine->tail < 1
+        || machine->tail > machine->actuators || machine->passive < 0
+        || machine->passive > machine->joints || machine->shared < 0
+        || machine->shared > PKM_MAX_SHARED || machine->shared > machine->passive
+        || machine->numbers < 1 || machine->numbers > PKM_MAX_NUMBERS || !(machine->length > 0)
+        || machine->first[0] != 0)
+        return 0;
+    for (int l = 0; l < machine->chains; l++) {
+        const int64_t k = (int64_t)machine->first[l + 1] - machine->first[l];
+        if (k < 1 || k > PKM_MAX_CHAIN) return 0;
+    }
+    for (int j = 0; j < machine->joints; j++) {
+        if (!chain_joint_fits(machine, j)) return 0;
+        if (machine->actuator[j] >= 0) moved[machine->actuator[j]]++;
+        else if (of[machine->coordinate[j]]++) return 0;
+    }
+    for (int a = 0; a < machine->actuators; a++)
+        if (!moved[a] || machine->drive_place[a] < 0 || machine->drive_place[a] > machine->numbers - 2)
+            return 0;
+    for (int l = 0; l < machine->chains; l++) {
+        const int left = chain_rows_left(machine, l, uses);
+        if (left < 0) return 0;
+        rows += left;
+    }
+    for (int j = 0; j < machine->joints; j++)
+        if (!uses[j] || (machine->coordinate[j] >= machine->shared && uses[j] > 1)) return 0;
+    return rows <= PKM_MAX_CHAIN_ROWS && rows >= free + machine->shared ? rows : 0;
+}
+
 ptrdiff_t pkm_swarm_size(const pkm_swarm *swarm)
 {
     const ptrdiff_t width = ((ptrdiff_t)swarm->particles + 7) / 8 * 8, dims = swarm->dims;

@@ -4,28 +4,6 @@
 
 #include "chain_alone.h"
 
-/* Are the counts within what the arrays hold? */
-INLINE int chains_fit(const pkm_chains *machine)
-{
-    const int *which, group = group_rows(machine->map, &which);
-    int rows = 0;
-    if (machine->chains < 1 || machine->chains > PKM_MAX_LIMBS || machine->joints > PKM_MAX_JOINTS
-        || machine->actuators < 1 || machine->actuators > PKM_MAX_LIMBS || machine->shared < 0
-        || machine->shared > PKM_MAX_SHARED || machine->tail < 1 || machine->numbers > PKM_MAX_NUMBERS
-        || !(machine->length > 0) || machine->map == MAP_TRANSLATION || machine->map == MAP_2TPR2TPS)
-        return 0;
-    for (int l = 0; l < machine->chains; l++) {
-        const int k = machine->first[l + 1] - machine->first[l], most = machine->ball[l] ? 3 : group;
-        int own = 0;
-        if (k < 1 || k > PKM_MAX_CHAIN || (machine->ball[l] && group != 6)) return 0;
-        for (int j = machine->first[l]; j < machine->first[l + 1]; j++)
-            own += machine->coordinate[machine->member[j]] >= machine->shared;
-        if (own > most) return 0;
-        rows += most - own;
-    }
-    return rows <= PKM_MAX_CHAIN_ROWS && rows >= map_m(machine->map) + machine->shared ? rows : 0;
-}
-
 typedef struct {
     const pkm_chains *machine;
     const double *geometry;
@@ -253,7 +231,7 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
                         ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
                         double *residual)
 {
-    if (!chains_fit(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_chain_count(machine)) return PKM_BAD_MACHINE;
     const chain_geometry of = {machine, geometry, geometry_stride};
     chain_numbers numbers;
     chain_start start = {0};
@@ -298,7 +276,7 @@ int CALL(chain_forward)(const pkm_chains *machine, ptrdiff_t n, const double *ge
 int CALL(chain_inverse)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
                         ptrdiff_t geometry_stride, const double *pose, double *q)
 {
-    if (!chains_fit(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_chain_count(machine)) return PKM_BAD_MACHINE;
     const chain_geometry of = {machine, geometry, geometry_stride};
     chain_numbers numbers;
     for (ptrdiff_t first = 0; first < n; first += LANES) {
@@ -344,7 +322,7 @@ int CALL(chain_frames)(const pkm_chains *machine, ptrdiff_t n, const double *geo
                        ptrdiff_t geometry_stride, const double *pose, const double *q,
                        double *passive, double *frames)
 {
-    if (!chains_fit(machine)) return PKM_BAD_MACHINE;
+    if (!pkm_chain_count(machine)) return PKM_BAD_MACHINE;
     const chain_geometry of = {machine, geometry, geometry_stride};
     const int width = 12 * (machine->first[machine->chains] + machine->chains);
     chain_numbers numbers;

@@ -245,7 +245,7 @@ SHARED mask chain_iterate(const pkm_chains *machine, const chain_numbers *number
                           real *residual)
 {
     const real closed = fill(CLOSED * machine->size), settled = fill(SETTLED * machine->size);
-    const real loose = fill(CHAIN_CLOSED * machine->size);
+    const real loose = fill(CHAIN_CLOSED * machine->size), exactly = fill(EXACT * machine->size);
     const real near = fill(machine->over ? 0.0 : NEAR * machine->size);
     mask solved = fill_mask(0), falling = solved;
     real last = fill(INFINITY), next = last;
@@ -257,7 +257,7 @@ SHARED mask chain_iterate(const pkm_chains *machine, const chain_numbers *number
             const real worst = served ? chain_renew(machine, numbers, at, to, &matrix)
                                       : chain_matrix_at(machine, numbers, at, to, &matrix);
             const mask still = (last <= settled) & ~falling; /* steps of rounding */
-            const mask exact = next <= fill(EXACT * machine->size);
+            const mask exact = next <= exactly;
             const mask open = machine->over ? ~finite(worst) : ~(worst <= select(still, loose, closed));
             const mask done = going & ~open & matrix.known & (exact | still);
             *known = select_mask(going, matrix.known, *known);
@@ -270,12 +270,12 @@ SHARED mask chain_iterate(const pkm_chains *machine, const chain_numbers *number
             const mask usable = finite(step.longest) & going;
             chain_move(machine, &step, usable, at);
             *iterations = select(going, *iterations + 1.0, *iterations);
-            falling = step.longest <= FALLING * last;
+            falling = select_mask(going, step.longest <= FALLING * last, falling);
             next = select(going, step.longest * (step.longest / last), next);
             if (!k && !served) next = step.longest;
             last = select(going, step.longest, last);
             running &= usable | ~going;
-            going = usable & ((falling & (step.longest <= near)) | (next <= settled));
+            going = usable & ((falling & (step.longest <= near)) | (next <= exactly));
         }
     }
     return solved;

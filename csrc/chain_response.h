@@ -9,7 +9,7 @@ int CALL(chain_closure)(const pkm_chains *machine, ptrdiff_t n, const double *ge
                         double *residual, double *by_step, double *by_free, double *by_q,
                         double *on_map, double *pose_by_free)
 {
-    const int all = chains_fit(machine), m = map_m(machine->map), unknowns = m + machine->shared;
+    const int all = pkm_chain_count(machine), m = map_m(machine->map), unknowns = m + machine->shared;
     const int actuators = machine->actuators;
     if (!all) return PKM_BAD_MACHINE;
     const chain_geometry of = {machine, geometry, geometry_stride};
@@ -80,14 +80,14 @@ INLINE void chain_drop(const chain_sink *sink, const chain_view *view, int first
             sink->out[k * sink->columns + column] += sink->answer[k * sink->all + first_row + n] * rows[n];
 }
 
-/* By the six errors at `place` of a joint at `at`, the joint before moved from axes Qa to Qx. */
+/* By the first `count` errors at `place` of a joint at `at`, the joint before moved from axes Qa to Qx. */
 SHARED void chain_by_errors(const chain_sink *sink, int l, const chain_view *view, int first_row,
-                            int place, const real *e, const real *Qx, const real *Qa, const real *at,
-                            const motion *end, double sign)
+                            int place, int count, const real *e, const real *Qx, const real *Qa,
+                            const real *at, const motion *end, double sign)
 {
     real along[9], turn[9], moment[9];
     FN(arm_error_twists)(Qx, Qa, at, e, along, turn, moment);
-    for (int i = 0; i < 6; i++) {
+    for (int i = 0; i < count; i++) {
         const int column = sink->at[place + i];
         real twist[6], change[6];
         if (column < 0) continue;
@@ -118,7 +118,8 @@ SHARED void chain_by_numbers(const chain_sink *sink, int l, const chain_geometry
     for (int j = 0; j < k; j++) {
         const int joint = machine->member[first + j], place = machine->place[joint];
         for (int i = 0; i < 6; i++) e[i] = chain_number(of->geometry, of->stride, place + i, row);
-        chain_by_errors(sink, l, view, first_row, place, e, moved.R, before.Q, frame[j].p, &frame[k], 1.0);
+        chain_by_errors(sink, l, view, first_row, place, 6, e, moved.R, before.Q, frame[j].p, &frame[k],
+                        1.0);
         before = chain_frame(machine, joint);
         moved = frame[j];
         if (!machine->prismatic[joint]) {
@@ -131,14 +132,14 @@ SHARED void chain_by_numbers(const chain_sink *sink, int l, const chain_geometry
         real R[9], p[3], zero[6] = {fill(0.0), fill(0.0), fill(0.0), fill(0.0), fill(0.0), fill(0.0)};
         const motion home = fill_motion(machine->home), still = unmoved();
         motion turned;
-        chain_by_errors(sink, l, view, first_row, machine->ball_place[l], zero, moved.R, before.Q,
+        chain_by_errors(sink, l, view, first_row, machine->ball_place[l], 3, zero, moved.R, before.Q,
                         frame[k].p, &frame[k], 1.0);
         FN(map_frame)(machine->map, at->state, R, p);
         for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++)
                 turned.R[3 * i + j] = R[3 * i] * home.R[3 * j] + R[3 * i + 1] * home.R[3 * j + 1]
                                       + R[3 * i + 2] * home.R[3 * j + 2];
-        chain_by_errors(sink, l, view, first_row, machine->end_place[l], zero, turned.R, still.R,
+        chain_by_errors(sink, l, view, first_row, machine->end_place[l], 3, zero, turned.R, still.R,
                         frame[k].p, &frame[k], -1.0);
     } else { /* of the end: about its point as the chain has the platform, C T_home⁻¹ */
         const motion home = fill_motion(machine->home), still = unmoved();
@@ -153,7 +154,7 @@ SHARED void chain_by_numbers(const chain_sink *sink, int l, const chain_geometry
             for (int j = 0; j < 3; j++)
                 point[i] += carried.R[3 * i + j] * (machine->end[3 * l + j] + e[j]);
         }
-        chain_by_errors(sink, l, view, first_row, machine->end_place[l], e, carried.R, still.R, point,
+        chain_by_errors(sink, l, view, first_row, machine->end_place[l], 6, e, carried.R, still.R, point,
                         &frame[k], -1.0);
     }
     for (int a = 0; a < machine->actuators; a++) {
@@ -170,12 +171,14 @@ int CALL(chain_response)(const pkm_chains *machine, ptrdiff_t n, const double *g
                          const int32_t *column, int columns, int twists, double *jacobian)
 {
     enum { WIDEST = 6 * PKM_MAX_NUMBERS };
-    const int all = chains_fit(machine), m = map_m(machine->map), unknowns = m + machine->shared;
+    const int all = pkm_chain_count(machine), m = map_m(machine->map), unknowns = m + machine->shared;
     if (!all) return PKM_BAD_MACHINE;
+    if (columns < 0 || columns > (column ? machine->numbers : machine->actuators)) return PKM_BAD_COLUMN;
     int16_t place[PKM_MAX_NUMBERS];
     for (int k = 0; k < PKM_MAX_NUMBERS; k++) place[k] = -1;
     for (int c = 0; column && c < columns; c++) {
-        if (column[c] < 0 || column[c] >= machine->numbers) return PKM_BAD_COLUMN;
+        if (column[c] < 0 || column[c] >= machine->numbers || place[column[c]] >= 0)
+            return PKM_BAD_COLUMN; /* a number has one column */
         place[column[c]] = (int16_t)c;
     }
     for (int a = 0; !column && a < columns; a++) place[machine->drive_place[a]] = (int16_t)a;

@@ -107,6 +107,10 @@ int pkm_closure_count(const pkm_machine *machine);
 /* The same number, or 0 also where `order` is not one that pkm_prepare sets: what every call asks. */
 int pkm_prepared(const pkm_machine *machine);
 
+/* The rows that chains leave when each has eliminated the passive joints of its own, or 0 for a
+ * machine of chains the core cannot take: every call asks. The arrays are as long as the counts say. */
+int pkm_chain_count(const pkm_chains *machine);
+
 /* Before every other call of a machine: count how many limbs are `sharing` an actuator, and set
  * `order` from an elimination with exchanges at the home pose: later ones run in that order.
  * `near` holds the middle of each limb's stroke, or NaN where it states none; what is NaN becomes the

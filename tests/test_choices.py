@@ -59,9 +59,11 @@ def places(name: str, count: int) -> np.ndarray:
     return pk.sample_poses(pk.load(name), count)
 
 
-def plan(name: str, criterion: Any, count: int, seed: int) -> list[int]:
+def plan(name: str, criterion: Any, count: int, seed: int, weight: float = 0.0) -> list[int]:
     candidates = moved(places(name, 40), seed)
-    found = pk.plan_poses(pk.load(name), candidates, count, criterion=criterion, kind="pose")
+    found = pk.plan_poses(
+        pk.load(name), candidates, count, criterion=criterion, kind="pose", travel_weight=weight
+    )
     return found.indices.tolist()
 
 
@@ -91,6 +93,12 @@ def test_the_last_bit_of_the_candidates_does_not_choose_a_plan(name: str, criter
     for count in (4, 10):  # too few to identify everything, and enough
         plans = [plan(name, criterion, count, seed) for seed in (0, *SEEDS)]
         assert all(other == plans[0] for other in plans[1:])
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_the_last_bit_of_the_candidates_does_not_choose_a_tour(name: str) -> None:
+    plans = [plan(name, "prediction", 8, seed, weight=0.5) for seed in (0, *SEEDS)]
+    assert all(other == plans[0] for other in plans[1:])
 
 
 @pytest.mark.filterwarnings("ignore::pkmcal.exceptions.CalibrationWarning")

@@ -36,7 +36,7 @@ EXPORT int begin(int bytes, int numbers)
     PLACE(soft), PLACE(drive_place), PLACE(zero);
 #undef PLACE
     geometry = (const double *)(room + numbers);
-    return chains_fit(machine);
+    return pkm_chain_count(machine);
 }
 
 /* pose -> q, each angle at whatever turn it comes */

@@ -20,6 +20,7 @@ from pkmcal.cli.progress import progress
 from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.box import Box, in_box
+from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
@@ -87,6 +88,14 @@ def plan(
         float | None,
         typer.Option(metavar="X", help="Of the actuators, mm or rad; closure needs it."),
     ] = None,
+    travel_weight: Annotated[
+        float,
+        typer.Option(
+            metavar="W",
+            help="What a shorter tour is worth: of 0.5, one 10 % shorter is worth a predicted error"
+            " 5 % larger. 0: nothing.",
+        ),
+    ] = 0.0,
     free: Free = None,
     prior: Prior = None,
     unknown: Annotated[
@@ -105,7 +114,9 @@ def plan(
     seed: Seed = 0,
     out: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write poses.csv and commands.csv, the actuators."),
+        typer.Option(
+            metavar="DIR", help="Write poses.csv and commands.csv, the actuators, with targets."
+        ),
     ] = None,
     force: Force = False,
     json: Json = False,
@@ -150,6 +161,7 @@ def plan(
             target=_points(target or [], kinds),
             noise=_noise(noise, kinds),
             actuator_noise=actuator_noise,
+            travel_weight=travel_weight,
             free=chosen or None,
             prior=read_prior(prior or [], seen, chosen),
             unknown=[word("--unknown", each, UNKNOWN) for each in unknown or ()],
@@ -278,11 +290,17 @@ def _places(machine: Robot | SerialArm, path: PathLike[str]) -> FloatArray:
 
 
 def _write(made: Plan, out: Path, head: str) -> None:
-    units, kinds = made.robot.actuator_units, np.array(made.kinds)
-    write_poses(out / "poses.csv", made.poses, comment=head)
-    if len(set(made.kinds)) == 1:
-        write_commands(out / "commands.csv", units, made.actuators, comment=head)
-        return
-    for kind in set(made.kinds):
-        mine = made.actuators[kinds == kind]
-        write_commands(out / f"commands-{kind}.csv", units, mine, comment=head)
+    kinds = list(dict.fromkeys(made.kinds))
+    several = {"kind": made.kinds} if len(kinds) > 1 else {}
+    write_poses(out / "poses.csv", made.poses, several, comment=head)
+    for kind in kinds:
+        points = made.target.get(kind, np.empty((1, 0)))
+        mine = made.actuators[np.array(made.kinds) == kind]
+        at = np.tile(points, (len(mine), 1))
+        write_commands(
+            out / (f"commands-{kind}.csv" if several else "commands.csv"),
+            reading_units(made.robot),
+            np.repeat(mine, len(points), axis=0),
+            {f"target.{axis} [mm]": place for axis, place in zip("xyz", at.T, strict=False)},
+            comment=head,
+        )

@@ -50,7 +50,7 @@ class CorrectionGrid(Result):
         Error of interpolation of each actuator, mm or rad: the largest at the places half-way
         between nodes, the middles of all edges, faces and cells. No bound: it is largest there
         where the correction bends evenly; cubic interpolation has been seen a quarter further off
-        beside them.
+        beside them, and what a drive law's table or harmonics do between the nodes is not seen.
     position_error, position_error_rms : float
         Error of the position at these places, mm, by interpolation alone: largest and root mean
         square.

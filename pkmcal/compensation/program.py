@@ -12,16 +12,14 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import flag, instance
 from pkmcal.arguments import number as as_number
 from pkmcal.arguments import path as as_path
-from pkmcal.arrays import FloatArray, IntArray, as_rows, wrapped
+from pkmcal.arrays import FloatArray, IntArray, as_rows
+from pkmcal.compensation.commanded_machine import CommandedMachine
 from pkmcal.compensation.gcode import Move, Program, number
-from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.reading import MOST_TEXT, content
-from pkmcal.kinematics.complete import written_as
-from pkmcal.kinematics.robot import Robot, determines_others, require_parallel
+from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
 
-_LETTERS = dict(zip(POSE, "XYZABC", strict=True))
 _DECIMALS = 5  # 10 nm, 0.04 arc seconds
 _ROUNDS = 12
 _MOST_PARTS = 10_000
@@ -41,8 +39,9 @@ class CorrectedProgram(Result):
     correction : float
         The largest correction of a position, mm; of joint moves, NaN.
     chord_error : float
-        How far the calibrated machine leaves the straight lines between the points, at most, at
-        quarters of every segment; mm, an angle as its arc at ``robot.length``.
+        How far the calibrated machine leaves the straight lines between the points: the largest
+        found at quarters of every segment, and where it passes a node of a drive's table. No bound:
+        beside these places it may be a sixteenth more. mm, an angle as its arc at ``robot.length``.
     """
 
     text: str
@@ -55,7 +54,7 @@ class CorrectedProgram(Result):
         parts = f"{self.moves} moves in {self.segments} segments"
         if np.isfinite(self.correction):
             parts += f"; corrections up to {self.correction:.3g} mm"
-        yield f"{parts}; off the straight lines by {self.chord_error:.2g} mm at most"
+        yield f"{parts}; found off the straight lines by up to {self.chord_error:.2g} mm"
 
 
 def compensate_program(
@@ -83,7 +82,7 @@ def compensate_program(
         The program: absolute or relative lines and rapid moves in mm or inches, X Y Z A B C as
         poses of the robot, A B C in degrees.
     chord : float
-        How far the machine may leave the straight line of a G1, mm.
+        How far the machine may be found off the straight line of a G1, as `chord_error` is, mm.
     joints : bool
         Write actuator coordinates in place of poses, as X Y Z A B C in the order of the actuators,
         mm and deg, for a controller without kinematics; feed as inverse time, G93.
@@ -131,7 +130,7 @@ def compensate_program(
     place = as_path("path", path)
     data = content(path, MOST_TEXT)
     text = data.decode("utf-8", errors="surrogateescape")
-    machine = _Machine(controller, calibrated, flag("joints", joints))
+    machine = CommandedMachine(controller, calibrated, flag("joints", joints))
     begin, shape = as_rows("start", controller.home if start is None else start, 6)
     if shape != ():
         raise ArgumentError(f"start must have shape (6,), found {(*shape, 6)}")
@@ -140,84 +139,7 @@ def compensate_program(
     return _corrected(program, machine, chord)
 
 
-class _Machine:
-    """Commands of the controller for coordinates (N, axes) in mm and deg, and where they lead."""
-
-    def __init__(self, controller: Robot, calibrated: Robot, joints: bool) -> None:
-        self.axes = controller.moved
-        self.letters = "".join(_LETTERS[axis] for axis in self.axes)
-        self.joints = joints
-        self.written = "XYZABC"[: controller.n_actuators] if joints else self.letters
-        self.length = controller.length
-        self._places = [POSE.index(axis) for axis in self.axes]
-        self._turns = np.array([place >= 3 for place in self._places])
-        self._match = True if determines_others(controller) else None
-        self._controller, self._calibrated = controller, calibrated
-        self._degrees = np.array(
-            [np.degrees(1.0) if unit == "rad" else 1.0 for unit in controller.actuator_units]
-        )
-
-    def shown(self, pose: FloatArray) -> FloatArray:
-        """Of poses (..., 6) the axes, in mm and deg."""
-        found: FloatArray = pose[..., self._places]
-        return np.where(self._turns, np.degrees(found), found)
-
-    def _near(self, pose: FloatArray, coordinates: FloatArray) -> FloatArray:
-        """`shown`, of poses (N, 6) with rotations as coordinates (N, axes) write theirs."""
-        if self._controller.machine.turns_freely:
-            wanted = np.where(self._turns, np.radians(coordinates), coordinates)
-            pose = written_as(pose, self._places, wanted)
-        return self.shown(pose)
-
-    def _poses(self, coordinates: FloatArray, robot: Robot) -> FloatArray:
-        poses = np.tile(robot.home, (len(coordinates), 1))
-        poses[:, self._places] = np.where(self._turns, np.radians(coordinates), coordinates)
-        return poses
-
-    def command(self, coordinates: FloatArray) -> FloatArray:
-        """What to write so that the calibrated machine goes there; NaN where it cannot.
-
-        Angles are in the turn of the coordinates; those of actuators in any.
-        """
-        poses = self._poses(coordinates, self._calibrated)
-        q = self._calibrated.inverse(poses, match=self._match)
-        if self.joints:
-            found: FloatArray = q * self._degrees
-            return found
-        found = self._near(self._controller.forward(q, guess=poses).pose, coordinates)
-        turned: FloatArray = coordinates + np.degrees(wrapped(np.radians(found - coordinates)))
-        return np.where(self._turns, turned, found)
-
-    def continuous(self, commands: FloatArray) -> FloatArray:
-        """Commands (..., N, n) of which actuators take the short way from each to the next."""
-        found: FloatArray = commands.copy()
-        if not self.joints:
-            return found
-        turns = self._controller.turns * self._degrees
-        for k in np.flatnonzero(np.isfinite(turns)):
-            found[..., k] = np.unwrap(found[..., k], period=abs(turns[k]))
-        return found
-
-    def reached(self, command: FloatArray, near: FloatArray) -> FloatArray:
-        """Where the calibrated machine goes on a command."""
-        poses = self._poses(near, self._calibrated)
-        if self.joints:
-            q = command / self._degrees
-        else:
-            own = self._poses(command, self._controller)
-            q = self._controller.inverse(own, match=self._match)
-        return self._near(self._calibrated.forward(q, guess=poses).pose, near)
-
-    def distance(self, one: FloatArray, other: FloatArray) -> FloatArray:
-        """Between coordinates, mm; angles as arcs."""
-        turned = wrapped(np.radians((one - other)[:, self._turns])) * self.length
-        off: FloatArray = np.linalg.norm(
-            np.concatenate([(one - other)[:, ~self._turns], turned], axis=1), axis=1
-        )
-        return off
-
-
-def _corrected(program: Program, machine: _Machine, chord: float) -> CorrectedProgram:
+def _corrected(program: Program, machine: CommandedMachine, chord: float) -> CorrectedProgram:
     moves = program.moves
     odd = next((move for move in moves if move.relative or move.scale != 1.0), None)
     if machine.joints and odd is not None:
@@ -258,7 +180,11 @@ def _require(program: Program, which: IntArray, commands: FloatArray) -> None:
 
 
 def _parts(
-    program: Program, machine: _Machine, starts: FloatArray, targets: FloatArray, chord: float
+    program: Program,
+    machine: CommandedMachine,
+    starts: FloatArray,
+    targets: FloatArray,
+    chord: float,
 ) -> tuple[IntArray, float]:
     """Into how many parts each move goes, and how far the machine leaves the lines then."""
     moves = program.moves
@@ -288,13 +214,13 @@ def _parts(
 
 def _chord_errors(
     program: Program,
-    machine: _Machine,
+    machine: CommandedMachine,
     starts: FloatArray,
     targets: FloatArray,
     parts: IntArray,
     moves: IntArray,
 ) -> FloatArray:
-    """The largest distance (moves,) from the line, at quarters of every part."""
+    """The largest distance (moves,) from the line, at quarters and bends of every part."""
     which = np.repeat(np.arange(len(parts)), parts)
     first = np.concatenate([np.arange(count) for count in parts])
 
@@ -306,21 +232,24 @@ def _chord_errors(
     commands = [machine.command(end) for end in ends]
     for found in commands:
         _require(program, moves[which], found)
-    commands = machine.continuous(np.stack(commands, axis=1)).swapaxes(0, 1)
+    begin, end = machine.continuous(np.stack(commands, axis=1)).swapaxes(0, 1)
+    rows, shares = machine.bends(begin, end)
+    rows = np.concatenate([np.tile(np.arange(len(which)), len(_INSIDE)), rows])
+    shares = np.concatenate([np.repeat(_INSIDE, len(which)), shares])
+    of = which[rows]
+    meant = starts[of] + ((first[rows] + shares) / parts[of])[:, None] * (targets - starts)[of]
+    reached = machine.reached(begin[rows] + shares[:, None] * (end - begin)[rows], meant)
+    off = machine.distance(reached, meant)
+    _require(program, moves[of], off[:, None])
     worst = np.zeros(len(parts))
-    for t in _INSIDE:
-        meant = at((first + t) / parts[which])
-        reached = machine.reached((1 - t) * commands[0] + t * commands[1], meant)
-        off = machine.distance(reached, meant)
-        _require(program, moves[which], off[:, None])
-        np.maximum.at(worst, which, off)
+    np.maximum.at(worst, of, off)
     return worst
 
 
 class _Writer:
     """The lines of moves, one after the other: it knows which numbers the controller has."""
 
-    def __init__(self, program: Program, machine: _Machine) -> None:
+    def __init__(self, program: Program, machine: CommandedMachine) -> None:
         self._program, self._machine = program, machine
         self._last: list[float | None] = [None] * len(machine.written)
 

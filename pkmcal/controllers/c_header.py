@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -13,17 +12,17 @@ import numpy as np
 from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray
-from pkmcal.controllers import c_source
+from pkmcal.controllers import c_chains, c_limbs, c_source
 from pkmcal.controllers.c_source import Number
-from pkmcal.controllers.laws import require_no_pulleys
+from pkmcal.controllers.laws import require_no_tackles
 from pkmcal.controllers.rendering import rendered
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.laws import MOST_STEPS, ROUNDING, LawNumbers
-from pkmcal.core.library import AXES, DRIVERS, MAPS, ROWS, SLOTS
+from pkmcal.core.library import MAPS, SLOTS
 from pkmcal.core.poses import invert
+from pkmcal.core.pulleys import OWN_SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
-from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 # benchmarks of the hexapod: docs/controllers.md says how
@@ -33,6 +32,8 @@ _MEASURED = (
 )
 _ENUMERATORS = tuple(slot.upper().replace(".", "_") for slot in SLOTS)
 _GAIN = SLOTS.index("gain")
+_GROOVE = [SLOTS.index(slot) for slot in OWN_SLOTS]
+_NEARER, _TIE = 1e-12, 1e-15  # of turns that agree, as agreed_turn of csrc/inverse.h has them
 _UNUSED_FRAME = np.zeros(9)
 
 
@@ -41,7 +42,8 @@ def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double")
 
     Its functions are named after the file: ``delta.h`` has ``delta_inverse``, ``delta_forward`` and
     ``delta_jacobian``. They allocate nothing, keep no state, and use of the C library only the
-    square root and the absolute value. In double their inverse gives the bits of `Robot.inverse`.
+    square root and the absolute value. In double their inverse gives the bits of `Robot.inverse`,
+    or, where limbs are chains of joints, its numbers but for rounding.
 
     Parameters
     ----------
@@ -55,7 +57,8 @@ def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double")
     Raises
     ------
     ValueError
-        The machine has more closures than free coordinates; nothing is written.
+        The machine has more closures than free coordinates, joints behind its platform, or passive
+        joints that chains share; nothing is written.
     OSError
         The folder does not exist or cannot be written.
 
@@ -83,107 +86,54 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
     """The header whose names begin with `prefix`."""
     word("number", number, ("double", "float"))
     machine = robot.machine
-    require_no_pulleys(robot, "a header")
-    if robot.model.chains is not None:
-        raise ArgumentError(f"robot: {robot.name} has chains of joints; a header holds other limbs")
+    require_no_tackles(robot, "a header")
     if machine.rows != machine.m:
         raise ArgumentError(
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"
             " a header holds machines with as many of both"
         )
-    _require_turns(robot)
     return rendered("robot.h.jinja", _contents(robot, prefix, number))
-
-
-def _require_turns(robot: Robot) -> None:
-    """Refuse cranks that share an actuator whose whole turn may leave one of them elsewhere."""
-    for a in range(robot.n_actuators):
-        sharing = [
-            (KINDS[limb.kind].actuator_unit, abs(g[_GAIN]))
-            for limb, g in zip(robot.model.limbs, robot.slots, strict=True)
-            if limb.actuator == a
-        ]
-        geared = len(set(sharing)) > 1 or (len(sharing) > 1 and robot.model.driven)
-        if "rad" in dict(sharing) and geared:
-            raise ArgumentError(
-                f"robot: limbs of {robot.name} share actuator q{a + 1} with different gears or"
-                " drive laws; which of its turns they agree on is more than a header finds"
-            )
 
 
 def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
     """What the template says, by the names in it."""
     machine, model = robot.machine, robot.model
-    limbs = model.limbs
-    map, m, n = model.map, machine.m, machine.actuators
-    kinds = [KINDS[limb.kind] for limb in limbs]
-    drivers = [driver for driver in DRIVERS if driver in {kind.driver for kind in kinds}]
-    rows = _rows(robot)
-    actuators = [limb.actuator for limb in limbs]
-    lengths = sum(name in "xyz" for name in MAPS[map])
+    map = model.map
     laws = _laws(robot)
-    turning = [bool(each) for each in machine.struct.angle[0 : len(limbs)]]
-    needed = _needed(robot, drivers, [row["name"] for row in rows])
+    made = c_limbs if model.chains is None else c_chains
+    own, called = made.contents(robot, prefix, number)
+    needed = ["pose_frame", *([] if robot.frames.trivial else ["pose_compose"])]
+    needed += [f"map_{map}_{part}" for part in _MAP_PARTS] + called
     needed += _LAWS[: 2 if laws else 0] + _LAWS[2:3] * _any(laws, "waves")
     functions = c_source.with_callees(needed + _LAWS[3:] * _any(laws, "points"))
     state = int(
         re.findall(r"state\[(\d+)\]", c_source.functions()[f"map_{map}_frame"].arguments)[0]
     )
-
-    def one(value: float) -> str:
-        return c_source.literal(value, number)
-
-    def several(values: Any) -> str:
-        return ", ".join(one(value) for value in np.ravel(list(values)))
-
-    def whole(values: Any) -> str:
-        return ", ".join(str(int(value)) for value in values)
-
-    first, second, frame, axis = prepared(robot)
-    texts = [c_source.as_c99(f, prefix, number, _ENUMERATORS) for f in functions]
-    slots = c_source.slots_read(texts, prefix, _ENUMERATORS)
-    blank = np.zeros((1, n))
-    _, own, _ = machine.bare(robot.slots, blank)
+    one, several, whole = c_source.writers(number)
+    texts = [c_source.as_c99(f, prefix, number, c_limbs.ENUMERATORS) for f in functions]
+    if model.chains is None:
+        slots = c_source.slots_read(texts, prefix, c_limbs.ENUMERATORS)
+        own |= c_limbs.numbers(robot, slots, prefix, several)
+        texts = c_source.of_slots(texts, prefix, c_limbs.ENUMERATORS, slots)
     wide = number == "double"
     size = machine.struct.size
-    return {
+    inverse, step, unknowns = own.pop("calls")
+    says: dict[str, Any] = own | {
         "title": re.sub(r"[^ -~]|\*/|/\*", "?", robot.name),
         "P": prefix,
         "U": prefix.upper(),
         "real": number,
         "measured": _MEASURED,
-        "n": n,
-        "m": m,
-        "limbs": len(limbs),
+        "n": machine.actuators,
+        "m": machine.m,
         "map": map,
         "free": ", ".join(MAPS[map]),
-        "lengths": lengths,
+        "lengths": sum(name in "xyz" for name in MAPS[map]),
         "state": state,
         "units": ", ".join(f"q{i} [{unit}]" for i, unit in enumerate(robot.actuator_units, 1)),
         "sqrt": "sqrt" if wide else "sqrtf",
         "fabs": "fabs" if wide else "fabsf",
         "home": several(robot.home),
-        "slots": [f"{prefix}_{name}" for name in slots],
-        "axes": len(AXES),
-        "numbers": [several(row[[_ENUMERATORS.index(slot) for slot in slots]]) for row in own],
-        "first": [several(row) for row in first],
-        "second": [several(row) for row in second],
-        "frame": [several(row) for row in frame],
-        "axis": [", ".join(f"{{ {several(each)} }}" for each in row) for row in axis],
-        "branch": several([float(limb.branch) for limb in limbs]),
-        "rows": rows,
-        "drivers": [{"name": driver} for driver in drivers],
-        "driver": whole(drivers.index(kind.driver) for kind in kinds),
-        "shared": n < len(limbs),
-        "which": f"{prefix}_actuator[i]" if n < len(limbs) else "i",
-        "actuator": whole(actuators),
-        "leads": whole(actuators.index(actuator) == i for i, actuator in enumerate(actuators)),
-        "turning": any(turning),
-        "all_turning": all(turning),
-        "angle": whole(turning),
-        "near": several(
-            machine.struct.near[i] if turns else 0.0 for i, turns in enumerate(turning)
-        ),
         "turn": one(2.0 * np.pi),
         "beta": MAPS[map].index("beta") if machine.turns_freely else None,
         "laws": [
@@ -201,7 +151,6 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
         "corrected": whole(bool(law.waves or law.points) for law in laws),
         "most_steps": MOST_STEPS,
         "law_rounding": one(ROUNDING if wide else 1e-6),
-        "sharing": several([float(actuators.count(i)) for i in range(n)]),
         "framed": None
         if robot.frames.trivial
         else {
@@ -209,15 +158,10 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
             for frame_name, given in (("base", model.base_frame), ("tool", model.tool_frame))
             for name, pose in _both_ways(frame_name, given)
         },
-        "functions": c_source.of_slots(texts, prefix, _ENUMERATORS, slots),
+        "functions": texts,
         "length": f"{robot.length:.6g}",
         "per_length": one(1.0 / robot.length),
         "size": one(size),
-        # what a step leaves is its square by pivot and size: 3e-14 and 2e-7 of the size
-        "settled": one((1e-9 if wide else 2e-5) * size),
-        "least_pivot": one(2e-5 if wide else 1e-3),
-        "shortest": one(1e-30 if wide else 1e-15),
-        "longest": one(1e30 if wide else 1e15),
         "largest": "DBL_MAX" if wide else "FLT_MAX",
         "zero": one(0.0),
         "half": one(0.5),
@@ -226,25 +170,13 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
         "most_angle": one(1e5 if wide else 1e3),
         "c": {name: one(value) for name, value in _constants(number).items()},
         "rounding": f"{4e-7 * size:.1g}",
-        "inverse_operations": _counted(functions, _inverse_calls(robot)),
-        "step_operations": _counted(functions, _step_calls(robot, rows), elimination=m),
+        "inverse_operations": _counted(functions, inverse),
+        "step_operations": _counted(functions, step, elimination=unknowns),
     }
-
-
-def _needed(robot: Robot, drivers: Sequence[str], rows: Sequence[str]) -> list[str]:
-    """Names of the generated functions that the template calls."""
-    map = robot.model.map
-    needed = ["pose_frame", *([] if robot.frames.trivial else ["pose_compose"])]
-    needed += [f"map_{map}_{part}" for part in _MAP_PARTS]
-    needed += ["limb_joint", "limb_drive", "limb_command", "sphere_row"]
-    needed += [f"{driver}_{part}" for driver in drivers for part in _DRIVER_PARTS]
-    return needed + [f"{row}_row" for row in rows]
+    return says
 
 
 _MAP_PARTS = ("from_pose", "frame", "retract", "angles", "pull", "free")
-_DRIVER_PARTS = ("inverse", "anchor", "radius", "derivatives")
-
-
 _LAWS = ["law_drive", "law_drive_inverse", "law_harmonic", "law_segment"]
 
 
@@ -260,7 +192,8 @@ def _laws(robot: Robot) -> list[LawNumbers]:
     if not isinstance(machine, DrivenMachine):
         return []
     for d, why in machine.laws.doubts(robot.slots).items():
-        raise ArgumentError(f"robot: limb {d + 1} of {robot.name}: its drive law: {why}")
+        limb = robot.model.limb_of_drive(d) + 1
+        raise ArgumentError(f"robot: limb {limb} of {robot.name}: its drive law: {why}")
     return machine.laws.numbers_of(robot.slots)
 
 
@@ -277,52 +210,6 @@ def _starts(laws: list[LawNumbers], part: str) -> str:
 
 def _largest(number: Number) -> float:
     return float(np.finfo(np.float64 if number == "double" else np.float32).max)
-
-
-def _rows(robot: Robot) -> list[dict[str, Any]]:
-    """The kinds of rows beside the sphere that some limb has."""
-    limbs = robot.model.limbs
-    of_limb = [KINDS[limb.kind].all_rows(limb.couple > 0) for limb in limbs]
-    levers = {limb.couple for limb in limbs if limb.couple > 0} or {0.0}
-    if len(levers) > 1:
-        raise ArgumentError(f"robot: the limbs of {robot.name} have different couple lengths")
-    (lever,) = levers
-    places = c_source.axes_of_rows()
-    return [
-        {
-            "name": row,
-            "base": places[row][0],
-            "platform": places[row][1],
-            "lever": repr(lever),
-            "everywhere": all(row in rows for rows in of_limb),
-            "has": ", ".join(str(int(row in rows)) for rows in of_limb),
-        }
-        for row in ROWS
-        if any(row in rows for rows in of_limb)
-    ]
-
-
-def prepared(robot: Robot) -> tuple[list[FloatArray], ...]:
-    """Of each limb what follows from its numbers alone, as the core computes it.
-
-    First and second direction of its anchor, the fixed frame of its base axis, and its axes.
-    """
-    first, second, frames, axes = [], [], [], []
-    for limb, g in zip(robot.model.limbs, robot.slots.tolist(), strict=True):
-        driver = KINDS[limb.kind].driver
-        names = dict(zip(_ENUMERATORS, range(len(SLOTS)), strict=True))
-        given = {"g": g, **names, "F": limb.frame.ravel().tolist()}
-        one, other = c_source.evaluate(f"{driver}_directions", given, ("first", "second"))
-        own = np.zeros((len(AXES), 3))
-        for place, axis in enumerate(AXES):
-            if axis in limb.frames:
-                frame = {"F": limb.frames[axis].ravel().tolist()}
-                own[place] = c_source.evaluate(f"{axis}_axis", given | frame, ("axis",))[0]
-        first.append(np.array(one))
-        second.append(np.array(other))
-        frames.append(limb.frame.ravel() if driver != "length" else _UNUSED_FRAME)
-        axes.append(own)
-    return first, second, frames, axes
 
 
 def _both_ways(name: str, pose: FloatArray | None) -> tuple[tuple[str, FloatArray], ...]:
@@ -343,21 +230,7 @@ def _constants(number: Number) -> dict[str, float]:
     return known
 
 
-def _inverse_calls(robot: Robot) -> list[str]:
-    calls = ["pose_frame"]
-    for limb in robot.model.limbs:
-        calls += ["limb_joint", f"{KINDS[limb.kind].driver}_inverse", "limb_command"]
-    return calls
-
-
-def _step_calls(robot: Robot, rows: list[dict[str, Any]]) -> list[str]:
-    map = robot.model.map
-    calls = [f"map_{map}_frame", f"map_{map}_retract"]
-    for limb in robot.model.limbs:
-        own = KINDS[limb.kind].all_rows(limb.couple > 0)
-        for row in ("sphere", *(row["name"] for row in rows if row["name"] in own)):
-            calls += [f"{row}_row", f"map_{map}_pull"]
-    return calls
+_SINCOS = np.array([18, 20, 0, 0])  # its operations: +, *, /, sqrt
 
 
 def _counted(functions: list[c_source.CFunction], calls: list[str], elimination: int = 0) -> str:
@@ -365,9 +238,12 @@ def _counted(functions: list[c_source.CFunction], calls: list[str], elimination:
     by_name = {function.name: function for function in functions}
     count = np.zeros(4, dtype=int)
     for name in calls:
+        if name == "sincos":
+            count += _SINCOS
+            continue
         count += by_name[name].operations
         body = by_name[name].body
-        count += body.count("FN(sincos)(") * np.array([18, 20, 0, 0])
+        count += body.count("FN(sincos)(") * _SINCOS
         count += body.count("arctangent2(") * np.array([16, 19, 1, 0])
     m = elimination
     products = sum((m - k - 1) * (m - k) for k in range(m)) + m * (m - 1) // 2

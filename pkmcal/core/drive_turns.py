@@ -12,9 +12,9 @@ import numpy as np
 from pkmcal.arrays import FloatArray, wrapped
 from pkmcal.core.laws import Laws
 
-_MOST_TURNS = 8  # either way
-_AGREE = 1e-7  # rad of the first drive: rounding of a pose that the machine takes
-_PER_TURN = 1e-2  # rad that drives have to agree better for each turn that is farther
+MOST_TURNS = 8  # either way
+AGREE = 1e-7  # rad of the first drive: rounding of a pose that the machine takes
+PER_TURN = 1e-2  # rad that drives have to agree better for each turn that is farther
 
 
 def agreed_turns(
@@ -52,7 +52,7 @@ def agreed_turns(
         nearest = way[:, d] + 2 * np.pi * np.rint((about[:, d] - way[:, d]) / (2 * np.pi))
         out[:, d] = nearest
         rows, least = np.flatnonzero(np.isfinite(nearest)), np.full(len(way), np.inf)
-        for k in sorted(range(-_MOST_TURNS, _MOST_TURNS + 1), key=abs):
+        for k in sorted(range(-MOST_TURNS, MOST_TURNS + 1), key=abs):
             at = nearest[rows] + 2 * np.pi * k
             come = approach if approach is None or approach.ndim == 1 else approach[rows]
             q = np.zeros((len(rows), len(driven)))
@@ -65,8 +65,8 @@ def agreed_turns(
                     off = wrapped(off) if laws.drives[j].angle else off
                     as_first = np.abs(off * there.slope[:, d] / there.slope[:, j])
                     apart = np.maximum(apart, as_first)
-            cost = np.where(np.isnan(apart), np.inf, apart + _PER_TURN * (1 + abs(k)))
-            cost[apart <= _AGREE] = 0.0
+            cost = np.where(np.isnan(apart), np.inf, apart + PER_TURN * (1 + abs(k)))
+            cost[apart <= AGREE] = 0.0
             better = cost < least[rows]
             out[rows[better], d], least[rows[better]] = at[better], cost[better]
             rows = rows[cost > 0.0]

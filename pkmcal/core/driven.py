@@ -354,5 +354,9 @@ class DrivenMachine(CoreMachine):
         """Look at each limb at poses (N, 6), as `pkmcal.core.machine.Machine.limbs`."""
         return self._of_limbs.limbs(self._bare(slots), pose)
 
+    def pulls(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """Force by limbs that push with 1, as `pkmcal.core.machine.Machine.pulls`."""
+        return self._of_limbs.pulls(self._bare(slots), pose)
+
 
 CompiledMachine = AnyMachine | DrivenMachine

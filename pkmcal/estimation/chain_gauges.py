@@ -39,11 +39,9 @@ def frame_motions(
     -------
     combinations : ndarray (d, k)
         Orthonormal; of the columns.
-    alone : ndarray of bool (12,)
-        Which motions are among them by themselves: x y z and about x y z of the base, then of the
-        platform.
+    motions : ndarray (12, k)
+        What they are, orthonormal: along and about x y z of the base, then of the platform.
     """
-    alone = np.zeros(12, dtype=bool)
     pose, q = _around_home(robot)
     own = parameters.geometry
     beside = np.delete(unidentifiable, own, axis=0)  # frames, targets, drifts
@@ -56,13 +54,12 @@ def frame_motions(
         -1, 12
     )
     if not (len(pose) and np.isfinite(effects).all()):
-        return np.empty((changes.shape[1], 0)), alone
+        return np.empty((changes.shape[1], 0)), np.empty((12, 0))
     others = np.vstack([_across(motions, effects), np.abs(effects).max() * beside])
     _, size, rows = np.linalg.svd(others, full_matrices=True)
     size = np.append(size, np.zeros(len(rows) - len(size)))
     found = rows[size <= _OUTSIDE * np.linalg.norm(effects, axis=0).max()].T
-    off = np.linalg.norm(_across(effects @ found, motions), axis=0)
-    return found, np.asarray(off <= _OUTSIDE * np.linalg.norm(motions, axis=0))
+    return found, np.linalg.qr(np.linalg.pinv(motions) @ effects @ found).Q
 
 
 def _across(span: FloatArray, columns: FloatArray) -> FloatArray:

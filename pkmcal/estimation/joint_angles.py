@@ -60,7 +60,7 @@ def swivels(
     by_twist = np.linalg.solve(outward.transpose(0, 2, 1), by_own[:, :, None])[:, :, 0]
     limb, width = int(joint.removeprefix("swivel")) - 1, robot.slots.shape[1]
     at = robot.geometry.slot_index - limb * width
-    mine = np.flatnonzero((at >= 0) & (at < len(SLOTS)))
+    mine = np.flatnonzero((at >= 0) & (at < len(SLOTS)))  # those behind do not turn it
     return angle, by_twist, by_limb[:, at[mine]] @ robot.geometry.chain[mine][:, places]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 from collections.abc import Iterator, Mapping
 from importlib import resources
@@ -53,6 +54,7 @@ def is_built_in(robot: str) -> bool:
     return robot in _builtin()
 
 
+@functools.cache
 def _builtin() -> dict[str, Any]:
     return {
         name: _BUILTIN / folder / f"{name}.toml"

@@ -360,7 +360,17 @@ class Kinematics:
         if match is None:
             raise ArgumentError("match must be True or names of coordinates, found None")
         places = matched_coordinates(match, self.moved)
-        return complete(self.machine, self.model.map, self.slots, self.frames, rows, places, near)
+        parts = self.machine, self.model.map, self.slots, self.frames
+        found = complete(*parts, rows, places, near)
+        # what is not matched may have started on the other side of a singularity
+        lost = np.flatnonzero(np.isnan(found.q).any(axis=1))
+        if lost.size:
+            start = np.tile(self.home, (len(lost), 1))
+            start[:, places] = rows[lost][:, places]
+            about = near if near is None or near.ndim == 1 else near[lost]
+            for each, again in zip(found, complete(*parts, start, places, about), strict=True):
+                each[lost] = again
+        return found
 
     def assembly_problem(self, q: FloatArray) -> AssemblyProblem:
         """The closures at coordinates (n,) or (N, n), for certificates and searches for modes."""

@@ -92,7 +92,8 @@ class Robot(Kinematics, Result):
         Parameters
         ----------
         pose : array_like (..., 6)
-            x y z in mm, α β γ in rad; what is not matched is where the search starts.
+            x y z in mm, α β γ in rad; what is not matched is where the search starts; it
+            starts once more from home where that leads nowhere.
         match : True or names of coordinates
             As many as the machine has degrees of freedom, in the user's frames; True takes those
             its file declares, or those that it moves (`moved`).
@@ -100,7 +101,7 @@ class Robot(Kinematics, Result):
         Returns
         -------
         ndarray (..., 6)
-            NaN where the machine has no such pose.
+            NaN where no such pose was found, nor with what is not matched begun at home.
 
         Examples
         --------

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from os import PathLike
 
+import numpy as np
+
 from pkmcal.arrays import FloatArray
 from pkmcal.files.column_names import known_as
 from pkmcal.files.csv_table import Table
@@ -20,7 +22,8 @@ def read_commands(path: str | PathLike[str], units: Sequence[str]) -> FloatArray
         A file with the columns q1 to qn in any order; others, such as what was measured there,
         are not looked at.
     units : sequence of str, n
-        "mm" or "rad": what the machine's actuators are.
+        "mm", "rad" or "counts": what the machine's actuators are, as `reading_units` has it. Counts
+        may be called mm, too.
 
     Returns
     -------
@@ -35,13 +38,21 @@ def read_commands(path: str | PathLike[str], units: Sequence[str]) -> FloatArray
     """
     table = Table(path)
     table.rename(known_as)
-    return table.stacked([f"q{i + 1}" for i in range(len(units))], units)
+    names = [f"q{i + 1}" for i in range(len(units))]
+    table.require(names)
+    known = {"counts": ("mm", "count")}  # in mm they were written once
+    columns = [
+        table.numbers(name, *known.get(unit, (unit,)))[0]
+        for name, unit in zip(names, units, strict=True)
+    ]
+    return np.stack(columns, axis=1)
 
 
 def write_commands(
     path: str | PathLike[str],
     units: Sequence[str],
     commands: FloatArray,
+    columns: dict[str, FloatArray] | None = None,
     *,
     comment: str = "",
 ) -> None:
@@ -55,6 +66,8 @@ def write_commands(
         "mm" or "rad".
     commands : ndarray (N, n)
         mm and rad.
+    columns : dict of str to ndarray (N,), optional
+        Others beside them, by heading, which says the unit.
     comment : str, optional
         Lines for its head, each with its ``#``.
 
@@ -63,5 +76,7 @@ def write_commands(
     OSError
         The folder does not exist or cannot be written.
     """
-    headings = [f"q{i + 1} [{unit}]" for i, unit in enumerate(units)]
-    write_csv(path, headings, (map(repr, row) for row in commands.tolist()), comment=comment)
+    others = columns or {}
+    headings = [*(f"q{i + 1} [{unit}]" for i, unit in enumerate(units)), *others]
+    rows = np.column_stack([commands, *others.values()]).tolist()
+    write_csv(path, headings, (map(repr, row) for row in rows), comment=comment)

@@ -51,15 +51,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import arguments
-from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray, TextArray, as_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError, FileError
 from pkmcal.files.column_names import SYNONYMS
 from pkmcal.files.csv_table import Table
+from pkmcal.kinematics.reading_units import Actuated
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements import orientation_columns
 from pkmcal.measurements.actuator_columns import (
-    Actuated,
     actuators_in,
     columns_of_actuators,
     compare,
@@ -67,8 +66,8 @@ from pkmcal.measurements.actuator_columns import (
 )
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.components import KINDS, Kind
-from pkmcal.measurements.join import JOINS, Join
 from pkmcal.measurements.join import join as joined
+from pkmcal.measurements.join import way_and_shift
 from pkmcal.measurements.kind_columns import (
     component_names,
     kinds_in,
@@ -107,7 +106,7 @@ def read_measurements(
     robot: Actuated | None = None,
     *,
     controller: str | PathLike[str] | None = None,
-    join: Join = "auto",
+    join: str = "auto",
     ignore: str | Sequence[str] = (),
     rename: Mapping[str, str] | None = None,
     header: Sequence[str] = (),
@@ -131,7 +130,7 @@ def read_measurements(
         tells orders of quaternions apart, and its gains say what a step is.
     controller : str or path, optional
         A log of the controller that has the actuators where the file has none.
-    join : {"auto", "name", "row", "time"}
+    join : {"auto", "name", "row", "time", "row+1", "row-1", ...}
         How a row of the log is found: by the name of the point or of its pose, by the order of
         the rows, by time-stamp (the last row at or before it). By default the first that works of
         name, time and row.
@@ -178,7 +177,7 @@ def read_measurements(
         )
     how = layout(ignore, rename, header, units)
     joints: Sequence[str] = getattr(robot, "joint_names", None) or ()
-    table = _table(path, controller, word("join", join, JOINS), how, joints)
+    table = _table(path, controller, join, how, joints)
     split_names(table)
     number_groups(table)
     several = several_targets(table)
@@ -306,11 +305,12 @@ def _probed(
 def _table(
     path: str | PathLike[str],
     controller: str | PathLike[str] | None,
-    how: Join,
+    join: str,
     columns: Layout,
     joints: Sequence[str],
 ) -> Table:
     """The table of a file, with the actuators of a controller's log."""
+    way, shift = way_and_shift(join)
     if controller is None:
         return open_table(path, columns, joints)
     log_columns = replace(columns, header=())
@@ -323,7 +323,7 @@ def _table(
     for name in seen:
         if not any(_has(each, name) for each in (table, log)) and name not in columns.ignore:
             raise table.header_error(f"no column {name!r} to rename, nor in {log.path}")
-    joined(table, log, how)
+    joined(table, log, way, shift)
     return table
 
 

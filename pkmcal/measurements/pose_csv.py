@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from os import PathLike
 
 import numpy as np
@@ -42,7 +43,7 @@ def read_poses(path: str | PathLike[str], robot: Robot) -> FloatArray:
     """
     table = Table(path)
     table.rename(known_as)
-    table.leave_out(BESIDE)
+    table.leave_out((*BESIDE, "kind"))
     table.refuse_unknown(POSE.__contains__, POSE)
     poses = np.repeat(robot.home[None], len(table), axis=0)
     for k, name in enumerate(POSE):
@@ -54,7 +55,7 @@ def read_poses(path: str | PathLike[str], robot: Robot) -> FloatArray:
 def write_poses(
     path: str | PathLike[str],
     poses: FloatArray,
-    columns: dict[str, FloatArray] | None = None,
+    columns: Mapping[str, FloatArray | Sequence[str]] | None = None,
     *,
     comment: str = "",
 ) -> None:
@@ -66,7 +67,7 @@ def write_poses(
         `read_poses` reads it back, to 1e-6 mm, where there are no other columns.
     poses : ndarray (N, 6)
         mm and rad.
-    columns : dict of str to ndarray (N,), optional
+    columns : dict of str to ndarray (N,) or sequence of str, optional
         By heading, which says the unit.
     comment : str, optional
         Lines for its head, each with its ``#``.
@@ -78,8 +79,12 @@ def write_poses(
     cells = (
         [
             *(display.fixed(float(v), _DECIMALS[u]) for v, u in zip(row, units, strict=True)),
-            *(f"{column[i]:.8g}" for column in others.values()),
+            *(_cell(column[i]) for column in others.values()),
         ]
         for i, row in enumerate(shown)
     )
     write_csv(path, [*headings, *others], cells, comment=comment)
+
+
+def _cell(value: object) -> str:
+    return value if isinstance(value, str) else f"{value:.8g}"

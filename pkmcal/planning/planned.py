@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import word, words
-from pkmcal.arrays import FloatArray, IntArray, as_rows
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
@@ -37,18 +37,17 @@ def planned(
     robot: Calibratable,
     q: FloatArray,
     kind: Kind,
-    target: ArrayLike | None,
+    several: FloatArray | None,
     noise: float | Tracker,
     actuator_noise: ArrayLike | None,
 ) -> Measurements:
-    """What would be measured, the rows of a pose one after another."""
+    """What would be measured, the rows of a pose one after another; `several` are targets."""
     surplus = isinstance(robot, Robot) and pose_steps.surplus(robot) > 0
     if surplus and actuator_noise is None:
         raise ArgumentError(
             f"actuator_noise: {robot.name} has more actuators than ways to move, which are"
             " measured, too: state how well they are read"
         )
-    several = None if target is None else as_rows("target", target, 3)[0]
     count = 1 if several is None else len(several)
     rows = np.repeat(q, count, axis=0)
     if kind == "closure":
@@ -145,10 +144,11 @@ def design_of(
         frame = rigid @ ways[:, : np.count_nonzero(sizes > _UNIDENTIFIABLE * sizes[0])]
         flat = aimed.reshape(len(moved), -1)
         return design((flat - frame @ (frame.T @ flat)).reshape(aimed.shape)), True
-    basis = sparse_basis(made.unidentifiable, chosen.names)
+    first = sparse_basis(made.unidentifiable, chosen.names)[:, 0]
+    unknown = as_sum(first, chosen.names, chosen.units, chosen.scale)
     raise ArgumentError(
-        f"candidates: not even all of them identify {as_sum(basis[:, 0], chosen.names)}, which"
-        " moves the targets; offer others, free fewer parameters or state a prior"
+        f"candidates: not even all of them identify {unknown}, which moves the targets;"
+        " offer others, free fewer parameters or state a prior"
     )
 
 

@@ -192,6 +192,17 @@ def test_a_plan_of_two_instruments_has_commands_for_each(run: Any, refused: Any)
         for kind in ("position", "distance")
     }
     assert rows == {"position": 8, "distance": 5} and not Path("plan/commands.csv").exists()
+    table = Path("plan/poses.csv").read_text().splitlines()
+    heads = next(line for line in table if not line.startswith("#"))
+    assert heads.endswith(",gamma [deg],kind")
+    assert sorted(line.rpartition(",")[2] for line in table[-13:]) == [
+        *["distance"] * 5, *["position"] * 8,
+    ]  # fmt: skip
+    assert len(read_poses("plan/poses.csv", pk.load("hexapod"))) == 13
+    lines = Path("plan/commands-distance.csv").read_text().splitlines()
+    assert lines[-6].endswith(",target.x [mm],target.y [mm],target.z [mm]")
+    assert all(line.endswith(",0.0,0.0,-300.0") for line in lines[-5:])
+    assert "target" not in Path("plan/commands-position.csv").read_text().split("q1")[1]
     assert "without --count and --accuracy" in refused(*arguments, "--count", "3")
     assert "expected KIND=N" in refused("plan", "hexapod", "--kind", "position=x")
     assert "the plan has position; found 'pose'" in refused(
@@ -201,3 +212,36 @@ def test_a_plan_of_two_instruments_has_commands_for_each(run: Any, refused: Any)
     assert "stands alone" in refused(
         "plan", "hexapod", "--kind", "pose=3", "--target", "1,2,3", "--target", "pose=1,2,3"
     )
+
+
+def test_what_a_plan_of_two_reflectors_lists_is_calibrated_with_what_was_read(run: Any) -> None:
+    """A row for each of them at each pose, with its place: only x, y and z have to be added."""
+    arguments = ("plan", "hexapod", "--count", "8", "--free", "offset*")
+    reflectors = ("--target", "100,0,50", "--target", "-80,60,50")
+    assert run(*arguments, *reflectors, "--out", "plan").exit_code == 0
+    lines = Path("plan/commands.csv").read_text().splitlines()
+    heads = next(i for i, line in enumerate(lines) if line.startswith("q1"))
+    robot = pk.load("hexapod")
+    q = read_commands("plan/commands.csv", ("mm",) * 6)
+    places = np.tile([[100.0, 0, 50], [-80, 60, 50]], (8, 1))
+    assert len(q) == 16 and (q[::2] == q[1::2]).all()
+    true = robot.replace({"offset2": robot.geometry["offset2"] + 0.7})
+    seen = pk.VirtualMachine(true, 0.005).measure(q, "position", places).values
+    cells = [",".join(map(repr, row)) for row in seen.tolist()]
+    added = [*lines[:heads], lines[heads] + ",x [mm],y [mm],z [mm]"]
+    added += [f"{line},{cell}" for line, cell in zip(lines[heads + 1 :], cells, strict=True)]
+    Path("measured.csv").write_text("\n".join(added) + "\n")
+    found = json.loads(
+        run("calibrate", "hexapod", "measured.csv", "--free", "offset*", "--json").stdout
+    )
+    there = found["parameters"]["offset2"]
+    assert there["value"] - robot.geometry["offset2"] == pytest.approx(0.7, abs=5 * there["stderr"])
+
+
+def test_a_shorter_tour_has_its_price(run: Any) -> None:
+    plain, short = (
+        json.loads(run("plan", "2tpr2tps", "--prior", "0.5", "--travel-weight", w, "--json").stdout)
+        for w in ("0", "1")
+    )
+    assert short["travel"] < 0.8 * plain["travel"] and short["predicted"] > plain["predicted"]
+    assert short["travel_unweighted"] == plain["travel"] == plain["travel_unweighted"]

@@ -12,6 +12,7 @@ import pytest
 import pkmcal as pk
 
 from .. import robots
+from ..driven import content, parsed
 
 DELTA = pk.load("linear-delta")
 OFF = {"rod1": 215.6, "base2.x": DELTA.geometry["base2.x"] + 0.4, "offset3": 0.3}
@@ -65,7 +66,7 @@ def followed(text: str, letters: str = "XYZ") -> Any:
 
 
 def in_pose(rows: Any) -> Any:
-    return np.pad(rows, ((0, 0), (0, 3)))
+    return np.concatenate([rows, np.zeros_like(rows)], axis=-1)
 
 
 def test_the_machine_goes_where_the_program_meant(tmp_path: Path) -> None:
@@ -314,3 +315,34 @@ def test_machines_that_are_not_alike_are_refused(tmp_path: Path) -> None:
     for other in (pk.load("rotary-delta"), robots.hexapod()):
         with pytest.raises(pk.ArgumentError, match="machine of the controller with other numbers"):
             pk.compensate_program(DELTA, other, tmp_path / "a.nc")
+
+
+@pytest.mark.parametrize("joints", [False, True])
+@pytest.mark.parametrize("seed", range(3))
+def test_bends_of_a_table_are_looked_at_wherever_they_are(
+    seed: int, joints: bool, tmp_path: Path
+) -> None:
+    """Between quarters of a segment a kink hides; the path is judged at 1000 places of each."""
+    rng = np.random.default_rng(seed)
+    data = content(DELTA)
+    home = DELTA.inverse(DELTA.home)
+    for limb, q in zip(data["limb"], home, strict=True):
+        nodes = q + np.sort(rng.uniform(-90, 90, 9))
+        limb["drive"] = {"table": np.column_stack([nodes, rng.uniform(-0.2, 0.2, 9)]).tolist()}
+        limb["stroke"] = [-2000.0, 2000.0]
+    machine = parsed(data)
+    path = tmp_path / "part.gcode"
+    path.write_text("G1 X-70 Y-20 Z5 F900\nG1 X70 Y20 Z25 F900\n")
+    controller = machine.replace({name: 0.0 for name in machine.geometry.names if "table" in name})
+    found = pk.compensate_program(controller, machine, path, chord=0.02, joints=joints)
+    rows = followed(found.text)
+    shares = np.linspace(0, 1, 1001)[:, None, None]
+    between = (1 - shares) * rows[:-1] + shares * rows[1:]
+    q = between if joints else controller.inverse(in_pose(between))
+    start, way = np.array([-70.0, -20.0, 5.0]), np.array([140.0, 40.0, 20.0])
+    k = np.arange(len(rows) - 1)[:, None]
+    meant = start + (k + shares) / (len(rows) - 1) * way
+    off = np.linalg.norm(machine.forward(q, guess=in_pose(meant)).pose[..., :3] - meant, axis=-1)
+    assert found.chord_error <= 0.02
+    assert off.max() > 0.9 * found.chord_error - 2e-5
+    assert off.max() < 17 / 16 * found.chord_error + 2e-5  # five decimals

@@ -22,6 +22,7 @@ import pkmcal as pk
 
 from .. import robots
 from .c_headers import PARALLEL
+from .test_c_header import geared, pulleys
 
 MODULES = Path("/usr/lib/linuxcnc/modules")
 SESSION = Path(__file__).with_name("linuxcnc_session.py")
@@ -43,6 +44,9 @@ CASES["curved laws"] = lambda: robots.hexapod(
     {"drive": {"harmonics": [{"k": 0.2, "cos": 0.05, "sin": -0.03}]}, "stroke": [300.0, 1500.0]},
     {"drive": {"table": [[300.0, 0.0], [800.0, 0.3], [900.0, 0.1]]}, "stroke": [300.0, 1500.0]},
 )
+CASES["pulleys"] = pulleys
+CASES["chains"] = lambda: pk.load("trivariant")
+CASES["geared"] = lambda: geared(0.5)
 CASES["framed"] = lambda: robots.hexapod({"offset": 12.0, "gain": -1.01}, frames=FRAMES)
 
 
@@ -341,7 +345,7 @@ def test_what_linuxcnc_cannot_hold_is_refused(tmp_path: Path) -> None:
     for robot, folder, reason in (
         (robots.hexapod(revolute, revolute), "x", "8 closures for 6 free coordinates"),
         (framed, "x", "base or tool frames"),
-        (pk.load("trivariant"), "x", "chains of joints"),
+        (pk.load("exechon"), "x", "8 closures for 6 free coordinates"),
         (pk.load("hexapod"), "a" * 30, "folder must have a name"),
         (pk.load("rbt-6t03p-printed"), "x", "cannot reach its home pose"),
     ):

@@ -1,4 +1,4 @@
-/* Every call of the C interface with a machine, a swarm or an arm and rows made of arbitrary bytes.
+/* Every call of the C interface with a machine, chains, a swarm or an arm and rows made of arbitrary bytes.
  *
  * What a caller owes is kept: arrays are as long as calls.h says, to the byte, so that the address
  * sanitizer sees what is read or written beyond. What the numbers are, and what the structs say, is
@@ -231,7 +231,10 @@ static void of_machine(ptrdiff_t n, unsigned strange, int isas)
     if (count && byte() & 1) pkm_base_inverse(&machine, n, geometry, stride, pose, NULL, 0, drives);
     const ptrdiff_t some = byte() & 1 ? 6 : 0, about = byte() & 1 ? q : 0;
     int32_t column[8];
-    for (int k = 0; k < 8; k++) column[k] = (int32_t)(byte() < 250 && size ? byte() % size : bits());
+    for (int k = 0, at = -1; k < 8; k++) { /* mostly in order, as they are asked for */
+        at += 1 + (int)byte() % 12;
+        column[k] = (int32_t)(byte() < 250 ? at : (int)bits());
+    }
     const pkm_machine *is = &machine;
     const int twists = byte() & 1;
     one_of(13);
@@ -247,7 +250,7 @@ static void of_machine(ptrdiff_t n, unsigned strange, int isas)
              D(2, n * rows * m), D(3, n * rows * q), D(4, 6 * n), D(5, 6 * n * m));
     EACH_ISA(readings, is, n, geometry, stride, pose, drives, column, 8, D(0, n * rows),
              D(1, n * rows * m), D(2, n * rows * 8));
-    EACH_ISA(moved, is, n, pose, guess, D(0, 6 * n), D(1, 6 * n * m));
+    EACH_ISA(moved, is->map, n, pose, guess, D(0, 6 * n), D(1, 6 * n * m));
     EACH_ISA(spheres, is, n, geometry, drives, D(0, n * limbs * PKM_SPHERE));
     EACH_ISA(limbs, is, n, geometry, stride, pose, D(0, n * limbs), D(1, 3 * n * limbs),
              D(2, 3 * n * limbs));
@@ -309,13 +312,15 @@ static void of_arm(ptrdiff_t n, unsigned strange, int isas)
     EACH_ISA(arm_error_jacobian, &arm, &links, error, frame, n, theta, D(0, 36 * n * joints));
 }
 
+#include "abi_chains.h"
+
 /* Calls that are one formula a row. */
 static void of_rows(ptrdiff_t n, unsigned strange, int isas)
 {
     const double *a = numbers(6 * n + 6, strange), *b = numbers(6 * n + 6, strange);
     const double *c = numbers(6 * n + 6, strange), *motion = numbers(16 * n + 9, strange);
     const ptrdiff_t six = byte() & 1 ? 6 : 0, three = byte() & 1 ? 3 : 0;
-    one_of(18);
+    one_of(25);
     EACH_ISA(compose, n, a, six, b, 6 - six, D(0, 6 * n));
     EACH_ISA(invert, n, a, D(0, 6 * n));
     EACH_ISA(compose_rates, n, a, b, c, six, a, D(0, 36 * n));
@@ -326,6 +331,14 @@ static void of_rows(ptrdiff_t n, unsigned strange, int isas)
              D(3, 3 * n));
     EACH_ISA(pulley, n, a, three, motion, 0, c, D(0, n), D(1, 3 * n), D(2, 3 * n), D(3, 9 * n), D(4, n),
              D(5, 3 * n), D(6, 3 * n));
+    EACH_ISA(between, n, a, b, c, three, D(0, n), D(1, 6 * n), D(2, 6 * n), D(3, 3 * n));
+    EACH_ISA(touched_points, n, a, six, b, D(0, 3 * n), D(1, 18 * n), D(2, 9 * n));
+    EACH_ISA(tilts, n, a, b, three, c, 3 - three, D(0, 2 * n), D(1, 6 * n), D(2, 6 * n), D(3, 6 * n));
+    EACH_ISA(law_drive, n, a, D(0, n), D(1, 5 * n), D(2, n));
+    EACH_ISA(law_drive_inverse, n, a, D(0, n));
+    EACH_ISA(law_harmonic, n, a, D(0, n), D(1, 3 * n), D(2, n));
+    EACH_ISA(law_segment, n, a, D(0, n), D(1, 3 * n));
+    EACH_ISA(strand, n, c, D(0, n), D(1, 3 * n), D(2, 9 * n));
     EACH_ISA(tpr2tps_lengths, n, a, b, D(0, 4 * n));
     EACH_ISA(tpr2tps_jacobian, n, a, b, D(0, 16 * n));
     EACH_ISA(exp, n, a, D(0, 16 * n));
@@ -354,11 +367,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     for (int k = 0; k < 4; k++) in.noise = in.noise << 8 ^ in.noise ^ byte();
     if (!in.noise) in.noise = 1;
     const int isas = pkm_best_isa() + 1;
-    switch (what % 8) {
+    switch (what % 10) {
     case 0: of_path(n, strange); break;
     case 1: of_swarm(n, strange, isas); break;
     case 2: of_arm(n, strange, isas); break;
     case 3: of_rows(n, strange, isas); break;
+    case 4:
+    case 5: of_chains(n, strange, isas); break;
     default: of_machine(n, strange, isas);
     }
     forget();

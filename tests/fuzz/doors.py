@@ -32,6 +32,7 @@ ROOT = Path(__file__).resolve().parents[2]
 MACHINES = ROOT / "pkmcal" / "builtin" / "machines"
 LOGS = ROOT / "tests" / "data"
 EXAMPLES = ROOT / "examples"
+MACHINE = pk.load("2tpr2tps")
 LONGEST = 1000  # letters of a message
 
 
@@ -103,10 +104,9 @@ def same(a: Measurements, b: Measurements) -> None:
 def table(folder: Path, content: bytes, name: str = "m.csv") -> bool:
     path = folder / name
     path.write_bytes(content)
-    machine = pk.load("2tpr2tps")
     found = taken(path, pk.read_measurements)
-    taken(path, lambda each: pk.read_measurements(each, machine))
-    taken(path, lambda each: read_poses(each, machine))
+    taken(path, lambda each: pk.read_measurements(each, MACHINE))
+    taken(path, lambda each: read_poses(each, MACHINE))
     taken(path, lambda each: read_commands(each, ("mm",) * 4))
     if found is None:
         return False

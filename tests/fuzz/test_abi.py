@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -18,6 +19,20 @@ def has_libfuzzer(folder: Path) -> bool:
     (folder / "empty.c").write_text("int LLVMFuzzerTestOneInput(void) { return 0; }")
     command = ["clang", "-fsanitize=fuzzer,address,undefined", "empty.c", "-o", "empty"]
     return not subprocess.run(command, cwd=folder, capture_output=True).returncode
+
+
+def test_every_call_is_fed() -> None:
+    """And an input may be for each call of its group."""
+    headers = (ROOT / "csrc" / "calls.h", ROOT / "generated" / "row_calls.h")
+    declared = {name for each in headers for name in re.findall(r"CALL\((\w+)\)", each.read_text())}
+    fed = set[str]()
+    for source in (ROOT / "tests" / "fuzz").glob("abi*.[ch]"):
+        _, *groups = re.split(r"\bone_of\((\d+)\);", source.read_text())
+        for count, group in zip(groups[::2], groups[1::2], strict=True):
+            calls = re.findall(r"EACH_ISA\((\w+), *[^.]", group)
+            assert len(calls) == int(count), calls
+            fed |= set(calls)
+    assert fed == declared
 
 
 @pytest.mark.slow

@@ -133,6 +133,23 @@ def test_a_pose_that_no_machine_takes_is_nan_and_leaves_the_others() -> None:
     )
 
 
+@pytest.mark.parametrize("name", [*CONSTRAINED, "linear-delta-6"])
+def test_a_pose_is_found_from_any_start_where_one_is_found_from_home(name: str) -> None:
+    robot, rng = with_errors(pk.load(name), 3), np.random.default_rng(38)
+    matched = places(*(robot.model.match or robot.coordinates))
+    at = np.tile(robot.home, (400, 1)) + rng.uniform(-1, 1, (400, 6)) * [100, 100, 100, *[0.5] * 3]
+    from_home = np.tile(robot.home, (400, 1))
+    from_home[:, matched] = at[:, matched]
+    expected, found = robot.complete(from_home), robot.complete(at)
+    known = np.isfinite(expected).all(axis=1)
+    assert known.sum() > 300
+    assert np.isfinite(found[known]).all()
+    np.testing.assert_allclose(found[known][:, matched], at[known][:, matched], rtol=0, atol=1e-6)
+    assert limbwise(robot, found[known]).max() < 1e-8
+    q = robot.inverse(at, match=True, near=robot.inverse(found))  # a row of its own for each
+    assert np.isfinite(q[known]).all()
+
+
 # match --------------------------------------------------------------------------------------------
 
 

@@ -52,6 +52,29 @@ def test_choice_is_the_best_of_all_or_hardly_worse(criterion: str, seed: int) ->
     assert costs[criterion](chosen) <= 1.02 * least
 
 
+@pytest.mark.parametrize("criterion", CRITERIA)
+def test_of_many_candidates_none_is_left_that_should_be_exchanged(criterion: str) -> None:
+    """Also one that is not on the shortlist: all exchanges are tried, in plain NumPy."""
+    rng = np.random.default_rng(3)
+    blocks = rng.normal(size=(2500, 2, 4)) * rng.uniform(0.9, 1.0, (2500, 1, 1))
+    aims = rng.normal(size=(5, 3, 4))
+    chosen = Design(blocks, PRIOR, aims, criterion, 1e9).grown(4)
+
+    def costs(rest: np.ndarray) -> np.ndarray:
+        """With each candidate beside these: the logarithm of what is made least."""
+        rows = blocks[rest].reshape(-1, 4)
+        kept = rows.T @ rows + PRIOR.T @ PRIOR
+        spread = np.linalg.inv(kept + np.einsum("nki,nkj->nij", blocks, blocks))
+        if criterion == "D":
+            return np.asarray(np.linalg.slogdet(spread)[1])
+        aimed = np.eye(4) if criterion == "A" else np.einsum("nij,nik->jk", aims, aims)
+        return np.log(np.einsum("nij,ij->n", spread, aimed))
+
+    for member in chosen:
+        left = costs(chosen[chosen != member])
+        assert np.delete(left, chosen).min() > left[member] - 1e-5
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_fewest_candidates_for_an_error_are_found(seed: int) -> None:
     blocks, aims = candidates(seed)
