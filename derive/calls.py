@@ -187,6 +187,8 @@ def calls() -> list[Call]:
                 " and tilts, twice by the end; and the swivel angles, by the same", pulleys.pulley,
                 "own frame joint length by_joint by_own bend swivel swivel_by_joint swivel_by_own",
                 ((), (3,), (3,), (3, 3), (), (3,), (3,)), {"own": "either", "frame": "either"}),
+        formula("strand", "straight parts of cables: their lengths, by the end and twice by it",
+                pulleys.strand, "joint length by_joint bend", ((), (3,), (3, 3))),
         formula("tpr2tps_lengths", "2TPR&2TPS: eq. 8", tpr2tps.lengths, "size free lengths",
                 ((4,),), {"size": "shared"}),
         formula("tpr2tps_jacobian", "2TPR&2TPS: eq. 12", tpr2tps.by_free, "size free jacobian",

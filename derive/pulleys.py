@@ -1,8 +1,10 @@
-"""A cable over a swivelling pulley: its length by where it ends, and how the pulley stands.
+"""Cables whose length is none between two points, by where they end.
 
-The cable runs along the swivel axis k onto the pulley at the entry point A, which is on the axis,
-follows the groove of radius r and leaves it along the tangent to its end D. The pulley turns about
-k until D is in its plane.
+Over a swivelling pulley: its length, and how the pulley stands. The cable runs along the swivel
+axis k onto the pulley at the entry point A, which is on the axis, follows the groove of radius r
+and leaves it along the tangent to its end D. The pulley turns about k until D is in its plane.
+
+Over several points: each part of it is straight.
 """
 
 from __future__ import annotations
@@ -52,6 +54,22 @@ def pulley() -> Function:
     return f
 
 
+def strand() -> Function:
+    """Derive the length of a straight part from a point P, with its derivatives."""
+    f = Function(
+        "strand",
+        "a straight part of a cable, from a point P to its end D",
+        "l = ‖D - P‖",
+    )
+    h = f.vector("h", 3, "D - P [mm]")
+    length = f.let("length", sp.sqrt(h.dot(h)))
+    pull = f.let("pull", h / length, "its direction")
+    f.output("l", length, "l [mm]")
+    f.output("by_joint", pull, "∂l/∂D")
+    f.output("bend", (sp.eye(3) - pull * pull.T) / length, "∂²l/∂D², 3 x 3")
+    return f
+
+
 def functions() -> list[Function]:
-    """The emitted functions of pulleys."""
-    return [pulley()]
+    """The emitted functions of cables."""
+    return [pulley(), strand()]

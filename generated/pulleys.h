@@ -1,5 +1,5 @@
 /* Generated from derive/pulleys.py by `python -m derive`; never edited by hand.
- * derivation 2878e994a0b06bcf
+ * derivation 61d8806883e58ebe
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #ifndef NARROW
@@ -155,3 +155,39 @@ INLINE void FN(pulley)(const real own[3], const real F[9], const real h[3], real
     turned_by_own[2] = -t51*t64;
 }
 #endif
+
+/*
+ * a straight part of a cable, from a point P to its end D
+ *     l = ‖D - P‖
+ * in  h[3]           D - P [mm]
+ * out l              l [mm]
+ * out by_joint[3]    ∂l/∂D
+ * out bend[9]        ∂²l/∂D², 3 x 3
+ * operations: 5 +, 17 *, 1 /, 1 sqrt
+ */
+INLINE void FN(strand)(const real h[3], real *l, real by_joint[3], real bend[9])
+{
+    const real length = FN(root)(h[0]*h[0] + h[1]*h[1] + h[2]*h[2]);
+    /* its direction */
+    const real t0 = 1.0f/length;
+    const real pull0 = h[0]*t0;
+    const real pull1 = h[1]*t0;
+    const real pull2 = h[2]*t0;
+    *l = length;
+    by_joint[0] = pull0;
+    by_joint[1] = pull1;
+    by_joint[2] = pull2;
+    bend[0] = (1.0f - pull0*pull0)*t0;
+    const real t1 = pull0*t0;
+    const real t2 = -pull1*t1;
+    bend[1] = t2;
+    const real t3 = -pull2*t1;
+    bend[2] = t3;
+    bend[3] = t2;
+    bend[4] = (1.0f - pull1*pull1)*t0;
+    const real t4 = -pull1*pull2*t0;
+    bend[5] = t4;
+    bend[6] = t3;
+    bend[7] = t4;
+    bend[8] = (1.0f - pull2*pull2)*t0;
+}

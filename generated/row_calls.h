@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 57e2750a27144f00
+ * derivation 74cc92fa5a24087f
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 /* a (n, 6) or (6), b (n, 6) or (6) -> out (n, 6): A followed by B. */
@@ -81,6 +81,10 @@ int CALL(pulley)(ptrdiff_t n, const double *own, ptrdiff_t own_stride, const dou
                  ptrdiff_t frame_stride, const double *joint, double *length, double *by_joint,
                  double *by_own, double *bend, double *swivel, double *swivel_by_joint,
                  double *swivel_by_own);
+
+/* joint (n, 3) -> length (n), by_joint (n, 3), bend (n, 3, 3): straight parts of cables: their
+ * lengths, by the end and twice by it. */
+int CALL(strand)(ptrdiff_t n, const double *joint, double *length, double *by_joint, double *bend);
 
 /* size (6), free (n, 4) -> lengths (n, 4): 2TPR&2TPS: eq. 8. */
 int CALL(tpr2tps_lengths)(ptrdiff_t n, const double *size, const double *free, double *lengths);

@@ -1,5 +1,5 @@
 /* Generated from derive/calls.py by `python -m derive`; never edited by hand.
- * derivation 57e2750a27144f00
+ * derivation 74cc92fa5a24087f
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 int CALL(compose)(ptrdiff_t n, const double *a, ptrdiff_t a_stride, const double *b,
@@ -267,6 +267,21 @@ int CALL(pulley)(ptrdiff_t n, const double *own, ptrdiff_t own_stride, const dou
         scatter_row(lane_swivel, 1, swivel, 1, row, count);
         scatter_row(lane_swivel_by_joint, 3, swivel_by_joint, 3, row, count);
         scatter_row(lane_swivel_by_own, 3, swivel_by_own, 3, row, count);
+    }
+    return 0;
+}
+
+int CALL(strand)(ptrdiff_t n, const double *joint, double *length, double *by_joint, double *bend)
+{
+    for (ptrdiff_t first = 0; first < n; first += LANES) {
+        ptrdiff_t row[LANES];
+        real lane_joint[3], lane_length[1], lane_by_joint[3], lane_bend[9];
+        const int count = block_rows(first, n, row);
+        gather_row(joint, 3, 3, row, lane_joint);
+        FN(strand)(lane_joint, lane_length, lane_by_joint, lane_bend);
+        scatter_row(lane_length, 1, length, 1, row, count);
+        scatter_row(lane_by_joint, 3, by_joint, 3, row, count);
+        scatter_row(lane_bend, 9, bend, 9, row, count);
     }
     return 0;
 }

@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.calibration.identification import Identification as Identification
     from pkmcal.calibration.identify import identify as identify
     from pkmcal.calibration.law_tests import LawTest as LawTest
+    from pkmcal.calibration.measuring_order import MeasuringOrder as MeasuringOrder
     from pkmcal.calibration.moved import Moved as Moved
     from pkmcal.calibration.slack import SlackCable as SlackCable
     from pkmcal.calibration.verdict import Verdict as Verdict
@@ -100,6 +101,7 @@ _HOMES = {
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),
     "calibration.law_tests": ("LawTest",),
+    "calibration.measuring_order": ("MeasuringOrder",),
     "calibration.moved": ("Moved",),
     "planning.plan_poses": ("Plan", "plan_poses"),
     "calibration.slack": ("SlackCable",),

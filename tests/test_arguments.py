@@ -304,8 +304,8 @@ CALLS: dict[str, Call] = {
     "plot": (FOUND.plot, {"path": "residuals.png"}, {"path": "path"}),
     "report": (
         FOUND.report,
-        {"folder": "report"},
-        {"folder": "path", "files": "text"},
+        {"folder": "report", "pdf": False},
+        {"folder": "path", "files": "text", "pdf": "flag"},
     ),
     "bootstrap": (
         pk.bootstrap,
@@ -521,6 +521,7 @@ def test_every_public_call_is_among_them() -> None:
     results = {  # made by calls, not by users
         *("Allocation", "ArmInverse", "Assemblies", "Bootstrap", "Certificate", "Compensation"),
         *("CircularTest", "Datum", "Drift", "LawTest", "ScrewTable", "SlackCable", "Tensions"),
+        "MeasuringOrder",
         *(
             "CorrectedProgram",
             "LocatedAnchors",

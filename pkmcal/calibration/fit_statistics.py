@@ -146,7 +146,7 @@ def _correlation(covariance: FloatArray, known: BoolArray) -> FloatArray:
 def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability:
     """What the measurements alone determine."""
     equations, measured = estimator.equations, estimate.state.measured
-    names = equations.parameters.names
+    chosen = equations.parameters
     named_freedoms = Gauges((), measured.unidentifiable)
     if equations.closures.unknowns:
         named_freedoms = gauges(equations.parameters, measured.unidentifiable)
@@ -155,12 +155,15 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
             named_freedoms = replace(named_freedoms, texts=left_open.texts)
     if mirror_fits(equations, estimate.evaluation, estimate.state.noise):
         named_freedoms = replace(named_freedoms, texts=(*named_freedoms.texts, MIRROR))
-    open_ones = sparse_basis(named_freedoms.rest, names).T
+    open_ones = sparse_basis(named_freedoms.rest, chosen.names).T
     jacobian = estimator.scaled_jacobian(estimate.evaluation)
     return Identifiability(
         rank=measured.rank,
         gap=measured.gap,
-        unidentifiable=tuple(as_sum(combination, names) for combination in open_ones),
+        unidentifiable=tuple(
+            as_sum(combination, chosen.names, chosen.units, chosen.scale)
+            for combination in open_ones
+        ),
         gauges=named_freedoms.texts,
         observability=observability(jacobian, len(equations.actuators), measured.rank),
     )

@@ -17,6 +17,7 @@ from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
 from pkmcal.calibration.drift import Drift, drift
 from pkmcal.calibration.law_tests import LawTest, law_tests
+from pkmcal.calibration.measuring_order import MeasuringOrder, measuring_order
 from pkmcal.calibration.moved import Moved, moved
 from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import robust_check
@@ -53,7 +54,7 @@ class Identification(Parts, Result):
         looked for where held-out points contradict the fit.
         """
         robust = robust_check(self.fit) if self.loss == "linear" else None
-        return judge(self, robust, self.moved, self.drift)
+        return judge(self, robust, self.moved, self.drift, self.measuring_order)
 
     @cached_property
     def moved(self) -> tuple[Moved, ...]:
@@ -73,6 +74,11 @@ class Identification(Parts, Result):
     def drift(self) -> Drift | None:
         """Whether repeated poses moved with time; None where too few were repeated to say."""
         return drift(self.fit, self.holdout, {*self.outliers, *self.holdout.odd})
+
+    @cached_property
+    def measuring_order(self) -> MeasuringOrder | None:
+        """Whether residuals follow the order of measuring; None where too few can say."""
+        return measuring_order(self.fit, self.outliers)
 
     @cached_property
     def law_tests(self) -> tuple[LawTest, ...]:
@@ -224,6 +230,7 @@ class Identification(Parts, Result):
         files: Mapping[str, bytes] | None = None,
         *,
         certificate: str | PathLike[str] | None = None,
+        pdf: bool = False,
     ) -> list[Path]:
         """Write the whole calibration as ``report.html``, one file that needs nothing else.
 
@@ -239,6 +246,8 @@ class Identification(Parts, Result):
             A TOML file with machine, serial, customer, operator, date, instrument, temperature and
             method: the report then begins with a certificate that states the expanded uncertainty
             with its budget, and has room for signatures.
+        pdf : bool
+            Whether ``report.pdf`` is printed as well, on A4, by a Chromium that is installed.
 
         Returns
         -------
@@ -247,6 +256,8 @@ class Identification(Parts, Result):
 
         Raises
         ------
+        ValueError
+            A mistake in the file of the certificate; no Chromium for the PDF.
         OSError
             The folder cannot be written.
         """
@@ -258,7 +269,8 @@ class Identification(Parts, Result):
                 f"files must map names to bytes, found {arguments.shown(files)}"
             )
         stated = None if certificate is None else certificates.read(certificate)
-        return report.write(self, arguments.path("folder", folder), files or {}, stated)
+        place, with_pdf = arguments.path("folder", folder), arguments.flag("pdf", pdf)
+        return report.write(self, place, files or {}, stated, with_pdf=with_pdf)
 
     def summary(self) -> str:
         """Everything a person should know, on one screen."""

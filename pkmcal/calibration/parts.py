@@ -87,6 +87,7 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "holdout_parameters",
     "law_tests",
     "drift",
+    "measuring_order",
     "warnings",
 )
 

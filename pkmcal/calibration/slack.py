@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, first_largest
 from pkmcal.display import first_rows
 from pkmcal.estimation.begin import estimator_at
 from pkmcal.estimation.equations import Equations
@@ -32,6 +32,8 @@ _ROUNDS = 10  # of leaving cables out and fitting anew
 _TOO_SHORT = 4.0  # deviations by which a reading is shorter than a slack cable's can be
 _SEEN = 1e-6  # degrees of freedom from which an equation's residual shows anything
 _ALIKE = 1e-3  # share by which squares differ that cannot be told apart
+_ROUNDING = 1e-6  # share by which they differ that are equal
+_TOLD_APART = 2.0 * np.log(100.0)  # squares: what explains so much less has odds of 1 to 100
 
 
 @dataclass(frozen=True)
@@ -43,9 +45,10 @@ class SlackCable:
     rows : tuple of int
         Numbers of the rows that are of this pose.
     actuators : tuple of int
-        Whose reading it is, counted from 1; several where it cannot be told which of them.
+        Whose reading it is, counted from 1; several where noise does not let it be told which of
+        them, the likeliest first.
     longer : float
-        By how much the reading is longer than the way, mm.
+        By how much the reading, of the likeliest, is longer than the way, mm.
     """
 
     rows: tuple[int, ...]
@@ -59,7 +62,10 @@ class SlackCable:
 
 @dataclass(frozen=True)
 class Cell:
-    """A reading at a pose that is too long: the pose, and the closures that it may be."""
+    """A reading at a pose that is too long: the pose, and the closures that it may be.
+
+    The likeliest comes first: that is the one to be left out.
+    """
 
     pose: int
     closures: tuple[int, ...]
@@ -68,23 +74,26 @@ class Cell:
 def _slack_cells(estimator: Estimator, estimate: Estimate) -> list[Cell]:
     """Readings that the others show to be longer than the way, at most one a pose."""
     equations = estimator.equations
-    odd, limit = _odd_poses(equations, estimate)
+    odd, limit, width = _odd_poses(equations, estimate)
     if not len(odd):
         return []
     gain, longer = _without_each(equations, estimate, odd)
     pulling, cells = _pulling(equations), []
     for pose, own, sign in zip(odd.tolist(), gain, longer > 0.0, strict=True):
         # if one that is too short explains more, something else is wrong with this row
-        alike = np.flatnonzero((own >= (1.0 - _ALIKE) * own.max()) & sign)
-        if own.max() > limit and len(alike) and pulling[alike].all():
-            cells.append(Cell(pose, tuple(alike.tolist())))
+        most = own.max()
+        alike = sign & (own >= most - max(_TOLD_APART * width, _ALIKE * most))
+        if most > limit and alike.any() and pulling[alike].all():
+            first = first_largest(np.where(alike, own, -np.inf), _ROUNDING * most)
+            others = (k for k in np.flatnonzero(alike).tolist() if k != first)
+            cells.append(Cell(pose, (first, *others)))
     return cells
 
 
-def _odd_poses(equations: Equations, estimate: Estimate) -> tuple[IntArray, float]:
-    """Poses at which some closure is further off than noise explains; and a squared deviation.
+def _odd_poses(equations: Equations, estimate: Estimate) -> tuple[IntArray, float, float]:
+    """Poses at which some closure is further off than noise explains; and two squared deviations.
 
-    That is what a closure has to explain, of all that are far off.
+    The first is what a closure has to explain, of all that are far off; the second that of one.
     """
     from scipy.special import ndtri
 
@@ -92,11 +101,11 @@ def _odd_poses(equations: Equations, estimate: Estimate) -> tuple[IntArray, floa
     seen = redundancy > _SEEN
     used = int(seen.sum())
     if not used:
-        return np.empty(0, dtype=np.intp), np.inf
+        return np.empty(0, dtype=np.intp), np.inf, np.inf
     standard = np.where(seen, longer**2 / np.where(seen, redundancy, 1.0), 0.0)
     width = max(1.0, median_ratio(standard[seen], np.ones(used, dtype=np.intp)))
     limit = float(ndtri(_FALSE_ALARM / used) ** 2 * width)
-    return np.flatnonzero(standard.max(axis=1) > limit), limit
+    return np.flatnonzero(standard.max(axis=1) > limit), limit, width
 
 
 def _without_each(
@@ -185,7 +194,7 @@ def slack_cables(
     cables = [
         SlackCable(
             tuple(equations.rows[pose_of == cell.pose].tolist()),
-            tuple(sorted(actuator[closure] + 1 for closure in cell.closures)),
+            tuple(actuator[closure] + 1 for closure in cell.closures),
             float(off[cell.pose, cell.closures[0]]),
         )
         for cell in cells

@@ -10,6 +10,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.drift import Drift
 from pkmcal.calibration.linearity import Weak, beyond_linear
+from pkmcal.calibration.measuring_order import MeasuringOrder
 from pkmcal.calibration.moved import Moved
 from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import RobustCheck
@@ -61,7 +62,11 @@ class Verdict:
 
 
 def judge(
-    found: Parts, robust: RobustCheck | None, moved: tuple[Moved, ...], drift: Drift | None = None
+    found: Parts,
+    robust: RobustCheck | None,
+    moved: tuple[Moved, ...],
+    drift: Drift | None = None,
+    order: MeasuringOrder | None = None,
 ) -> Verdict:
     """Judge a calibration.
 
@@ -75,6 +80,8 @@ def judge(
         What moved between the fitted points and those held out.
     drift : Drift or None
         Whether repeated poses moved with time, where any were.
+    order : MeasuringOrder or None
+        Whether residuals follow the order of measuring, where enough are left to say.
     """
     grave = _grave(found, robust)
     doubts = [*_contradicted(found, moved), *_few(found)]
@@ -85,6 +92,9 @@ def judge(
         )
     if drift is not None and drift.large:
         doubts.append(str(drift))
+    order = None if grave or (drift is not None and drift.found) else order
+    if order is not None and order.large:
+        doubts.append(str(order))
     doubts += found.warnings
     weak = None if grave else beyond_linear(found.fit.estimate, found.fit.uncertainty)
     if weak is not None and not weak.assembled:
@@ -92,6 +102,8 @@ def judge(
     if not grave and not doubts and _little_gained(found):
         doubts.append(f"little was gained, {_change(found)}: {_other_causes(found)}")
     remarks = _remarks(found, robust, drift, weak)
+    if order is not None and order.found and not order.large:
+        remarks = (printable(str(order), _LONGEST), *remarks)
     reasons = tuple(printable(text, _LONGEST) for text in grave + doubts)
     if grave:
         return Verdict("not calibrated", reasons, remarks)

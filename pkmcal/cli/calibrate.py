@@ -200,6 +200,12 @@ def calibrate(
             " customer, operator, date, instrument, temperature, method.",
         ),
     ] = None,
+    pdf: Annotated[
+        bool,
+        typer.Option(
+            "--pdf", help="Print report.pdf beside it, on A4, by a Chromium that is installed."
+        ),
+    ] = False,
     force: Force = False,
     json: Json = False,
 ) -> int:
@@ -231,9 +237,10 @@ def calibrate(
     urdf = isinstance(given, pk.SerialArm) and given.source is not None
     names = ["robot.toml", "residuals.png", *["robot.urdf"] * urdf]
     output = None if out is None else Output(out, names, read, force)
-    reported = None if report is None else _report_files(report, read, force)
-    if certificate is not None and report is None:
-        raise ArgumentError("--certificate: it is part of the report, --report DIR")
+    reported = None if report is None else _report_files(report, read, force, pdf)
+    if report is None and (certificate is not None or pdf):
+        option = "--pdf" if certificate is None else "--certificate"
+        raise ArgumentError(f"{option}: it is part of the report, --report DIR")
     stated = None if certificate is None else _checked_statement(certificate, read)
     if tracker is not None:
         seen = read_tracker(tracker)
@@ -276,7 +283,7 @@ def calibrate(
                 found.robot.save_urdf(draft / "robot.urdf")
     if reported is not None:
         with progress("report"), reported.draft() as draft:
-            found.report(draft, read.contents(), certificate=stated)
+            found.report(draft, read.contents(), certificate=stated, pdf=pdf)
             _save(found, draft / "robot.toml", read, robot)
     if json:
         say(as_json(found, "parameters", "correlations", schema="calibrate"))
@@ -290,13 +297,20 @@ def calibrate(
                 say(f"URDF with the joint errors in its origins: {output.paths[2]}")
         if reported is not None:
             say(f"\nreport: {reported.paths[0]}")
+            if pdf:
+                say(f"the same to print: {reported.paths[-1]}")
     return 0 if found.verdict.state == "calibrated" and not doubts else 1
 
 
-def _report_files(folder: Path, read: Inputs, force: bool) -> Output:
-    from pkmcal.report.report import FILES  # and all that a report needs: only if there is one
+def _report_files(folder: Path, read: Inputs, force: bool, pdf: bool) -> Output:
+    """Where the report goes; that nothing prints a PDF is said before the work."""
+    # they import all that a report needs: only if there is one
+    from pkmcal.report.pdf import browser
+    from pkmcal.report.report import FILES, PDF
 
-    return Output(folder, FILES, read, force)
+    if pdf:
+        browser()
+    return Output(folder, [*FILES, *[PDF] * pdf], read, force)
 
 
 def _checked_statement(certificate: Path, read: Inputs) -> Input:

@@ -126,7 +126,7 @@ def compensate(
         bounds=bounds,
     )
     if output is not None:
-        units = [f"[{unit}]" for unit in machine.actuator_units]
+        units = [f"[{unit}]" for unit in found.units]
         columns = {
             f"{word}{i + 1} {unit}": values[:, i]
             for word, values in (("q", found.actuators), ("dq", found.correction))

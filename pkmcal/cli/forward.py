@@ -14,6 +14,7 @@ from pkmcal.cli.options import Force, Json, Radians, RobotOrArm
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
 from pkmcal.core.library import POSE, STATUS
+from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.command_csv import read_commands
 from pkmcal.measurements.pose_csv import write_poses
@@ -42,8 +43,9 @@ def forward(
     """
     read = Inputs()
     machine = as_machine(pk.load(read.robot(robot)))
-    row = numbers_on_line("actuators", actuators, machine.actuator_units, rad)
-    q = read_commands(read.file(actuators), machine.actuator_units) if row is None else row
+    units = reading_units(machine)
+    row = numbers_on_line("actuators", actuators, units, rad)
+    q = read_commands(read.file(actuators), units) if row is None else row
     output = None if out is None else Output(out, ["poses.csv"], read, force)
     solved = machine.forward(q)
     if output is not None:

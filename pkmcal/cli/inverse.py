@@ -11,6 +11,7 @@ from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json, ParallelRobot, Radians
 from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
+from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.loading import load_parallel
 from pkmcal.measurements.command_csv import write_commands
 from pkmcal.measurements.pose_csv import read_poses
@@ -54,20 +55,20 @@ def inverse(
         rows = machine.complete(rows)
     q = machine.inverse(rows)
     allowed = machine.feasible(rows)
+    units = reading_units(machine)
     if output is not None:
         with output.draft() as draft:
-            units = machine.actuator_units
             write_commands(draft / "commands.csv", units, q, comment=read.comment())
     if json:
         say(
             as_json(
-                {"actuators": q, "units": machine.actuator_units, "ok": allowed.ok},
+                {"actuators": q, "units": units, "ok": allowed.ok},
                 schema="inverse",
             )
         )
     else:
         heads = [f"q{i + 1}" for i in range(machine.n_actuators)]
-        say(table(heads, machine.actuator_units, q))
+        say(table(heads, units, q))
         for line in allowed.broken():
             say(line)
         if output is not None:

@@ -31,7 +31,10 @@ Controller = Annotated[
 JoinBy = Annotated[
     str,
     typer.Option(
-        "--join", metavar="WORD", help="How rows of the log are found: name, row, time; or auto."
+        "--join",
+        metavar="WORD",
+        help="How rows of the log are found: name, row, time; or auto. row+1: of a log that is a"
+        " row late, the row after.",
     ),
 ]
 Ignore = Annotated[
@@ -99,8 +102,9 @@ class Reading:
         if self.probe_offset is not None:
             stated["probe_offset"] = _offset(self.probe_offset)
         log = None if self.controller is None else read.file(self.controller)
-        join: Any = self.join
-        measured = pk.read_measurements(read.file(path), robot, controller=log, join=join, **stated)
+        measured = pk.read_measurements(
+            read.file(path), robot, controller=log, join=self.join, **stated
+        )
         for note in measured.notes:
             say(f"pkmcal: {note}", err=True)
         return measured

@@ -46,6 +46,8 @@ _KEYS = {
     "universal": "first axis of its joint on the base, with couple",
     "couple": "a length: makes its second constraint count too",
     "weights": "of its constraints beside the length",
+    "over": "further points from which parts of the cable run to the platform: [[x, y, z], …]",
+    "parts": "how many parts run from base, and from each point under over",
     "swivel": "axis of the pulley, along which the cable runs onto it, at base",
     "radius": "of the pulley's groove",
     "axis": "of the crank, at base",

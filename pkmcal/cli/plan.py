@@ -20,6 +20,7 @@ from pkmcal.cli.progress import progress
 from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.box import Box, in_box
+from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
 from pkmcal.loading import load
@@ -298,7 +299,7 @@ def _write(made: Plan, out: Path, head: str) -> None:
         at = np.tile(points, (len(mine), 1))
         write_commands(
             out / (f"commands-{kind}.csv" if several else "commands.csv"),
-            made.robot.actuator_units,
+            reading_units(made.robot),
             np.repeat(mine, len(points), axis=0),
             {f"target.{axis} [mm]": place for axis, place in zip("xyz", at.T, strict=False)},
             comment=head,

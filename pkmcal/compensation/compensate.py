@@ -15,6 +15,7 @@ from pkmcal.core.swarm import PAPER, SwarmSettings, minimise_eq18
 from pkmcal.display import Table, first_rows, fixed
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.kinematics import Match
+from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
 
@@ -235,7 +236,7 @@ def compensate(
         gross=gross.reshape(shape),
         method=method,
         orientation=orientation,
-        units=robot.actuator_units,
+        units=reading_units(robot),
     )
 
 

@@ -8,15 +8,24 @@ comment, ``INLINE void FN(name)(arguments)``, assignments.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from importlib import resources
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
 Number = Literal["double", "float"]
 
+_HEADERS = (
+    "posemaps.h",
+    "frames.h",
+    "limbs.h",
+    "laws.h",
+    "pulleys.h",
+    "screws.h",
+    "chains.h",
+)
 _FUNCTION = re.compile(
     r"/\*\n(?P<comment>(?: \*[^\n]*\n)+?) \*/\n"
     r"INLINE void FN\((?P<name>\w+)\)\((?P<arguments>[^{]*)\)\n\{\n(?P<body>.*?)\n\}\n",
@@ -54,7 +63,7 @@ def _text(header: str) -> str:
 def functions() -> dict[str, CFunction]:
     """Every function of the generated headers that concerns one pose of one machine, by name."""
     found = {}
-    for header in ("posemaps.h", "frames.h", "limbs.h", "laws.h", "pulleys.h"):
+    for header in _HEADERS:
         for match in _FUNCTION.finditer(_text(header)):
             counts = _OPERATIONS.search(match["comment"])
             if counts is None:
@@ -100,6 +109,28 @@ def literal(value: float, number: Number) -> str:
         return repr(float(value))
     text = str(np.float32(value))
     return f"{text}f" if re.search(r"[.e]", text) else f"{text}.0f"
+
+
+def largest(number: Number) -> float:
+    """The largest number of a type."""
+    return float(np.finfo(np.float64 if number == "double" else np.float32).max)
+
+
+def writers(
+    number: Number,
+) -> tuple[Callable[[float], str], Callable[[Any], str], Callable[[Any], str]]:
+    """What writes one number of a type, several, and several whole ones."""
+
+    def one(value: float) -> str:
+        return literal(value, number)
+
+    def several(values: Any) -> str:
+        return ", ".join(one(value) for value in np.ravel(list(values)))
+
+    def whole(values: Any) -> str:
+        return ", ".join(str(int(value)) for value in values)
+
+    return one, several, whole
 
 
 def as_c99(function: CFunction, prefix: str, number: Number, slots: Iterable[str]) -> str:
@@ -159,7 +190,7 @@ def _zero(prefix: str, slot: str) -> re.Pattern[str]:
 
 
 def evaluate(name: str, inputs: Mapping[str, object], outputs: Iterable[str]) -> list[list[float]]:
-    """The vectors (3,) that a generated function gives, to the bit what the core computes.
+    """The vectors that a generated function gives, to the bit what the core computes.
 
     Parameters
     ----------
@@ -171,10 +202,12 @@ def evaluate(name: str, inputs: Mapping[str, object], outputs: Iterable[str]) ->
         Names of the arguments that it writes.
     """
     body = functions()[name].body
+    sizes = dict(re.findall(r"real (\w+)\[(\d+)\]", functions()[name].arguments))
     body = re.sub(r"/\*.*?\*/|^\s*real [\w, ]+;$", "", body, flags=re.DOTALL | re.MULTILINE)
     body = re.sub(r"FN\(sincos\)\((.*?), &(\w+), &(\w+)\)", r"\2, \3 = sincos(\1)", body)
     body = re.sub(r"FN\(fill\)\(0\.0f\)", "0.0", body).replace("const real ", "")
-    written = {each: [0.0] * 3 for each in outputs}
+    body = re.sub(r"(\d+\.\d*)f\b", r"\1", body)
+    written = {each: [0.0] * int(sizes[each]) for each in outputs}
     scope: dict[str, object] = {"__builtins__": {}, "sincos": _sincos, **inputs, **written}
     for statement in body.split(";"):
         exec(" ".join(statement.split()), scope)

@@ -232,8 +232,9 @@ def _printer(
     distances: int,
     notes: tuple[str, ...] = (),
 ) -> Printer:
-    text = text_of(delta, gains, file.stem, head.format(file=file.name))
-    return Printer(as_robot(delta, gains, file.stem), measurements, distances, text, notes)
+    text = text_of(delta, gains, file.stem, head.format(file=file.name), bed=True)
+    robot = as_robot(delta, gains, file.stem, bed=True)
+    return Printer(robot, measurements, distances, text, notes)
 
 
 def _first(printer: PrinterConfig, section: str, option: str) -> float:

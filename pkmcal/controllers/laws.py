@@ -8,12 +8,12 @@ from pkmcal.kinematics.robot import Robot
 
 
 def require_plain_limbs(robot: Robot, holder: str) -> None:
-    """Refuse a robot with drive laws or pulleys; `holder` is what has no place for them.
+    """Refuse a robot with drive laws, pulleys or tackles; `holder` is what has no place for them.
 
     Raises
     ------
     ValueError
-        Naming the limb, and its law or pulley.
+        Naming the limb, and its law, pulley or tackle.
     """
     require_no_laws(robot, holder)
     require_no_pulleys(robot, holder)
@@ -30,11 +30,22 @@ def require_no_laws(robot: Robot, holder: str) -> None:
 
 
 def require_no_pulleys(robot: Robot, holder: str) -> None:
-    """Refuse a robot with cables over pulleys, naming the first."""
+    """Refuse a robot with cables over pulleys or several points, naming the first."""
     for i in robot.model.pulleys:
         raise ArgumentError(
             f"robot: limb {i + 1} of {robot.name} runs over a pulley, which {holder} cannot hold"
         )
+    require_no_tackles(robot, holder)
+
+
+def require_no_tackles(robot: Robot, holder: str) -> None:
+    """Refuse a robot with cables over several points, naming the first."""
+    for i, limb in enumerate(robot.model.limbs):
+        if limb.parts:
+            raise ArgumentError(
+                f"robot: limb {i + 1} of {robot.name} runs over several points, which {holder}"
+                " cannot hold"
+            )
 
 
 def said(law: Law) -> str:
@@ -45,5 +56,6 @@ def said(law: Law) -> str:
         "harmonics": law.harmonics,
         "table": law.table,
         "backlash": law.backlash,
+        "stretch": law.stretch,
     }
     return ", ".join(word for word, has in words.items() if has)

@@ -141,13 +141,20 @@ def _with_numbers(x: FloatArray) -> FirmwareDelta:
 
 
 def as_robot(
-    firmware: FirmwareDelta, gains: Sequence[float], name: str = "linear delta", head: str = ""
+    firmware: FirmwareDelta,
+    gains: Sequence[float],
+    name: str = "linear delta",
+    head: str = "",
+    bed: bool = False,
 ) -> Robot:
-    """The robot with the firmware's numbers; `gains` as in `text_of`."""
-    return robot_files.robot_of(text_of(firmware, gains, name, head), "the firmware's numbers")
+    """The robot with the firmware's numbers; the others as in `text_of`."""
+    text = text_of(firmware, gains, name, head, bed)
+    return robot_files.robot_of(text, "the firmware's numbers")
 
 
-def text_of(firmware: FirmwareDelta, gains: Sequence[float], name: str, head: str) -> str:
+def text_of(
+    firmware: FirmwareDelta, gains: Sequence[float], name: str, head: str, bed: bool = False
+) -> str:
     """A robot file with the firmware's numbers.
 
     Parameters
@@ -158,7 +165,11 @@ def text_of(firmware: FirmwareDelta, gains: Sequence[float], name: str, head: st
         Mm a carriage rises for a unit of its actuator, which is 0 at the end stop.
     name, head : str
         The robot's name; lines of comment.
+    bed : bool
+        Whether the nozzle stays between the towers, over the bed and below the end stops.
     """
+    across, high = round(firmware.radius, 3), round(min(firmware.endstops), 3)
+    box = {"x": [-across, across], "y": [-across, across], "z": [0.0, high]}
     parameters = {"radius": firmware.radius}
     parameters |= {f"angle{i}": angle for i, angle in enumerate(firmware.angles, 1)}
     limbs = [
@@ -184,4 +195,5 @@ def text_of(firmware: FirmwareDelta, gains: Sequence[float], name: str, head: st
         limbs,
         parameters,
         "# Heights do not determine which way x is, so angle3 stays, and hardly the rods.\n",
+        box if bed and across > 0 and high > 0 else None,
     )

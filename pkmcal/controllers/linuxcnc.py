@@ -17,7 +17,7 @@ from pkmcal.controllers.comp_file import comp_texts, without_laws
 from pkmcal.controllers.loss import Loss
 from pkmcal.controllers.rendering import rendered
 from pkmcal.core.driven import DrivenMachine
-from pkmcal.core.library import POSE, SLOTS
+from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.kinematics.robot import Robot, determines_others, require_parallel
@@ -40,7 +40,7 @@ def linuxcnc(robot: Robot, folder: str | PathLike[str]) -> Loss | None:
     Parameters
     ----------
     robot : Robot
-        A machine with as many closures as free coordinates.
+        A machine that a C header holds.
     folder : str or path
         Where to write; made if it is not there. Existing files are replaced, each whole.
 
@@ -85,7 +85,9 @@ def contents(robot: Robot, folder: str) -> tuple[dict[str, str], Loss | None]:
             f" found {folder!r}"
         )
     tabled = robot
-    if robot.model.chains is None and not _folded(robot):  # the module is of the joints
+    if robot.model.chains is not None:
+        _require_no_backlash(robot)
+    elif not _folded(robot):  # the module is of the joints
         robot = without_laws(robot)
     module = None if robot.model.driven else linuxcnc_modules.of_robot(robot)
     says = _contents(robot, name)
@@ -113,6 +115,15 @@ def _folded(robot: Robot) -> bool:
     laws = [law for law in robot.model.laws if law is not None]
     curved = any(law.quadratic or law.spool or law.harmonics for law in laws)
     return not laws or (curved and not any(law.backlash for law in laws))
+
+
+def _require_no_backlash(robot: Robot) -> None:
+    for d, law in enumerate(robot.model.laws):
+        if law is not None and law.backlash:
+            raise ArgumentError(
+                f"robot: limb {robot.model.limb_of_drive(d) + 1} of {robot.name} has backlash,"
+                " which a component of chains of joints cannot hold"
+            )
 
 
 def _tables(robot: Robot, plain: Robot) -> dict[int, str]:
@@ -170,7 +181,9 @@ def _contents(robot: Robot, name: str) -> dict[str, Any]:
 def _axes(robot: Robot) -> tuple[str, ...]:
     """The coordinates that programs command: as many as there are actuators."""
     axes = robot.moved
-    if len(axes) != robot.n_actuators:
+    if len(axes) != robot.n_actuators and (
+        determines_others(robot) or len(axes) > robot.n_actuators
+    ):
         raise ArgumentError(
             f"robot: {robot.name} has {robot.n_actuators} actuators for {len(axes)} coordinates"
         )
@@ -201,23 +214,23 @@ def _limits(robot: Robot, at_home: FloatArray, size: float) -> tuple[FloatArray,
     reach = np.array([2.0 * np.pi if unit == "rad" else size for unit in robot.actuator_units])
     least, most = at_home - reach, at_home + reach
     stated: dict[int, FloatArray] = {}
-    for i, (g, limb) in enumerate(zip(robot.slots, robot.model.limbs, strict=True)):
-        if limb.stroke is not None:
-            ends = np.sort(_ends(robot, i, limb.stroke, g))
-            known = stated.get(limb.actuator, ends)
-            stated[limb.actuator] = np.array([max(known[0], ends[0]), min(known[1], ends[1])])
+    for d, drive in enumerate(robot.model.drives):
+        if drive.stroke is not None:
+            ends = np.sort(_ends(robot, d, drive.stroke))
+            known = stated.get(drive.actuator, ends)
+            stated[drive.actuator] = np.array([max(known[0], ends[0]), min(known[1], ends[1])])
     for i, ends in stated.items():
         least[i], most[i] = ends
     return least, most
 
 
-def _ends(robot: Robot, i: int, stroke: tuple[float, float], g: FloatArray) -> FloatArray:
-    """The actuator coordinates (2,) at the ends of a limb's stroke."""
-    machine = robot.machine
+def _ends(robot: Robot, d: int, stroke: tuple[float, float]) -> FloatArray:
+    """The actuator coordinates (2,) at the ends of a drive's stroke."""
+    machine, drive = robot.machine, robot.model.drives[d]
     if isinstance(machine, DrivenMachine):
-        ways = np.repeat(np.array(stroke)[:, None], len(robot.model.limbs), axis=1)
-        return machine.laws.readings(robot.slots, ways)[:, i]
-    ends: FloatArray = (np.array(stroke) - g[SLOTS.index("offset")]) / g[SLOTS.index("gain")]
+        return machine.laws.reading(robot.slots, np.array(stroke), d)
+    numbers = robot.slots.ravel()
+    ends: FloatArray = (np.array(stroke) - numbers[drive.offset]) / numbers[drive.gain]
     return ends
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from pkmcal.arguments import path as as_path
 from pkmcal.arrays import FloatArray, furthest_axis
-from pkmcal.controllers.c_header import prepared
+from pkmcal.controllers.c_limbs import prepared
 from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError

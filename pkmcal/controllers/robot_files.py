@@ -18,6 +18,7 @@ def text_of(
     limbs: Iterable[Mapping[str, object]],
     parameters: Mapping[str, object] | None = None,
     remark: str = "",
+    workspace: Mapping[str, object] | None = None,
 ) -> str:
     """The text of a robot file in mm and degrees.
 
@@ -29,9 +30,13 @@ def text_of(
         What the file's keys of these names say.
     remark : str
         A line of comment on what is free.
+    workspace : mapping, optional
+        Ends of coordinates.
     """
     blocks = [head, lines({"name": name, "units": {"length": "mm", "angle": "deg"}})]
     blocks.append("[pose]\n" + lines(pose))
+    if workspace:
+        blocks.append("[workspace]\n" + lines(workspace))
     if parameters:
         blocks.append("[parameters]\n" + lines(parameters))
     blocks.append(remark + "[calibration]\n" + lines({"free": free}))

@@ -13,7 +13,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.controllers import robot_files
-from pkmcal.controllers.c_header import prepared
+from pkmcal.controllers.c_limbs import prepared
 from pkmcal.controllers.laws import require_plain_limbs
 from pkmcal.controllers.loss import Loss, fitted, require_held
 from pkmcal.core.library import SLOTS

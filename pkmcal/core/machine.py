@@ -217,12 +217,18 @@ class Machine(CoreMachine):
         velocity and acceleration of the pose (N, 6) each. NaN where singular. With more rows than
         free coordinates it is that of the poses which miss them least, solved again.
         """
+        found = self._met(slots, pose, q, q1, q2)
+        return found if self.rows == self.m else self._missing(slots, pose, q, q1, q2, found)
+
+    def _met(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, q1: FloatArray, q2: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """`motion` where all closures are met."""
         n = len(pose)
         motion, rates = np.empty((n, 3, 4, 4)), np.empty((n, 2, 6))
         given = (n, slots, _by_row(slots), pose, q, q1, q2, motion, rates)
         call("motion", self.struct, *given, isa=self.isa)
-        found = (motion, rates[:, 0], rates[:, 1])
-        return found if self.rows == self.m else self._missing(slots, pose, q, q1, q2, found)
+        return motion, rates[:, 0], rates[:, 1]
 
     def _missing(
         self,
@@ -311,6 +317,13 @@ class Machine(CoreMachine):
         given = (n, slots, _by_row(slots), pose, drive, base, platform)
         call("limbs", self.struct, *given, isa=self.isa)
         return drive, base, platform
+
+    def pulls(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """Force on the platform joints by limbs that push with 1 (N, limbs, 3), in base axes.
+
+        Cables pull the other way. Of a limb between two points the unit vector along it.
+        """
+        return self.limbs(slots, pose)[1]
 
     def closure_cost(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
         """Sum of the squared closures over poses (M, 6) and coordinates (M, n), mm².

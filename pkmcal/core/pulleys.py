@@ -1,11 +1,12 @@
-"""A machine some of whose cables run over swivelling pulleys, as one of limbs between two points.
+"""A machine with cables whose length is none between two points, as one of limbs between points.
 
-The length of such a cable is a function l of where its end D is, whose gradient t is the unit
-vector along its straight part. To first order the cable is one from the point D - l t: the sphere
-of radius l about it has the same value and the same gradient. So at a known pose all first
-derivatives are those of the machine of limbs with these points as its anchors, and the forward
-kinematics go from one such machine to the next, each solved in the core, as Newton's method goes
-from one linear system to the next. What spheres bend otherwise than l is added where second
+Over a swivelling pulley or over several points, the length of a cable is a function l of where
+its end D is, with the gradient s t: the unit vector t, and s = 1 over a pulley, or as many parts as
+pull along t. To first order l/s is the distance from the point D - t l/s: the sphere of that radius
+about it has the same value and the same gradient. So at a known pose all first derivatives are
+those of the machine of limbs with these points as its anchors, and offsets and gains over s. The
+forward kinematics go from one such machine to the next, each solved in the core, as Newton's method
+goes from one linear system to the next. What spheres bend otherwise than l/s is added where second
 derivatives count.
 """
 
@@ -23,69 +24,135 @@ from pkmcal.core.machine import Closure, Machine
 from pkmcal.exceptions import ArgumentError
 
 OWN_SLOTS = ("crank", "tilt1", "tilt2")  # the radius, and the tilts of the swivel axis
+BENT = ("pulley", "tackle")  # drivers of limbs that are no distance between two points
 _OWN = [SLOTS.index(slot) for slot in OWN_SLOTS]
+_END = (3, 4, 5)
 _OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 _STEPS = 30  # from one machine of limbs to the next
 _SETTLED = 1e-12  # of the machine's size: the step after which the next is rounding
 
 
 class _Cables(NamedTuple):
-    """The cables over pulleys at N poses, (N, pulleys, ...).
+    """Cables at N poses, (N, cables, ...), their lengths over s.
 
-    Where they end; lengths, by D, by radius and tilts, and twice by D; swivel angles, by D, by
-    radius and tilts; and how D moves with the platform's twist, (3, 6).
+    Where they end; s; lengths over s, by D, by the numbers of their limbs and twice by D; and how D
+    moves with the platform's twist, (3, 6).
     """
 
     end: FloatArray
+    parts: FloatArray
     length: FloatArray
     pull: FloatArray
-    by_own: FloatArray
+    by_number: FloatArray
     bend: FloatArray
-    swivel: FloatArray
-    swivel_by_end: FloatArray
-    swivel_by_own: FloatArray
     by_twist: FloatArray
 
 
+class _Swivels(NamedTuple):
+    """Angles of swivels (N, pulleys), by D, and by radius and tilts."""
+
+    turned: FloatArray
+    by_end: FloatArray
+    by_own: FloatArray
+
+
 class PulleyMachine(Machine):
-    """A machine with limbs of the driver "pulley", with the calls of `Machine`.
+    """A machine with limbs of the drivers "pulley" and "tackle", with the calls of `Machine`.
 
     Parameters are those of `Machine`. A limb of the driver "pulley" has the frame of its swivel
-    axis as its base frame, and its radius where a crank has its length.
+    axis as its base frame, and its radius where a crank has its length. One of the driver "tackle"
+    has `parts`, how many run from each of its points: from its base point, and from those that are
+    behind the other numbers of its limb.
     """
 
     fixed_spheres = False
 
-    def __init__(self, map: str, limbs: list[dict[str, Any]], *args: Any, **options: Any) -> None:
-        over = [limb["driver"] == "pulley" for limb in limbs]
-        self._over: IntArray = np.flatnonzero(over)
-        frames = [np.ravel(limbs[i]["frames"]["base"]) for i in self._over]
-        self._axes: FloatArray = np.array(frames, dtype=np.float64)
-        plain = [
-            limb | {"driver": "length"} if o else limb for limb, o in zip(limbs, over, strict=True)
+    def __init__(
+        self,
+        map: str,
+        limbs: list[dict[str, Any]],
+        length: float,
+        slots: FloatArray,
+        *args: Any,
+        **options: Any,
+    ) -> None:
+        drivers = np.array([limb["driver"] for limb in limbs])
+        self._over: IntArray = np.flatnonzero(np.isin(drivers, BENT))
+        self._of_pulleys: IntArray = np.flatnonzero(drivers[self._over] == "pulley")
+        self._pulleys: IntArray = self._over[self._of_pulleys]
+        frames = [np.ravel(limbs[i]["frames"]["base"]) for i in self._pulleys]
+        self._axes: FloatArray = np.array(frames, dtype=np.float64).reshape(-1, 9)
+        self._tackles = [
+            (k, np.array(limbs[i]["parts"], dtype=np.float64))
+            for k, i in enumerate(self._over)
+            if drivers[i] == "tackle"
         ]
-        super().__init__(map, plain, *args, **options)
+        plain = [limb | {"driver": "length"} if limb["driver"] in BENT else limb for limb in limbs]
+        narrow = np.ascontiguousarray(slots[:, : len(SLOTS)])
+        super().__init__(map, plain, length, narrow, *args, **options)
         self._of_actuator = np.array(list(self.struct.actuator[0 : self.struct.limbs]))
 
     # cables and the machine of limbs that stands for them -----------------------------------------
 
     def cables(self, slots: FloatArray, pose: FloatArray) -> _Cables:
-        """Look at the cables over pulleys at poses (N, 6) as given."""
-        n, k = len(pose), len(self._over)
-        mine = np.broadcast_to(slots[..., self._over, :], (n, k, slots.shape[-1]))
-        mine = mine.reshape(n * k, slots.shape[-1])
-        each = np.repeat(pose, k, axis=0)
-        end, by_twist, _ = instruments.points(each, np.ascontiguousarray(mine[:, 3:6]), self.isa)
-        own, joint = np.ascontiguousarray(mine[:, _OWN]), end - mine[:, 0:3]
+        """Look at the cables at poses (N, 6) as given."""
+        n, k, width = len(pose), len(self._over), slots.shape[-1]
+        mine = np.broadcast_to(slots[..., self._over, :], (n, k, width))
+        joints = np.ascontiguousarray(mine[..., 3:6]).reshape(n * k, 3)
+        end, by_twist, _ = instruments.points(np.repeat(pose, k, axis=0), joints, self.isa)
+        found = _Cables(
+            end.reshape(n, k, 3),
+            np.ones((n, k)),
+            np.empty((n, k)),
+            np.empty((n, k, 3)),
+            np.zeros((n, k, width)),
+            np.empty((n, k, 3, 3)),
+            by_twist.reshape(n, k, 3, 6),
+        )
+        if len(self._pulleys):
+            length, pull, by_own, bend, *_ = self._over_pulleys(mine, found.end)
+            at = self._of_pulleys
+            found.length[:, at], found.pull[:, at], found.bend[:, at] = length, pull, bend
+            found.by_number[:, at[:, None], _OWN] = by_own
+        for place, parts in self._tackles:
+            self._over_points(found, mine[:, place], place, parts)
+        return found
+
+    def _over_pulleys(self, mine: FloatArray, end: FloatArray) -> tuple[FloatArray, ...]:
+        """What the core says of pulleys, (N, pulleys, ...)."""
+        n, p = len(end), len(self._pulleys)
+        numbers = mine[:, self._of_pulleys].reshape(n * p, mine.shape[2])
+        joint = end[:, self._of_pulleys].reshape(n * p, 3) - numbers[:, 0:3]
+        own = np.ascontiguousarray(numbers[:, _OWN])
         found = rows("pulley", own, np.tile(self._axes, (n, 1)), joint, isa=self.isa)
-        parts = (end, *found, by_twist)
-        return _Cables(*(part.reshape(n, k, *part.shape[1:]) for part in parts))
+        return tuple(part.reshape(n, p, *part.shape[1:]) for part in found)
+
+    def _over_points(self, found: _Cables, mine: FloatArray, at: int, parts: FloatArray) -> None:
+        """Fill in a cable over several points, its limb's numbers (N, numbers) given."""
+        n, points = len(mine), len(parts)
+        places = [0, 1, 2, *range(len(SLOTS), len(SLOTS) + 3 * (points - 1))]
+        joint = found.end[:, at, None] - mine[:, places].reshape(n, points, 3)
+        length, pull, bend = (
+            each.reshape(n, points, *each.shape[1:])
+            for each in rows("strand", np.ascontiguousarray(joint).reshape(-1, 3), isa=self.isa)
+        )
+        along = parts @ pull
+        s = np.linalg.norm(along, axis=1)
+        with np.errstate(invalid="ignore", divide="ignore"):  # parts that pull against each other
+            found.parts[:, at], found.length[:, at] = s, length @ parts / s
+            found.pull[:, at] = along / s[:, None]
+            found.bend[:, at] = np.einsum("p,npij->nij", parts, bend) / s[:, None, None]
+            by_points = -(parts[:, None] * pull).reshape(n, 3 * points) / s[:, None]
+        found.by_number[:, at, places] = by_points
 
     def _limbs_at(self, slots: FloatArray, pose: FloatArray) -> tuple[FloatArray, _Cables]:
         """Geometries (N, limbs, SLOTS) of the machines of limbs at poses (N, 6)."""
         cables = self.cables(slots, pose)
-        out = np.array(np.broadcast_to(slots, (len(pose), *slots.shape[-2:])), order="C")
+        narrow = slots[..., : len(SLOTS)]
+        out = np.array(np.broadcast_to(narrow, (len(pose), *narrow.shape[-2:])), order="C")
         out[:, self._over, 0:3] = cables.end - cables.length[..., None] * cables.pull
+        for number in (_OFFSET, _GAIN):
+            out[:, self._over, number] /= cables.parts
         return out, cables
 
     def _on_map(self, pose: FloatArray) -> FloatArray:
@@ -98,33 +165,40 @@ class PulleyMachine(Machine):
         By the platform's twist (ω, v) (N, pulleys, 6) and by the numbers of their limbs
         (N, pulleys, SLOTS).
         """
-        cables = self.cables(slots, pose)
-        by_number = np.zeros((*cables.swivel.shape, len(SLOTS)))
-        by_number[..., 0:3] = -cables.swivel_by_end
-        turned = np.einsum("nkj,nkjt->nkt", cables.swivel_by_end, cables.by_twist)
+        cables, p = self.cables(slots, pose), self._of_pulleys
+        mine = np.broadcast_to(
+            slots[..., self._over, :], (len(pose), len(self._over), slots.shape[-1])
+        )
+        found = _Swivels(*self._over_pulleys(mine, cables.end)[4:])
+        by_number = np.zeros((*found.turned.shape, len(SLOTS)))
+        by_number[..., 0:3] = -found.by_end
+        turned = np.einsum("nkj,nkjt->nkt", found.by_end, cables.by_twist[:, p])
         frame = rows("points", pose, np.zeros(3), isa=self.isa)[2]  # R
-        by_number[..., 3:6] = np.einsum("nkj,nji->nki", cables.swivel_by_end, frame)
-        by_number[..., _OWN] = cables.swivel_by_own
-        return cables.swivel, turned, by_number
+        by_number[..., 3:6] = np.einsum("nkj,nji->nki", found.by_end, frame)
+        by_number[..., _OWN] = found.by_own
+        return found.turned, turned, by_number
 
     def _columns(
-        self, columns: Int32Array
+        self, columns: Int32Array, width: int
     ) -> tuple[Int32Array, IntArray, list[tuple[int, int, int]]]:
         """What to ask of the machine of limbs for columns of the geometry.
 
-        The columns with the offset of the limb in place of a pulley's own numbers, rising and each
-        once; where each of the columns is among them; and of the own ones place, pulley and number.
+        The columns with the offset of the limb in place of numbers that lengthen its cable, rising
+        and each once; where each of the columns is among them; and of those that are others here
+        place, cable and number.
         """
-        limb, slot = np.divmod(columns, len(SLOTS))
-        own = np.isin(limb, self._over) & np.isin(slot, _OWN)
-        asked, back = np.unique(
-            np.where(own, limb * len(SLOTS) + _OFFSET, columns), return_inverse=True
-        )
-        pulley_of = {int(i): p for p, i in enumerate(self._over)}
-        which = [
-            (c, pulley_of[int(limb[c])], OWN_SLOTS.index(SLOTS[slot[c]]))
-            for c in np.flatnonzero(own).tolist()
-        ]
+        limb, slot = np.divmod(columns, width)
+        cable_of = {int(i): k for k, i in enumerate(self._over)}
+        pulleys = set(self._pulleys.tolist())
+        asked = limb * len(SLOTS) + slot
+        which = []
+        for c, (i, number) in enumerate(zip(limb.tolist(), slot.tolist(), strict=True)):
+            if i not in cable_of or number in _END or (i in pulleys and number not in _OWN):
+                continue
+            if number != _GAIN:
+                asked[c] = i * len(SLOTS) + _OFFSET
+            which.append((c, cable_of[i], number))
+        asked, back = np.unique(asked, return_inverse=True)
         return asked.astype(np.int32), back.reshape(-1), which
 
     @staticmethod
@@ -133,9 +207,11 @@ class PulleyMachine(Machine):
     ) -> FloatArray:
         """Columns (N, ..., columns) of those asked for: of own numbers as they lengthen cables."""
         out: FloatArray = found[..., back]
-        for column, pulley, number in own:
-            longer = cables.by_own[:, pulley, number]
-            out[..., column] *= -longer.reshape(-1, *(1,) * (out.ndim - 2))
+        for column, cable, number in own:
+            longer = -cables.by_number[:, cable, number]
+            if number in (_OFFSET, _GAIN):
+                longer = 1.0 / cables.parts[:, cable]
+            out[..., column] *= longer.reshape(-1, *(1,) * (out.ndim - 2))
         return out
 
     # kinematics: as `Machine` ---------------------------------------------------------------------
@@ -160,20 +236,25 @@ class PulleyMachine(Machine):
         status, iterations = np.ones(n, dtype=np.int32), np.zeros(n, dtype=np.int32)
         at = self._on_map(np.broadcast_to(guess, (n, 6)))
         going, limit = np.arange(n), _SETTLED * self.struct.size
+        open_ = self.with_tolerance(np.inf)  # on the way closures need not agree
         for _ in range(_STEPS):
             if not len(going):
                 break
             own = slots[going] if slots.ndim == 3 else slots
             limbs, _cables = self._limbs_at(own, at[going])
-            found, failed, steps, left = super().forward(limbs, q[going], at[going], threads)
+            found, failed, steps, left = Machine.forward(open_, limbs, q[going], at[going], threads)
             iterations[going] += steps
             moved = np.abs(found - at[going])
             moved[:, 3:] *= self.struct.length
             at[going] = found
             done = (moved.max(axis=1) <= limit) & (failed == 0)
+            if self.rows > self.m and done.any():
+                last = super().forward(limbs[done], q[going[done]], found[done], threads)
+                failed[done] = last[1]
+            there = done & (failed == 0)
             ended = done | (failed != 0)
             status[going[ended]], residual[going[ended]] = failed[ended], left[ended]
-            pose[going[done]] = found[done]
+            pose[going[there]] = found[there]
             going = going[~ended]
         if shape is None or len(shape) == 1:
             return pose, status, iterations, residual
@@ -203,7 +284,7 @@ class PulleyMachine(Machine):
         """∂pose/∂(numbers at `columns` of the flattened geometry): (N, 6, columns)."""
         pose = self._on_map(pose)
         limbs, cables = self._limbs_at(slots, pose)
-        asked, back, own = self._columns(columns)
+        asked, back, own = self._columns(columns, slots.shape[-1])
         found = super().error_jacobian(limbs, pose, q, asked, twists)
         return self._put_back(found, back, own, cables)
 
@@ -223,7 +304,7 @@ class PulleyMachine(Machine):
         limbs, cables = self._limbs_at(slots, pose)
         if columns is None:
             return super().readings(limbs, pose, q)
-        asked, back, own = self._columns(columns)
+        asked, back, own = self._columns(columns, slots.shape[-1])
         residual, by_step, by_number = super().readings(limbs, pose, q, asked)
         assert by_number is not None
         return residual, by_step, self._put_back(by_number, back, own, cables)
@@ -231,8 +312,18 @@ class PulleyMachine(Machine):
     def limbs(
         self, slots: FloatArray, pose: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Look at each limb at poses (N, 6): q̃ and the directions of the straight parts."""
-        return super().limbs(self._limbs_at(slots, pose)[0], pose)
+        """Look at each limb at poses (N, 6): q̃ and the directions in which limbs pull."""
+        limbs, cables = self._limbs_at(slots, pose)
+        drive, base, platform = super().limbs(limbs, pose)
+        drive[:, self._over] *= cables.parts
+        return drive, base, platform
+
+    def pulls(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """Force on the platform by tensions of 1, away from it, as `Machine.pulls`."""
+        limbs, cables = self._limbs_at(slots, pose)
+        pulls = super().limbs(limbs, pose)[1]
+        pulls[:, self._over] *= cables.parts[..., None]
+        return pulls
 
     # along a path ---------------------------------------------------------------------------------
 
@@ -241,27 +332,30 @@ class PulleyMachine(Machine):
         pose = rows("motion_pose", np.ascontiguousarray(motion[:, 0]).reshape(-1, 16))[0]
         limbs, cables = self._limbs_at(slots, pose)
         velocity, acceleration = super().rates(limbs, motion)
-        extra = self._bends(slots, cables, motion) / slots[..., self._over, _GAIN]
+        extra = self._bends(slots, cables, motion) / limbs[:, self._over, _GAIN]
         shared = np.array([self.struct.sharing[a] for a in self._of_actuator[self._over]])
         for k, limb in enumerate(self._over):
             acceleration[:, self._of_actuator[limb]] += extra[:, k] / shared[k]
         return velocity, acceleration
 
-    def motion(
+    def _met(
         self, slots: FloatArray, pose: FloatArray, q: FloatArray, q1: FloatArray, q2: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The platform's motion, as `Machine.motion`; each pulley with an actuator of its own."""
+        """As that of `Machine`; each of these cables with an actuator of its own."""
         mine = self._of_actuator[self._over]
         if (np.bincount(self._of_actuator)[mine] > 1).any():
-            raise ArgumentError("accelerations of pulleys that share an actuator are not known")
+            raise ArgumentError(
+                "accelerations of cables over pulleys or several points that share an actuator are"
+                " not known"
+            )
         limbs, cables = self._limbs_at(slots, pose)
-        moving = super().motion(limbs, pose, q, q1, q2)[0]
+        moving = super()._met(limbs, pose, q, q1, q2)[0]
         needed = q2.copy()
-        needed[:, mine] -= self._bends(slots, cables, moving) / slots[..., self._over, _GAIN]
-        return super().motion(limbs, pose, q, q1, needed)
+        needed[:, mine] -= self._bends(slots, cables, moving) / limbs[:, self._over, _GAIN]
+        return super()._met(limbs, pose, q, q1, needed)
 
     def _bends(self, slots: FloatArray, cables: _Cables, motion: FloatArray) -> FloatArray:
-        """What cables accelerate by as their ends move, beyond what the spheres do (N, pulleys)."""
+        """What cables accelerate by as their ends move, beyond what the spheres do (N, cables)."""
         points = np.column_stack([slots[self._over, 3:6], np.ones(len(self._over))])
         speed = np.einsum("nij,kj->nki", motion[:, 1, :3], points)
         along = np.einsum("nki,nki->nk", speed, cables.pull)
@@ -271,6 +365,6 @@ class PulleyMachine(Machine):
         return difference
 
 
-def has_pulleys(limbs: Sequence[dict[str, Any]]) -> bool:
-    """Whether one of a machine's limbs has the driver "pulley"."""
-    return any(limb["driver"] == "pulley" for limb in limbs)
+def has_bent(limbs: Sequence[dict[str, Any]]) -> bool:
+    """Whether one of a machine's limbs has a driver of `BENT`."""
+    return any(limb["driver"] in BENT for limb in limbs)

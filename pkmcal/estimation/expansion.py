@@ -97,6 +97,7 @@ def expansion_of(robot: Calibratable, given: Coefficients) -> Expansion | None:
     coefficient, column = np.zeros(len(numbers)), np.zeros(len(numbers), dtype=np.intp)
     for i, number in enumerate(numbers):
         part = number.slot.partition(".")[0]
+        part = "base" if part.startswith("over") else part
         if part in _PARTS:
             coefficient[i], column[i] = of.get(part, 0.0), _PARTS.index(part)
             continue
@@ -152,8 +153,15 @@ def in_words(sets: Sequence[Measurements], given: Mapping[str, float], robot: Ca
     if not given:
         advice = "; --expansion (expansion=) states how it expands" if has_lengths(robot) else ""
         return f"the machine was at {span}, which is not taken into account{advice}"
+    return (
+        f"numbers are those at {REFERENCE:g} °C; the machine was at {span}, expansion:"
+        f" {coefficients(given)}, taken as exact: no ± contains their uncertainty"
+    )
+
+
+def coefficients(given: Mapping[str, float]) -> str:
+    """The coefficients that were given, by part."""
     parts: dict[float, list[str]] = {}
     for name, coefficient in given.items():
         parts.setdefault(coefficient, []).append(name)
-    each = "; ".join(f"{', '.join(names)} {c * 1e6:.3g} µm/m/K" for c, names in parts.items())
-    return f"numbers are those at {REFERENCE:g} °C; the machine was at {span}, expansion: {each}"
+    return "; ".join(f"{', '.join(names)} {c * 1e6:.3g} µm/m/K" for c, names in parts.items())

@@ -1,8 +1,8 @@
 """Freedoms that no self-calibration can end: where the machine stands, how large it is.
 
-Closures do not change when all anchors move as one body, or when every length and every gain grows
-by the same factor. Such combinations of parameters are named by what they are, not by their
-numbers.
+Closures do not change when all that stands on the base moves as one body, axes included, nor when
+all that is on the platform does, nor when every length and every gain grows by the same factor.
+Such combinations of parameters are named by what they are, not by their numbers.
 """
 
 from __future__ import annotations
@@ -13,18 +13,22 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.core.library import SLOTS
+from pkmcal.core.library import AXES, SLOTS
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
+from pkmcal.screw import from_pose
 
 MIRROR = "its mirror image fits as well: which of the two it is, the robot file says alone"
 _OUTSIDE = 1e-6  # share of a motion outside what may move that does not count
 _ALIKE = 1e-6  # share by which costs differ that are the same
 _AXES = ("x", "y", "z")
-_SCALE = 6  # column of the motions that is the common scale
+_BASE, _SCALE, _PLATFORM = 0, 6, 7  # first columns of the motions: shifts, turns; the common scale
+_MOTIONS = 13
+_MIXED = 1e-3  # of a motion: what is none of its own
+_OFFSET = SLOTS.index("offset")
 _SCALED = [SLOTS.index(name) for name in SLOTS if "tilt" not in name]  # gains too
 
 
@@ -60,6 +64,7 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
     if robot.model.chains is not None:  # whose numbers are errors of joints, not places of points
         return Gauges((), unidentifiable)
     moves = _motions(robot)
+    beside = _swivel_zeros(parameters)
     numbers = moves.reshape(-1, moves.shape[2])[robot.geometry.slot_index]
     chain = robot.geometry.chain[:, parameters.places]
     change = np.linalg.pinv(chain) @ numbers  # of the free numbers, as far as they can follow
@@ -67,6 +72,8 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
     own = parameters.geometry
     scaled = np.zeros((len(parameters), change.shape[1]))
     scaled[own] = change[parameters.number_of[own]] / parameters.scale[own, None]
+    for i, turned in beside.items():
+        scaled[i] = turned / parameters.scale[i]
     size = np.linalg.norm(scaled, axis=0)
     there = size > 0  # the machine has what would move, and some of it is free
     scaled, left = scaled[:, there] / size[there], left[:, there] / size[there]
@@ -85,43 +92,95 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
 
 
 def _motions(robot: Robot) -> FloatArray:
-    """Changes of all numbers (*slots, 7): shifts and turns of the base, and the scale."""
-    slots = robot.slots
-    change = np.zeros((*slots.shape, 7))
-    change[:, 0:3, 0:3] = np.eye(3)
+    """Changes of all numbers (*slots, 13): shifts and turns of the base, the scale, the platform's.
+
+    Turns are about the mean of the base's points, and of the platform's.
+    """
+    slots, limbs = robot.slots, robot.model.limbs
+    change = np.zeros((*slots.shape, _MOTIONS))
+    over = range(len(SLOTS), robot.model.own_width, 3)
+    of_base = [0, *over]  # the first of the three numbers of each point
     middle = slots[:, 0:3].mean(axis=0)
-    turned = np.cross(np.eye(3)[None], (slots[:, 0:3] - middle)[:, None])  # (limbs, axis, xyz)
-    if not any(KINDS[limb.kind].axes_of(limb.couple > 0) for limb in robot.model.limbs):
-        change[:, 0:3, 3:6] = turned.transpose(0, 2, 1)
-    if all(KINDS[limb.kind].actuator_unit == "mm" for limb in robot.model.limbs):
-        change[:, _SCALED, _SCALE] = slots[:, _SCALED]
+    for i, limb in enumerate(limbs):
+        for first in of_base[: max(1, len(limb.parts))]:
+            _move(change[i], slots[i], first, _BASE, middle)
+        _move(change[i], slots[i], 3, _PLATFORM, slots[:, 3:6].mean(axis=0))
+        for axis, tilts in _tilts(robot, i).items():
+            columns = _PLATFORM if axis == "platform" else _BASE
+            change[i][[SLOTS.index(name) for name in AXES[axis]], columns + 3 : columns + 6] = (
+                tilts[:2]
+            )
+            if axis == "base" and KINDS[limb.kind].driver == "crank":
+                change[i, _OFFSET, 3:6] = tilts[2]
+    if all(KINDS[limb.kind].actuator_unit == "mm" for limb in limbs):
+        lengths = [*_SCALED, *range(len(SLOTS), robot.model.own_width)]
+        change[:, lengths, _SCALE] = slots[:, lengths]
         for number, place in zip(robot.geometry.numbers, robot.geometry.slot_index, strict=True):
-            spool = robot.model.limbs[number.limb].law
+            spool = limbs[number.limb].law
             turns = spool is not None and spool.spool  # gain and quadratic number turn a spool
             key = number.slot.removeprefix("drive.")
             if key != number.slot or key == "gain":
                 grows = not (turns and key in ("gain", "quadratic"))
-                change.reshape(-1, 7)[place, _SCALE] = slots.flat[place] * grows
+                change.reshape(-1, _MOTIONS)[place, _SCALE] = slots.flat[place] * grows
     return change
 
 
+def _move(
+    change: FloatArray, numbers: FloatArray, first: int, columns: int, middle: FloatArray
+) -> None:
+    """Shift and turn the point of a limb whose coordinates begin at a number."""
+    place = slice(first, first + 3)
+    change[place, columns : columns + 3] = np.eye(3)
+    change[place, columns + 3 : columns + 6] = np.cross(np.eye(3), numbers[place] - middle).T
+
+
+def _tilts(robot: Robot, i: int) -> dict[str, FloatArray]:
+    """Of each axis of a limb its two tilts and its turn about itself, by turns about x, y and z."""
+    limb, found = robot.model.limbs[i], {}
+    for axis in KINDS[limb.kind].axes_of(limb.couple > 0):
+        tilt1, tilt2 = (robot.slots[i, SLOTS.index(name)] for name in AXES[axis])
+        tilted = from_pose(np.array([0.0, 0.0, 0.0, -tilt1, -tilt2, 0.0]))[:3, :3].T
+        frame = limb.frames[axis] @ tilted
+        by_tilts = np.array([[np.cos(tilt2), 0, 0], [0, 1, 0], [np.sin(tilt2), 0, 1]])
+        found[axis] = np.linalg.solve(by_tilts, frame.T)
+    return found
+
+
+def _swivel_zeros(parameters: Parameters) -> dict[int, FloatArray]:
+    """How zeros of the angles of swivels follow the motions, by parameter."""
+    robot, found = parameters.robot, {}
+    assert isinstance(robot, Robot)
+    for i in robot.model.pulleys:
+        name = f"angle.swivel{i + 1}.zero"
+        for k, own in enumerate(parameters.names):
+            if own.partition("@")[0] == name:
+                found[k] = np.zeros(_MOTIONS)
+                found[k][3:6] = _tilts(robot, i)["base"][2]
+    return found
+
+
 def _texts(free: FloatArray) -> list[str]:
-    """Motions (7, d) in words."""
-    alone = [k for k in range(7) if np.linalg.norm(free[k]) > 1.0 - 1e-3]
+    """Motions (13, d) in words."""
+    alone = [k for k in range(_MOTIONS) if np.linalg.norm(free[k]) > 1.0 - _MIXED]
     texts = []
+    for first, moves, where in (
+        (_BASE, "the base frame may be", "nothing that was measured says where it stands"),
+        (_PLATFORM, "the platform's frame may be", "nothing that was measured says where it is"),
+    ):
+        shifts = [_AXES[k - first] for k in alone if first <= k < first + 3]
+        turns = [_AXES[k - first - 3] for k in alone if first + 3 <= k < first + 6]
+        words = [f"moved along {_listed(shifts)}"] if shifts else []
+        words += [f"turned about {_listed(turns)}"] if turns else []
+        if words:
+            texts.append(f"{moves} {' and '.join(words)}: {where}")
     if len(alone) < free.shape[1]:  # turned about an anchor that is held, say
+        rest = free.copy()
+        rest[alone] = 0.0
         held = free.shape[1] - len(alone)
-        texts.append(f"the anchors may be moved as one body in {held} more way{'s' * (held > 1)}")
-    shifts = [_AXES[k] for k in alone if k < 3]
-    turns = [_AXES[k - 3] for k in alone if 3 <= k < _SCALE]
-    words = [f"moved along {_listed(shifts)}"] if shifts else []
-    words += [f"turned about {_listed(turns)}"] if turns else []
-    if words:
-        texts.insert(
-            0,
-            f"the base frame may be {' and '.join(words)}: nothing that was measured says where it"
-            " stands",
-        )
+        what = "the anchors may be moved as one body"
+        if np.linalg.norm(rest[_PLATFORM:]) > _MIXED:
+            what = "the anchors and the platform's joints may be moved together"
+        texts.append(f"{what} in {held} more way{'s' * (held > 1)}")
     if _SCALE in alone:
         texts.append("the common scale: all lengths and gains may grow by the same factor")
     return texts

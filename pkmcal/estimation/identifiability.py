@@ -21,7 +21,8 @@ _NUISANCE = re.compile(r"(frame|target|anchor|tool|mounting|touch|run)\d*\.")
 _OUTSIDE = 1e-5  # share of a combination outside some parameters that does not count
 _ALIKE = 1e-3  # share by which entries of a combination differ that are not equal
 _SURE = 6  # decimals of a coefficient that are more than rounding
-_SPELLED = 6  # parameters whose coefficients are printed
+_LEAST = 0.01  # coefficient that is printed
+_MOST = 24  # terms that are printed
 CLEAR = 0.01  # share of the machine's size to which a combination must be determined to count
 
 
@@ -182,38 +183,49 @@ def sparse_basis(unidentifiable: FloatArray, names: Sequence[str]) -> FloatArray
     kinds = list(dict.fromkeys(families))
     member = np.array([[family == kind for kind in kinds] for family in families])
     found = np.zeros((d, 0))  # orthonormal combinations of the columns
-    parts: list[FloatArray] = []
+    parts = np.zeros((len(unidentifiable), 0))
     few = (itertools.combinations(range(len(kinds)), k) for k in range(1, _KINDS + 1))
     for support in [*itertools.chain.from_iterable(few), range(len(kinds))]:
         if found.shape[1] == d:
             break
-        outside = unidentifiable[~member[:, list(support)].any(axis=1)]
-        _, singular, rows = np.linalg.svd(np.vstack([outside, np.zeros((d, d))]))
+        away = ~member[:, list(support)].any(axis=1)
+        _, singular, rows = np.linalg.svd(np.vstack([unidentifiable[away], np.zeros((d, d))]))
         inside = rows[np.count_nonzero(singular > _OUTSIDE) :].T
         _, size, turn = np.linalg.svd(inside - found @ (found.T @ inside), full_matrices=False)
         new = inside @ turn[: np.count_nonzero(size > _OUTSIDE)].T
-        if new.shape[1]:
-            parts.append(_reduced(unidentifiable @ new))
-            found = np.linalg.qr(np.hstack([found, new])).Q
-    return np.hstack([np.zeros((len(unidentifiable), 0)), *parts])
+        if not new.shape[1]:
+            continue
+        made = unidentifiable @ new
+        fewer = parts[:, np.abs(parts[away]).max(axis=0, initial=0.0) <= _OUTSIDE]
+        own = _pivots(fewer)  # combinations of fewer kinds: their parameters are taken out
+        made -= fewer @ np.linalg.solve(fewer[own], made[own])
+        parts = np.hstack([parts, _reduced(made)])
+        found = np.linalg.qr(np.hstack([found, new])).Q
+    return parts
 
 
 def _reduced(basis: FloatArray) -> FloatArray:
-    """Eliminate: each combination has a parameter that the others are without.
+    """Eliminate: each combination has a parameter that the others are without."""
+    pivots = _pivots(basis)
+    reduced = np.linalg.solve(basis[pivots].T, basis.T).T
+    largest = [first_largest(sizes, _ALIKE * float(sizes.max())) for sizes in np.abs(reduced).T]
+    scaled: FloatArray = reduced / reduced[largest, np.arange(len(pivots))]
+    return scaled
 
-    Which parameters these are depends on the space that the columns span alone, not on the columns:
-    the linear algebra library turns these in their space as rounding has it.
+
+def _pivots(basis: FloatArray) -> list[int]:
+    """As many parameters as combinations, by which these are told apart best.
+
+    Which they are depends on the space that the columns span alone, not on the columns: the linear
+    algebra library turns these in their space as rounding has it.
     """
-    rest, pivots = basis.copy(), list[int]()
+    rest, pivots = np.linalg.qr(basis).Q, list[int]()
     for _ in range(basis.shape[1]):
         sizes = np.linalg.norm(rest, axis=1)
         pivots.append(first_largest(sizes, _ALIKE * float(sizes.max())))
         along = rest[pivots[-1]] / sizes[pivots[-1]]
         rest -= np.outer(rest @ along, along)
-    reduced = np.linalg.solve(basis[pivots].T, basis.T).T
-    largest = [first_largest(sizes, _ALIKE * float(sizes.max())) for sizes in np.abs(reduced).T]
-    scaled: FloatArray = reduced / reduced[largest, np.arange(len(pivots))]
-    return scaled
+    return pivots
 
 
 def _family(name: str) -> str:
@@ -223,34 +235,52 @@ def _family(name: str) -> str:
     return along[1] if along else re.sub(r"\d+", "", name)
 
 
-def as_sum(combination: FloatArray, names: Sequence[str]) -> str:
+def as_sum(
+    combination: FloatArray, names: Sequence[str], units: Sequence[str], scale: FloatArray
+) -> str:
     """Print a combination of parameters, such as "base1.x + base2.x − platform1.x".
 
-    Measurements do not change where the parameters change together in these proportions.
+    Measurements do not change where the parameters change together in these proportions. The
+    largest come first, with two digits; what is below 0.01 of the largest is left out. Where units
+    differ it is said how numbers in other units than mm count.
 
     Parameters
     ----------
     combination : ndarray (n,)
         Its largest entry is 1.
-    names : sequence of str
+    names, units : sequence of str
         Of the parameters.
+    scale : ndarray (n,)
+        How much of its unit is 1 in the combination.
     """
     groups: dict[float, list[str]] = {}
     for value, name in zip(combination, names, strict=True):
-        if abs(value) > 0.01:
+        if abs(value) > _LEAST:
             groups.setdefault(float(f"{round(float(value), _SURE):.2g}"), []).append(name)
-    members = [name for group in groups.values() for name in group]
-    if len(members) > _SPELLED and set(map(abs, groups)) != {1.0}:
-        kinds = list(dict.fromkeys(_family(name) for name in names))
-        ordered = sorted(members, key=lambda name: (kinds.index(_family(name)), names.index(name)))
-        return f"a combination of {listed(ordered)}"
     terms = [
-        (" − " if value < 0 else " + ", "" if abs(value) == 1.0 else f"{abs(value):g} ", name)
-        for value, group in sorted(groups.items(), key=lambda pair: pair[0] < 0)
-        for name in _runs(group, " − … − " if value < 0 else " + … + ", abs(value) == 1.0)
+        (value, text)
+        for value, group in sorted(groups.items(), key=lambda pair: (-abs(pair[0]), -pair[0]))
+        for text in _runs(group, " − … − " if value < 0 else " + … + ", abs(value) == 1.0)
     ]
-    text = "".join(sign + factor + name for sign, factor, name in terms)
+    text = "".join(
+        f"{' − ' if value < 0 else ' + '}{'' if abs(value) == 1.0 else f'{abs(value):g} '}{name}"
+        for value, name in terms[:_MOST]
+    )
+    if len(terms) > _MOST:
+        text += f" + … ({len(terms) - _MOST} more, of at most {abs(terms[_MOST][0]):g})"
+    there = np.flatnonzero(np.abs(combination) > _LEAST).tolist()
+    count_as = {units[i]: 1.0 / float(scale[i]) for i in there}
+    if len(count_as) > 1:
+        others = {unit: factor for unit, factor in count_as.items() if unit != "mm"}
+        text += f" ({', '.join(_counted(unit, factor) for unit, factor in others.items())})"
     return text.removeprefix(" + ")
+
+
+def _counted(unit: str, factor: float) -> str:
+    """How a number that is no length counts among lengths in mm."""
+    if unit == "rad":
+        return f"angles as arcs at {factor:.4g} mm"
+    return f"numbers {'without unit' if unit == '1' else f'in {unit}'} times {factor:.3g}"
 
 
 def listed(names: Sequence[str]) -> str:

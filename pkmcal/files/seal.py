@@ -2,8 +2,8 @@
 
 What has no seal, or another content than it states, is somebody's work. The seal stands where the
 format has room for a remark: a comment of CSV, TOML, HTML, SVG, XML, URDF, C, ini and hal files,
-the first key of JSON, a text chunk before the end of PNG. Other files, a printer's configuration
-and G-code among them, are their owner's and have no seal.
+the first key of JSON, a text chunk before the end of PNG, a comment at the end of PDF. Other files,
+a printer's configuration and G-code among them, are their owner's and have no seal.
 """
 
 from __future__ import annotations
@@ -47,6 +47,10 @@ def _remark(digest: str) -> bytes:
     return f"<!-- {_WORDS}: {digest} -->\n".encode()
 
 
+def _comment(digest: str) -> bytes:
+    return f"% {_WORDS}: {digest}\n".encode()
+
+
 def _chunk(digest: str) -> bytes:
     body = b"tEXt" + f"{_WORDS}\0{digest}".encode()
     return struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
@@ -65,6 +69,7 @@ _FORMS = {
     ".xml": _Form(_remark),
     ".urdf": _Form(_remark),
     ".sdf": _Form(_remark),
+    ".pdf": _Form(_comment),
     ".png": _Form(_chunk, before=_IEND),
 }
 

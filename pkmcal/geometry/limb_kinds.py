@@ -12,8 +12,9 @@ from typing import Literal
 
 from pkmcal.arrays import Unit
 from pkmcal.core.library import AXES, DRIVERS, ROWS, SLOTS
+from pkmcal.core.pulleys import BENT
 
-Driver = Literal["length", "slider", "crank", "pulley"]
+Driver = Literal["length", "slider", "crank", "pulley", "tackle"]
 
 POINT_SLOTS = SLOTS[:6]
 
@@ -26,9 +27,9 @@ class LimbKind:
     ----------
     name : str
         The name of the kind.
-    driver : {"length", "slider", "crank", "pulley"}
-        How the actuator moves the limb; a crank's coordinate is an angle. Of a pulley the core
-        knows limbs between two points that stand for it (`pkmcal.core.pulleys`).
+    driver : {"length", "slider", "crank", "pulley", "tackle"}
+        How the actuator moves the limb; a crank's coordinate is an angle. Of a pulley and a tackle
+        the core knows limbs between two points that stand for it (`pkmcal.core.pulleys`).
     what : str
         What the limb is, in a few words.
     axes : mapping of str to str
@@ -52,12 +53,12 @@ class LimbKind:
     cable: bool = False
 
     def __post_init__(self) -> None:
-        unknown = {self.driver, *self.axes, *self.rows} - {*DRIVERS, "pulley", *AXES, *ROWS}
+        unknown = {self.driver, *self.axes, *self.rows} - {*DRIVERS, *BENT, *AXES, *ROWS}
         if unknown:
             raise ValueError(f"{self.name}: the core has no {', '.join(sorted(unknown))}")
         for couple in {False, self.couple}:
             used = {axis for row in self.all_rows(couple) for axis in ROWS[row]}
-            used |= set() if self.driver == "length" else {"base"}
+            used |= set() if self.driver in ("length", "tackle") else {"base"}
             if used != set(self.axes_of(couple)):
                 raise ValueError(
                     f"{self.name}: its driver and rows have the axes {sorted(used)}, "
@@ -77,6 +78,7 @@ class LimbKind:
             "slider": {"rod": "rod"},
             "crank": {"rod": "rod", "crank": "crank"},
             "pulley": {"radius": "crank"},  # what turns about the base point, as a crank does
+            "tackle": {},
         }
         return of_drivers[self.driver]
 
@@ -89,6 +91,11 @@ class LimbKind:
     def has_zero(self) -> bool:
         """Whether the direction in which an angle about the base axis is 0 can be stated."""
         return self.driver in ("crank", "pulley")
+
+    @property
+    def has_points(self) -> bool:
+        """Whether it runs over several points of the base, with whole numbers of parts."""
+        return self.driver == "tackle"
 
     def axes_of(self, couple: bool) -> dict[str, str]:
         """The axes of a limb with or without a couple length, in the order of the core."""
@@ -104,6 +111,7 @@ class LimbKind:
         axes = self.axes.values()
         return (
             ("kind", "base", "platform", "offset", "gain", "actuator")
+            + (("over", "parts") if self.has_points else ())
             + tuple(self.lengths)
             + tuple(axes)
             + tuple(f"{axis}_tilt" for axis in axes)
@@ -167,6 +175,7 @@ KINDS: dict[str, LimbKind] = {
             axes={"base": "swivel"},
             cable=True,
         ),
+        LimbKind("tackle", "tackle", "a cable over several points, taut", cable=True),
         LimbKind("RUS", "crank", "a crank and a rod", axes={"base": "axis"}),
     )
 }

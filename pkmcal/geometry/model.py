@@ -10,6 +10,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, Unit
 from pkmcal.core.laws import Drive, Laws
+from pkmcal.core.library import SLOTS
+from pkmcal.core.pulleys import BENT
 from pkmcal.display import Table, fixed
 from pkmcal.geometry.box import Box
 from pkmcal.geometry.chains import Chains
@@ -66,6 +68,8 @@ class Limb:
         Limits of q̃; mm or rad.
     base_cone, platform_cone : Cone or None
         Limits of the joints.
+    parts : tuple of int
+        How many parts of a cable run from each of its points to the platform; of a tackle.
     law : Law or None
         What lies between the actuator's reading and q̃ beside gain and offset; of chains their
         joints have it.
@@ -81,6 +85,7 @@ class Limb:
     base_cone: Cone | None = None
     platform_cone: Cone | None = None
     law: Law | None = None
+    parts: tuple[int, ...] = ()
 
     @property
     def frame(self) -> FloatArray:
@@ -105,6 +110,7 @@ class Limb:
             "near": np.nan if self.stroke is None else sum(self.stroke) / 2,
             "frames": self.frames,
             "lever": self.couple,
+            "parts": self.parts,
             "weights": [1.0, *(self.weights or [1.0] * len(rows))],
         }
 
@@ -206,9 +212,22 @@ class Model:
         )  # fmt: skip
 
     @property
+    def own_width(self) -> int:
+        """How many numbers a limb has in the geometry's slots, apart from those of drive laws."""
+        return len(SLOTS) + 3 * max(
+            (len(limb.parts) - 1 for limb in self.limbs if limb.parts), default=0
+        )
+
+    @property
     def pulleys(self) -> tuple[int, ...]:
         """Limbs, counted from 0, that run over a pulley."""
         return tuple(i for i, limb in enumerate(self.limbs) if limb.kind == "pulley")
+
+    @property
+    def bent(self) -> tuple[int, ...]:
+        """Limbs, counted from 0, that run over a pulley or over several points."""
+        kinds = [KINDS.get(limb.kind) for limb in self.limbs]  # a chain of joints has none
+        return tuple(i for i, kind in enumerate(kinds) if kind is not None and kind.driver in BENT)
 
     def doubts(self) -> list[tuple[int, str]]:
         """Drive laws without an inverse over their stroke: limbs, counted from 0, and why."""

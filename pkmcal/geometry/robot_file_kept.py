@@ -94,6 +94,8 @@ class _Edit:
         kind = KINDS[limb.kind]
         for point in ("base", "platform"):
             self._point(table, point, [numbers.get(f"{point}.{axis}") for axis in "xyz"])
+        for j in range(1, len(limb.parts)):
+            self._list(table["over"], j - 1, [numbers.get(f"over{j}.{axis}") for axis in "xyz"])
         for axis, name in kind.axes_of(limb.couple > 0.0).items():
             self._list(table, f"{name}_tilt", [numbers.get(slot) for slot in AXES[axis]])
         for key, slot in {**kind.lengths, "offset": "offset", "gain": "gain"}.items():
@@ -142,11 +144,11 @@ class _Edit:
             self._put(found, "z", self._written(z.name), [])
         self._comment(found, [n.name for n in (x, y, z) if n is not None])
 
-    def _list(self, table: Any, key: str, numbers: list[LimbNumber | None]) -> None:
+    def _list(self, table: Any, key: str | int, numbers: list[LimbNumber | None]) -> None:
         names = [number.name for number in numbers if number is not None]
         if not any(map(self._concerns, names)):
             return
-        if key not in table:
+        if isinstance(key, str) and key not in table:
             table[key] = [0.0] * len(numbers)
         for k, number in enumerate(numbers):
             if number is not None and self._changed(number.name):

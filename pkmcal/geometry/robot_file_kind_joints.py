@@ -14,6 +14,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import AXES, MAPS, SLOTS
 from pkmcal.core.machine import Machine
+from pkmcal.core.pulleys import BENT
 from pkmcal.files.toml_table import Table
 from pkmcal.geometry.chain_joints import Joint, across
 from pkmcal.geometry.limb_kinds import KINDS
@@ -44,8 +45,8 @@ def joints_of_kind(
 
     `home` is the platform's pose (6,). Names under ``[parameters]`` stand for their values.
     """
-    if table.data.get("kind") == "pulley":
-        table.fail("kind", "what a pulley winds up is no joint: it does not go beside chains")
+    if (name := table.data.get("kind")) in BENT:
+        table.fail("kind", f"what a {name} takes up is no joint: it does not go beside chains")
     limb, entries, of_law = read_limb(table, table.integer("actuator", 1) - 1, parameters)
     if "actuator" not in table:
         table.fail("", "the key 'actuator' is missing: beside chains every limb states its own")

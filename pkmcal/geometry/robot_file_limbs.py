@@ -29,6 +29,7 @@ UNIT_WORDS: dict[Unit, str] = {
     "1/mm": "per length",
     "1/rad": "per angle",
     "1/mm2": "per square of length",
+    "1/N": "per force",
 }
 
 
@@ -118,7 +119,8 @@ def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
     """Read every ``[[limb]]`` table."""
     read = [read_limb(table, i, parameters) for i, table in enumerate(tables)]
     limbs = [limb for limb, _, _ in read]
-    width = len(SLOTS) + max(len(of_law) for _, _, of_law in read)
+    own = len(SLOTS) + 3 * max(len(limb.parts[1:]) for limb in limbs)
+    width = own + max(len(of_law) for _, _, of_law in read)
     numbers: list[LimbNumber] = []
     values: dict[str, float] = {}
     for i, (limb, entries, of_law) in enumerate(read):
@@ -127,8 +129,12 @@ def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
             unit = gain_unit(law, kind.actuator_unit) if slot == "gain" else unit
             numbers.append(LimbNumber(name, unit, i, slot, entries[slot].tie))
             values[name] = entries[slot].value
+        for j, (slot, name) in enumerate(over_points(i + 1, limb.parts)):
+            place = i * width + len(SLOTS) + j
+            numbers.append(LimbNumber(name, "mm", i, slot, entries[slot].tie, place))
+            values[name] = entries[slot].value
         for j, (number, entry) in enumerate(of_law):
-            slot, place = f"drive.{number.name.partition('.')[2]}", i * width + len(SLOTS) + j
+            slot, place = f"drive.{number.name.partition('.')[2]}", i * width + own + j
             numbers.append(LimbNumber(number.name, number.unit, i, slot, entry.tie, place))
             values[number.name] = entry.value
     _check_actuators(tables, limbs)
@@ -138,6 +144,12 @@ def read_limbs(tables: Sequence[Table], parameters: Parameters) -> Limbs:
         blank[:, SLOTS.index("gain")] = 1.0
     free = {number.name for number in numbers if number.tie is None}
     return Limbs(tuple(limbs), numbers, {n: v for n, v in values.items() if n in free}, blank)
+
+
+def over_points(number: int, parts: Sequence[int]) -> list[tuple[str, str]]:
+    """Slot and name of each number of the points of limb `number` behind its base point."""
+    points = range(1, len(parts))
+    return [(f"over{j}.{axis}", f"over{number}.{j}.{axis}") for j in points for axis in "xyz"]
 
 
 def read_limb(
@@ -185,6 +197,7 @@ def read_limb(
         base_cone=_cone(table, "base_cone"),
         platform_cone=_cone(table, "platform_cone"),
         law=law,
+        parts=_parts(table) if kind.has_points else (),
     )
     for array in frames.values():
         array.flags.writeable = False
@@ -201,6 +214,10 @@ def _read_numbers(
     for point in ("base", "platform"):
         for coordinate, found in zip("xyz", _point(table, point, parameters), strict=True):
             entries[f"{point}.{coordinate}"] = found
+    if kind.has_points:
+        for j, place in enumerate(_over(table), 1):
+            for axis, value in zip("xyz", place, strict=True):
+                entries[f"over{j}.{axis}"] = entry("over", value, "mm")
     entries["offset"] = entry("offset", table.data.get("offset", 0.0), kind.actuator_unit)
     of_gain = gain_unit(law, kind.actuator_unit)
     entries["gain"] = entry("gain", table.data.get("gain", 1.0), of_gain)
@@ -236,6 +253,26 @@ def _point(table: Table, key: str, parameters: Parameters) -> tuple[Entry, Entry
     tied = radius.name is not None or angle.name is not None
     x_entry, y_entry = (Entry(tie.value(values), tie if tied else None) for tie in ties)
     return x_entry, y_entry, parameters.entry(height)
+
+
+def _over(table: Table) -> list[list[object]]:
+    """The points of a cable behind its base point, as the file has them."""
+    found = table["over"]
+    good = isinstance(found, list) and bool(found)
+    if not good or not all(isinstance(point, list) and len(point) == 3 for point in found):
+        table.fail("over", f"must be points [[x, y, z], …], one or more, found {shown(found)}")
+    points: list[list[object]] = found
+    return points
+
+
+def _parts(table: Table) -> tuple[int, ...]:
+    """How many parts of a cable run from its base point, and from each behind it."""
+    count = 1 + len(_over(table))
+    what = "whole numbers, of base and of each point under over"
+    found = table.list_of("parts", count, what) if "parts" in table else [1] * count
+    if any(isinstance(each, bool) or not isinstance(each, int) or each < 1 for each in found):
+        table.fail("parts", f"must be {what}, 1 or more, found {shown(list(found))}")
+    return tuple(int(each) for each in found)
 
 
 def _positive(table: Table, key: str, value: float) -> float:

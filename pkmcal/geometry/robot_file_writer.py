@@ -95,6 +95,10 @@ def _limb(limb: Limb, i: int, geometry: Geometry) -> dict[str, Any]:
         "base": _point("base", numbers, geometry),
         "platform": _point("platform", numbers, geometry),
     }
+    if limb.parts:
+        points = range(1, len(limb.parts))
+        data["over"] = [_point(f"over{j}", numbers, geometry) for j in points]
+        data["parts"] = list(limb.parts)
     for axis, key in kind.axes_of(couple).items():
         data[key] = limb.frames[axis][:, 2].tolist()
         data[f"{key}_tilt"] = [entry(slot) for slot in AXES[axis]]

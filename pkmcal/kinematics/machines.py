@@ -9,7 +9,7 @@ from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.driven import CompiledMachine, DrivenMachine
 from pkmcal.core.library import MAPS, SLOTS
 from pkmcal.core.machine import Machine
-from pkmcal.core.pulleys import PulleyMachine, has_pulleys
+from pkmcal.core.pulleys import PulleyMachine, has_bent
 from pkmcal.geometry.model import Model
 
 
@@ -30,7 +30,7 @@ def machine_of(model: Model, slots: FloatArray, length: float) -> CompiledMachin
         inner = ChainMachine(model.chains.layout, model.closure_tolerance)
         width = model.chains.count
     else:
-        inner, width = _of_limbs(model, slots, length), len(SLOTS)
+        inner, width = _of_limbs(model, slots, length), model.own_width
     if not model.driven:
         return inner
     rows, columns = slots.shape
@@ -41,12 +41,12 @@ def _of_limbs(model: Model, slots: FloatArray, length: float) -> Machine:
     """A machine of limbs; one with drive laws has a drive of its own for each of them."""
     limbs = [limb.for_core() for limb in model.limbs]
     if model.driven:
-        slots = np.ascontiguousarray(slots[:, : len(SLOTS)])
+        slots = np.ascontiguousarray(slots[:, : model.own_width])
         slots[:, [SLOTS.index("offset"), SLOTS.index("gain")]] = 0.0, 1.0
         limbs = [limb | {"actuator": i} for i, limb in enumerate(limbs)]
     if sum(len(limb["weights"]) for limb in limbs) == len(MAPS[model.map]):
         for limb in limbs:  # nothing to weigh: all closures hold
             limb["weights"] = [1.0] * len(limb["weights"])
     home = np.ascontiguousarray(model.home, dtype=np.float64)
-    made = PulleyMachine if has_pulleys(limbs) else Machine
+    made = PulleyMachine if has_bent(limbs) else Machine
     return made(model.map, limbs, length, slots, home, model.closure_tolerance)

@@ -531,6 +531,41 @@ class Robot(Kinematics, Result):
         other.machine = self.machine.approaching(rows[0] if shape == () else rows)
         return other
 
+    def tensioned(self, tension: ArrayLike) -> Robot:
+        """The robot with cables, belts or screws under tension, for laws with `stretch`.
+
+        Parameters
+        ----------
+        tension : array_like (n,) or (..., n)
+            Of what each actuator drives, N, as load cells or `pkmcal.tensions` say; negative where
+            it is pushed. A batch goes with calls of as many rows.
+
+        Returns
+        -------
+        Robot
+            What `replace` and `load` make of it knows no tensions.
+
+        Raises
+        ------
+        ValueError, TypeError
+            Another shape, or numbers that are not finite.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")  # whose legs do not stretch
+        >>> bool(robot.tensioned([50.0] * 6).forward(robot.inverse(robot.home)).ok)
+        True
+        """
+        rows, shape = as_rows("tension", tension, self.n_actuators)
+        if not np.isfinite(rows).all():
+            raise ArgumentError("tension must be finite")
+        if not self.model.driven:
+            return self
+        other = copy(self)
+        other.machine = self.machine.tensioned(rows[0] if shape == () else rows)
+        return other
+
     @cached_property
     def _of_any_misfit(self) -> CompiledMachine:
         return self.machine.with_tolerance(np.inf)

@@ -157,7 +157,7 @@ def _balance(
         forces: FloatArray = (twists.transpose(0, 2, 1) @ wrench[:, :, None])[:, :, 0] / arcs
         return forces
 
-    directions = machine.limbs(slots, own)[1]
+    directions = machine.pulls(slots, own)
     slopes = machine.closure(slots, own, machine.inverse(slots, own)).by_step.transpose(0, 2, 1)
     kinds = [1 + int(row).bit_count() for row in machine.struct.rows[0 : machine.struct.limbs]]
     first = np.concatenate([[0], np.cumsum(kinds)[:-1]]).astype(np.intp)

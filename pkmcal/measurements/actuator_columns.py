@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from typing import Protocol
 
 import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.files.csv_table import Table
-from pkmcal.kinematics.robot import Robot
+from pkmcal.kinematics.reading_units import Actuated, gain_of
 
 _WITHOUT = (
     "; the actuators at each row are needed: of a log of the controller with --controller LOG; of"
@@ -21,14 +20,6 @@ _QUANTITIES: dict[str | None, tuple[str, ...]] = {  # the one that is meant wher
     None: ("mm", "rad", "count"),
 }
 _ACTUATOR = re.compile(r"q[1-9][0-9]*")
-
-
-class Actuated(Protocol):
-    """A machine whose actuators have units: `Robot`, `SerialArm`."""
-
-    @property
-    def actuator_units(self) -> tuple[str, ...]:
-        """Unit of each actuator, "mm" or "rad"."""
 
 
 def actuators_in(table: Table) -> list[str]:
@@ -74,7 +65,7 @@ def _counted(table: Table, i: int, of_robot: str | None, robot: Actuated | None)
             f"column {column.name!r} has unit [{column.unit}]: give the robot, whose gain says"
             " how much one is"
         )
-    gain, winds = _gain(robot, i)
+    gain, winds = (None, False) if robot is None else gain_of(robot, i)
     if gain is None or abs(gain) == 1.0:
         raise table.header_error(
             f"column {column.name!r} has unit [{column.unit}], and the robot does not state how"
@@ -82,21 +73,9 @@ def _counted(table: Table, i: int, of_robot: str | None, robot: Actuated | None)
         )
     turns = "rad of the spool" if winds else of_robot
     note = f"actuators in {column.unit}, converted by the robot's gain ({gain:.6g} {turns} each)"
-    if note not in table.notes:
+    if column.unit != "counts" and note not in table.notes:  # as pkmcal itself writes them
         table.notes.append(note)
     return of_robot
-
-
-def _gain(robot: object, actuator: int) -> tuple[float | None, bool]:
-    """The gain of the first limb of an actuator, and whether it turns a spool; None: no limb."""
-    if not isinstance(robot, Robot):
-        return None, False
-    limbs = robot.model.limbs
-    limb = next((k for k, limb in enumerate(limbs) if limb.actuator == actuator), None)
-    if limb is None:
-        return None, False
-    law = limbs[limb].law
-    return float(robot.geometry[f"gain{limb + 1}"]), law is not None and law.spool
 
 
 def compare(table: Table, units: tuple[str, ...], robot: Actuated | None) -> None:

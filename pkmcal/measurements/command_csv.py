@@ -22,7 +22,8 @@ def read_commands(path: str | PathLike[str], units: Sequence[str]) -> FloatArray
         A file with the columns q1 to qn in any order; others, such as what was measured there,
         are not looked at.
     units : sequence of str, n
-        "mm" or "rad": what the machine's actuators are.
+        "mm", "rad" or "counts": what the machine's actuators are, as `reading_units` has it. Counts
+        may be called mm, too.
 
     Returns
     -------
@@ -37,7 +38,14 @@ def read_commands(path: str | PathLike[str], units: Sequence[str]) -> FloatArray
     """
     table = Table(path)
     table.rename(known_as)
-    return table.stacked([f"q{i + 1}" for i in range(len(units))], units)
+    names = [f"q{i + 1}" for i in range(len(units))]
+    table.require(names)
+    known = {"counts": ("mm", "count")}  # in mm they were written once
+    columns = [
+        table.numbers(name, *known.get(unit, (unit,)))[0]
+        for name, unit in zip(names, units, strict=True)
+    ]
+    return np.stack(columns, axis=1)
 
 
 def write_commands(

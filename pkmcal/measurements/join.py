@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from pkmcal.arguments import word
 from pkmcal.arrays import IntArray
 from pkmcal.exceptions import FileError
 from pkmcal.files.csv_table import Table
@@ -18,21 +19,40 @@ from pkmcal.measurements.time_stamps import seconds, with_date
 
 Join = Literal["auto", "name", "row", "time"]
 JOINS: tuple[Join, ...] = ("auto", "name", "row", "time")
+_LATE = re.compile(r"row([+-][1-9][0-9]{0,5})")
 _ENOUGH = 0.5  # of the points have to be found by a key for it to be one
 _NUMBER = re.compile(r"([0-9]+)\D*$")
 _LISTED = 3
-_BESIDE = ("session", "approach", "temperature")  # of the log, beside its actuators
+_BESIDE = ("session", "approach", "tension", "temperature")  # of the log, beside its actuators
 _EPOCH = 1e8  # s: seconds since 1970 are more
 
 Rows = list[int | None]  # of the log, for each row of the instrument
 
 
-def join(table: Table, log: Table, how: Join) -> None:
+def way_and_shift(given: object) -> tuple[Join, int]:
+    """How to join, and by how many rows the log is late: of "row+1" by one.
+
+    Raises
+    ------
+    ValueError, TypeError
+        No such word.
+
+    Examples
+    --------
+    >>> way_and_shift("row+1"), way_and_shift("name")
+    (('row', 1), ('name', 0))
+    """
+    late = _LATE.fullmatch(given) if isinstance(given, str) else None
+    return ("row", int(late[1])) if late else (word("join", given, JOINS), 0)
+
+
+def join(table: Table, log: Table, how: Join, shift: int = 0) -> None:
     """Give the rows of an instrument the actuators of a controller's log; what was done is a note.
 
     By name: the point's name, its pose or its group is that of a row of the log. By time: each
     point takes the last row of the log at or before it. By row: as many rows, in the same order,
-    or a row of the log for each pose. Points without a row are left out.
+    or a row of the log for each pose; with a shift, the row that many after it. Points without a
+    row are left out.
 
     Raises
     ------
@@ -54,9 +74,16 @@ def join(table: Table, log: Table, how: Join) -> None:
             refused.append(f"by {way}: {found}")
             continue
         rows, said = found
+        if shift:
+            rows = [_within(row, shift, len(log)) for row in rows]
+            said += f", each with the row {abs(shift)} {'after' if shift > 0 else 'before'} it"
         _put(table, log, actuators, rows, f"joined with {log.path} by {way}: {said}")
         return
     raise FileError(f"{table.path}: cannot be joined with {log.path}; {'; '.join(refused)}")
+
+
+def _within(row: int | None, shift: int, count: int) -> int | None:
+    return row + shift if row is not None and 0 <= row + shift < count else None
 
 
 def _put(table: Table, log: Table, actuators: Sequence[str], rows: Rows, said: str) -> None:

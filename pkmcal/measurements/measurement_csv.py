@@ -23,6 +23,7 @@ columns                               meaning
 ``temperature [°C]``                  of the machine; or ``temperature.base``, ``.platform``,
                                       ``.q1`` …, of what that actuator drives
 ``approach.q1`` …                     1 or -1: the reading had grown or fallen; 0: not known
+``tension.q1`` …                      of what the actuator drives, N, or one ``tension`` for all
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
@@ -51,15 +52,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal import arguments
-from pkmcal.arguments import word
 from pkmcal.arrays import FloatArray, TextArray, as_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError, FileError
 from pkmcal.files.column_names import SYNONYMS
 from pkmcal.files.csv_table import Table
+from pkmcal.kinematics.reading_units import Actuated
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements import orientation_columns
 from pkmcal.measurements.actuator_columns import (
-    Actuated,
     actuators_in,
     columns_of_actuators,
     compare,
@@ -67,8 +67,8 @@ from pkmcal.measurements.actuator_columns import (
 )
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.components import KINDS, Kind
-from pkmcal.measurements.join import JOINS, Join
 from pkmcal.measurements.join import join as joined
+from pkmcal.measurements.join import way_and_shift
 from pkmcal.measurements.kind_columns import (
     component_names,
     kinds_in,
@@ -107,7 +107,7 @@ def read_measurements(
     robot: Actuated | None = None,
     *,
     controller: str | PathLike[str] | None = None,
-    join: Join = "auto",
+    join: str = "auto",
     ignore: str | Sequence[str] = (),
     rename: Mapping[str, str] | None = None,
     header: Sequence[str] = (),
@@ -131,7 +131,7 @@ def read_measurements(
         tells orders of quaternions apart, and its gains say what a step is.
     controller : str or path, optional
         A log of the controller that has the actuators where the file has none.
-    join : {"auto", "name", "row", "time"}
+    join : {"auto", "name", "row", "time", "row+1", "row-1", ...}
         How a row of the log is found: by the name of the point or of its pose, by the order of
         the rows, by time-stamp (the last row at or before it). By default the first that works of
         name, time and row.
@@ -178,7 +178,7 @@ def read_measurements(
         )
     how = layout(ignore, rename, header, units)
     joints: Sequence[str] = getattr(robot, "joint_names", None) or ()
-    table = _table(path, controller, word("join", join, JOINS), how, joints)
+    table = _table(path, controller, join, how, joints)
     split_names(table)
     number_groups(table)
     several = several_targets(table)
@@ -198,6 +198,7 @@ def read_measurements(
     fields["time"] = times
     fields["temperature"] = read_temperature(table, len(actuator_units))
     fields["approach"] = _read_approach(table, len(actuator_units))
+    fields["tension"] = _read_tension(table, len(actuator_units))
     values: FloatArray | None
     if several:
         actuators, values, fields = read_several(table, several, actuators, fields)
@@ -300,17 +301,19 @@ def _probed(
         time=times,
         temperature=read_temperature(table, measured.actuators.shape[1]),
         approach=_read_approach(table, measured.actuators.shape[1]),
+        tension=_read_tension(table, measured.actuators.shape[1]),
     )
 
 
 def _table(
     path: str | PathLike[str],
     controller: str | PathLike[str] | None,
-    how: Join,
+    join: str,
     columns: Layout,
     joints: Sequence[str],
 ) -> Table:
     """The table of a file, with the actuators of a controller's log."""
+    way, shift = way_and_shift(join)
     if controller is None:
         return open_table(path, columns, joints)
     log_columns = replace(columns, header=())
@@ -323,7 +326,7 @@ def _table(
     for name in seen:
         if not any(_has(each, name) for each in (table, log)) and name not in columns.ignore:
             raise table.header_error(f"no column {name!r} to rename, nor in {log.path}")
-    joined(table, log, how)
+    joined(table, log, way, shift)
     return table
 
 
@@ -345,8 +348,8 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
         "probe",
         "contact",
     }
-    names |= {"actuator_sigma", "approach", *parts_of(0), WHOLE}
-    whats = ("actuator_sigma", "approach", WHOLE)
+    names |= {"actuator_sigma", "approach", "tension", *parts_of(0), WHOLE}
+    whats = ("actuator_sigma", "approach", "tension", WHOLE)
     names |= {f"{what}.{q}" for what in whats for q in actuators}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
@@ -419,6 +422,15 @@ def _read_approach(table: Table, count: int) -> FloatArray | None:
         return None
     columns = np.stack([table.integers(name) for name in names], axis=1)
     return np.broadcast_to(columns.astype(np.float64), (len(table), count))
+
+
+def _read_tension(table: Table, count: int) -> FloatArray | None:
+    """Tension of what each actuator drives (rows, n), N."""
+    names = columns_of_actuators(table, "tension", count)
+    if not names:
+        return None
+    columns = np.stack([table.numbers(name, "N")[0] for name in names], axis=1)
+    return np.broadcast_to(columns, (len(table), count))
 
 
 def _read_session(table: Table) -> TextArray | None:

@@ -132,7 +132,7 @@ def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
     if not square:
         reason = "more closures than free coordinates"
     elif not problem.provable:
-        reason = "cables over pulleys"
+        reason = "cables over pulleys or several points"
     elif start is None:
         reason = "no start system for such limbs"
     else:

@@ -64,6 +64,10 @@ def planned(
             raise ArgumentError(
                 f"noise must be above 0, found {noise}: without it any poses will do"
             )
+        # a frame laid through noise is tilted by as much as heights can tell, and what is never
+        # seen of a level machine would seem to be
+        exact = VirtualMachine(robot, 0.0).measure(rows, kind, places)
+        measured = replace(measured, values=exact.values)
         if several is not None:
             index = np.tile(np.arange(count), len(q))
             measured = replace(measured, target=several, target_index=index)
@@ -144,10 +148,11 @@ def design_of(
         frame = rigid @ ways[:, : np.count_nonzero(sizes > _UNIDENTIFIABLE * sizes[0])]
         flat = aimed.reshape(len(moved), -1)
         return design((flat - frame @ (frame.T @ flat)).reshape(aimed.shape)), True
-    basis = sparse_basis(made.unidentifiable, chosen.names)
+    first = sparse_basis(made.unidentifiable, chosen.names)[:, 0]
+    unknown = as_sum(first, chosen.names, chosen.units, chosen.scale)
     raise ArgumentError(
-        f"candidates: not even all of them identify {as_sum(basis[:, 0], chosen.names)}, which"
-        " moves the targets; offer others, free fewer parameters or state a prior"
+        f"candidates: not even all of them identify {unknown}, which moves the targets;"
+        " offer others, free fewer parameters or state a prior"
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, rms
 from pkmcal.calibration.identification import Identification
-from pkmcal.estimation.expansion import temperatures
+from pkmcal.estimation.expansion import REFERENCE, coefficients, temperatures
 from pkmcal.estimation.identifiability import listed
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files import reading
@@ -26,7 +26,6 @@ _TEXTS = (
 )  # fmt: skip
 _INSTRUMENT = ("name", "serial", "certificate", "expanded", "factor")
 _TEMPERATURE = ("mean", "uncertainty", "expansion", "expansion_uncertainty")
-_REFERENCE = 20.0  # °C, of ISO 1
 _ROUNDED = 0.1  # K, to which temperatures are stated
 
 
@@ -150,7 +149,7 @@ def budget(found: Identification, stated: Statement, predicted: FloatArray) -> B
     lines += _misfit(found)
     if np.isfinite(stated.temperature):
         length = float(np.linalg.norm(found.fit.start.pose[:, :3], axis=1).max())
-        mean = stated.temperature - _REFERENCE
+        mean = stated.temperature - REFERENCE
         half, coefficient = stated.temperature_uncertainty, stated.expansion_uncertainty
         lines += [
             Contribution(
@@ -165,7 +164,7 @@ def budget(found: Identification, stated: Statement, predicted: FloatArray) -> B
                 standard(coefficient, "rectangular"),
                 mean * length,
                 type="B",
-                remark=f"±{coefficient:g}/K rectangular, {mean:+.3g} K from {_REFERENCE:g} °C",
+                remark=f"±{coefficient:g}/K rectangular, {mean:+.3g} K from {REFERENCE:g} °C",
             ),
         ]
     held = found.datum.names
@@ -235,20 +234,68 @@ def _shown(stated: Statement, read: tuple[float, float] | None) -> str:
     return f"({stated.temperature:g} ± {stated.temperature_uncertainty:g}) °C"
 
 
+def _reference(found: Identification) -> str:
+    """At which temperature the lengths of the machine are what was identified."""
+    if found.expansion:
+        return f"{REFERENCE:g} °C (ISO 1): the lengths stated are those at it"
+    return f"{REFERENCE:g} °C (ISO 1): not reduced to it, lengths are as at the measurement"
+
+
+def _expansion(found: Identification, stated: Statement) -> str:
+    """Which expansion was calibrated with, and how well it is known."""
+    sure = ", its uncertainty is not stated"
+    if stated.expansion_uncertainty > 0:
+        sure = f", ± {stated.expansion_uncertainty * 1e6:.3g} µm/m/K"
+    if found.expansion:
+        return coefficients(found.expansion) + sure
+    if np.isfinite(stated.expansion):
+        return f"{stated.expansion * 1e6:.3g} µm/m/K{sure}; no length was reduced by it"
+    return ""
+
+
 def as_data(
-    stated: Statement, made: Budget, read: tuple[float, float] | None = None
+    found: Identification,
+    stated: Statement,
+    predicted: FloatArray,
+    positions: FloatArray,
+    left_out: int = 0,
 ) -> dict[str, Any]:
-    """The certificate as JSON files hold it; `read` are temperatures that were measured, °C."""
+    """The certificate as JSON files hold it.
+
+    Parameters
+    ----------
+    found, stated, predicted
+        As `budget` takes them.
+    positions : ndarray (N, 3)
+        Of the tool at the poses of `predicted`, mm.
+    left_out : int
+        How many poses were drawn at which nothing is predicted.
+    """
+    made = budget(found, stated, predicted)
+    worst = None
+    if predicted.size:
+        k = int(np.argmax(predicted))
+        there = budget(found, stated, predicted[k : k + 1])
+        worst = {
+            "expanded_uncertainty": there.expanded,
+            "coverage": there.coverage,
+            "position": positions[k].tolist(),
+        }
     return {
         **stated.texts,
         "instrument": stated.instrument,
-        "temperature": _shown(stated, read),
+        "temperature": _shown(stated, temperatures(found.fit.equations.sets)),
+        "reference_temperature": _reference(found),
+        "expansion": _expansion(found, stated),
         "instrument_stated": bool(np.isfinite(stated.expanded)),
         "standard_uncertainty": made.combined,
         "expanded_uncertainty": made.expanded,
         "coverage_factor": made.factor,
         "coverage": made.coverage,
         "dof": made.dof,
+        "poses": len(predicted),
+        "poses_left_out": left_out,
+        "worst": worst,
         "budget": [
             {
                 "source": line.source,

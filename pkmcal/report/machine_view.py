@@ -31,7 +31,7 @@ def element(found: Identification) -> tuple[str, str]:
     Both are empty for a machine that the page cannot hold: the still pictures stay.
     """
     robot = found.robot
-    if isinstance(robot, Robot) and robot.model.pulleys:
+    if isinstance(robot, Robot) and robot.model.bent:
         return "", ""
     data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
     data["places"] = _measured(found)

@@ -13,10 +13,10 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.row_names import row_names
 from pkmcal.display import printable
-from pkmcal.estimation.expansion import in_words, temperatures
+from pkmcal.estimation.expansion import in_words
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import checksums, comment, version
-from pkmcal.report import certificate, contents, machine_view
+from pkmcal.report import certificate, contents, machine_view, pdf
 from pkmcal.report.as_json import as_json
 from pkmcal.report.axes import axes
 from pkmcal.report.certificate import Statement
@@ -29,6 +29,7 @@ _CERTAIN = 1e4  # degrees of freedom that are as good as infinitely many
 _SMALL = 1e-3  # below which numbers are written with a power of ten
 _TEMPLATE = "report.html.jinja"
 FILES = ("report.html", "report.json", "robot.toml")
+PDF = "report.pdf"
 
 
 def write(
@@ -36,6 +37,8 @@ def write(
     folder: Path,
     files: Mapping[str, bytes],
     stated: Statement | None = None,
+    *,
+    with_pdf: bool = False,
 ) -> list[Path]:
     """Write ``report.html``, ``report.json`` and ``robot.toml``, the same for the same inputs.
 
@@ -49,18 +52,27 @@ def write(
         What was read, by name: the report states the checksums.
     stated : Statement, optional
         Of a certificate, which the report then begins with.
+    with_pdf : bool
+        Whether Chromium prints ``report.pdf`` of it, which contains when.
 
     Raises
     ------
+    ValueError
+        No PDF can be printed.
     OSError
         The folder cannot be written.
     """
+    if with_pdf:
+        pdf.browser()
     facts = gather(found, files, stated)
     page, numbers, robot = (folder / name for name in FILES)
     found.robot.save(robot, comment(files))
     write_whole(numbers, as_json(_as_data(facts), schema="report") + "\n")
     write_whole(page, html(facts))
-    return [page, numbers, robot]
+    if not with_pdf:
+        return [page, numbers, robot]
+    pdf.print_page(page, folder / PDF)
+    return [page, numbers, robot, folder / PDF]
 
 
 def gather(
@@ -73,10 +85,11 @@ def gather(
     accuracy = None if isinstance(predicted, str) else predicted[0]
     signed = None
     if stated is not None:
-        sure = np.empty(0) if accuracy is None else accuracy.predicted
-        made = certificate.budget(found, stated, sure)
-        read = temperatures(found.fit.equations.sets)
-        signed = certificate.as_data(stated, made, read)
+        sure, where, unsure = np.empty(0), np.empty((0, 3)), 0
+        if accuracy is not None:
+            sure, where = accuracy.predicted, accuracy.positions[np.isfinite(accuracy.accuracy)]
+            unsure = len(accuracy.accuracy) - len(sure)
+        signed = certificate.as_data(found, stated, sure, where, unsure)
     return {
         "state": state,
         "verdict": sentence,

@@ -32,8 +32,9 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
     model = robot.model
     machine, slots = drives.within(robot)
     laws = drives.laws(robot)
-    if model.pulleys:
-        raise ArgumentError(f"robot: {model.name} has pulleys, which the page cannot hold")
+    if model.bent:
+        what = "tackles" if model.limbs[model.bent[0]].parts else "pulleys"
+        raise ArgumentError(f"robot: {model.name} has {what}, which the page cannot hold")
     size = float(machine.struct.size)
     if isinstance(machine, Machine):
         blob, numbers, strokes = memory.limbs(machine, slots), 0, _strokes(robot)

@@ -197,6 +197,31 @@ def test_with_one_cable_more_than_needed_it_cannot_be_told_which(tmp_path: Path)
     assert " or q" in str(cable)
 
 
+def test_the_slack_cable_is_among_those_named_where_others_would_do_as_well() -> None:
+    """Two cables more than needed: at some poses two pull nearly alike, and noise hides which."""
+    robot = pk.load(Path(__file__).parents[2] / "examples" / "cable-robot" / "robot.toml")
+    gain = np.array([robot.geometry[f"gain{i}"] for i in range(1, 9)])
+    alone = several = 0
+    for seed in range(2):
+        rng = np.random.default_rng([seed, 9])
+        box = np.array([900, 600, 500, 0.1, 0.1, 0.1])
+        at = robot.home + rng.uniform(-1, 1, (40, 6)) * box
+        q = robot.inverse(at) + rng.normal(0, 0.2, (40, 8)) / gain
+        rows, cables = rng.choice(40, 5, replace=False), rng.integers(8, size=5)
+        loose = dict(zip(rows.tolist(), cables.tolist(), strict=True))
+        for row, cable in loose.items():
+            q[row, cable] += rng.uniform(5, 60) / gain[cable]
+        log = pk.Measurements(q, None, "closure", actuator_sigma=0.2 / np.abs(gain))
+        found = pk.identify(robot, log, "offset*", slack="drop")
+        named = {row: each.actuators for each in found.slack for row in each.rows}
+        assert named.keys() == loose.keys()
+        for row, cable in loose.items():
+            assert cable + 1 in named[row]
+        alone += sum(len(each) == 1 for each in named.values())
+        several += sum(len(each) > 1 for each in named.values())
+    assert alone >= 3 and several >= 1
+
+
 def test_legs_that_push_are_never_slack(tmp_path: Path) -> None:
     path = tmp_path / "legs.toml"
     machine_on(CORNERS, path)

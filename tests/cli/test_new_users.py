@@ -153,6 +153,20 @@ def test_a_log_that_is_a_row_late_is_named(
     assert "belongs to the pose 1 " in " ".join(said.split())
 
 
+def test_a_log_that_is_a_row_late_is_joined_as_its_message_says(
+    run: Any, command: list[Any], hexapod: Path
+) -> None:
+    late = ("--controller", hexapod / "late.csv", *EXCHANGED)
+    result = run(*command, *late, "--join", "row")
+    said = " ".join((result.stdout + result.stderr).split())
+    there = re.search(r"belongs to the pose 1 (before|after) it", said)
+    assert there is not None
+    join = "row+1" if there[1] == "after" else "row-1"
+    result = run(*command, *late, "--join", join, "--drop-outliers", "--holdout", "0.2")
+    assert result.exit_code == 0, result.stdout + result.stderr
+    assert f"each with the row 1 {there[1]} it" in result.stderr
+
+
 def test_from_two_raw_files_to_a_sheet(
     run: Any, command: list[Any], hexapod: Path, tmp_path: Path
 ) -> None:

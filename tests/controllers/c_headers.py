@@ -72,7 +72,7 @@ class Library:
     def _rows(self, name: str, given: Any, written: Any) -> tuple[Any, Any]:
         call = getattr(self._library, name)
         given = np.ascontiguousarray(given, dtype=self._type)
-        written = np.array(written, dtype=self._type)
+        written = np.array(written, dtype=self._type, order="C")
         status = [
             call(one.ctypes.data_as(ctypes.c_void_p), other.ctypes.data_as(ctypes.c_void_p))
             for one, other in zip(given, written, strict=True)

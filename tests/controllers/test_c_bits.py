@@ -12,7 +12,7 @@ import pytest
 import pkmcal as pk
 
 from .c_headers import needed
-from .test_c_header import geared, lawful, pulleys_and_legs
+from .test_c_header import eight, geared, lawful, pulleys_and_legs
 
 # Poses from integers, so that they are exact; the hash (FNV-1a) of the bits of q and pose.
 _PROGRAM = """\
@@ -101,8 +101,8 @@ const report = (high, low, solved) => console.log(hex(high) + hex(low) + " " + s
 WebAssembly.instantiate(fs.readFileSync("program"), { env: { report } })
     .then((made) => made.instance.exports.run());
 """
-_WASM = "clang --target=wasm32 -O2 -std=c99 -fno-math-errno -nostdlib -isystem wasm -Dmain=run"
-_WASM += " -Wl,--no-entry,--export=run,--allow-undefined"
+_WASM = "clang --target=wasm32 -O2 -std=c99 -fno-math-errno -mbulk-memory -nostdlib -isystem wasm"
+_WASM += " -Dmain=run -Wl,--no-entry,--export=run,--allow-undefined"
 _M7 = (
     "-mcpu=cortex-m7 -mthumb -mfpu=fpv5-d16 -mfloat-abi=hard --specs=rdimon.specs -T m7.ld start.c"
 )
@@ -153,13 +153,15 @@ def reference(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
 
 
 # everything of its own, sine to arctangent; constraints; laws and their Newton's method; turns that
-# suit two limbs; pulleys
+# suit two limbs; pulleys; chains
 MACHINES = {
     "6-rus": lambda: pk.load("6-rus"),
     "3prs": lambda: pk.load("3prs"),
     "laws": lawful,
     "geared": lambda: geared(0.5),
     "pulleys": pulleys_and_legs,
+    "least squares": eight,
+    "chains": lambda: pk.load("trivariant"),
 }
 SOLVED = {"geared": 500}  # how many poses at least: most of these it cannot take
 

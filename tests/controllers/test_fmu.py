@@ -22,6 +22,7 @@ CASES = {
     "rotary-delta": lambda: pk.load("rotary-delta"),
     "drive laws": lawful,
     "pulleys": pulleys,
+    "chains": lambda: pk.load("trivariant"),
 }
 
 
@@ -85,7 +86,8 @@ def test_fmpy_finds_nothing_wrong_and_the_poses_of_the_robot(case: str, tmp_path
         slave.setFloat64(to_pose, want.tolist())
         slave.doStep(0.01 * step, 0.01)
         np.testing.assert_allclose(slave.getFloat64(pose), want, rtol=0, atol=1e-9)
-        assert slave.getFloat64(to_q) == actuators.tolist()
+        off = np.abs(slave.getFloat64(to_q) - actuators).max()
+        assert off == 0.0 or (case == "chains" and off < 1e-10)
         assert slave.getInt32([places["status"], places["to.status"]]) == [0, 0]
     slave.setFloat64(to_pose, [1e6, 0.0, 0.0, 0.0, 0.0, 0.0])
     slave.setFloat64(q, [float("nan")] * robot.n_actuators)
@@ -99,7 +101,7 @@ def test_fmpy_finds_nothing_wrong_and_the_poses_of_the_robot(case: str, tmp_path
 
 def test_machines_that_no_header_holds_are_refused(refused: Any, tmp_path: Path) -> None:
     out = tmp_path / "x.fmu"
-    assert "a header holds other limbs" in refused("export", "tricept", "--as", "fmu", "--out", out)
+    assert "8 closures for 6" in refused("export", "exechon", "--as", "fmu", "--out", out)
     with pytest.raises(pk.ArgumentError, match="cannot reach its home"):
         pk.export.fmu(pk.load("linear-delta").replace({"rod1": 10.0}), out)
     assert not out.exists()

@@ -164,6 +164,10 @@ def pulley(isa: int, part: slice) -> list[np.ndarray]:
     return [*library.rows("pulley", own[part], frame[part], POINTS[part], isa=isa)]
 
 
+def strand(isa: int, part: slice) -> list[np.ndarray]:
+    return [*library.rows("strand", POINTS[part], isa=isa)]
+
+
 CASES: dict[str, Case] = {
     "law_drive": law("law_drive"),
     "law_drive_inverse": law("law_drive_inverse"),
@@ -176,6 +180,7 @@ CASES: dict[str, Case] = {
     "touched_points": touched_points,
     "tilts": tilts,
     "pulley": pulley,
+    "strand": strand,
     "tpr2tps_lengths": lambda isa, part: closed_forms(isa, part, tpr2tps_lengths, (4,)),
     "tpr2tps_jacobian": lambda isa, part: closed_forms(isa, part, tpr2tps_jacobian, (4, 4)),
     "closure_cost": closure_cost,

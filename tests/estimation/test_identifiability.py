@@ -96,12 +96,41 @@ def test_observability_indices_of_known_singular_values() -> None:
         ([1, 1, 1, 0], "base1.x + … + base3.x"),
         ([1, 1, -1, 0], "base1.x + base2.x − base3.x"),
         ([-1, -1, -1, 1], "offset1 − base1.x − … − base3.x"),
-        ([1, 0, -0.5, 0.25], "base1.x + 0.25 offset1 − 0.5 base3.x"),
+        ([1, 0, -0.5, 0.25], "base1.x − 0.5 base3.x + 0.25 offset1"),
+        ([0.004, 1, 0.1234, 0.5], "base2.x + 0.5 offset1 + 0.12 base3.x"),
     ],
 )
 def test_combinations_as_sums(values: list[float], text: str) -> None:
     names = ["base1.x", "base2.x", "base3.x", "offset1"]
-    assert as_sum(np.array(values), names) == text
+    assert as_sum(np.array(values), names, ["mm"] * 4, np.ones(4)) == text
+
+
+def test_coefficients_of_many_are_printed_and_angles_among_lengths_are_told() -> None:
+    names = [*(f"base{i}.x" for i in range(1, 9)), "frame.gamma"]
+    units, scale = ["mm"] * 8 + ["rad"], np.array([*[1.0] * 8, 1 / 250])
+    values = np.array([1, -0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3, 0.25])
+    assert as_sum(values, names, units, scale) == (
+        "base1.x − 0.9 base2.x + 0.8 base3.x + 0.7 base4.x + 0.6 base5.x + 0.5 base6.x"
+        " + 0.4 base7.x + 0.3 base8.x + 0.25 frame.gamma (angles as arcs at 250 mm)"
+    )
+    assert "arcs" not in as_sum(np.array([0.0] * 8 + [1.0]), names, units, scale)
+    many = 0.02 + np.linspace(0.98, 0.0, 30)
+    text = as_sum(many, [f"n{2 * i}" for i in range(30)], ["mm"] * 30, np.ones(30))
+    assert text.endswith(f" + … (6 more, of at most {many[24]:.2g})")
+
+
+def test_no_combination_is_named_twice() -> None:
+    """Of a 3-RPS whose frame and target are unknown twelve are open, and all are independent."""
+    robot = pk.load("3rps")
+    q = robot.inverse(pk.sample_poses(robot, 40), match=True)
+    measured = pk.VirtualMachine(robot, 0.01).measure(q)
+    found = pk.identify(robot, measured, frame="unknown", target="unknown")
+    open_ones = found.fit.estimate.state.measured.unidentifiable
+    basis = sparse_basis(open_ones, found.free)
+    basis /= np.linalg.norm(basis, axis=0)
+    assert np.linalg.svd(basis)[1][-1] > 0.1 and basis.shape[1] == len(found.free) - found.rank
+    np.testing.assert_allclose(open_ones @ (open_ones.T @ basis), basis, atol=1e-9)
+    assert len(set(found.unidentifiable)) == len(found.unidentifiable)
 
 
 def test_names_that_count_on_are_shortened() -> None:

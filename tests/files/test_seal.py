@@ -25,6 +25,7 @@ CONTENTS = {
     ".html": b"<!doctype html>\n<p>text</p>\n",
     ".svg": SVG,
     ".png": PNG,
+    ".pdf": b"%PDF-1.4\ntrailer\nstartxref\n9\n%%EOF\n",
     ".xml": b"<a>\n  <b/>\n</a>\n",
     ".urdf": b"<a>\n  <b/>\n</a>\n",
     ".h": b"#ifndef A_H\n#define A_H\n#endif\n",

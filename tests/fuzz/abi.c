@@ -351,6 +351,7 @@ static void of_rows(ptrdiff_t n, unsigned strange, int isas)
     EACH_ISA(law_drive_inverse, n, a, D(0, n));
     EACH_ISA(law_harmonic, n, a, D(0, n), D(1, 3 * n), D(2, n));
     EACH_ISA(law_segment, n, a, D(0, n), D(1, 3 * n));
+    EACH_ISA(strand, n, c, D(0, n), D(1, 3 * n), D(2, 9 * n));
     EACH_ISA(tpr2tps_lengths, n, a, b, D(0, 4 * n));
     EACH_ISA(tpr2tps_jacobian, n, a, b, D(0, 16 * n));
     EACH_ISA(exp, n, a, D(0, 16 * n));

@@ -92,7 +92,7 @@ def test_a_written_robot_reads_back_to_the_last_bit(source: str | Path, tmp_path
     assert all_bits(written(model, tmp_path)) == all_bits(model)
 
 
-KINDS = ["UPS", "TPR", "UPR", "RPS", "PUS", "PRS", "RUS", "cable", "pulley"]
+KINDS = ["UPS", "TPR", "UPR", "RPS", "PUS", "PRS", "RUS", "cable", "pulley", "tackle"]
 NUMBER = st.floats(-1e4, 1e4)
 LENGTH = st.floats(1.0, 1e3)
 NAMED_LENGTH = st.sampled_from(["p", "-q", "q"]) | NUMBER
@@ -129,6 +129,12 @@ def limbs(draw: st.DrawFn) -> dict[str, Any]:
         limb["zero"] = [[0, -z, y], [z, 0, -x], [-y, x, 0]][k]
     if kind in ("RUS", "pulley"):
         limb["crank" if kind == "RUS" else "radius"] = draw(LENGTH | st.just("arm"))
+    if kind == "tackle":
+        limb["over"] = draw(
+            st.lists(st.lists(NAMED_LENGTH, min_size=3, max_size=3), min_size=1, max_size=3)
+        )
+        count = 1 + len(limb["over"])
+        limb["parts"] = draw(st.lists(st.integers(1, 4), min_size=count, max_size=count))
     if kind != "RUS" and draw(st.booleans()):
         limb["offset"] = draw(NAMED_LENGTH)
     rows = {"TPR": 1, "UPR": 2, "RPS": 1, "PRS": 1}.get(kind, 0)

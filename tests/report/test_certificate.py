@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.report import certificate
+from pkmcal.report import certificate, pdf, report
 
 from .. import browser, workspaces
 
@@ -124,9 +124,29 @@ def test_the_page_begins_with_what_is_stated(folder: Path, found: pk.Identificat
     assert f"U = {told['expanded_uncertainty']:.3g}".rstrip("0") in page
     assert told["expanded_uncertainty"] == pytest.approx(2 * told["standard_uncertainty"])
     assert found.verdict.reasons[0].split(" falls")[0] in page
+    assert "20 °C (ISO 1): not reduced to it" in page
+    assert "11.5 µm/m/K, ± 1 µm/m/K; no length was reduced by it" in page
     found.report(folder.parent)
     plain = (folder.parent / "report.html").read_text("utf-8")
     assert 'id="certificate"' not in plain
+
+
+def test_the_worst_pose_is_stated_beside_the_workspace(
+    found: pk.Identification, folder: Path, stated: Path
+) -> None:
+    """There the tool is least certain: more than over all, by what the covariance says there."""
+    told = json.loads((folder / "report.json").read_text("utf-8"))["certificate"]
+    page = (folder / "report.html").read_text("utf-8")
+    sample = pk.sample_poses(found.robot, 500, share=0.9)
+    accuracy = found.accuracy(sample)
+    assert told["poses"] == 500 and told["poses_left_out"] == 0
+    assert "nothing can be predicted" not in page
+    assert told["worst"]["position"] == pytest.approx(sample[np.argmax(accuracy), :3])
+    others = told["standard_uncertainty"] ** 2 - np.mean(accuracy**2) / 3
+    expected = 2 * np.sqrt(others + accuracy.max() ** 2 / 3)
+    assert told["worst"]["expanded_uncertainty"] == pytest.approx(expected)
+    assert told["worst"]["expanded_uncertainty"] > told["expanded_uncertainty"]
+    assert f"U = {told['worst']['expanded_uncertainty']:.3g}".rstrip("0") in page
 
 
 def test_many_degrees_of_freedom_are_written_out(found: pk.Identification, tmp_path: Path) -> None:
@@ -161,7 +181,11 @@ def test_it_states_no_other_temperature_than_was_calibrated_with(
     (tmp_path / "stated.toml").write_text(f"[temperature]\n{text}\n", "utf-8")
     stated = certificate.read(tmp_path / "stated.toml")
     if message is None:
-        certificate.budget(found, stated, np.empty(0))
+        told = certificate.as_data(found, stated, np.empty(0), np.empty((0, 3)))
+        assert told["reference_temperature"].startswith("20 °C (ISO 1): the lengths stated are")
+        sure = "± 1 µm/m/K" if "expansion_uncertainty" in text else "its uncertainty is not stated"
+        assert told["expansion"] == f"base, platform, limbs 11.5 µm/m/K, {sure}"
+        assert told["worst"] is None
     else:
         with pytest.raises(ValueError, match=message):
             certificate.budget(found, stated, np.empty(0))
@@ -206,13 +230,33 @@ def test_it_is_part_of_a_report(run: Any, refused: Any, stated: Path, tmp_path: 
     assert 'id="certificate"' in page and "certificate.toml" in page, "its checksum is stated"
 
 
-def test_it_prints_on_a4(folder: Path, tmp_path: Path) -> None:
-    browser.look(
-        folder / "report.html", f"--print-to-pdf={tmp_path / 'page.pdf'}", "--no-pdf-header-footer"
-    )
-    boxes = re.findall(
-        rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", (tmp_path / "page.pdf").read_bytes()
-    )
+def test_it_prints_on_a4(found: pk.Identification, stated: Path, tmp_path: Path) -> None:
+    browser.chromium()
+    made = found.report(tmp_path, certificate=stated, pdf=True)
+    assert [path.name for path in made] == [*report.FILES, "report.pdf"]
+    boxes = re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", made[-1].read_bytes())
     assert len(boxes) >= 3
     sizes = np.array(boxes, dtype=float) / 72 * 25.4
     np.testing.assert_allclose(sizes, np.tile([210.0, 297.0], (len(boxes), 1)), atol=1.0)
+
+
+def test_without_a_browser_a_pdf_is_refused_before_the_work(
+    run: Any, refused: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    example = Path(__file__).resolve().parents[2] / "examples" / "linear-delta"
+    command = ("calibrate", example / "robot.toml", example / "probe.csv", "--pdf")
+    assert "--pdf: it is part of the report, --report DIR" in refused(*command)
+    said = refused(*command, "--report", tmp_path / "out")
+    assert "pdf: no Chromium was found" in said and "open report.html in any browser" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_browser_that_prints_nothing_is_named(tmp_path: Path) -> None:
+    broken = tmp_path / "chromium"
+    broken.write_text("#!/bin/sh\necho no display >&2\nexit 1\n")
+    broken.chmod(0o755)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PATH", f"{tmp_path}:/bin:/usr/bin")
+        with pytest.raises(pk.ArgumentError, match="chromium printed nothing: no display"):
+            pdf.print_page(tmp_path / "page.html", tmp_path / "page.pdf")

@@ -1,0 +1,219 @@
+"""Whether what a fit leaves changes with the order of measuring, as where something moved."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.calibration.fit import Fit
+from pkmcal.calibration.row_names import row_names
+from pkmcal.display import chance_text, displayed, printable
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.statistics.linear_fit import means, numbered
+from pkmcal.statistics.order_test import Course, Series
+
+CHANCE = 0.01  # below which residuals follow the order
+_FEWEST = 8  # visits of a series
+_MOST = 0.5  # of the residuals' variance, from which they are little else
+
+
+@dataclass(frozen=True)
+class MeasuringOrder:
+    """How residuals follow the order in which was measured, of the series that does so most.
+
+    A series are the rows of one file, or of one session in it, in the order of the column `time`,
+    or of the rows where there is none.
+
+    Attributes
+    ----------
+    components : tuple of str
+        What was read: x, y, z of positions.
+    shift : tuple of float
+        How far each went: at `jump`, or between its highest and lowest; mm and rad.
+    scatter : tuple of float
+        Standard deviation of one visit of a pose beside that.
+    units : tuple of str
+        Of each.
+    chance : float
+        How likely as much would be if nothing moved, by the test of `statistics.order_test`, times
+        the number of series.
+    share : float
+        Of the residuals' variance that is in it, in the component in which it is most.
+    jump : str
+        The row from which on all are displaced, in words, where a jump explains most; else "".
+    visits : int
+        How many poses there were one after the other.
+    series : str
+        Which file or session, where there are several.
+    """
+
+    components: tuple[str, ...]
+    shift: tuple[float, ...]
+    scatter: tuple[float, ...]
+    units: tuple[str, ...]
+    chance: float
+    share: float
+    jump: str
+    visits: int
+    series: str
+
+    @property
+    def found(self) -> bool:
+        """Whether residuals follow the order."""
+        return self.chance < CHANCE
+
+    @property
+    def large(self) -> bool:
+        """Whether that is most of what they are."""
+        return self.found and self.share > _MOST
+
+    def _counted(self) -> list[int]:
+        """Components that are lengths, or all where none is."""
+        lengths = [k for k, unit in enumerate(self.units) if unit == "mm"]
+        return lengths or list(range(len(self.units)))
+
+    def __str__(self) -> str:
+        counted = self._counted()
+        size = float(np.linalg.norm([self.shift[k] for k in counted]))
+        value, unit = displayed(size, self.units[counted[0]])
+        most = self.components[max(counted, key=lambda k: abs(self.shift[k]))]
+        along = "" if len(counted) == 1 else f", most of it {most}"
+        where = f" from {self.jump} on" if self.jump else " in the course of measuring"
+        of = f" of {self.series}" if self.series else ""
+        return (
+            f"residuals{of} shift by {value:.3g} {unit}{where}{along} ({chance_text(self.chance)}):"
+            " machine or instrument moved meanwhile, or the model is wrong where the machine was"
+            " then; measure some poses again at the end"
+        )
+
+
+def measuring_order(fit: Fit, odd: Collection[int]) -> MeasuringOrder | None:
+    """Test the fitted rows of each series; None where none is long enough, or rows are mixtures.
+
+    Parameters
+    ----------
+    fit : Fit
+        The fit.
+    odd : collection of int
+        Outliers, which are left out.
+    """
+    if fit.uncertainty.mixed:
+        return None
+    visits = _visits(fit, odd)
+    if not len(visits.row):
+        return None
+    tested = [_tested(visits, series) for series in range(len(visits.names))]
+    known = [each for each in tested if each is not None]
+    if not known:
+        return None
+    series, first, course = min(known, key=lambda each: each[2].chance)
+    sets = fit.uncertainty.equations.sets
+    units = {n: u for m in sets for n, u in zip(m.components, m.units, strict=True)}
+    read = np.flatnonzero(course.scatter)
+    at = [] if course.jump is None else [visits.row[first + course.jump]]
+    return MeasuringOrder(
+        components=tuple(list(units)[k] for k in read),
+        shift=tuple(course.shift[read].tolist()),
+        scatter=tuple(course.scatter[read].tolist()),
+        units=tuple(list(units.values())[k] for k in read),
+        chance=min(1.0, len(known) * course.chance),
+        share=course.share,
+        jump=row_names(fit.equations.datasets, at),
+        visits=len(course.values),
+        series=visits.names[series] if len(visits.names) > 1 else "",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Visits:
+    """Rows between which the machine was nowhere else, in the order of measuring, as one."""
+
+    names: tuple[str, ...]  # of the series
+    series: IntArray  # (V,)
+    row: IntArray  # the first of each
+    visit: IntArray  # (E,) of each equation, components of a visit averaged
+    design: FloatArray
+    residual: FloatArray
+    by_component: FloatArray
+
+
+def _visits(fit: Fit, odd: Collection[int]) -> _Visits:
+    sure, equations = fit.uncertainty, fit.uncertainty.equations
+    series, names = _series(equations.datasets)
+    time = np.concatenate([
+        data.rows.astype(float) if data.measured.time is None else data.measured.time
+        for data in equations.datasets
+    ])  # fmt: skip
+    use = ~np.isin(equations.rows, list(odd))
+    order = np.lexsort((equations.rows, time, series))
+    order = order[use[order]]
+    pose = sure.poses
+    new = (np.diff(pose[order], prepend=-1) != 0) | (np.diff(series[order], prepend=-1) != 0)
+    visit = np.full(len(time), -1)
+    visit[order] = np.cumsum(new) - 1
+    first = order[new]
+    labels = sure.labels
+    mine = visit[labels.row] >= 0
+    key = numbered(visit[labels.row][mine], labels.component[mine])
+    whole = np.column_stack([sure.fit.design, sure.fit.residual, _by_component(fit)])
+    averaged = means(whole[mine], key)
+    p = sure.fit.design.shape[1]
+    return _Visits(
+        names=names,
+        series=series[first],
+        row=equations.rows[first],
+        visit=visit[labels.row][mine][np.unique(key, return_index=True)[1]],
+        design=averaged[:, :p],
+        residual=averaged[:, p],
+        by_component=averaged[:, p + 1 :],
+    )
+
+
+def _series(datasets: Sequence[FitData]) -> tuple[IntArray, tuple[str, ...]]:
+    """The series of each row (N,), and their names: files, sessions in them, what was touched."""
+    found: list[IntArray] = []
+    names: list[str] = []
+    for i, data in enumerate(datasets):
+        m = data.measured
+        if m.session is None and m.touched is None:
+            found.append(np.full(len(m), len(names), dtype=np.intp))
+            names.append(printable(m.file or f"measurements {i + 1}"))
+            continue
+        columns = [each.tolist() for each in (m.session, m.touched) if each is not None]
+        labels = list(zip(*columns, strict=True))
+        numbers = {each: len(names) + k for k, each in enumerate(dict.fromkeys(labels))}
+        found.append(np.array([numbers[each] for each in labels], dtype=np.intp))
+        names += [printable(", ".join(each)) for each in numbers]
+    return np.concatenate(found), tuple(names)
+
+
+def _by_component(fit: Fit) -> FloatArray:
+    """How equations (M, k) change if what was read does by 1, mm or rad."""
+    equations = fit.uncertainty.equations
+    numbers = {
+        n: k for k, n in enumerate(dict.fromkeys(n for m in equations.sets for n in m.components))
+    }
+    parts = []
+    for m in equations.sets:
+        one = np.eye(len(numbers))[[numbers[n] for n in m.components]]
+        parts.append(np.tile(one, (len(m), 1, 1)))
+    return equations.whitened(parts, fit.uncertainty.factors)
+
+
+def _tested(visits: _Visits, series: int) -> tuple[int, int, Course] | None:
+    """Which series, its first visit, and its course; None where it is too short."""
+    own = np.flatnonzero(visits.series == series)
+    if len(own) < _FEWEST:
+        return None
+    within = (visits.visit >= own[0]) & (visits.visit <= own[-1])
+    tested = Series(
+        visits.design, visits.residual, visits.by_component,
+        np.where(within, visits.visit - own[0], -1),
+    )  # fmt: skip
+    course = tested.course()
+    if course is None:
+        return None
+    return series, int(own[0]), tested.jumped(course) if course.chance < CHANCE else course

@@ -1,0 +1,72 @@
+"""A page as PDF on A4, as an installed Chromium prints it.
+
+A browser, for the page is made for browsers: libraries that print HTML know neither all of its
+style sheet nor its scripts.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+from pkmcal.exceptions import ArgumentError
+
+_BROWSERS = (
+    *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome"),
+    *("microsoft-edge", "brave-browser"),
+)
+_FLAGS = (
+    *("--headless", "--disable-gpu", "--no-first-run", "--disable-background-networking"),
+    *("--disable-component-update", "--disable-sync", "--no-pdf-header-footer"),
+    "--virtual-time-budget=2000",  # ms until the scripts of the page have drawn
+)
+_PATIENCE = 120  # seconds
+
+
+def browser() -> str:
+    """Find a browser that prints.
+
+    Raises
+    ------
+    ValueError
+        None is installed.
+    """
+    for name in _BROWSERS:
+        if found := shutil.which(name):
+            return found
+    raise ArgumentError(
+        "pdf: no Chromium was found (Debian: apt-get install chromium); without it open"
+        " report.html in any browser and print it"
+    )
+
+
+def print_page(page: Path, to: Path) -> None:
+    """Print an HTML file.
+
+    Raises
+    ------
+    ValueError
+        No browser is installed, or it printed nothing.
+    """
+    by = browser()
+    root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+    with tempfile.TemporaryDirectory(prefix="pkmcal-", ignore_cleanup_errors=True) as profile:
+        command = [by, *_FLAGS, *root, f"--user-data-dir={profile}", f"--print-to-pdf={to}"]
+        try:
+            done = subprocess.run(
+                [*command, page.resolve().as_uri()],
+                stdin=subprocess.DEVNULL,
+                capture_output=True,
+                text=True,
+                errors="replace",
+                timeout=_PATIENCE,
+            )
+            said = done.stderr.strip().splitlines()
+        except subprocess.TimeoutExpired:
+            said = [f"no answer within {_PATIENCE} s"]
+    if not to.exists():
+        why = said[-1] if said else "it does not say why"
+        raise ArgumentError(f"pdf: {by} printed nothing: {why}")
