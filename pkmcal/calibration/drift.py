@@ -16,7 +16,7 @@ from pkmcal.estimation.expansion import temperatures
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.statistics.drift_test import trend
+from pkmcal.statistics.drift_test import LEAST, trend
 from pkmcal.statistics.linear_fit import means, numbered
 
 CHANCE = 0.01  # below which repeats drift
@@ -141,6 +141,8 @@ def _tested(parts: Sequence[tuple[FitData, FloatArray]], odd: Collection[int]) -
     if not lengths:
         return None
     rows = _rows(parts, odd, lengths)
+    if len(rows.pose) <= len(np.unique(rows.pose)) + LEAST:
+        return None  # no visit is a second one, or too few are
     visit = _visits(rows)
     if not len(visit):
         return None

@@ -57,7 +57,7 @@ from pkmcal.estimation.mode_slips import in_other_modes
 from pkmcal.estimation.parameters import Asked, Bounds, Known, Prior
 from pkmcal.estimation.set_noise import unlike_noise
 from pkmcal.estimation.starts import known_distances
-from pkmcal.estimation.uncertainty import Uncertainty, uncertainty, unlike_components
+from pkmcal.estimation.uncertainty import Uncertainty, solved, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import as_given, as_machine
@@ -244,12 +244,15 @@ def identify(
         if not hint and not start.ok:
             hint = ["check units, signs and columns of their actuators, or leave these rows out"]
         raise ArgumentError("; ".join([f"measurements: {error}", *hint])) from None
-    unlike = unlike_components(estimator, estimate)
+    solution = solved(estimator, estimate)
+    unlike = unlike_components(estimator, estimate, solution)
     if unlike is not None:
         commanded = equations.reweighted(unlike[1])
         estimator = Estimator(commanded, estimator.start, loss)
         estimate = estimator.solve(estimate.evaluation)
-    sure = uncertainty(estimator, estimate, covariance, None if unlike is None else unlike[0])
+        solution = solved(estimator, estimate)
+    classes = None if unlike is None else unlike[0]
+    sure = uncertainty(estimator, estimate, solution, covariance, classes)
     drawn = not isinstance(holdout, Measurements)
     held = held_without(held, dropped) if drawn else held
     outside = evaluate(held, estimator, estimate, sure)

@@ -13,6 +13,8 @@ from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.options import Force, Json
 from pkmcal.cli.output import Output, say
 from pkmcal.controllers.import_printer import Firmware
+from pkmcal.kinematics.reading_units import reading_units
+from pkmcal.measurements.measurement_writer import write_measurements
 from pkmcal.report.as_json import as_json
 
 
@@ -47,7 +49,8 @@ def import_file(
     with output.draft() as draft:
         (draft / "robot.toml").write_text(read.comment() + printer.text, encoding="utf-8")
         if measured is not None:
-            measured.write(draft / table, comment=read.comment())
+            units = reading_units(printer.robot)
+            write_measurements(measured, draft / table, read.comment(), units)
     if json:
         rows = 0 if measured is None else len(measured)
         places = rows if table == "belts.csv" else 0

@@ -20,6 +20,7 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.kinematics.kinematics import Match
 from pkmcal.kinematics.perturbed import ideal
+from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.kinematics.workspace import require_moved
 from pkmcal.result import Result
@@ -254,7 +255,7 @@ def correction_grid(
         position_error_rms=rms(missed),
         checked=len(known),
         reached=int(known.sum()),
-        actuator_units=tuple(robot.actuator_units),
+        actuator_units=reading_units(robot),
     )
 
 

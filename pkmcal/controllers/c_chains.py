@@ -53,6 +53,7 @@ def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any],
     unknowns = max(robot.machine.m + passive, 6)
     says = {
         "chains": len(joints),
+        "over": False,
         "limbs": n,  # drives
         "members": members,
         "first": whole(layout.first),
@@ -134,5 +135,6 @@ def _calls(layout: ChainLayout) -> list[str]:
         calls.append("chain_ball" if ball else "chain_closure")
         for joint in layout.member[layout.first[chain] : layout.first[chain + 1]]:
             calls += ["motion_compose"]
-            calls += ["arm_slid"] if layout.prismatic[joint] else ["arm_turned", "chain_turn"]
+            slides = layout.prismatic[joint]
+            calls += ["arm_slid"] if slides else ["sincos", "arm_turned", "chain_turn"]
     return calls

@@ -48,7 +48,7 @@ def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double")
     Parameters
     ----------
     robot : Robot
-        A machine with as many closures as free coordinates.
+        A machine; of chains of joints, one with as many closures as free coordinates.
     path : str or path
         Where to write; an existing file is replaced, whole or not at all.
     number : {"double", "float"}
@@ -57,8 +57,8 @@ def c_header(robot: Robot, path: str | PathLike[str], number: Number = "double")
     Raises
     ------
     ValueError
-        The machine has more closures than free coordinates, joints behind its platform, or passive
-        joints that chains share; nothing is written.
+        The machine has chains with more closures than free coordinates, joints behind its platform,
+        or passive joints that chains share; nothing is written.
     OSError
         The folder does not exist or cannot be written.
 
@@ -87,10 +87,10 @@ def text_of(robot: Robot, prefix: str, number: Number) -> str:
     word("number", number, ("double", "float"))
     machine = robot.machine
     require_no_tackles(robot, "a header")
-    if machine.rows != machine.m:
+    if robot.model.chains is not None and machine.rows != machine.m:
         raise ArgumentError(
             f"robot: {robot.name} has {machine.rows} closures for {machine.m} free coordinates;"
-            " a header holds machines with as many of both"
+            " a header holds chains with as many of both"
         )
     return rendered("robot.h.jinja", _contents(robot, prefix, number))
 
@@ -141,7 +141,9 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
                 "base": several(law.base),
                 "waves": [several(wave) for wave in law.waves],
                 "points": [several(point) for point in law.points],
-                "span": several(np.clip(law.span, -_largest(number), _largest(number))),
+                "span": several(
+                    np.clip(law.span, -c_source.largest(number), c_source.largest(number))
+                ),
             }
             for law in laws
         ],
@@ -208,10 +210,6 @@ def _starts(laws: list[LawNumbers], part: str) -> str:
     return ", ".join(map(str, starts)) if starts[-1] else ""
 
 
-def _largest(number: Number) -> float:
-    return float(np.finfo(np.float64 if number == "double" else np.float32).max)
-
-
 def _both_ways(name: str, pose: FloatArray | None) -> tuple[tuple[str, FloatArray], ...]:
     there = np.zeros(6) if pose is None else np.ascontiguousarray(pose, dtype=np.float64)
     return (name, there), (f"{name}_inverse", invert(there))
@@ -230,14 +228,20 @@ def _constants(number: Number) -> dict[str, float]:
     return known
 
 
+_SINCOS = np.array([18, 20, 0, 0])  # its operations: +, *, /, sqrt
+
+
 def _counted(functions: list[c_source.CFunction], calls: list[str], elimination: int = 0) -> str:
     """Operations of calls, with those of their sines and arctangents, and of an elimination."""
     by_name = {function.name: function for function in functions}
     count = np.zeros(4, dtype=int)
     for name in calls:
+        if name == "sincos":
+            count += _SINCOS
+            continue
         count += by_name[name].operations
         body = by_name[name].body
-        count += body.count("FN(sincos)(") * np.array([18, 20, 0, 0])
+        count += body.count("FN(sincos)(") * _SINCOS
         count += body.count("arctangent2(") * np.array([16, 19, 1, 0])
     m = elimination
     products = sum((m - k - 1) * (m - k) for k in range(m)) + m * (m - 1) // 2

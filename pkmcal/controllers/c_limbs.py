@@ -74,19 +74,35 @@ def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any],
         "tie": one(_TIE),
         "pulleys": any(over),
         "all_pulleys": all(over),
-        "over": whole(over),
+        "on_pulley": whole(over),
+        "over": machine.rows > m,
+        "closures": machine.rows,
+        "weight": several(machine.struct.weight[0 : machine.rows]),
+        "tolerance": one(min(machine.struct.closure_tolerance, c_source.largest(number))),
         "groove": [
             several(g[_GROOVE] if has else 0.0 * g[_GROOVE])
             for g, has in zip(robot.slots, over, strict=True)
         ],
-        # what a step leaves is its square by pivot and size: 3e-14 and 2e-7 of the size
-        "settled": one((1e-9 if wide else 2e-5) * size),
-        "least_pivot": one(2e-5 if wide else 1e-3),
+        **_limits(machine.rows > m, number, size),
         "shortest": one(1e-30 if wide else 1e-15),
         "longest": one(1e30 if wide else 1e15),
         "calls": (_inverse_calls(robot), _step_calls(robot, rows), m),
     }
     return says, _needed(robot, drivers, [row["name"] for row in rows])
+
+
+def _limits(over: bool, number: Number, size: float) -> dict[str, str]:
+    """Step after which a pose is known, and the least pivot.
+
+    What a step leaves is its square by pivot and size: 3e-14 and 2e-7 of the size. With more
+    closures than coordinates it is a share of it, and the normal equations square the pivot.
+    """
+    one, _, _ = c_source.writers(number)
+    if over:
+        settled, pivot = (5e-12, 4e-10) if number == "double" else (2e-6, 1e-6)
+    else:
+        settled, pivot = (1e-9, 2e-5) if number == "double" else (2e-5, 1e-3)
+    return {"settled": one(settled * size), "least_pivot": one(pivot)}
 
 
 def numbers(

@@ -111,6 +111,11 @@ def literal(value: float, number: Number) -> str:
     return f"{text}f" if re.search(r"[.e]", text) else f"{text}.0f"
 
 
+def largest(number: Number) -> float:
+    """The largest number of a type."""
+    return float(np.finfo(np.float64 if number == "double" else np.float32).max)
+
+
 def writers(
     number: Number,
 ) -> tuple[Callable[[float], str], Callable[[Any], str], Callable[[Any], str]]:

@@ -42,7 +42,7 @@ def fmu(robot: Robot, path: str | PathLike[str]) -> None:
     Parameters
     ----------
     robot : Robot
-        A machine with as many closures as free coordinates.
+        A machine that a C header holds.
     path : str or path
         Where to write; an existing file is replaced, whole or not at all. Its name is that of the
         model.

@@ -40,7 +40,7 @@ def linuxcnc(robot: Robot, folder: str | PathLike[str]) -> Loss | None:
     Parameters
     ----------
     robot : Robot
-        A machine with as many closures as free coordinates.
+        A machine that a C header holds.
     folder : str or path
         Where to write; made if it is not there. Existing files are replaced, each whole.
 
@@ -181,7 +181,9 @@ def _contents(robot: Robot, name: str) -> dict[str, Any]:
 def _axes(robot: Robot) -> tuple[str, ...]:
     """The coordinates that programs command: as many as there are actuators."""
     axes = robot.moved
-    if len(axes) != robot.n_actuators:
+    if len(axes) != robot.n_actuators and (
+        determines_others(robot) or len(axes) > robot.n_actuators
+    ):
         raise ArgumentError(
             f"robot: {robot.name} has {robot.n_actuators} actuators for {len(axes)} coordinates"
         )

@@ -20,6 +20,8 @@ from pkmcal.statistics.noise import Noise, Split, joined, noise, split
 from pkmcal.statistics.pseudo_residuals import PseudoResiduals, pseudo_residuals
 from pkmcal.statistics.variance_components import told_apart, variance_components
 
+_ROUNDED = 1e3  # times rounding errors, below which residuals are nothing else
+
 
 def stated_variances(measured: Measurements) -> FloatArray | None:
     """Mean variance of the lengths of each row (N,), mm², as sigma says; None where it does not.
@@ -74,6 +76,12 @@ class Uncertainty:
     def known(self) -> bool:
         """Whether there is noise to state the uncertainty: stated, or shown by spare equations."""
         return not self.unknown.any()
+
+    @property
+    def rounded(self) -> bool:
+        """Whether the residuals are nothing but rounding errors."""
+        limit = _ROUNDED * self.equations.rounding(self.factors)
+        return bool(np.linalg.norm(self.fit.residual) < limit)
 
     @property
     def mixed(self) -> bool:
@@ -176,9 +184,19 @@ class Uncertainty:
         return joined(parts)
 
 
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """A fit as a linear model: what its equations belong to, and its residuals."""
+
+    labels: Labels
+    fit: LinearFit
+    pseudo: PseudoResiduals
+
+
 def uncertainty(
     estimator: Estimator,
     estimate: Estimate,
+    solution: Solution,
     rule: CovarianceRule,
     classes: IntArray | None = None,
 ) -> Uncertainty:
@@ -188,14 +206,15 @@ def uncertainty(
     ----------
     estimator, estimate : Estimator, Estimate
         The fit.
+    solution : Solution
+        It as a linear model.
     rule : {"auto", "classical", "cluster"}
         That of `identify`.
     classes : ndarray of int (M,), optional
         Classes of equations whose variances were estimated apart; see `unlike_components`.
     """
     equations, state = estimator.equations, estimate.state
-    named = labels(equations)
-    fit, pseudo = _linear_fit(estimator, estimate, named)
+    fit = solution.fit
     chosen = equations.parameters
     rates = chosen.reported_rates(estimate.evaluation.theta) * chosen.scale
     if rule == "auto" and equations.closures.unknowns and fit.clusters < len(equations.components):
@@ -207,9 +226,9 @@ def uncertainty(
     if classes is not None:
         apart = variance_components(fit, classes, _prior_residual(estimator, estimate))
     return Uncertainty(
-        labels=named,
+        labels=solution.labels,
         fit=fit,
-        pseudo=pseudo,
+        pseudo=solution.pseudo,
         covariance=covariance(
             fit,
             rule,
@@ -225,10 +244,9 @@ def uncertainty(
     )
 
 
-def _linear_fit(
-    estimator: Estimator, estimate: Estimate, named: Labels
-) -> tuple[LinearFit, PseudoResiduals]:
-    state = estimate.state
+def solved(estimator: Estimator, estimate: Estimate) -> Solution:
+    """The linear model at an estimate."""
+    named, state = labels(estimator.equations), estimate.state
     pseudo = PseudoResiduals(estimate.residual, 1.0, 1.0)
     if estimator.loss != "linear":
         pseudo = pseudo_residuals(
@@ -246,7 +264,7 @@ def _linear_fit(
         named.pose,
         named.component,
     )
-    return fit, pseudo
+    return Solution(named, fit, pseudo)
 
 
 def _prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:
@@ -254,7 +272,7 @@ def _prior_residual(estimator: Estimator, estimate: Estimate) -> FloatArray:
 
 
 def unlike_components(
-    estimator: Estimator, estimate: Estimate
+    estimator: Estimator, estimate: Estimate, solution: Solution
 ) -> tuple[IntArray, list[FloatArray]] | None:
     """Whether components of a set without sigma have unlike variances.
 
@@ -277,8 +295,7 @@ def unlike_components(
         return None
     if estimator.loss != "linear" or not estimator.unstated.all() or not several:
         return None
-    named = labels(equations)
-    fit, _ = _linear_fit(estimator, estimate, named)
+    named, fit = solution.labels, solution.fit
     if shared_error_score(fit) > SHARED:
         return None
     every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.sets]

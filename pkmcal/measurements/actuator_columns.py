@@ -73,7 +73,7 @@ def _counted(table: Table, i: int, of_robot: str | None, robot: Actuated | None)
         )
     turns = "rad of the spool" if winds else of_robot
     note = f"actuators in {column.unit}, converted by the robot's gain ({gain:.6g} {turns} each)"
-    if note not in table.notes:
+    if column.unit != "counts" and note not in table.notes:  # as pkmcal itself writes them
         table.notes.append(note)
     return of_robot
 

@@ -84,7 +84,10 @@ class Writable(OfAKind, Protocol):
 
 
 def write_measurements(
-    measurements: Writable, path: str | PathLike[str], comment: str = ""
+    measurements: Writable,
+    path: str | PathLike[str],
+    comment: str = "",
+    reading: Sequence[str] | None = None,
 ) -> None:
     """Write measurements in mm and rad, one row each, so that they are read back to the last bit.
 
@@ -99,25 +102,27 @@ def write_measurements(
         The file; replaced as a whole or not at all.
     comment : str, optional
         Lines for its head, each with its ``#``.
+    reading : sequence of str, optional
+        Units of the actuators, of `reading_units`, for what is not in mm and rad.
 
     Raises
     ------
     OSError
         The file cannot be written; one that was there before is untouched.
     """
-    headings, columns = zip(*_columns(measurements), strict=True)
+    own = measurements.actuator_units or ("mm",) * measurements.actuators.shape[1]
+    headings, columns = zip(*_columns(measurements, reading or own), strict=True)
     write_csv(path, headings, zip(*columns, strict=True), comment=comment)
 
 
-def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
+def _columns(m: Writable, units: Sequence[str]) -> Iterator[tuple[str, Sequence[str]]]:
     """Headings and cells, in the order in which they are written."""
-    units = m.actuator_units or ("mm",) * m.actuators.shape[1]
     for i, unit in enumerate(units):
         yield f"q{i + 1} [{unit}]", _exact(m.actuators[:, i])
     yield from kind_cells(m, units)
     for name, unit, column in columns_read(m):
         yield f"{name} [{unit}]", _exact(column)
-    yield from _actuator_sigma(m)
+    yield from _actuator_sigma(m, units)
     read = components(m.kind, m.artefact)
     units_read = [unit for _, unit in read]
     if m.sigma is not None and m.sigma.ndim == 3:
@@ -153,10 +158,9 @@ def _columns(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
             yield f"tension.q{i + 1} [N]", _exact(each)
 
 
-def _actuator_sigma(m: Writable) -> Iterator[tuple[str, Sequence[str]]]:
+def _actuator_sigma(m: Writable, units: Sequence[str]) -> Iterator[tuple[str, Sequence[str]]]:
     if m.actuator_sigma is None:
         return
-    units = m.actuator_units or ("mm",) * m.actuators.shape[1]
     if len(set(units)) == 1 and (m.actuator_sigma == m.actuator_sigma[:, :1]).all():
         yield f"actuator_sigma [{units[0]}]", _exact(m.actuator_sigma[:, 0])
         return

@@ -282,6 +282,9 @@ def move(
     acceleration) there by less than the largest of them does in a step. Steps end at 5e-10 of the
     duration, and a change of less than 1e-11 of the largest position or velocity is rounding.
 
+    The speed of an actuator jumps where its drive law passes a node of a table: accelerations, and
+    limits of these, are those of the pieces between.
+
     Examples
     --------
     >>> import pkmcal as pk

@@ -123,12 +123,11 @@ def linear_fit(
 
 
 def numbered(*keys: IntArray) -> IntArray:
-    """Number each distinct combination of whole numbers, (M,), from 0."""
-    if len(keys) == 1:
-        return np.unique(keys[0], return_inverse=True)[1].reshape(-1)
-    first = numbered(keys[0])
-    second = numbered(*keys[1:])
-    return numbered(first * (int(second.max()) + 1) + second)
+    """Number each distinct combination of whole numbers from 0 on, (M,), from 0."""
+    combined = keys[0]
+    for key in keys[1:]:
+        combined = combined * (int(key.max()) + 1) + key
+    return np.unique(combined, return_inverse=True)[1].reshape(-1)
 
 
 def means(rows: FloatArray, key: IntArray) -> FloatArray:

@@ -21,9 +21,15 @@ _MET = 1e-6  # share of the first scale below which half of the rows are met exa
 
 def median_ratio(squares: FloatArray, components: IntArray) -> float:
     """Variance that squared lengths of rows show by their median: 1 if they are chi squared."""
+    return float(np.median(squares / _medians(components)))
+
+
+def _medians(components: IntArray) -> FloatArray:
+    """Medians of chi squared variables with so many degrees of freedom."""
     from scipy.special import gammaincinv
 
-    return float(np.median(squares / (2 * gammaincinv(components / 2, 0.5))))
+    medians: FloatArray = 2 * gammaincinv(components / 2, 0.5)
+    return medians
 
 
 def robust_ratio(design: FloatArray, residual: FloatArray, components: IntArray) -> float:
@@ -42,12 +48,12 @@ def robust_ratio(design: FloatArray, residual: FloatArray, components: IntArray)
     if m - p < _LEAST_FREEDOM:
         return float("nan")
     first = np.cumsum(components) - components
-    factor = m / (m - p)
+    factor, medians = m / (m - p), _medians(components)
     left = residual
     scale = first_scale = np.inf
     for _ in range(_ROUNDS):
         squares = np.add.reduceat(left**2, first)
-        revised = np.sqrt(median_ratio(squares, components) * factor)
+        revised = np.sqrt(np.median(squares / medians) * factor)
         if np.isinf(first_scale):
             first_scale = revised
         if not revised > _MET * first_scale or abs(revised / scale - 1.0) < _SETTLED:

@@ -23,6 +23,7 @@ from pkmcal.statistics.linear_fit import LinearFit
 
 _LEAST_FREEDOM = 15.0  # degrees of freedom for each class that is told apart
 _DIFFERENT = 0.10  # chance of the likelihood ratio below which classes are told apart
+_NO_SLOPE = 0.3  # of a score test, above which the likelihoods of both are too much alike to look
 _ROUNDS, _SETTLED, _STEP, _HALVINGS = 50, 1e-6, 1.0, 12  # of the logarithms of the variances
 _SPENT = 1e-6  # share of the equations of a class that must be left
 _TINY = 1e-18  # of the mean variance: a class that the fit meets exactly
@@ -78,36 +79,20 @@ def variance_components(
         Residuals of the prior's rows.
     """
     model = _Model(fit, classes, prior_residual)
-    factor = len(fit.residual) / max(fit.freedom, 1.0)
-    here = model.at(np.maximum(model.square / model.count * factor, model.floor))
-    for _ in range(_ROUNDS):
-        if here is None:
-            return None
-        # Newton's step of the logarithms, or Fisher's far from the top, halved until it climbs
-        matrix = here.curvature
-        if not np.linalg.eigvalsh(matrix)[0] > 0:
-            matrix = here.information * np.outer(here.theta, here.theta)
-        step = np.clip(np.linalg.solve(matrix, here.slope), -_STEP, _STEP)
-        if np.abs(step).max() < _SETTLED:
-            break
-        further = None
-        for _ in range(_HALVINGS):
-            further = model.at(np.maximum(here.theta * np.exp(step), model.floor))
-            if further is not None and further.likelihood >= here.likelihood:
-                break
-            step, further = step / 2.0, None
-        if further is None:
-            break
-        here = further
-    assert here is not None
-    theta, plain, slopes = here.theta, here.plain, here.slopes
-    of_variances = np.asarray(np.linalg.inv(here.information), dtype=np.float64)
+    best = model.highest(fit.freedom)
+    return None if best is None else _at_best(classes, best)
+
+
+def _at_best(classes: IntArray, best: _Point) -> VarianceComponents | None:
+    """The variances and what they imply; None where that is none."""
+    theta, plain, slopes = best.theta, best.plain, best.slopes
+    of_variances = np.asarray(np.linalg.inv(best.information), dtype=np.float64)
     excess = np.tensordot(np.diagonal(of_variances) / theta, slopes, 1)
-    excess -= np.einsum("ab,aij,jk,bkl->il", of_variances, slopes, plain, slopes, optimize=True)
+    excess -= (slopes @ plain @ np.tensordot(of_variances, slopes, 1)).sum(axis=0)
     matrix = plain + 2.0 * plain @ excess @ plain
     if not (np.isfinite(matrix).all() and (np.diagonal(matrix) > 0).all()):
         return None
-    return VarianceComponents(classes, theta, matrix, here.likelihood, plain, slopes, of_variances)
+    return VarianceComponents(classes, theta, matrix, best.likelihood, plain, slopes, of_variances)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +110,18 @@ class _Point:
     plain: FloatArray
     slopes: FloatArray
 
+    @property
+    def by_logarithms(self) -> FloatArray:
+        """`information` to the logarithms."""
+        matrix: FloatArray = self.information * np.outer(self.theta, self.theta)
+        return matrix
+
 
 class _Model:
     """The restricted likelihood of a fit whose classes of equations have their own variances."""
 
     def __init__(self, fit: LinearFit, classes: IntArray, prior_residual: FloatArray) -> None:
+        self.classes = classes
         self.count = np.bincount(classes).astype(np.float64)
         rows = [classes == c for c in range(len(self.count))]
         self._inner = np.array([fit.design[mine].T @ fit.design[mine] for mine in rows])
@@ -164,6 +156,44 @@ class _Model:
         curvature[every, every] += left / theta - slope
         return _Point(theta, likelihood, slope, curvature, information, plain, slopes)
 
+    def highest(self, freedom: float) -> _Point | None:
+        """Where the likelihood is highest, from equal degrees of freedom on; None as `at`."""
+        factor = len(self.classes) / max(freedom, 1.0)
+        here = self.at(np.maximum(self.square / self.count * factor, self.floor))
+        for _ in range(_ROUNDS):
+            if here is None:
+                return None
+            # Newton's step of the logarithms, or Fisher's far from the top, halved until it climbs
+            matrix = here.curvature
+            if not np.linalg.eigvalsh(matrix)[0] > 0:
+                matrix = here.by_logarithms
+            step = np.clip(np.linalg.solve(matrix, here.slope), -_STEP, _STEP)
+            if np.abs(step).max() < _SETTLED:
+                break
+            further = None
+            for _ in range(_HALVINGS):
+                further = self.at(np.maximum(here.theta * np.exp(step), self.floor))
+                if further is not None and further.likelihood >= here.likelihood:
+                    break
+                step, further = step / 2.0, None
+            if further is None:
+                break
+            here = further
+        return here
+
+    def score_chance(self, coarse: IntArray, theta: FloatArray) -> float:
+        """Chance of a slope as steep if variances theta of coarser classes (M,) were right.
+
+        Rao's score test; NaN where a class has no freedom left.
+        """
+        of_class = np.zeros(len(self.count), dtype=np.intp)
+        of_class[self.classes] = coarse
+        here = self.at(theta[of_class])
+        if here is None:
+            return float("nan")
+        steep = float(here.slope @ np.linalg.solve(here.by_logarithms, here.slope))
+        return chi2_tail(max(steep, 0.0), len(self.count) - len(theta))
+
 
 def told_apart(
     fit: LinearFit, candidates: Sequence[IntArray], prior_residual: FloatArray
@@ -179,17 +209,24 @@ def told_apart(
     prior_residual : ndarray (q,)
         Residuals of the prior's rows.
     """
-    present = variance_components(fit, candidates[0], prior_residual)
+    present, of_present = (
+        _Model(fit, candidates[0], prior_residual).highest(fit.freedom),
+        candidates[0],
+    )
     found = None
     for classes in candidates[1:]:
         many = int(classes.max()) + 1
-        if present is None or fit.freedom < _LEAST_FREEDOM * many:
+        if present is None or fit.freedom < _LEAST_FREEDOM * many or many <= len(present.theta):
             continue
-        other = variance_components(fit, classes, prior_residual)
-        more = many - len(present.variances)
-        if other is None or more <= 0:
+        model = _Model(fit, classes, prior_residual)
+        if model.score_chance(of_present, present.theta) > _NO_SLOPE:
+            continue
+        other = model.highest(fit.freedom)
+        if other is None:
             continue
         gained = 2.0 * (other.likelihood - present.likelihood)
-        if chi2_tail(gained, more) < _DIFFERENT:
-            present = found = other
+        if chi2_tail(gained, many - len(present.theta)) < _DIFFERENT:
+            better = _at_best(classes, other)
+            if better is not None:
+                present, of_present, found = other, classes, better
     return found

@@ -12,7 +12,7 @@ import pytest
 import pkmcal as pk
 
 from .c_headers import needed
-from .test_c_header import geared, lawful, pulleys_and_legs
+from .test_c_header import eight, geared, lawful, pulleys_and_legs
 
 # Poses from integers, so that they are exact; the hash (FNV-1a) of the bits of q and pose.
 _PROGRAM = """\
@@ -160,6 +160,7 @@ MACHINES = {
     "laws": lawful,
     "geared": lambda: geared(0.5),
     "pulleys": pulleys_and_legs,
+    "least squares": eight,
     "chains": lambda: pk.load("trivariant"),
 }
 SOLVED = {"geared": 500}  # how many poses at least: most of these it cannot take

@@ -134,6 +134,36 @@ def pulleys_and_legs() -> pk.Robot:
     return robots.made("spatial", {"z": 1000.0}, limbs, frames=FRAMES)
 
 
+def eight(**more: Any) -> pk.Robot:
+    """A body on eight cables over pulleys, four above and four below."""
+    limbs = []
+    for i, (x, y) in enumerate([(1, 1), (-1, 1), (-1, -1), (1, -1)] * 2):
+        z = 1 if i < 4 else -1
+        limbs.append(
+            {"kind": "pulley", "base": [2000.0 * x, 1500.0 * y, 1250.0 + 1250.0 * z]}
+            | {"platform": [150.0 * x, 120.0 * y, 80.0 * z], "radius": 40.0 + i}
+            | {"swivel": [0, 0, z], "swivel_tilt": [0.01 * i, -0.02 * i], "zero": [1, 0, 0]}
+            | {"offset": 10.0 * i, "gain": 1.0 + 0.01 * i}
+        )
+    return robots.made("spatial", {"z": 1200.0}, limbs, **more)
+
+
+def four() -> pk.Robot:
+    """A point on four cables."""
+    anchors = ([0, -1600, -120], [1400, 800, -120], [-1300, 700, -100], [0, 0, 2300])
+    limbs = [{"kind": "cable", "base": at, "platform": [0, 0, 0]} for at in anchors]
+    return robots.made("translation", {"z": 400.0}, limbs)
+
+
+def held(weight: float = 1.0) -> pk.Robot:
+    """Legs two of which keep to planes, further than six legs need."""
+    plain = robots.hexapod()
+    legs = plain.slots[:2, 3:6] + plain.home[:3] - plain.slots[:2, 0:3]
+    across = np.cross(legs, [0.0, 0.0, 1.0])
+    limbs = [{"kind": "UPR", "revolute": each, "weights": [weight]} for each in across.tolist()]
+    return robots.hexapod(*limbs, closure_tolerance=20.0)
+
+
 def cables() -> pk.Robot:
     """A point on three cables."""
     anchors = ([0, -1600, -120], [1400, 800, -120], [0, 0, 2300])
@@ -174,6 +204,8 @@ CASES |= {
     "pulleys": pulleys,
     "pulleys, with laws": lambda: pulleys({"spool": 60.0, "buildup": 0.1}),
     "pulleys and legs, framed": pulleys_and_legs,
+    "eight pulleys": eight,
+    "four cables": four,
 }
 # every driver, row and pose map
 SOME = [
@@ -191,6 +223,7 @@ SOME = [
     "geared, with laws",
     "pulleys, with laws",
     "pulleys and legs, framed",
+    "eight pulleys",
 ]
 
 
@@ -333,12 +366,41 @@ def test_a_singular_pose_is_not_called_good(tmp_path: Path) -> None:
     assert status[0] == 2
 
 
-def test_machine_with_more_closures_than_coordinates_is_refused(tmp_path: Path) -> None:
-    revolute = {"kind": "UPR", "revolute": [1.0, 0.0, 0.0]}
-    robot = robots.hexapod(revolute, revolute)
-    with pytest.raises(pk.ArgumentError, match="8 closures for 6 free coordinates"):
-        pk.export.c_header(robot, tmp_path / "robot.h")
-    assert not (tmp_path / "robot.h").exists()
+@pytest.mark.parametrize("make", [four, held, lambda: held(3.0)])
+@pytest.mark.parametrize("noise", [0.01, 1.0, 10.0])
+def test_more_closures_than_coordinates_have_the_pose_of_least_squares(
+    make: Any, noise: float, tmp_path: Path
+) -> None:
+    """Where they miss each other by more than the machine's tolerance, they do not close.
+
+    Contradictions of 10 mm leave the last steps, here as in Python, no squares of the ones before.
+    """
+    robot = make()
+    poses = robot.home + np.random.default_rng(1).normal(size=(200, 6)) * [20, 20, 20, 0, 0, 0]
+    q = robot.inverse(poses)
+    q += np.random.default_rng(2).normal(size=q.shape) * noise
+    status, found = compiled(robot, tmp_path).forward(q, robot.home)
+    want = robot.forward(q, robot.home)
+    np.testing.assert_array_equal(status, want.status)
+    near = 1e-10 if noise <= 1.0 else 1e-9
+    np.testing.assert_allclose(found[status == 0], want.pose[want.ok], rtol=0, atol=near)
+    assert (status == 0).any() or noise > 1.0
+    np.testing.assert_array_equal(
+        found[status != 0], np.broadcast_to(robot.home, found[status != 0].shape)
+    )
+
+
+def test_redundant_pulleys_have_the_pose_of_least_squares(tmp_path: Path) -> None:
+    """Of cables that contradict each other; what does not settle is said, here as in Python."""
+    robot = eight()
+    poses = robot.home + np.random.default_rng(1).normal(size=(100, 6)) * [20, 20, 20, 0, 0, 0]
+    q = robot.inverse(poses)
+    q += np.random.default_rng(2).normal(size=q.shape) * 0.02
+    status, found = compiled(robot, tmp_path).forward(q, robot.home)
+    want = robot.forward(q, robot.home)
+    both = (status == 0) & want.ok
+    assert both.mean() > 0.9 and set(status) <= {0, 1}
+    np.testing.assert_allclose(found[both], want.pose[both], rtol=0, atol=1e-8)
 
 
 def test_geared_cranks_get_the_turn_at_which_both_stand(tmp_path: Path) -> None:
@@ -365,6 +427,18 @@ def test_an_end_inside_its_pulley_is_refused(library: Any) -> None:
     status, found = header.forward(robot.inverse(robot.home)[None], inside[0])
     assert status.tolist() == [3]
     np.testing.assert_array_equal(found, inside)
+
+
+def test_a_cable_over_several_points_is_refused(tmp_path: Path) -> None:
+    anchors = ([0, -1600, -120], [1400, 800, -120], [0, 0, 2300])
+    limbs: list[dict[str, Any]] = [
+        {"kind": "cable", "base": at, "platform": [0, 0, 0]} for at in anchors
+    ]
+    limbs[2] |= {"kind": "tackle", "over": [[100, 0, 2300]], "parts": [1, 1]}
+    robot = robots.made("translation", {"z": 400.0}, limbs)
+    with pytest.raises(pk.ArgumentError, match="limb 3 of made for a test runs over several"):
+        pk.export.c_header(robot, tmp_path / "robot.h")
+    assert not (tmp_path / "robot.h").exists()
 
 
 def test_turns_of_a_crank_are_those_of_its_stroke(library: Any) -> None:

@@ -22,7 +22,7 @@ import pkmcal as pk
 
 from .. import robots
 from .c_headers import PARALLEL
-from .test_c_header import geared, pulleys
+from .test_c_header import eight, geared, pulleys
 
 MODULES = Path("/usr/lib/linuxcnc/modules")
 SESSION = Path(__file__).with_name("linuxcnc_session.py")
@@ -45,6 +45,7 @@ CASES["curved laws"] = lambda: robots.hexapod(
     {"drive": {"table": [[300.0, 0.0], [800.0, 0.3], [900.0, 0.1]]}, "stroke": [300.0, 1500.0]},
 )
 CASES["pulleys"] = pulleys
+CASES["eight pulleys"] = eight
 CASES["chains"] = lambda: pk.load("trivariant")
 CASES["geared"] = lambda: geared(0.5)
 CASES["framed"] = lambda: robots.hexapod({"offset": 12.0, "gain": -1.01}, frames=FRAMES)
@@ -332,7 +333,6 @@ def test_the_command_line_writes_the_folder_and_keeps_what_was_changed_in_it(
 
 
 def test_what_linuxcnc_cannot_hold_is_refused(tmp_path: Path) -> None:
-    revolute = {"kind": "UPR", "revolute": [1.0, 0.0, 0.0]}
     framed = robots.made(
         "planar",
         {"x": 0.0},
@@ -343,7 +343,6 @@ def test_what_linuxcnc_cannot_hold_is_refused(tmp_path: Path) -> None:
         frames=FRAMES,
     )
     for robot, folder, reason in (
-        (robots.hexapod(revolute, revolute), "x", "8 closures for 6 free coordinates"),
         (framed, "x", "base or tool frames"),
         (pk.load("exechon"), "x", "8 closures for 6 free coordinates"),
         (pk.load("hexapod"), "a" * 30, "folder must have a name"),

@@ -34,6 +34,8 @@ def test_steps_of_a_printer_are_no_mm(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert run("import", PRINTER, "--out", "in").exit_code == 0
+    assert "q1 [counts],q2 [counts],q3 [counts],z [mm]" in Path("in/probe.csv").read_text()
+    assert run("calibrate", "in/robot.toml", "in/probe.csv").exit_code == 0
     said = run("inverse", "in/robot.toml", "0,0,10,0,0,0", "--out", "out").stdout
     assert "q1 [counts]" in said and "[mm]" not in said
     back = run("forward", "in/robot.toml", "out/commands.csv").stdout.splitlines()
@@ -46,6 +48,18 @@ def test_steps_of_a_printer_are_no_mm(
     way = np.abs(np.diff(drives, axis=0)).max(axis=1).sum()
     plan = pk.plan_poses(robot, robot.forward(q).pose, 8, kind="height", free="offset*")
     assert plan.travel == pytest.approx(way, rel=1e-9) and way < 5000, "mm, no steps"
+
+
+def test_a_printer_that_is_imported_stays_over_its_bed(tmp_path: Path) -> None:
+    printer = pk.import_printer(PRINTER)
+    robot = printer.robot
+    (tmp_path / "robot.toml").write_text(printer.text, "utf-8")
+    for each in (robot, pk.load(tmp_path / "robot.toml")):
+        poses = pk.sample_poses(each, 100, share=1.0)
+        ends = robot.inverse([0, 0, 0, 0, 0, 0]) * 0.0  # steps at the end stops
+        high = robot.forward(ends).pose[2]
+        assert poses[:, 2].min() >= 0.0 and poses[:, 2].max() <= high
+        assert poses[:, 2].max() > 0.9 * high
 
 
 def test_counts_are_read_as_mm_as_well(tmp_path: Path) -> None:

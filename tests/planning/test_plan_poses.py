@@ -335,6 +335,19 @@ def test_noise_of_actuators_is_planned_with(hexapod: Robot, candidates: np.ndarr
     assert noisy > 1.3 * none
 
 
+@pytest.mark.parametrize("unknown", ["frame", ["frame", "target"]])
+def test_heights_of_a_planar_machine_tell_nothing_whatever_is_unknown(unknown: Any) -> None:
+    """In a tilted frame they would, but nothing tilts it; to know less never helps."""
+    robot = pk.load("3rrr-planar")
+    poses = pk.sample_poses(robot, 40, seed=0, share=0.6)
+
+    def predicted(unknown: Any) -> float:
+        plan = pk.plan_poses(robot, poses, 12, kind="height", prior=5.0, unknown=unknown)
+        return plan.predicted
+
+    assert predicted(unknown) == pytest.approx(predicted(()), rel=1e-6)
+
+
 @pytest.mark.parametrize("name", ["3rrr-planar", "five-bar"])
 def test_measurements_that_no_parameter_moves_are_refused(name: str) -> None:
     """Heights of a machine that moves in a plane."""
