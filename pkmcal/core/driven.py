@@ -118,7 +118,11 @@ class DrivenMachine(CoreMachine):
 
     def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
         """Readings (N, n) of drives; of those that share an actuator the mean."""
-        approach = self._approach(len(way))
+        return self._at_drives(slots, way, self._approach(len(way)))
+
+    def _at_drives(
+        self, slots: FloatArray, way: FloatArray, approach: FloatArray | None
+    ) -> FloatArray:
         q = self.laws.readings(slots, way, approach)
         out: FloatArray = q[:, [drives[0] for drives in self._driven]]
         if len(self._driven) == len(self.laws.drives):
@@ -151,8 +155,9 @@ class DrivenMachine(CoreMachine):
 
     def reference(self, slots: FloatArray) -> FloatArray:
         """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
-        near = self.inner.reference(self._bare(slots))
-        q: FloatArray = self.at_drives(slots, near[None])[0]
+        turning = [drive.angle for drive in self.laws.drives]
+        near = np.where(turning, self.inner.reference(self._bare(slots)), np.nan)
+        q: FloatArray = self._at_drives(slots, near[None], None)[0]  # whatever rows approach it
         angle = np.array([self.laws.drives[drives[0]].angle for drives in self._driven])
         return np.where(angle, q, 0.0)
 
