@@ -27,8 +27,8 @@ from pkmcal.kinematics.robot import Robot, require_parallel
 
 # benchmarks of the hexapod: docs/controllers.md says how
 _MEASURED = (
-    "double 3.9 kB, 720 instructions an inverse, 10 000 a forward from home;\n"
-    " * float 3.7 kB, 780 and 8 100"
+    "double 3.9 kB, 590 instructions an inverse, 10 000 a forward from home;\n"
+    " * float 3.7 kB, 660 and 8 100"
 )
 _ENUMERATORS = tuple(slot.upper().replace(".", "_") for slot in SLOTS)
 _GAIN = SLOTS.index("gain")
