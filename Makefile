@@ -33,7 +33,7 @@ help:
 	@echo "make test-lowest run the tests with the lowest versions that pyproject.toml allows"
 	@echo "make fuzz        feed damaged files and command lines: COUNT=10000 of each, SEED=1"
 	@echo "make fuzz-abi    feed the C interface, with clang's libFuzzer and sanitizers: COUNT=10000"
-	@echo "make mutants     mistakes in FOLDER=csrc or derive that the tests must see: MUTANTS=100"
+	@echo "make mutants     mistakes in FOLDER=csrc, derive, pkmcal/estimation … that the tests must see: MUTANTS=100"
 	@echo "make check       fail if 'make regenerate' would change anything"
 	@echo "make wasm        compile the core of the pages again, with clang $(WASM_CLANG); check-wasm compares"
 	@echo "make bench       run the benchmarks"

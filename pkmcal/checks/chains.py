@@ -9,6 +9,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.checks.finding import Finding, named
 from pkmcal.checks.function import outside_workspace, singular, turning
+from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
 
 _NONE = 1e-7  # of the largest: a singular value that is none
@@ -58,12 +59,15 @@ def strokes(robot: Robot) -> Iterator[Finding]:
     """Home beyond a stroke or a cone."""
     home = robot.feasible(robot.home)
     for name in ("stroke", "base_cone", "platform_cone"):
-        limbs = np.flatnonzero(~getattr(home, name))
-        if limbs.size:
+        found = np.flatnonzero(~getattr(home, name))
+        limbs = [int(i) for i in found if not home.is_tail(int(i))]
+        who = [named(limbs)] if limbs else []
+        who += ["the tail"] if len(found) > len(limbs) else []
+        if who:
             yield Finding(
                 "stroke",
-                tuple(int(i) + 1 for i in limbs),
-                f"at home {named(limbs)} breaks a {name.replace('_', ' ')}",
+                tuple(i + 1 for i in limbs),
+                f"at home {' and '.join(who)} breaks a {name.replace('_', ' ')}",
                 "check the limits of its joints, the home values and the home pose",
             )
 
@@ -116,9 +120,15 @@ def surplus(robot: Robot) -> str:
     over = robot.machine.rows - robot.machine.m
     if over <= 0:
         return ""
+    closures = f"{robot.machine.rows} closures for {robot.machine.m} coordinates"
+    spare = pose_steps.surplus(robot)
+    joints = f"over-constrained by {over - spare}" if over > spare else ""
+    if not spare:
+        return f"{joints}: {closures}; with errors the joints yield, each by its `soft`"
     return (
-        f"over-constrained by {over}: {robot.machine.rows} closures for {robot.machine.m}"
-        " coordinates; with errors the joints yield, each by its `soft`"
+        f"{joints}{joints and '; '}{robot.n_actuators} actuators, {spare} more than needed:"
+        f" {closures}; what they read can contradict itself: the joints then yield, each by its"
+        " `soft`, and it can calibrate itself by their readings"
     )
 
 

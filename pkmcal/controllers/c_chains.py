@@ -135,5 +135,6 @@ def _calls(layout: ChainLayout) -> list[str]:
         calls.append("chain_ball" if ball else "chain_closure")
         for joint in layout.member[layout.first[chain] : layout.first[chain + 1]]:
             calls += ["motion_compose"]
-            calls += ["arm_slid"] if layout.prismatic[joint] else ["arm_turned", "chain_turn"]
+            slides = layout.prismatic[joint]
+            calls += ["arm_slid"] if slides else ["sincos", "arm_turned", "chain_turn"]
     return calls

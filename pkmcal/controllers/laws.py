@@ -56,5 +56,6 @@ def said(law: Law) -> str:
         "harmonics": law.harmonics,
         "table": law.table,
         "backlash": law.backlash,
+        "stretch": law.stretch,
     }
     return ", ".join(word for word, has in words.items() if has)

@@ -198,7 +198,7 @@ class ChainMachine(CoreMachine):
         if status[0] != 0:
             return np.full((len(pose), self.actuators), np.nan)
         return coordinates(
-            lambda there, near: self.forward(slots, there, near, 1)[:2],
+            lambda there, near: self.forward(slots, there, guess if near is None else near, 1)[:2],
             lambda at, there: self.forward_jacobian(slots, at, there, twists=True),
             pose, (home[0], q), self.layout.size, arms,
         )  # fmt: skip

@@ -95,6 +95,10 @@ class CoreMachine(ABC):
         """The same with actuators that come from a direction, (n,) or (N, n): without laws it."""
         return self
 
+    def tensioned(self: M, tension: FloatArray) -> M:
+        """The same with tensions of what actuators drive, (n,) or (N, n): without laws it."""
+        return self
+
     def as_offsets(
         self, slots: FloatArray, q: FloatArray, columns: Int32Array, units: Sequence[str]
     ) -> tuple[Int32Array, list[str], FloatArray]:

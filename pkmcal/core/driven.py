@@ -41,6 +41,8 @@ class DrivenMachine(CoreMachine):
     approach : ndarray or None
         The direction that actuators come from, (n,) or a row for each row of a call (N, n): +1
         upwards, -1 downwards, 0 unknown, which is half way.
+    tension : ndarray or None
+        Of what actuators drive, likewise, N; None: 0.
     """
 
     def __init__(
@@ -51,6 +53,7 @@ class DrivenMachine(CoreMachine):
         self.actuators = 1 + int(self.laws.actuator.max())
         self.m, self.rows = inner.m, inner.rows
         self.approach: FloatArray | None = None
+        self.tension: FloatArray | None = None
         self._wide, self._width = shape[1], width
         self._offsets = [self._within(drive.offset) for drive in drives]
         self._gains = [self._within(drive.gain) for drive in drives]
@@ -72,6 +75,10 @@ class DrivenMachine(CoreMachine):
         """The same with actuators that come from a direction, (n,) or (N, n)."""
         return self._with(approach=approach)
 
+    def tensioned(self, tension: FloatArray) -> DrivenMachine:
+        """The same with tensions of what actuators drive, (n,) or (N, n)."""
+        return self._with(tension=tension)
+
     def _with(self, **changed: object) -> DrivenMachine:
         other = copy(self)
         other.__dict__.update(changed)
@@ -81,7 +88,7 @@ class DrivenMachine(CoreMachine):
 
     def ways(self, slots: FloatArray, q: FloatArray) -> Ways:
         """Ways (N, drives) at readings (N, n), with their derivatives."""
-        return self.laws.ways(slots, q, self._approach(len(q)))
+        return self.laws.ways(slots, q, *self._state(len(q)))
 
     def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """Ways (N, drives) at readings (N, n)."""
@@ -95,14 +102,17 @@ class DrivenMachine(CoreMachine):
         """The machine within, its geometry, and its actuators where the readings are q."""
         return self.inner, self._bare(slots), self.drives(slots, q)
 
-    def _approach(self, count: int) -> FloatArray | None:
-        if self.approach is None:
+    def _state(self, count: int) -> tuple[FloatArray | None, FloatArray | None]:
+        """Approach and tension of each drive, as `Laws` takes them."""
+        return self._of_drives("approach", count), self._of_drives("tension", count)
+
+    def _of_drives(self, name: str, count: int) -> FloatArray | None:
+        given: FloatArray | None = getattr(self, name)
+        if given is None:
             return None
-        if self.approach.ndim == 2 and len(self.approach) != count:
-            raise ArgumentError(
-                f"approach is of {len(self.approach)} rows, but {count} were asked for"
-            )
-        return self.approach[..., self.laws.actuator]
+        if given.ndim == 2 and len(given) != count:
+            raise ArgumentError(f"{name} is of {len(given)} rows, but {count} were asked for")
+        return given[..., self.laws.actuator]
 
     def _bare(self, slots: FloatArray) -> FloatArray:
         """The geometry of the machine within: its gains are 1, its offsets 0."""
@@ -118,20 +128,16 @@ class DrivenMachine(CoreMachine):
 
     def at_drives(self, slots: FloatArray, way: FloatArray) -> FloatArray:
         """Readings (N, n) of drives; of those that share an actuator the mean."""
-        return self._at_drives(slots, way, self._approach(len(way)))
-
-    def _at_drives(
-        self, slots: FloatArray, way: FloatArray, approach: FloatArray | None
-    ) -> FloatArray:
-        q = self.laws.readings(slots, way, approach)
+        state = self._state(len(way))
+        q = self.laws.readings(slots, way, *state)
         out: FloatArray = q[:, [drives[0] for drives in self._driven]]
         if len(self._driven) == len(self.laws.drives):
             return out
-        there = self.laws.ways(slots, out, approach).way  # of all that share, as the first has it
+        there = self.laws.ways(slots, out, *state).way  # of all that share, as the first has it
         angle = np.array([drive.angle for drive in self.laws.drives])
         with np.errstate(invalid="ignore"):  # ways that are infinite
             turned = way + 2 * np.pi * np.rint((there - way) / (2 * np.pi))
-        return self._mean(self.laws.readings(slots, np.where(angle, turned, way), approach))
+        return self._mean(self.laws.readings(slots, np.where(angle, turned, way), *state))
 
     def _mean(self, each: FloatArray) -> FloatArray:
         """Of drives (N, drives, ...) that share an actuator the mean, (N, n, ...)."""
@@ -157,7 +163,8 @@ class DrivenMachine(CoreMachine):
         """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
         turning = [drive.angle for drive in self.laws.drives]
         near = np.where(turning, self.inner.reference(self._bare(slots)), np.nan)
-        q: FloatArray = self._at_drives(slots, near[None], None)[0]  # whatever rows approach it
+        anyhow = self._with(approach=None, tension=None)
+        q: FloatArray = anyhow.at_drives(slots, near[None])[0]
         angle = np.array([self.laws.drives[drives[0]].angle for drives in self._driven])
         return np.where(angle, q, 0.0)
 
@@ -181,7 +188,7 @@ class DrivenMachine(CoreMachine):
             drives if self.laws.drives[drives[0]].angle and (near is not None or drives[1:]) else []
             for drives in self._driven
         ]
-        return agreed_turns(self.laws, slots, chosen, way, about.way, self._approach(len(way)))
+        return agreed_turns(self.laws, slots, chosen, way, about.way, self._state(len(way))[0])
 
     # kinematics: as `pkmcal.core.machine.Machine` -------------------------------------------------
 
@@ -258,7 +265,7 @@ class DrivenMachine(CoreMachine):
         return own, of_laws, [drives[i] for i in of_laws]
 
     def _by_number(self, slots: FloatArray, q: FloatArray, columns: Int32Array) -> FloatArray:
-        return self.laws.by_number(slots, q, columns.tolist(), self._approach(len(q)))
+        return self.laws.by_number(slots, q, columns.tolist(), *self._state(len(q)))
 
     def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
         """The closure rows and their derivatives at poses (N, 6) and readings (N, n)."""
@@ -313,7 +320,7 @@ class DrivenMachine(CoreMachine):
         self, slots: FloatArray, pose: FloatArray, q: FloatArray, columns: Int32Array | None = None
     ) -> tuple[FloatArray, FloatArray, FloatArray | None]:
         """Closures in units of what was read, as `pkmcal.core.machine.Machine.readings`."""
-        inner, bare, approach = self.inner, self._bare(slots), self._approach(len(q))
+        inner, bare = self.inner, self._bare(slots)
         at = self.ways(slots, q)
         own, of_laws, drive = self._sorted(np.empty(0, np.int32) if columns is None else columns)
         wanted = None
@@ -322,7 +329,7 @@ class DrivenMachine(CoreMachine):
         residual, by_step, by_own = inner.readings(bare, pose, at.way, wanted)
         spheres = inner.reading_rows
         of = self.laws.actuator
-        needed = self.laws.readings(slots, at.way + residual[:, spheres], approach)
+        needed = self.laws.readings(slots, at.way + residual[:, spheres], *self._state(len(q)))
         reached = np.isfinite(needed)
         needed = np.where(reached, needed, q[:, of])
         slope, by_number = np.empty_like(needed), np.empty((len(q), len(of_laws)))

@@ -1,8 +1,9 @@
 """Drive laws: the readings q of actuators and the ways q̃ of their drives, row by row, and back.
 
-Of each drive q̃ = offset + S(gain q + quadratic q²) + Σ (a cos k q + b sin k q) + table(q)
-± backlash / 2, where S(w) = ((R + u)² - R²)/c with u = c w / 2 is a spool, or w without one. The
-formulas are those of ``derive/laws.py``.
+Of each drive q̃ = (offset + S(gain q + quadratic q²) + Σ (a cos k q + b sin k q) + table(q)
+± backlash / 2) (1 + stretch t) at a tension t, where S(w) = ((R + u)² - R²)/c with u = c w / 2 is a
+spool, or w without one. The formulas of what is in the first brackets are those of
+``derive/laws.py``.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ class Drive:
         Whether its way is an angle.
     offset, gain : int
         Places.
-    quadratic, spool, buildup, backlash : int or None
+    quadratic, spool, buildup, backlash, stretch : int or None
         Places; None: it has no such number.
     harmonics : tuple of (float, int, int)
         k, and the places of cos and sin.
@@ -57,6 +58,7 @@ class Drive:
     table: FloatArray | None = None
     corrections: tuple[int, ...] = ()
     backlash: int | None = None
+    stretch: int | None = None
     stroke: tuple[float, float] | None = None
 
     @property
@@ -120,6 +122,7 @@ class Laws:
 
         self._offset = np.array([drive.offset for drive in drives])
         self._backlash = np.array([place(drive.backlash, zero) for drive in drives])
+        self._stretch = np.array([place(drive.stretch, zero) for drive in drives])
         self._base = np.array(
             [
                 [d.gain, place(d.quadratic, zero), place(d.spool, one), place(d.buildup, zero)]
@@ -136,7 +139,7 @@ class Laws:
         self._spans: tuple[bytes, FloatArray] | None = None
         self._of_place: dict[int, tuple[int, str, int]] = {}
         for d, drive in enumerate(drives):
-            for kind in ("offset", "gain", "quadratic", "spool", "buildup", "backlash"):
+            for kind in ("offset", "gain", "quadratic", "spool", "buildup", "backlash", "stretch"):
                 if (found := getattr(drive, kind)) is not None:
                     self._of_place[found] = (d, kind, 0)
             for j, (_, a, b) in enumerate(drive.harmonics):
@@ -147,11 +150,18 @@ class Laws:
         """The drive whose law has the number at a place of the flattened geometry, or -1."""
         return self._of_place.get(column, (-1, "", 0))[0]
 
-    def ways(self, slots: FloatArray, q: FloatArray, approach: FloatArray | None = None) -> Ways:
+    def ways(
+        self,
+        slots: FloatArray,
+        q: FloatArray,
+        approach: FloatArray | None = None,
+        tension: FloatArray | None = None,
+    ) -> Ways:
         """Ways at readings q (N, n).
 
-        `slots` is one geometry, or one per row (N, ...); `approach` (N, drives) or (drives,) is the
-        direction that each drive comes from: +1 upwards, -1 downwards, 0 unknown.
+        `slots` is one geometry, or one per row (N, ...). Of each drive (N, drives) or (drives,):
+        `approach`, the direction that it comes from, +1 upwards, -1 downwards, 0 unknown, and
+        `tension`, N.
         """
         numbers = self._numbers(slots)
         at = q[:, self.actuator]
@@ -167,7 +177,10 @@ class Laws:
             self._correct(found, numbers, at)
         if approach is not None:
             found.way[...] -= 0.5 * approach * numbers[:, self._backlash]
-        return found
+        if tension is None:
+            return found
+        longer = 1.0 + tension * numbers[:, self._stretch]
+        return Ways(found.way * longer, found.slope * longer, found.bend * longer)
 
     def by_number(
         self,
@@ -175,6 +188,7 @@ class Laws:
         q: FloatArray,
         columns: Sequence[int],
         approach: FloatArray | None = None,
+        tension: FloatArray | None = None,
     ) -> FloatArray:
         """Derivative of ways by numbers of the laws at `columns`, each of its drive: (N, columns).
 
@@ -190,6 +204,9 @@ class Laws:
                 out[:, i] = 1.0
             elif kind == "backlash":
                 out[:, i] = 0.0 if approach is None else -0.5 * np.atleast_2d(approach)[:, d]
+            elif kind == "stretch":
+                out[:, i] = 0.0 if tension is None else self.ways(slots, q, approach).way[:, d]
+                out[:, i] *= 0.0 if tension is None else np.atleast_2d(tension)[:, d]
             elif kind in base:
                 x = np.empty((len(q), 5))
                 x[:, 0], x[:, 1:] = at[:, d], numbers[:, self._base[d]]
@@ -202,10 +219,16 @@ class Laws:
                 k, *_ = self.drives[d].harmonics[j]
                 x = np.column_stack([at[:, d], np.full(len(q), k), np.zeros((len(q), 2))])
                 out[:, i] = rows("law_harmonic", x)[1][:, 1 if kind == "cos" else 2]
+            if tension is not None and kind != "stretch":
+                out[:, i] *= (1.0 + tension * numbers[:, self._stretch])[:, d]
         return out
 
     def readings(
-        self, slots: FloatArray, way: FloatArray, approach: FloatArray | None = None
+        self,
+        slots: FloatArray,
+        way: FloatArray,
+        approach: FloatArray | None = None,
+        tension: FloatArray | None = None,
     ) -> FloatArray:
         """The readings (N, drives) at which drives have gone their ways (N, drives).
 
@@ -213,6 +236,8 @@ class Laws:
         monotone.
         """
         numbers = self._numbers(slots)
+        if tension is not None:
+            way = way / (1.0 + tension * numbers[:, self._stretch])
         rest = way - numbers[:, self._offset]
         if approach is not None:
             rest = rest + 0.5 * approach * numbers[:, self._backlash]

@@ -20,7 +20,15 @@ from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
 
 # What a step of 1 is: 1 mm, 1 mrad, a ratio's 0.001, and by as much over a metre or a radian.
-PER_STEP = {"mm": 1.0, "rad": 1e-3, "1": 1e-3, "1/mm": 1e-6, "1/rad": 1e-3, "1/mm2": 1e-9}
+PER_STEP = {
+    "mm": 1.0,
+    "rad": 1e-3,
+    "1": 1e-3,
+    "1/mm": 1e-6,
+    "1/rad": 1e-3,
+    "1/mm2": 1e-9,
+    "1/N": 1e-6,
+}
 Study = Literal["limb1", "offsets", "all-limbs"]
 STUDIES: tuple[Study, ...] = get_args(Study)
 _NUMBERED = re.compile(r"([a-z_]+)[0-9]+(.*)")

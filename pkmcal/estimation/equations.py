@@ -179,7 +179,7 @@ class Equations(Readings):
         """
         p = self.parameters
         robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
-        machines = Machines(tuple(robots), self._own, self.approach)
+        machines = Machines(tuple(robots), self._own, self.state)
         states = self.closures.settled(machines, self._states)
         if self.closures.unknowns:
             factors = np.ones(len(self.unstated)) if noise is None else noise

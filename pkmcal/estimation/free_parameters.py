@@ -59,6 +59,7 @@ def parameters(
     of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
     of_unit |= {"1/mm": 1.0 / travel**2, "1/rad": robot.length / travel**2}
     of_unit["1/mm2"] = of_unit["1/mm"] / robot.length
+    of_unit["1/N"] = 1.0 / travel / max(_pull(data.measured) for data in datasets)
     scale = np.array([of_unit[unit] for unit in units])
     if like is not None:
         known = dict(zip(like.names, like.scale.tolist(), strict=True))
@@ -200,6 +201,11 @@ def _travel(robot: Calibratable, measured: Measurements) -> float:
     """Largest actuator coordinate, mm; an angle counts as its arc."""
     arcs = measured.actuators * mm_per_unit(robot.actuator_units, robot.length)
     return max(1.0, float(np.abs(arcs).max()))
+
+
+def _pull(measured: Measurements) -> float:
+    """Largest tension, N."""
+    return 1.0 if measured.tension is None else max(1.0, float(np.abs(measured.tension).max()))
 
 
 def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool) -> list[int]:

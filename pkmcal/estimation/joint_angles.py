@@ -17,6 +17,7 @@ from pkmcal.arrays import FloatArray, IntArray, wrapped
 from pkmcal.core.library import SLOTS
 from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
 
@@ -69,15 +70,13 @@ def angles(
     q: FloatArray,
     pose: FloatArray,
     joint: str,
-    approach: FloatArray | None = None,
+    state: DriveState,
 ) -> FloatArray:
     """Angles (N,) from home at coordinates (N, n), near poses (N, 6); NaN where there is none.
 
-    `approach` (N, n) says from where the actuators came.
+    `state` is that of the drives.
     """
-    place, robot = place_of(machine, joint), cast(Robot, machine)
-    if approach is not None:
-        robot = robot.approaching(approach)
+    place, robot = place_of(machine, joint), state.of(cast(Robot, machine))
     found: FloatArray = robot.forward(q, pose).passive[:, place]
     return found
 
@@ -88,7 +87,7 @@ def rates(
     pose: FloatArray,
     joint: str,
     places: IntArray,
-    approach: FloatArray | None = None,
+    state: DriveState,
 ) -> FloatArray:
     """How they follow numbers of the geometry at some places, (N, p), the actuators held."""
     values, units = machine.geometry.values, machine.geometry.units
@@ -101,6 +100,6 @@ def rates(
         for side in (1, -1):
             changed = values.copy()
             changed[number] += side * step
-            ends.append(angles(machine.with_values(changed), q, pose, joint, approach))
+            ends.append(angles(machine.with_values(changed), q, pose, joint, state))
         found[:, column] = wrapped(ends[0] - ends[1]) / (2 * step)
     return found

@@ -13,6 +13,7 @@ from pkmcal.estimation import joint_angles
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.sessions import NONE
+from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements import orientation
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.components import KINDS
@@ -49,8 +50,8 @@ class Readings:
         Distinct rows of what the actuators read.
     actuator_sigma : ndarray (K, n) or None
         Its stated deviations.
-    approach : ndarray (K, n) or None
-        From where the actuators came.
+    state : DriveState
+        From where the actuators came, and the tension of what they drive, (K, n) each.
     pose_of : list of ndarray of int
         Which pose each row of each set is at.
     other_of : list of ndarray of int or None
@@ -108,25 +109,32 @@ class Readings:
             *(m.actuators for m in self.sets),
             *(m.other for m in self.sets if m.other is not None),
         ])  # fmt: skip
-        noises = [m.actuator_sigma for m in (*self.sets, *(self.sets[i] for i in double))]
-        stated = [sigma for sigma in noises if sigma is not None]
-        commands = np.hstack([actuators, np.concatenate(stated)]) if stated else actuators
-        directions = [m.approach for m in self.sets]
-        if any(each is not None for each in directions):  # backlash is between their poses
-            known = [np.zeros(m.actuators.shape) if m.approach is None else m.approach
-                     for m in (*self.sets, *(self.sets[i] for i in double))]  # fmt: skip
-            commands = np.hstack([commands, np.concatenate(known)])
+        sources = [*self.sets, *(self.sets[i] for i in double)]
+        noises = [m.actuator_sigma for m in sources if m.actuator_sigma is not None]
+        approach, tension = (
+            _of_all(each, [m.actuators for m in sources])
+            for each in zip(*(m.drive_state for m in sources), strict=True)
+        )
+        given = {
+            "actuators": actuators,
+            "sigma": np.concatenate(noises) if noises else None,
+            "approach": approach,
+            "tension": tension,
+        }
+        known = {name: part for name, part in given.items() if part is not None}
+        commands = np.hstack([*known.values()])
         self.machine_columns, machine_of = self.spread.machines(len(parameters.places))
         machine = np.concatenate([*machine_of, *(machine_of[i] for i in double)])
         # machines of different sessions are not at the same pose at the same actuators
         several = len(self.machine_columns) > 1
         key = np.column_stack([commands, machine]) if several else commands
         distinct, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
-        n, width = actuators.shape[1], commands.shape[1]
-        self.actuators = np.ascontiguousarray(distinct[:, :n])
-        self.actuator_sigma = np.ascontiguousarray(distinct[:, n : 2 * n]) if stated else None
-        own = n * (1 + bool(stated))
-        self.approach = np.ascontiguousarray(distinct[:, own:width]) if width > own else None
+        width = commands.shape[1]
+        parts = np.split(distinct[:, :width], len(known), axis=1)
+        of_pose = dict(zip(known, map(np.ascontiguousarray, parts), strict=True))
+        self.actuators = of_pose["actuators"]
+        self.actuator_sigma = of_pose.get("sigma")
+        self.state = DriveState(of_pose.get("approach"), of_pose.get("tension"))
         self.machine_of_pose: IntArray = machine[first]
         self.command_of_pose: IntArray = (
             np.unique(distinct[:, :width], axis=0, return_inverse=True)[1].reshape(-1)
@@ -265,8 +273,8 @@ class Readings:
             return found, by_twist
         for machine, rows in self._machines(i, theta):
             q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
-            approach = None if measured.approach is None else measured.approach[rows]
-            found[rows] = joint_angles.angles(machine, q, at, joint, approach)
+            state = measured.drive_state.at(rows)
+            found[rows] = joint_angles.angles(machine, q, at, joint, state)
         return found, None
 
     def by_numbers(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray | None:
@@ -280,8 +288,8 @@ class Readings:
             if joint_angles.follows_pose(machine, measured.joint):
                 found[rows, 0] = joint_angles.swivels(machine, at, measured.joint, places)[2]
                 continue
-            approach = None if measured.approach is None else measured.approach[rows]
-            found[rows, 0] = joint_angles.rates(machine, q, at, measured.joint, places, approach)
+            state = measured.drive_state.at(rows)
+            found[rows, 0] = joint_angles.rates(machine, q, at, measured.joint, places, state)
         return found
 
     def _machines(self, i: int, theta: FloatArray) -> Iterator[tuple[Calibratable, IntArray]]:
@@ -404,3 +412,13 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
 def _same_turnings(sigma: FloatArray, first: int) -> bool:
     """Whether standard deviations (N, k) are the same about every axis."""
     return sigma.ndim == 2 and bool((sigma[:, first + 1 :] == sigma[:, first : first + 1]).all())
+
+
+def _of_all(
+    parts: Sequence[FloatArray | None], actuators: Sequence[FloatArray]
+) -> FloatArray | None:
+    """The rows of all sets; 0 where a set says nothing, None where none says anything."""
+    if all(part is None for part in parts):
+        return None
+    pairs = zip(parts, actuators, strict=True)
+    return np.concatenate([np.zeros(q.shape) if part is None else part for part, q in pairs])

@@ -16,6 +16,7 @@ from pkmcal.arrays import FloatArray, Int32Array, IntArray
 from pkmcal.estimation.closures import Closures, Commanded, RowStates, closures_of
 from pkmcal.estimation.sessions import spread
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
 
@@ -32,30 +33,29 @@ class Machines:
         One, or one for each session.
     rows : tuple of ndarray of int
         The poses that are its own, of each.
-    approach : ndarray (K, n) or None
-        From where the actuators came.
+    state : DriveState
+        From where the actuators came, and the tension of what they drive (K, n).
     """
 
     robots: tuple[Calibratable, ...]
     rows: tuple[IntArray, ...]
-    approach: FloatArray | None = None
+    state: DriveState
 
     @cached_property
-    def approaching(self) -> tuple[Calibratable, ...]:
-        """The machines, each with actuators that come from where they came at its poses."""
+    def driven(self) -> tuple[Calibratable, ...]:
+        """The machines, each with its drives in the state of its poses."""
         return tuple(
-            _approaching(r, self.approach, own)
-            for r, own in zip(self.robots, self.rows, strict=True)
+            _driven(r, self.state.at(own)) for r, own in zip(self.robots, self.rows, strict=True)
         )
 
     def at(self, k: int) -> Calibratable:
         """The machine of pose `k`."""
         robot = next(r for r, own in zip(self.robots, self.rows, strict=True) if k in own)
-        return _approaching(robot, self.approach, np.intp(k))
+        return _driven(robot, self.state.at(np.intp(k)))
 
     def joined(self, function: Callable[[Calibratable, IntArray], FloatArray]) -> FloatArray:
         """What a function of a machine and its poses gives, pose by pose."""
-        parts = [function(r, own) for r, own in zip(self.approaching, self.rows, strict=True)]
+        parts = [function(r, own) for r, own in zip(self.driven, self.rows, strict=True)]
         return _joined(parts, self.rows)
 
     def actuator_twists(self, states: RowStates) -> FloatArray:
@@ -165,7 +165,7 @@ class SessionClosures:
         self, machines: Machines, states: RowStates
     ) -> list[tuple[Closures, Calibratable, RowStates]]:
         own = [states] if len(self._rows) == 1 else [_some(states, rows) for rows in self._rows]
-        return list(zip(self._parts, machines.approaching, own, strict=True))
+        return list(zip(self._parts, machines.driven, own, strict=True))
 
     def _states(self, parts: Sequence[RowStates]) -> RowStates:
         if len(parts) == 1:
@@ -177,12 +177,8 @@ class SessionClosures:
         )
 
 
-def _approaching(
-    robot: Calibratable, approach: FloatArray | None, rows: IntArray | np.intp
-) -> Calibratable:
-    if approach is None or not isinstance(robot, Robot):
-        return robot
-    return robot.approaching(approach[rows])
+def _driven(robot: Calibratable, state: DriveState) -> Calibratable:
+    return state.of(robot) if isinstance(robot, Robot) else robot
 
 
 def commanded_closures(rows: Sequence[IntArray], read: FloatArray) -> SessionClosures:

@@ -103,7 +103,7 @@ def _joints(
     for m, pose in sets:
         joint = str(m.joint)
         off.setdefault(joint, []).append(
-            angles(machine, m.actuators, pose, joint, m.approach) - m.values
+            angles(machine, m.actuators, pose, joint, m.drive_state) - m.values
         )
     for joint, parts in off.items():
         turns = np.exp(1j * np.concatenate(parts))

@@ -20,6 +20,7 @@ RESERVED = (
     "attachment",
     "actuator_sigma",
     "approach",
+    "tension",
     "to",
     "touch",
     "temperature",

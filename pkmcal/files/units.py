@@ -33,6 +33,7 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "°C": {"°C": (1.0, 1.0)},
     "K": {"K": (1.0, 1.0)},
     "°F": {"°F": (1.0, 1.0)},
+    "N": {"N": (1.0, 1.0)},
     "count": {"steps": (1.0, 1.0), "counts": (1.0, 1.0), "rev": (1.0, 1.0)},
 }
 # Other spellings of units; a unit may also be in capitals.
@@ -53,7 +54,7 @@ SPELLINGS = {
     "ticks": "counts", "pulses": "counts",
 }  # fmt: skip
 _KNOWN = {unit for units in UNITS.values() for unit in units}
-_LETTERS = {"K", "k", "c", "f", '"', "'"}  # which behind a name may as well be a part of it
+_LETTERS = {"K", "k", "N", "n", "c", "f", '"', "'"}  # behind a name they may be a part of it
 
 
 def _pattern(without: Collection[str] = ()) -> str:

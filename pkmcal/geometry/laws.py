@@ -36,6 +36,8 @@ class Law:
     smoothness : float or None
         Standard deviation of what a correction is off the middle of its neighbours, mm or rad;
         None: nothing is known of it.
+    stretch : bool
+        Whether the drive grows with its tension.
     """
 
     quadratic: bool = False
@@ -44,6 +46,7 @@ class Law:
     table: tuple[float, ...] | None = None
     smoothness: float | None = None
     backlash: bool = False
+    stretch: bool = False
 
     def numbers(self, drive: int | Literal[""], unit: Unit) -> tuple[LawNumber, ...]:
         """The numbers of the law of a drive in mm or rad, counted from 1, in the stated order."""
@@ -66,6 +69,8 @@ class Law:
             add("table", unit, j, f"table{j + 1}")
         if self.backlash:
             add("backlash", unit)
+        if self.stretch:
+            add("stretch", "1/N")
         return tuple(found)
 
 
@@ -121,5 +126,6 @@ def drive(
         table=None if law.table is None else np.array(law.table),
         corrections=tuple(places["table", j] for j in range(len(law.table or ()))),
         backlash=places.get(("backlash", 0)),
+        stretch=places.get(("stretch", 0)),
         stroke=stroke,
     )

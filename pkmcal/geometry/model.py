@@ -226,7 +226,8 @@ class Model:
     @property
     def bent(self) -> tuple[int, ...]:
         """Limbs, counted from 0, that run over a pulley or over several points."""
-        return tuple(i for i, limb in enumerate(self.limbs) if KINDS[limb.kind].driver in BENT)
+        kinds = [KINDS.get(limb.kind) for limb in self.limbs]  # a chain of joints has none
+        return tuple(i for i, kind in enumerate(kinds) if kind is not None and kind.driver in BENT)
 
     def doubts(self) -> list[tuple[int, str]]:
         """Drive laws without an inverse over their stroke: limbs, counted from 0, and why."""

@@ -11,7 +11,7 @@ from pkmcal.files.toml_table import Table, shown
 from pkmcal.geometry.laws import Law, LawNumber
 from pkmcal.geometry.model import Model
 
-KEYS = ("quadratic", "spool", "buildup", "harmonics", "table", "smoothness", "backlash")
+KEYS = ("quadratic", "spool", "buildup", "harmonics", "table", "smoothness", "backlash", "stretch")
 # How a number is read: the table and the key for messages, the value, its unit.
 Reader = Callable[[Table, str, object, Unit], Any]
 
@@ -31,6 +31,8 @@ def read_law(
         table.fail("drive", f"states no law; it may have {', '.join(KEYS)}")
     if "spool" in drive and unit == "rad":
         drive.fail("spool", "takes up a length, and this actuator turns the limb")
+    if "stretch" in drive and unit == "rad":
+        drive.fail("stretch", "lengthens what is under tension, and this actuator turns the limb")
     if "buildup" in drive and "spool" not in drive:
         drive.fail("buildup", "is that of a spool, whose radius is missing: spool = …")
     waves = drive.tables("harmonics", "the key") if "harmonics" in drive else []
@@ -50,6 +52,7 @@ def read_law(
         table=places,
         smoothness=smoothness,
         backlash="backlash" in drive,
+        stretch="stretch" in drive,
     )
     numbers = []
     for each in law.numbers(number, unit):

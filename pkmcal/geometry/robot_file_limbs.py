@@ -29,6 +29,7 @@ UNIT_WORDS: dict[Unit, str] = {
     "1/mm": "per length",
     "1/rad": "per angle",
     "1/mm2": "per square of length",
+    "1/N": "per force",
 }
 
 

@@ -164,8 +164,8 @@ class Robot(Kinematics, Result):
             self._limb_limits(own, q) if self.model.chains is None else self._chain_limits(own, q)
         )
         found = replace(limits, workspace=box.in_box(self.model.workspace, given))
-        each = (getattr(found, field.name) for field in fields(Feasibility))
-        return Feasibility(*(array.reshape((*shape, *array.shape[1:])) for array in each))
+        arrays = {f.name: getattr(found, f.name) for f in fields(Feasibility) if f.name != "tail"}
+        return replace(found, **{k: a.reshape((*shape, *a.shape[1:])) for k, a in arrays.items()})
 
     def _limb_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
         """Limits of limbs in closed form at own poses (N, 6), by actuators (N, n) or without."""
@@ -529,6 +529,41 @@ class Robot(Kinematics, Result):
             return self
         other = copy(self)
         other.machine = self.machine.approaching(rows[0] if shape == () else rows)
+        return other
+
+    def tensioned(self, tension: ArrayLike) -> Robot:
+        """The robot with cables, belts or screws under tension, for laws with `stretch`.
+
+        Parameters
+        ----------
+        tension : array_like (n,) or (..., n)
+            Of what each actuator drives, N, as load cells or `pkmcal.tensions` say; negative where
+            it is pushed. A batch goes with calls of as many rows.
+
+        Returns
+        -------
+        Robot
+            What `replace` and `load` make of it knows no tensions.
+
+        Raises
+        ------
+        ValueError, TypeError
+            Another shape, or numbers that are not finite.
+
+        Examples
+        --------
+        >>> import pkmcal as pk
+        >>> robot = pk.load("hexapod")  # whose legs do not stretch
+        >>> bool(robot.tensioned([50.0] * 6).forward(robot.inverse(robot.home)).ok)
+        True
+        """
+        rows, shape = as_rows("tension", tension, self.n_actuators)
+        if not np.isfinite(rows).all():
+            raise ArgumentError("tension must be finite")
+        if not self.model.driven:
+            return self
+        other = copy(self)
+        other.machine = self.machine.tensioned(rows[0] if shape == () else rows)
         return other
 
     @cached_property

@@ -280,6 +280,18 @@ def approach_array(given: ArrayLike | None, actuators: FloatArray) -> FloatArray
     return np.array(np.broadcast_to(found, actuators.shape))
 
 
+def tension_array(given: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None:
+    """Tension of what each actuator drives (N, n), N."""
+    if given is None:
+        return None
+    found = numbers("tension", given)
+    if found.shape not in ((), shape[1:], shape):
+        raise ArgumentError(
+            f"tension must be one number or have shape {shape[1:]} or {shape}; found {found.shape}"
+        )
+    return np.array(np.broadcast_to(found, shape))
+
+
 def sessions_array(given: str | Sequence[str] | TextArray | None, rows: int) -> TextArray | None:
     """One name per row; None where none is given."""
     if given is None:

@@ -91,6 +91,8 @@ def title(m: Listed) -> str:
         parts.append("actuator_sigma stated")
     if m.approach is not None:
         parts.append("approach stated")
+    if m.tension is not None:
+        parts.append("tension stated")
     if m.sessions:
         many = "s" if len(m.sessions) > 1 else ""
         parts.append(f"session{many} {', '.join(map(display.printable, m.sessions))}")

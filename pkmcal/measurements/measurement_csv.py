@@ -23,6 +23,7 @@ columns                               meaning
 ``temperature [°C]``                  of the machine; or ``temperature.base``, ``.platform``,
                                       ``.q1`` …, of what that actuator drives
 ``approach.q1`` …                     1 or -1: the reading had grown or fallen; 0: not known
+``tension.q1`` …                      of what the actuator drives, N, or one ``tension`` for all
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
@@ -197,6 +198,7 @@ def read_measurements(
     fields["time"] = times
     fields["temperature"] = read_temperature(table, len(actuator_units))
     fields["approach"] = _read_approach(table, len(actuator_units))
+    fields["tension"] = _read_tension(table, len(actuator_units))
     values: FloatArray | None
     if several:
         actuators, values, fields = read_several(table, several, actuators, fields)
@@ -299,6 +301,7 @@ def _probed(
         time=times,
         temperature=read_temperature(table, measured.actuators.shape[1]),
         approach=_read_approach(table, measured.actuators.shape[1]),
+        tension=_read_tension(table, measured.actuators.shape[1]),
     )
 
 
@@ -345,8 +348,8 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
         "probe",
         "contact",
     }
-    names |= {"actuator_sigma", "approach", *parts_of(0), WHOLE}
-    whats = ("actuator_sigma", "approach", WHOLE)
+    names |= {"actuator_sigma", "approach", "tension", *parts_of(0), WHOLE}
+    whats = ("actuator_sigma", "approach", "tension", WHOLE)
     names |= {f"{what}.{q}" for what in whats for q in actuators}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
@@ -419,6 +422,15 @@ def _read_approach(table: Table, count: int) -> FloatArray | None:
         return None
     columns = np.stack([table.integers(name) for name in names], axis=1)
     return np.broadcast_to(columns.astype(np.float64), (len(table), count))
+
+
+def _read_tension(table: Table, count: int) -> FloatArray | None:
+    """Tension of what each actuator drives (rows, n), N."""
+    names = columns_of_actuators(table, "tension", count)
+    if not names:
+        return None
+    columns = np.stack([table.numbers(name, "N")[0] for name in names], axis=1)
+    return np.broadcast_to(columns, (len(table), count))
 
 
 def _read_session(table: Table) -> TextArray | None:

@@ -75,6 +75,10 @@ class Writable(OfAKind, Protocol):
         """From where each actuator came."""
 
     @property
+    def tension(self) -> FloatArray | None:
+        """Of what each actuator drives, N."""
+
+    @property
     def session(self) -> TextArray | None:
         """When each row was measured."""
 
@@ -149,6 +153,9 @@ def _columns(m: Writable, units: Sequence[str]) -> Iterator[tuple[str, Sequence[
     if m.approach is not None:
         for i, each in enumerate(m.approach.T):
             yield f"approach.q{i + 1}", [f"{direction:.0f}" for direction in each]
+    if m.tension is not None:
+        for i, each in enumerate(m.tension.T):
+            yield f"tension.q{i + 1} [N]", _exact(each)
 
 
 def _actuator_sigma(m: Writable, units: Sequence[str]) -> Iterator[tuple[str, Sequence[str]]]:

@@ -15,6 +15,7 @@ from pkmcal.arguments import checked_seed, shown, word, words
 from pkmcal.arrays import FloatArray, Int64Array, TextArray
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements.components import KINDS, Artefact, Kind, components
 from pkmcal.measurements.fields import (
     actuator_sigma_array,
@@ -29,6 +30,7 @@ from pkmcal.measurements.fields import (
     sigma_array,
     target_array,
     temperature_array,
+    tension_array,
     units_of_actuators,
     value_of_row,
     values_array,
@@ -47,7 +49,7 @@ from pkmcal.result import Result
 
 _PER_ROW = (
     "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines", "session",
-    "approach", "other", "run", "touched", "temperature", "time",
+    "approach", "tension", "other", "run", "touched", "temperature", "time",
 )  # fmt: skip
 
 
@@ -121,6 +123,9 @@ class Measurements(Result):
         From where each actuator came, for drives with backlash: 1 where its reading had grown, -1
         where it had fallen, 0 where that is not known. "order": the machine was driven from row to
         row as they stand. Kept as (N, n).
+    tension : scalar, (n,) or (N, n) array, optional
+        Of what each actuator drives, N: what load cells read, or `pkmcal.tensions` says. A drive
+        law with `stretch` is longer by it.
     temperature : scalar, (N,) or (N, 2 + n) array, optional
         °C, of the whole machine, or of base, platform and what each actuator drives; NaN: not read.
         `identify` refers numbers to 20 °C where it is told how the machine expands. Kept as
@@ -167,6 +172,7 @@ class Measurements(Result):
     joint: str | None = None
     session: TextArray | None = None
     approach: FloatArray | None = None
+    tension: FloatArray | None = None
     temperature: FloatArray | None = None
     time: FloatArray | None = None
     lines: Int64Array | None = None
@@ -196,6 +202,7 @@ class Measurements(Result):
         joint: str | None = None,
         session: str | Sequence[str] | TextArray | None = None,
         approach: ArrayLike | None = None,
+        tension: ArrayLike | None = None,
         temperature: ArrayLike | None = None,
         time: ArrayLike | None = None,
         lines: ArrayLike | None = None,
@@ -241,6 +248,7 @@ class Measurements(Result):
             **own,
             "session": sessions_array(session, len(q)),
             "approach": approach_array(approach, q),
+            "tension": tension_array(tension, q.shape),
             "temperature": temperature_array(temperature, q.shape),
             "time": None if time is None else row_numbers("time", time, len(q)),
             "lines": None if lines is None else integers("lines", lines, len(q)),
@@ -302,7 +310,12 @@ class Measurements(Result):
 
         Rows of one `group` are of one pose, and rows at the same actuators.
         """
-        return pose_index(self.actuators, self.approach, self.group)
+        return pose_index(self.actuators, self.drive_state, self.group)
+
+    @property
+    def drive_state(self) -> DriveState:
+        """From where actuators came, and the tension of what they drive."""
+        return DriveState(self.approach, self.tension)
 
     @property
     def sessions(self) -> tuple[str, ...]:
@@ -409,6 +422,8 @@ class Measurements(Result):
             columns["session"] = self.session
         if self.approach is not None:
             columns |= {f"approach.q{i + 1}": each for i, each in enumerate(self.approach.T)}
+        if self.tension is not None:
+            columns |= {f"tension.q{i + 1}": each for i, each in enumerate(self.tension.T)}
         return columns
 
     def _parts(self) -> Iterator[str | Table]:

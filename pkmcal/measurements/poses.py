@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pkmcal.arrays import FloatArray, Int64Array
 
 
 def pose_index(
-    actuators: FloatArray, approach: FloatArray | None, group: Int64Array | None
+    actuators: FloatArray, driven: Sequence[FloatArray | None], group: Int64Array | None
 ) -> Int64Array:
     """The pose of each row (N,), from 0: rows of one group are one, and rows at equal actuators.
+
+    `driven` are approach and tension (N, n), where known: drives are elsewhere where these differ.
 
     Readings of actuators may differ by their last digit where a group says that they are repeats,
     and home that is measured again has the name of another point.
@@ -18,11 +22,10 @@ def pose_index(
     Examples
     --------
     >>> home, other, near = [1.0], [2.0], [2.001]
-    >>> pose_index(np.array([home, other, home, near]), None, np.array([1, 2, 3, 2])).tolist()
+    >>> pose_index(np.array([home, other, home, near]), (), np.array([1, 2, 3, 2])).tolist()
     [0, 1, 0, 1]
     """
-    # backlash is between places that were approached from other sides
-    places = actuators if approach is None else np.hstack([actuators, approach])
+    places = np.hstack([actuators, *(each for each in driven if each is not None)])
     pose = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
     if group is not None:
         pose = _joined(np.unique(group, return_inverse=True)[1].reshape(-1), pose)

@@ -91,6 +91,7 @@ class VirtualMachine:
         touches: Sequence[str] | None = None,
         joint: str | None = None,
         approach: ArrayLike | None = None,
+        tension: ArrayLike | None = None,
     ) -> Measurements:
         """Command actuators and measure where the machine goes.
 
@@ -123,6 +124,8 @@ class VirtualMachine:
             Of kind "angle": the passive joint, a name of ``robot.passive_names``.
         approach : scalar, (n,) or (N, n) array, or "order", optional
             From where the actuators come; see `Measurements`.
+        tension : scalar, (n,) or (N, n) array, optional
+            Of what each actuator drives, N.
 
         Returns
         -------
@@ -149,6 +152,7 @@ class VirtualMachine:
             actuator_units=getattr(self._machine, "actuator_units", None),
             attachment=attachment,
             approach=approach,
+            tension=tension,
             other=other,
             run=run,
             touched=touches,
@@ -168,8 +172,8 @@ class VirtualMachine:
     ) -> FloatArray:
         """What would be read without noise, (N, k)."""
         machine = self._machine
-        if blank.approach is not None and isinstance(machine, Robot):
-            machine = machine.approaching(blank.approach)
+        if isinstance(machine, Robot):
+            machine = blank.drive_state.of(machine)
         solved = _solved(machine, blank.actuators, "q")
         if blank.joint is not None:
             names = getattr(self._machine, "passive_names", ())

@@ -9,6 +9,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.core.chains import AnyMachine
 from pkmcal.core.driven import DrivenMachine
+from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.robot import Robot
 
 Stroke = tuple[float, float] | None
@@ -34,6 +35,8 @@ def laws(robot: Robot) -> list[dict[str, Any]] | None:
     machine = robot.machine
     if not isinstance(machine, DrivenMachine):
         return None
+    if machine.tension is not None:
+        raise ArgumentError(f"robot: {robot.name} is under tension, which the page cannot hold")
     numbers = robot.slots.ravel().tolist()
     approach = np.zeros(robot.n_actuators) if machine.approach is None else machine.approach
     found = []

@@ -429,6 +429,18 @@ def test_an_end_inside_its_pulley_is_refused(library: Any) -> None:
     np.testing.assert_array_equal(found, inside)
 
 
+def test_a_cable_over_several_points_is_refused(tmp_path: Path) -> None:
+    anchors = ([0, -1600, -120], [1400, 800, -120], [0, 0, 2300])
+    limbs: list[dict[str, Any]] = [
+        {"kind": "cable", "base": at, "platform": [0, 0, 0]} for at in anchors
+    ]
+    limbs[2] |= {"kind": "tackle", "over": [[100, 0, 2300]], "parts": [1, 1]}
+    robot = robots.made("translation", {"z": 400.0}, limbs)
+    with pytest.raises(pk.ArgumentError, match="limb 3 of made for a test runs over several"):
+        pk.export.c_header(robot, tmp_path / "robot.h")
+    assert not (tmp_path / "robot.h").exists()
+
+
 def test_turns_of_a_crank_are_those_of_its_stroke(library: Any) -> None:
     """Not those of an arctangent, which would jump by a whole turn between -π and π."""
     robot = turned()

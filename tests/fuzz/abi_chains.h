@@ -21,6 +21,7 @@ static int places(chain_arrays *made, int count)
 static int chain_joint(chain_arrays *made, int driven)
 {
     const int joint = made->is.joints++;
+    driven = driven && made->is.actuators < PKM_MAX_LIMBS;
     made->prismatic[joint] = byte() < 60;
     made->actuator[joint] = driven ? made->is.actuators : -1;
     made->coordinate[joint] = driven ? -1 : made->is.passive++;
@@ -66,8 +67,10 @@ static void spoil(chain_arrays *made)
     int32_t *const arrays[] = {made->first, made->member, made->ball, made->end_place, made->ball_place,
                                made->drive_place, made->prismatic, made->actuator, made->coordinate,
                                made->place};
-    if (byte() & 1) *counts[byte() % 9] = small(80);
-    else arrays[byte() % 10][byte() % PKM_MAX_LIMBS] = small(80);
+    const unsigned which = byte(), entry = byte() % PKM_MAX_LIMBS, count = byte() & 1;
+    const int says = small(80);
+    if (count) *counts[which % 9] = says;
+    else arrays[which % 10][entry] = says;
 }
 
 static int within(int count, int most) { return count < 0 || count > most ? 0 : count; }
@@ -132,17 +135,20 @@ static void of_chains(ptrdiff_t n, unsigned strange, int isas)
     const ptrdiff_t q = rows ? is->actuators : 0, m = rows ? map_free(is->map) : 0;
     const ptrdiff_t members = rows ? is->first[is->chains] + is->chains : 0;
     const ptrdiff_t step = rows ? m + is->shared : 0, passive = rows ? is->passive : 0;
-    n = n % 6;
+    n = n % 3; /* a row may be sought from two dozen postures */
     const ptrdiff_t stride = byte() & 1 ? count : 0, some = byte() & 1 ? 6 : 0;
     double *geometry = rows ? chain_geometry(&made, n + 1, count, strange) : fresh(0);
     double *pose = numbers(6 * n, strange), *guess = numbers(6 * n + 6, strange);
     double *drives = numbers(q * n, strange);
-    for (ptrdiff_t i = 0; i < n && byte() < 128; i++) { /* near home, where chains close */
+    const int near = byte() < 244; /* home, where chains close: elsewhere dozens of postures are tried */
+    for (ptrdiff_t i = 0; i < n && near; i++) {
         for (int k = 0; k < 6; k++)
             pose[6 * i + k] = k < 3 ? is->home[9 + k] + 0.01 * number(0) : 1e-4 * number(0);
         for (ptrdiff_t a = 0; a < q; a++) drives[q * i + a] = is->zero[a] + 1e-3 * number(0);
     }
-    if (byte() & 1) memcpy(guess, pose, sizeof(double) * (size_t)(6 * n));
+    if (near) memcpy(guess, pose, sizeof(double) * (size_t)(6 * n));
+    for (int k = 0; near && k < 6; k++) guess[6 * n + k] = k < 3 ? is->home[9 + k] : 0.0;
+    if (near && !some) memcpy(guess, guess + 6 * n, 6 * sizeof(double));
     int32_t column[8];
     for (int k = 0, at = 0; k < 8; k++) {
         at += 1 + (int)byte() % 8;

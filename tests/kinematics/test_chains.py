@@ -294,3 +294,16 @@ def test_modes_of_chains_are_those_that_are_proven_of_legs(tmp_path: Path) -> No
     assert len(proven) == len(found) == 16 and proven.complete
     assert np.abs(proven.poses[:, :3] - found.poses[:, :3]).max() < 1e-7
     assert np.abs(proven.sign - proven.sign[0] * found.sign[0] * found.sign).max() == 0
+
+
+@pytest.mark.parametrize("name", ("tricept", "eclipse", "agile-eye", "exechon"))
+def test_what_a_row_comes_to_does_not_depend_on_its_neighbours(name: str) -> None:
+    """Near and far rows side by side: one keeps its matrix where another needs a new one."""
+    robot = disturbed(pk.load(name))
+    q = np.concatenate([commands(robot, 12, share=s) for s in (0.01, 0.3, 2.0)])
+    q = q.reshape(3, 12, -1).swapaxes(0, 1).reshape(36, -1)
+    together = robot.forward(q)
+    alone = [robot.forward(row) for row in q]
+    assert np.array_equal(together.pose, [each.pose for each in alone], equal_nan=True)
+    assert np.array_equal(together.iterations, [each.iterations for each in alone])
+    assert len(set(together.iterations)) > 1

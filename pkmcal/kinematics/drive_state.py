@@ -1,0 +1,35 @@
+"""What drives depend on beside their readings: from where they came, and under which tension."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.kinematics.robot import Robot
+
+
+class DriveState(NamedTuple):
+    """Of each actuator at N rows; None where nothing is known.
+
+    Attributes
+    ----------
+    approach : ndarray (N, n) or None
+        +1 where its reading had grown, -1 where it had fallen, 0 where that is not known.
+    tension : ndarray (N, n) or None
+        Of what it drives, N.
+    """
+
+    approach: FloatArray | None = None
+    tension: FloatArray | None = None
+
+    def at(self, rows: IntArray | np.intp) -> DriveState:
+        """That of some rows, or of one."""
+        return DriveState(*(None if each is None else each[rows] for each in self))
+
+    def of(self, robot: Robot) -> Robot:
+        """The robot in this state."""
+        if self.approach is not None:
+            robot = robot.approaching(self.approach)
+        return robot if self.tension is None else robot.tensioned(self.tension)
