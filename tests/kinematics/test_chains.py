@@ -16,7 +16,14 @@ from pkmcal.core.library import ISAS
 from pkmcal.geometry import robot_file
 from pkmcal.kinematics import overconstrained
 from pkmcal.screw import from_pose
-from tests.chain_files import all_errors, as_chains, described, same_errors
+from tests.chain_files import (
+    BOOMS,
+    all_errors,
+    as_chains,
+    described,
+    leg_on_leg,
+    same_errors,
+)
 from tests.chain_twin import Twin
 
 DIGITS = Path(__file__).parents[3] / "shared" / "design" / "chains.json"
@@ -307,3 +314,19 @@ def test_what_a_row_comes_to_does_not_depend_on_its_neighbours(name: str) -> Non
     assert np.array_equal(together.pose, [each.pose for each in alone], equal_nan=True)
     assert np.array_equal(together.iterations, [each.iterations for each in alone])
     assert len(set(together.iterations)) > 1
+
+
+@pytest.mark.parametrize("boom", BOOMS)
+def test_forward_undoes_inverse_where_a_chain_is_held_by_another(boom: str, tmp_path: Path) -> None:
+    """The leg on the boom alone would be assembled in as many ways as the boom can turn."""
+    robot = loaded(leg_on_leg(boom), tmp_path)
+    rng = np.random.default_rng(3)
+    poses = robot.home + rng.uniform(-1, 1, (50, 6)) * [40, 40, 0, 0, 0, 0.2]
+    q = robot.inverse(poses)
+    found = robot.forward(q, guess=poses)
+    assert (found.status == 0).all()
+    np.testing.assert_allclose(found.pose, poses, atol=1e-8)
+    cos, sin = np.cos(poses[:, 5]), np.sin(poses[:, 5])
+    x, y = poses[:, 0] - 30 * cos + 20 * sin, poses[:, 1] - 30 * sin - 20 * cos
+    first = np.hypot(x, y) if boom == "passive" else np.arctan2(-x, y)
+    np.testing.assert_allclose(np.ptp(q[:, 0] - first), 0, atol=1e-8)

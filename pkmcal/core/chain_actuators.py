@@ -1,7 +1,7 @@
-"""Actuators of machines with joints behind the platform, by Gauss and Newton on `forward`.
+"""Actuators of machines whose chains cannot be taken one by one, by Gauss and Newton on `forward`.
 
-Such a pose is that of the tool; where the platform is follows from all actuators at once, so that
-no limb can be taken alone.
+With joints behind the platform a pose is that of the tool; where the platform is follows from all
+actuators at once. A chain that shares a joint may need the others to hold it.
 """
 
 from __future__ import annotations
