@@ -95,6 +95,21 @@ def tree(path: str | PathLike[str]) -> ElementTree.Element:
     return root
 
 
+def comments_around(path: str | PathLike[str]) -> tuple[str, str]:
+    """What is said before and behind the root element, a comment a line; a tree holds neither."""
+    parser = ElementTree.XMLPullParser(events=("start", "end", "comment"))
+    parser.feed(reading.content(path, reading.MOST_URDF))
+    parser.close()
+    found, depth, begun = ("", ""), 0, False
+    for event, element in parser.read_events():
+        if event != "comment":
+            depth, begun = depth + (1 if event == "start" else -1), True
+        elif not depth:
+            line = f"<!--{element.text}-->\n"
+            found = (found[0], found[1] + line) if begun else (found[0] + line, found[1])
+    return found
+
+
 class _Builder(ElementTree.TreeBuilder):
     """Builds the tree, and refuses what a URDF file has not."""
 
