@@ -133,7 +133,7 @@ def _other_turns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
         ("orientations are those of the base in the platform's frame", given.inv().as_quat()),
     ):
         values = measured.values.copy()
-        values[np.ix_(good, angles)] = Rotation.from_quat(other).as_euler("xyz")
+        values[np.ix_(good, np.array(angles))] = Rotation.from_quat(other).as_euler("xyz")
         yield words, replace(measured, values=values)
 
 

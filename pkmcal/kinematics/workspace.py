@@ -248,7 +248,9 @@ def _middle(robot: Robot) -> FloatArray:
         k = POSE.index(name)
         if not low <= middle[k] <= high:
             middle[k] = (low + high) / 2.0
-    return completed(robot, middle[None])[0] if (middle != robot.home).any() else middle
+    if (middle != robot.home).any():
+        middle = completed(robot, middle[None])[0]
+    return middle
 
 
 def require_moved(robot: Robot, axes: Mapping[str, object]) -> None:

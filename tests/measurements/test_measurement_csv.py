@@ -294,10 +294,6 @@ ERRORS = [
     ("q1 [mm],z [mm],\n1,2,3\n", "line 1: column 3 is headed ''"),
     (",q1 [mm],z [mm]\n0.5,1,2\n", "line 1: column 1 is headed ''"),
     (",q1 [mm],z [mm]\n7,1,2\n7,2,3\n", "line 1: column 1 is headed ''"),
-    (
-        "q1 [],z [mm]\n1,2\n",
-        "(or another of mm, um, cm, m, in, rad, mrad, deg, rev, arcmin, arcsec)",
-    ),
     ("q1 [mm],z mm]\n1,2\n", "line 1: column 2 is headed 'z mm]'"),
     ("qq1 [mm],z [mm]\n1,2\n", "line 1: unknown column 'qq1'"),
     ("q1 [mm],z [mm],sigmas [mm]\n1,2,3\n", "unknown column 'sigmas'; did you mean 'sigma'?"),
@@ -382,3 +378,13 @@ def test_the_index_of_a_data_frame_is_left_out_with_a_word(tmp_path: Path) -> No
     read = read_measurements(path)
     np.testing.assert_array_equal(read.actuators, [[1.0], [1.5], [2.0]])
     assert any("numbers the rows: left out" in note for note in read.notes)
+
+
+def test_units_that_are_expected_are_each_named_once(tmp_path: Path) -> None:
+    """A turn is a unit of angles and of counts."""
+    path = tmp_path / "m.csv"
+    path.write_text("q1,z [mm]\n1,2\n")
+    with pytest.raises(ValueError, match="column 'q1' has no unit") as raised:
+        read_measurements(path)
+    units = str(raised.value).partition("another of ")[2].partition(")")[0].split(", ")
+    assert "rev" in units and len(set(units)) == len(units)
