@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import time
+import tracemalloc
+
 import numpy as np
 from scipy.optimize import least_squares
 
 import pkmcal as pk
 from benchmarks.timing import Report, medians, times
+from pkmcal.estimation.begin import estimator_at
 from tests.simulated import hexapod_poses, tilted_poses, with_errors
 
 POSES, SIGMA, NOISE = 30, 0.5, 0.02
 WANTED = 50.0
 REPLICATES = 1000
 CANDIDATES, CHOSEN = 500, 20
+BELTS = 100_000
 
 
 class Plain:
@@ -149,10 +154,44 @@ def bench_others(report: Report) -> None:
     report.table(["job", "ms"], [[name, f"{1e3 * s:.1f}"] for name, s in took.items()])
 
 
+def belts(rows: int) -> tuple[pk.Robot, pk.Measurements]:
+    """Four belts, 5 numbers free, whose lengths alone were read."""
+    robot = pk.load("examples/belts/robot.toml")
+    rng = np.random.default_rng(0)
+    off = dict(zip(robot.model.free, rng.normal(0, 10, len(robot.model.free)), strict=True))
+    true = robot.replace({name: robot.geometry[name] + error for name, error in off.items()})
+    at = np.zeros((rows, 6))
+    at[:, :2] = rng.uniform([400, 300], [2600, 1700], (rows, 2))
+    q = true.inverse(at) + rng.normal(0, 0.5, (rows, 4))
+    return robot, pk.Measurements(q, None, "closure", actuator_sigma=0.5)
+
+
+def bench_belts(report: Report) -> None:
+    """A machine that calibrates itself, a pose of its own for every row; processor time."""
+    robot, log = belts(100)
+    fit = pk.identify(robot, log).fit
+
+    def solve() -> None:
+        estimator_at(fit.uncertainty.equations, fit.equations, fit.start, "linear").solve()
+
+    jobs = {"100 rows, the solve alone": solve, "100 rows": lambda: pk.identify(robot, log)}
+    took = medians(jobs, 25, time.thread_time)
+    robot, many = belts(BELTS)
+    jobs = {f"{BELTS} rows": lambda: pk.identify(robot, many)}
+    took |= medians(jobs, 3, time.thread_time)
+    tracemalloc.start()
+    pk.identify(robot, many)
+    peak = tracemalloc.get_traced_memory()[1] / BELTS
+    tracemalloc.stop()
+    report.table(["four belts, ms", ""], [[name, f"{1e3 * s:.1f}"] for name, s in took.items()])
+    report.text(f"Memory at its peak: {peak / 1e3:.2f} kB a row.")
+
+
 def main() -> None:
     report = Report("Calibration")
     bench_28_parameters(report)
     bench_others(report)
+    bench_belts(report)
     report.write("identify")
 
 

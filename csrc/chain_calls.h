@@ -1,8 +1,8 @@
-/* The calls of machines of chains (see chain_system.h and chain_newton.h). */
+/* The calls of machines of chains (see chain_system.h, chain_newton.h and chain_alone.h). */
 #ifndef CHAIN_CALLS_H
 #define CHAIN_CALLS_H
 
-#include "chain_newton.h"
+#include "chain_alone.h"
 
 typedef struct {
     const pkm_chains *machine;
@@ -118,14 +118,17 @@ SHARED void chain_solve(const pkm_chains *machine, const chain_numbers *numbers,
     mask known = fill_mask(0), solved;
     *at = *guess;
     *iterations = fill(1.0);
+    *residual = fill(INFINITY);
     chain_begin(machine, start, from, to, usable, at);
-    solved = chain_iterate(machine, numbers, to, MAX_ITERATIONS / 2, usable, at, &known, iterations);
+    solved = chain_iterate(machine, numbers, to, MAX_ITERATIONS / 2, usable, at, &known, iterations,
+                           residual);
     const mask again = usable & ~solved;
     if (any(again)) {
         chain_state path = *guess;
         chain_prediction next = *start;
         real begin[PKM_MAX_LIMBS], end[PKM_MAX_LIMBS];
         mask there = fill_mask(0), sure = fill_mask(0);
+        real missed = fill(INFINITY);
         memcpy(begin, from, sizeof begin);
         for (int part = 1; part <= PATH_PARTS; part++) {
             const double share = (double)part / PATH_PARTS;
@@ -135,17 +138,16 @@ SHARED void chain_solve(const pkm_chains *machine, const chain_numbers *numbers,
             chain_begin(machine, &next, begin, end, again, &path);
             there = chain_iterate(machine, numbers, end,
                                   part == PATH_PARTS ? MAX_ITERATIONS / 2 : PATH_STEPS, again, &path,
-                                  &sure, iterations);
+                                  &sure, iterations, &missed);
             memcpy(begin, end, sizeof begin);
         }
         for (int s = 0; s < MAX_STATE; s++) at->state[s] = select(there, path.state[s], at->state[s]);
         for (int c = 0; c < machine->passive; c++)
             at->theta[c] = select(there, path.theta[c], at->theta[c]);
+        *residual = select(there, missed, *residual);
         known = select_mask(there, sure, known);
         solved |= there;
     }
-    *residual = chain_worst(machine, numbers, at, to);
-    solved &= finite(*residual);
     const mask flat = ~known | (*residual <= fill(CHAIN_CLOSED * machine->size));
     *status = select_mask(flat, fill_mask(PKM_SINGULAR), fill_mask(PKM_NOT_CONVERGED));
     *status = select_mask(solved, fill_mask(PKM_OK), *status);

@@ -4,30 +4,6 @@
 
 #include "chain_calls.h"
 
-/* How the rows Φ = -Nᵀ r of chain l follow a change of r. */
-INLINE void chain_pull(const chain_view *view, const real *change, real *rows)
-{
-    for (int n = 0; n < view->rows - view->own; n++) rows[n] = -wrench_on(view->rows, view->N[n], change);
-}
-
-/* The change of r by the coordinate of actuator a, 0 where the chain has it not. */
-INLINE int chain_by_drive(const pkm_chains *machine, int l, const motion *frame, int a, real *change)
-{
-    const int first = machine->first[l], k = machine->first[l + 1] - first;
-    int found = 0;
-    for (int i = 0; i < 6; i++) change[i] = fill(0.0);
-    for (int j = 0; j < k; j++) {
-        const int joint = machine->member[first + j];
-        real column[6];
-        if (machine->actuator[joint] != a) continue;
-        chain_column(machine, l, joint, &frame[j], &frame[k], column);
-        for (int i = 0; i < (machine->ball[l] ? 3 : 6); i++)
-            change[i] += column[i] * (machine->prismatic[joint] ? 1.0 : machine->length);
-        found = 1;
-    }
-    return found;
-}
-
 int CALL(chain_closure)(const pkm_chains *machine, ptrdiff_t n, const double *geometry,
                         ptrdiff_t geometry_stride, const double *pose, const double *q,
                         double *residual, double *by_step, double *by_free, double *by_q,
@@ -49,8 +25,7 @@ int CALL(chain_closure)(const pkm_chains *machine, ptrdiff_t n, const double *ge
         mask held;
         const mask good = chain_inspect(machine, &numbers, pose, q, row, lane_q, drive, &at, &held);
         const real zero = select(good, fill(0.0), fill(NAN)), sure = select(held, zero, fill(NAN));
-        const int rows = chain_views(machine, &numbers, &at, drive, NULL, view, phi, jacobian, &worst,
-                                     &flat);
+        const int rows = chain_views(machine, &numbers, &at, drive, view, phi, jacobian, &worst, &flat);
         real found[6], by_free_of_pose[36];
         map_to_pose(machine->map, at.state, found);
         scatter_row(found, 6, on_map, 6, row, count);
@@ -147,8 +122,11 @@ SHARED void chain_by_numbers(const chain_sink *sink, int l, const chain_geometry
                         1.0);
         before = chain_frame(machine, joint);
         moved = frame[j];
-        if (!machine->prismatic[joint])
-            FN(arm_turned)(frame[j].R, joint_value(machine, joint, at->theta, drive), moved.R);
+        if (!machine->prismatic[joint]) {
+            real sine, cosine;
+            FN(sincos)(joint_value(machine, joint, at->theta, drive), &sine, &cosine);
+            FN(arm_turned)(frame[j].R, sine, cosine, moved.R);
+        }
     }
     if (machine->ball[l]) {
         real R[9], p[3], zero[6] = {fill(0.0), fill(0.0), fill(0.0), fill(0.0), fill(0.0), fill(0.0)};
@@ -219,8 +197,9 @@ int CALL(chain_response)(const pkm_chains *machine, ptrdiff_t n, const double *g
         chain_prepare(&of, first, row, &numbers);
         mask held;
         mask good = chain_inspect(machine, &numbers, pose, q, row, lane_q, drive, &at, &held) & held;
-        const int rows = chain_views(machine, &numbers, &at, drive, NULL, view, phi, jac, &worst, &flat);
-        normal_system(unknowns, rows, rows, jac, phi, A, X);
+        const int rows = chain_views(machine, &numbers, &at, drive, view, phi, jac, &worst, &flat);
+        normal_matrix(unknowns, rows, jac, A);
+        normal_sides(unknowns, rows, jac, X);
         solve(unknowns, rows, A, X, &pivot);
         if (rows > unknowns) pivot = FN(root)(pivot);
         good &= (pivot > fill(LEAST_PIVOT)) & (flat < fill(1.0 / LEAST_COLUMN));

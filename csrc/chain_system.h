@@ -33,7 +33,7 @@ typedef struct {
 typedef struct {
     int rows, own;         /* rows, and passive joints of its own */
     real J[6][6];          /* of these, column by column; Householder's vectors after elimination */
-    real tau[6], R[6];     /* of Householder; the diagonal of R */
+    real tau[6], R[6];     /* of Householder; reciprocals of R's diagonal */
     real shared[PKM_MAX_CHAIN][6];
     int which[PKM_MAX_CHAIN], sharing;
     real N[6][6];          /* wrenches; row by row */
@@ -132,20 +132,32 @@ INLINE real joint_value(const pkm_chains *machine, int joint, const real *theta,
     return a >= 0 ? drive[a] : theta[machine->coordinate[joint]];
 }
 
-/* The frames of the joints of chain l before they move, and of its end. */
+/* The frames of the joints of chain l before they move, and of its end. Sines come first: side by side
+ * they do not wait for each other. */
 INLINE void chain_walk(const pkm_chains *machine, int l, const chain_numbers *numbers,
                        const real *theta, const real *drive, motion *frame)
 {
     const int first = machine->first[l], k = machine->first[l + 1] - first;
     const motion *link = numbers->link + first + l;
-    frame[0] = link[0];
+    real x[PKM_MAX_CHAIN], sine[PKM_MAX_CHAIN], cosine[PKM_MAX_CHAIN];
     for (int j = 0; j < k; j++) {
         const int joint = machine->member[first + j];
-        const real x = joint_value(machine, joint, theta, drive);
-        motion moved = frame[j];
-        if (machine->prismatic[joint]) FN(arm_slid)(frame[j].R, frame[j].p, x, moved.p);
-        else FN(arm_turned)(frame[j].R, x, moved.R);
-        frame[j + 1] = composed(&moved, &link[j + 1]);
+        x[j] = joint_value(machine, joint, theta, drive);
+        if (!machine->prismatic[joint]) FN(sincos)(x[j], &sine[j], &cosine[j]);
+    }
+    for (int i = 0; i < 9; i++) frame[0].R[i] = link[0].R[i];
+    for (int i = 0; i < 3; i++) frame[0].p[i] = link[0].p[i];
+    for (int j = 0; j < k; j++) {
+        const motion *at = &frame[j], *next = &link[j + 1];
+        motion *to = &frame[j + 1];
+        real moved[9];
+        if (machine->prismatic[machine->member[first + j]]) {
+            FN(arm_slid)(at->R, at->p, x[j], moved);
+            FN(motion_compose)(at->R, moved, next->R, next->p, to->R, to->p);
+        } else {
+            FN(arm_turned)(at->R, sine[j], cosine[j], moved);
+            FN(motion_compose)(moved, at->p, next->R, next->p, to->R, to->p);
+        }
     }
 }
 
@@ -175,17 +187,27 @@ INLINE void chain_column(const pkm_chains *machine, int l, int joint, const moti
     chain_cut(machine, l, twist, out);
 }
 
-/* r, and of a ball its lever R b. */
-INLINE void chain_misses(const pkm_chains *machine, int l, const chain_numbers *numbers,
+/* r, and of a ball its lever R b. Returns the largest of r; infinite where it is no number, and beyond
+ * a quarter turn, where vee falls again and is 0 after half a turn. */
+INLINE real chain_misses(const pkm_chains *machine, int l, const chain_numbers *numbers,
                          const motion *end, const real *R, const real *p, real *r, real *lever)
 {
-    real all[6];
+    const int *which, rows = machine->ball[l] ? 3 : group_rows(machine->map, &which);
+    real worst = fill(0.0);
     if (machine->ball[l]) {
         FN(chain_ball)(R, p, numbers->ball[l], end->p, r, lever);
-        return;
+    } else {
+        real all[6];
+        FN(chain_closure)(end->R, end->p, R, p, fill(machine->length), all);
+        chain_cut(machine, l, all, r);
     }
-    FN(chain_closure)(end->R, end->p, R, p, fill(machine->length), all);
-    chain_cut(machine, l, all, r);
+    for (int i = 0; i < rows; i++) worst = larger(worst, absolute(r[i]));
+    if (!machine->ball[l]) {
+        real trace = fill(0.0);
+        for (int i = 0; i < 9; i++) trace += end->R[i] * R[i];
+        worst = select(trace > fill(1.0), worst, fill(INFINITY));
+    }
+    return select(finite(worst), worst, fill(INFINITY));
 }
 
 /* Cholesky factor of what the joints yield at the end: each gives way along and about every axis,
@@ -244,36 +266,45 @@ INLINE void divide_by_transposed(int rows, real (*L)[6], real *x)
     }
 }
 
+/* Entries of a and b from `first` on, multiplied and added: every other one, so that one sum does not
+ * wait for the other. */
+INLINE real products(int first, int end, const real *a, const real *b)
+{
+    real one = a[first] * b[first], other = first + 1 < end ? a[first + 1] * b[first + 1] : fill(0.0);
+    for (int i = first + 2; i < end; i += 2) one += a[i] * b[i];
+    for (int i = first + 3; i < end; i += 2) other += a[i] * b[i];
+    return one + other;
+}
+
 /* Q R of the own columns, in place; the wrenches N. The sign of the last one makes det (J N)
  * positive, so that they turn with the limb and never jump. */
-INLINE void chain_eliminate(int over, chain_view *view, real *flat)
+INLINE void chain_eliminate_rows(int rows, int over, chain_view *view, real *flat)
 {
-    const int rows = view->rows, own = view->own;
+    const int own = view->own;
     real sign = fill(own % 2 ? -1.0 : 1.0);
-    for (int c = 0; c < own; c++) {
-        real *x = view->J[c], squares = fill(0.0);
-        for (int i = c; i < rows; i++) squares += x[i] * x[i];
-        const real length = FN(root)(squares), size = length * (length + absolute(x[c]));
+    UNROLL for (int c = 0; c < rows; c++) {
+        if (c >= own) break;
+        real *x = view->J[c];
+        const real length = FN(root)(products(c, rows, x, x)), size = length * (length + absolute(x[c]));
         const mask positive = x[c] > fill(0.0);
-        view->R[c] = select(positive, -length, length);
+        const real inverse = 1.0 / length;
+        view->R[c] = select(positive, -inverse, inverse);
         sign = select(positive, -sign, sign);
-        *flat = larger(*flat, 1.0 / length);
-        x[c] -= view->R[c];
+        *flat = larger(*flat, inverse);
+        x[c] -= select(positive, -length, length);
         view->tau[c] = 1.0 / size;
         for (int d = c + 1; d < own; d++) {
-            real *y = view->J[d], t = fill(0.0);
-            for (int i = c; i < rows; i++) t += x[i] * y[i];
-            t *= view->tau[c];
+            real *y = view->J[d];
+            const real t = products(c, rows, x, y) * view->tau[c];
             for (int i = c; i < rows; i++) y[i] -= t * x[i];
         }
     }
     for (int n = own; n < rows; n++) {
         real *v = view->N[n - own];
         for (int i = 0; i < rows; i++) v[i] = fill(i == n ? 1.0 : 0.0);
-        for (int c = own - 1; c >= 0; c--) {
-            real t = fill(0.0);
-            for (int i = c; i < rows; i++) t += view->J[c][i] * v[i];
-            t *= view->tau[c];
+        UNROLL for (int c = rows - 1; c >= 0; c--) {
+            if (c >= own) continue;
+            const real t = products(c, rows, view->J[c], v) * view->tau[c];
             for (int i = c; i < rows; i++) v[i] -= t * view->J[c][i];
         }
         if (n == rows - 1)
@@ -282,10 +313,16 @@ INLINE void chain_eliminate(int over, chain_view *view, real *flat)
     }
 }
 
-/* Chain l at a state. `ahead`, or NULL, is by how much the actuators are still to move. */
-INLINE void chain_look(const pkm_chains *machine, int l, const chain_numbers *numbers,
-                       const real *theta, const real *drive, const real *ahead, const real *R,
-                       const real *p, chain_view *view)
+INLINE void chain_eliminate(int over, chain_view *view, real *flat)
+{
+    if (view->rows == 6) chain_eliminate_rows(6, over, view, flat);
+    else chain_eliminate_rows(3, over, view, flat);
+}
+
+/* Chain l at a state, not yet eliminated. Returns what it misses. */
+INLINE real chain_look(const pkm_chains *machine, int l, const chain_numbers *numbers,
+                       const real *theta, const real *drive, const real *R, const real *p,
+                       chain_view *view)
 {
     const int first = machine->first[l], k = machine->first[l + 1] - first;
     const int *which;
@@ -293,65 +330,32 @@ INLINE void chain_look(const pkm_chains *machine, int l, const chain_numbers *nu
     view->rows = machine->ball[l] ? 3 : group_rows(machine->map, &which);
     view->own = view->sharing = 0;
     chain_walk(machine, l, numbers, theta, drive, frame);
-    chain_misses(machine, l, numbers, &frame[k], R, p, view->r, view->lever);
+    const real missed = chain_misses(machine, l, numbers, &frame[k], R, p, view->r, view->lever);
     for (int j = 0; j < k; j++) {
-        const int joint = machine->member[first + j], a = machine->actuator[joint];
-        real column[6];
-        if (a >= 0 && !ahead) continue;
+        const int joint = machine->member[first + j];
+        if (machine->actuator[joint] >= 0) continue;
+        const int shared = machine->coordinate[joint] < machine->shared;
+        real *column = shared ? view->shared[view->sharing] : view->J[view->own];
         chain_column(machine, l, joint, &frame[j], &frame[k], column);
-        if (a >= 0) {
-            const real by = ahead[a] * (machine->prismatic[joint] ? 1.0 : machine->length);
-            for (int i = 0; i < view->rows; i++) view->r[i] += column[i] * by;
-        } else if (machine->coordinate[joint] < machine->shared) {
-            memcpy(view->shared[view->sharing], column, sizeof column);
-            view->which[view->sharing++] = machine->coordinate[joint];
-        } else {
-            memcpy(view->J[view->own++], column, sizeof column);
-        }
+        if (shared) view->which[view->sharing++] = machine->coordinate[joint];
+        else view->own++;
     }
-    if (!machine->over) return;
-    chain_compliance(machine, l, frame, view);
-    for (int c = 0; c < view->own; c++) divide_by(view->rows, view->L, view->J[c]);
+    if (machine->over) {
+        chain_compliance(machine, l, frame, view);
+        for (int c = 0; c < view->own; c++) divide_by(view->rows, view->L, view->J[c]);
+    }
+    return missed;
 }
 
-/* A wrench's product with a twist's closing rows. */
-INLINE real wrench_on(int rows, const real *N, const real *x)
+/* What chain l misses at a state, and r. */
+INLINE real chain_missed(const pkm_chains *machine, int l, const chain_numbers *numbers,
+                         const real *R, const real *p, const real *theta, const real *drive, real *r)
 {
-    real sum = fill(0.0);
-    for (int i = 0; i < rows; i++) sum += N[i] * x[i];
-    return sum;
-}
-
-/* The rows of chain l, Φ = -Nᵀ r and its derivatives by the scaled step and what chains share. */
-INLINE int chain_rows(const pkm_chains *machine, int l, const chain_view *view, const real *state,
-                      real *residual, real *jacobian)
-{
-    const int m = map_m(machine->map), unknowns = m + machine->shared;
-    const int count = view->rows - view->own, *which;
-    group_rows(machine->map, &which);
-    for (int n = 0; n < count; n++) {
-        const real *N = view->N[n];
-        real omega[3] = {fill(0.0), fill(0.0), fill(0.0)}, v[3] = {fill(0.0), fill(0.0), fill(0.0)};
-        real *row = jacobian + n * unknowns;
-        if (machine->ball[l]) {
-            for (int i = 0; i < 3; i++) {
-                const int j = (i + 1) % 3, k = (i + 2) % 3;
-                omega[i] = view->lever[j] * N[k] - view->lever[k] * N[j];
-                v[i] = N[i];
-            }
-        } else {
-            for (int i = 0; i < view->rows; i++)
-                if (which[i] < 3) omega[which[i]] = N[i] * machine->length;
-                else v[which[i] - 3] = N[i];
-        }
-        const real phi = -wrench_on(view->rows, N, view->r);
-        FN(store_row)(machine->map, 1, state, phi, omega, v, fill(1.0), fill(1.0 / machine->length),
-                      &residual[n], row);
-        for (int s = 0; s < machine->shared; s++) row[m + s] = fill(0.0);
-        for (int s = 0; s < view->sharing; s++)
-            row[m + view->which[s]] -= wrench_on(view->rows, N, view->shared[s]);
-    }
-    return count;
+    motion frame[PKM_MAX_CHAIN + 1];
+    real lever[3];
+    chain_walk(machine, l, numbers, theta, drive, frame);
+    return chain_misses(machine, l, numbers, &frame[machine->first[l + 1] - machine->first[l]], R, p, r,
+                        lever);
 }
 
 #endif

@@ -198,32 +198,40 @@ INLINE int scaled_rows(int map, const pkm_machine *machine, const FN(limb_sphere
     return 0;
 }
 
-/* Square systems as they are; more rows than m become the normal equations of least squares.
- * B (m x k) holds the right-hand sides on return: k = 1 with the residual, else k = rows with the
- * identity, so that X is the (pseudo-)inverse. */
-INLINE void normal_system(int m, int rows, int k, const real *jacobian, const real *residual, real *A,
-                          real *B)
+/* Square systems as they are; more rows than m become the normal equations of least squares. */
+INLINE void normal_matrix(int m, int rows, const real *jacobian, real *A)
 {
     if (rows == m) {
         memcpy(A, jacobian, sizeof(real) * m * m);
-        if (k == 1) memcpy(B, residual, sizeof(real) * m);
-        else
-            for (int i = 0; i < m * m; i++) B[i] = fill(i % (m + 1) ? 0.0 : 1.0);
         return;
     }
-    for (int i = 0; i < m; i++) {
+    for (int i = 0; i < m; i++)
         for (int j = 0; j < m; j++) {
             real sum = fill(0.0);
             for (int r = 0; r < rows; r++) sum += jacobian[r * m + i] * jacobian[r * m + j];
             A[i * m + j] = sum;
         }
-        if (k == 1) {
-            B[i] = fill(0.0);
-            for (int r = 0; r < rows; r++) B[i] += jacobian[r * m + i] * residual[r];
-        } else {
-            for (int r = 0; r < rows; r++) B[i * k + r] = jacobian[r * m + i];
-        }
+}
+
+/* Their right-hand side b (m) for a residual. */
+INLINE void normal_side(int m, int rows, const real *jacobian, const real *residual, real *b)
+{
+    if (rows == m) {
+        memcpy(b, residual, sizeof(real) * m);
+        return;
     }
+    for (int i = 0; i < m; i++) {
+        b[i] = fill(0.0);
+        for (int r = 0; r < rows; r++) b[i] += jacobian[r * m + i] * residual[r];
+    }
+}
+
+/* Their right-hand sides B (m x rows) for each row's own, so that X is the (pseudo-)inverse. */
+INLINE void normal_sides(int m, int rows, const real *jacobian, real *B)
+{
+    for (int i = 0; i < m; i++)
+        for (int r = 0; r < rows; r++)
+            B[i * rows + r] = rows == m ? fill(i == r ? 1.0 : 0.0) : jacobian[r * m + i];
 }
 
 #endif

@@ -93,7 +93,8 @@ INLINE int response_rows(int map, const pkm_machine *machine, const FN(limb_sphe
     const int m = map_m(map);
     real residual[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6], A[36], pivot;
     const int rows = scaled_rows(map, machine, sphere, state, residual, jacobian);
-    normal_system(m, rows, rows == m ? m : rows, jacobian, residual, A, response);
+    normal_matrix(m, rows, jacobian, A);
+    normal_sides(m, rows, jacobian, response);
     solve(m, rows, A, response, &pivot);
     const mask known = pivot > fill(1e-14);
     for (int j = 0; j < m; j++) {

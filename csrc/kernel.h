@@ -2,7 +2,9 @@
  * machine, and elimination in a fixed order. Included by lanes.h for `narrow` and for `wide`, and by
  * paths.c for complex numbers. */
 
+#ifndef UNROLL
 #define UNROLL _Pragma("GCC unroll 6") /* the loops of elimination: registers hold its rows then */
+#endif
 /* Ends a switch over the drivers or rows of a machine: `pkm_closure_count` refuses others, so what
  * every case sets is set. */
 #define NO_OTHER_CASE default: __builtin_unreachable()

@@ -46,7 +46,8 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
         const mask halved = running & ~better;
         share = select(halved, 0.5 * share, fill(1.0));
         real fresh[6], trial_pivot;
-        normal_system(m, rows, 1, jacobian, phi, A, fresh);
+        normal_matrix(m, rows, jacobian, A);
+        normal_side(m, rows, jacobian, phi, fresh);
         solve(m, 1, A, fresh, &trial_pivot);
         if (rows > m) trial_pivot = FN(root)(trial_pivot); /* the normal equations square it */
         real longest = zero, turn = zero;

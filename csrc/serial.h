@@ -227,10 +227,13 @@ INLINE void follow_link(const pkm_links *links, int joints, int i, const ptrdiff
 INLINE void move_joint(const pkm_arm *arm, int i, real q, motion *T)
 {
     motion moved = *T;
-    if (arm->prismatic[i])
+    real sine, cosine;
+    if (arm->prismatic[i]) {
         FN(arm_slid)(T->R, T->p, q, moved.p);
-    else
-        FN(arm_turned)(T->R, q, moved.R);
+    } else {
+        FN(sincos)(q, &sine, &cosine);
+        FN(arm_turned)(T->R, sine, cosine, moved.R);
+    }
     *T = moved;
 }
 

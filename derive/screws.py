@@ -236,7 +236,7 @@ def _link() -> Function:
 def _turned() -> Function:
     f = Function("arm_turned", "a frame turned about its z axis", "R' = R Rz(θ)   (B eq. 2)")
     R = f.matrix("R", "rotation, row by row")
-    s, c = f.sincos("t", f.scalar("theta", "[rad]"))
+    s, c = f.scalar("s", "sin θ"), f.scalar("c", "cos θ")
     f.output("turned", R * rot_z(c, s), "rotation, row by row")
     return f
 

@@ -1,5 +1,5 @@
 /* Generated from derive/screws.py by `python -m derive`; never edited by hand.
- * derivation 4ef477eb820a60ee
+ * derivation c5dc5c965dcef0cb
  * `real` is a number or a lane of numbers, FN(name) the function for that type. */
 
 #define SERIES_END 10.0
@@ -648,30 +648,27 @@ INLINE void FN(arm_link)(const real e[6], const real Qa[9], const real ra[3], co
 }
 #endif
 
-#ifndef NARROW
 /*
  * a frame turned about its z axis
  *     R' = R Rz(θ)   (B eq. 2)
  * in  R[9]           rotation, row by row
- * in  theta          [rad]
+ * in  s              sin θ
+ * in  c              cos θ
  * out turned[9]      rotation, row by row
  * operations: 6 +, 12 *, 0 /, 0 sqrt
  */
-INLINE void FN(arm_turned)(const real R[9], real theta, real turned[9])
+INLINE void FN(arm_turned)(const real R[9], real s, real c, real turned[9])
 {
-    real st, ct;
-    FN(sincos)(theta, &st, &ct);
-    turned[0] = R[0]*ct + R[1]*st;
-    turned[1] = R[1]*ct - R[0]*st;
+    turned[0] = R[0]*c + R[1]*s;
+    turned[1] = R[1]*c - R[0]*s;
     turned[2] = R[2];
-    turned[3] = R[3]*ct + R[4]*st;
-    turned[4] = R[4]*ct - R[3]*st;
+    turned[3] = R[3]*c + R[4]*s;
+    turned[4] = R[4]*c - R[3]*s;
     turned[5] = R[5];
-    turned[6] = R[6]*ct + R[7]*st;
-    turned[7] = R[7]*ct - R[6]*st;
+    turned[6] = R[6]*c + R[7]*s;
+    turned[7] = R[7]*c - R[6]*s;
     turned[8] = R[8];
 }
-#endif
 
 /*
  * a frame moved along its z axis

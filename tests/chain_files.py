@@ -14,6 +14,43 @@ from pkmcal.geometry.limb_kinds import KINDS
 
 FloatArray = NDArray[np.float64]
 
+_LEG_ON_LEG = """\
+name = "a leg on a leg"
+units = { length = "mm", angle = "deg" }
+[pose]
+map = "planar"
+home = { y = 300.0 }
+[[limb]]
+kind = "chain"
+joints = [
+  { kind = "R", at = [0.0, 0.0], share = "boom"BOOM },
+  { kind = "P"SLIDE },
+  { kind = "R", at = [-30.0, 280.0] },
+]
+[[limb]]
+kind = "chain"
+joints = [
+  { share = "boom" },
+  { kind = "R", at = [60.0, 20.0] },
+  { kind = "P", actuator = 2 },
+  { kind = "R", at = [40.0, 290.0] },
+]
+[[limb]]
+kind = "chain"
+joints = [
+  { kind = "R", at = [400.0, 50.0] },
+  { kind = "P", actuator = 3 },
+  { kind = "R", at = [50.0, 310.0] },
+]
+"""
+BOOMS = ("passive", "driven")
+
+
+def leg_on_leg(boom: str) -> str:
+    """A planar machine's file: a leg hinged to the boom of another, which nothing or q1 turns."""
+    on_boom, on_slide = ("", ", actuator = 1") if boom == "passive" else (", actuator = 1", "")
+    return _LEG_ON_LEG.replace("BOOM", on_boom).replace("SLIDE", on_slide)
+
 
 def described(machine: dict[str, Any]) -> str:
     """A robot file of joints given one by one, every axis on its own; q counts from home."""

@@ -24,9 +24,9 @@ FLAGS = [
     *("--target=wasm32", "-std=c11", "-Oz", "-ffp-contract=off", "-fno-math-errno"),
     *("-fno-trapping-math", "-fno-strict-aliasing", "-mbulk-memory", "-nostdlib"),
     *("-ffunction-sections", "-fdata-sections", "-fvisibility=hidden", "-Werror"),
-    # One lane at a time the core is called seldom: each function once, and no loop unrolled. Both
-    # macros are what lanes.h and kernel.h ask of a compiler for speed.
-    *("-Dalways_inline=unused", "-Wno-macro-redefined"),
+    # One lane at a time the core is called seldom: each function once, and no loop unrolled, which
+    # lanes.h and kernel.h ask of a compiler for speed.
+    *("-Dalways_inline=unused", "-DUNROLL=", "-Wno-macro-redefined"),
     *("-isystem", "csrc/view/include", "-Icsrc", "-Igenerated"),
     "-Wl,--no-entry,--strip-all,--gc-sections,--export-dynamic,-z,stack-size=262144",
 ]

@@ -24,8 +24,8 @@ _MOST = 0.5  # of the residuals' variance, from which they are little else
 class MeasuringOrder:
     """How residuals follow the order in which was measured, of the series that does so most.
 
-    A series are the rows of one file, or of one session in it, in the order of the column `time`,
-    or of the rows where there is none.
+    A series are the rows of one file, or of one session or touched point in it, in the order of the
+    column `time`, or of the rows where there is none.
 
     Attributes
     ----------
@@ -91,7 +91,9 @@ class MeasuringOrder:
 
 
 def measuring_order(fit: Fit, odd: Collection[int]) -> MeasuringOrder | None:
-    """Test the fitted rows of each series; None where none is long enough, or rows are mixtures.
+    """Test the fitted rows of each series.
+
+    None where none is long enough, rows are mixtures, or residuals rounding errors.
 
     Parameters
     ----------
@@ -100,7 +102,7 @@ def measuring_order(fit: Fit, odd: Collection[int]) -> MeasuringOrder | None:
     odd : collection of int
         Outliers, which are left out.
     """
-    if fit.uncertainty.mixed:
+    if fit.uncertainty.mixed or fit.uncertainty.rounded:
         return None
     visits = _visits(fit, odd)
     if not len(visits.row):

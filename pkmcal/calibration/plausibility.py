@@ -192,6 +192,7 @@ def _drives(evaluation: Evaluation) -> FloatArray:
 def _out_of_stroke(robot: Robot, drive: FloatArray) -> BoolArray:
     """Which drives (K, limbs) are beyond their strokes by more than errors explain."""
     strokes = [limb.stroke or (-np.inf, np.inf) for limb in robot.model.limbs]
+    drive = drive[:, : len(strokes)]  # without the tail
     low, high = np.array(strokes).T
     room = np.where(np.isfinite(low), _BEYOND * (high - low), 0.0)
     out: BoolArray = (drive < low - room) | (drive > high + room)

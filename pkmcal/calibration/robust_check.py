@@ -15,7 +15,6 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.statistics.robust_scale import median_ratio, ratio_by_chance, robust_ratio
 
 _SUSPECT = 1.25  # ratio of the linear model's noises from which the robust fit is made
-_ROUNDED = 1e3  # times rounding errors, below which residuals are nothing else
 DISAGREES, CARRIED = 1.5, 5.0  # ratio that is said, and that decides
 _MOST = 500  # poses of which it is made, drawn at random
 
@@ -60,8 +59,7 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     equations, estimate = fit.uncertainty.equations, fit.estimate
     linear = fit.uncertainty.fit
     ratio = robust_ratio(linear.design, linear.residual, equations.components)
-    rounding = _ROUNDED * equations.rounding(estimate.state.noise)
-    if not ratio > _SUSPECT or np.linalg.norm(linear.residual) < rounding:
+    if not ratio > _SUSPECT or fit.uncertainty.rounded:
         return None
     drawn = _drawn(fit)
     few = Equations([data for data, _ in drawn], fit.parameters).reweighted(

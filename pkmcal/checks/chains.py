@@ -9,6 +9,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.checks.finding import Finding, named
 from pkmcal.checks.function import outside_workspace, singular, turning
+from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
 
 _NONE = 1e-7  # of the largest: a singular value that is none
@@ -58,12 +59,15 @@ def strokes(robot: Robot) -> Iterator[Finding]:
     """Home beyond a stroke or a cone."""
     home = robot.feasible(robot.home)
     for name in ("stroke", "base_cone", "platform_cone"):
-        limbs = np.flatnonzero(~getattr(home, name))
-        if limbs.size:
+        found = np.flatnonzero(~getattr(home, name))
+        limbs = [int(i) for i in found if not home.is_tail(int(i))]
+        who = [named(limbs)] if limbs else []
+        who += ["the tail"] if len(found) > len(limbs) else []
+        if who:
             yield Finding(
                 "stroke",
-                tuple(int(i) + 1 for i in limbs),
-                f"at home {named(limbs)} breaks a {name.replace('_', ' ')}",
+                tuple(i + 1 for i in limbs),
+                f"at home {' and '.join(who)} breaks a {name.replace('_', ' ')}",
                 "check the limits of its joints, the home values and the home pose",
             )
 
@@ -80,7 +84,35 @@ def axes_in_line(robot: Robot) -> Iterator[Finding]:
         )
 
 
-CHAIN_CHECKS = (outside_workspace, mobility, home_values, strokes, turning, singular, axes_in_line)
+def idle_tail(robot: Robot) -> Iterator[Finding]:
+    """Joints behind the platform that move the tool as the limbs do already."""
+    if _has_idle_tail(robot):
+        ways = _ways(robot, _away(robot)[1])
+        yield Finding(
+            "mobility",
+            (),
+            f"{robot.n_actuators} actuators, but the tool moves in {ways} ways: joints of the tail"
+            " move it as the limbs do already, so no pose says where they are",
+            "turn their axes, or take them out",
+        )
+
+
+def singular_anywhere(robot: Robot) -> Iterator[Finding]:
+    """`singular`, of machines whose poses determine their actuators."""
+    if not _has_idle_tail(robot):
+        yield from singular(robot)
+
+
+CHAIN_CHECKS = (
+    outside_workspace,
+    mobility,
+    idle_tail,
+    home_values,
+    strokes,
+    turning,
+    singular_anywhere,
+    axes_in_line,
+)
 
 
 def surplus(robot: Robot) -> str:
@@ -88,9 +120,15 @@ def surplus(robot: Robot) -> str:
     over = robot.machine.rows - robot.machine.m
     if over <= 0:
         return ""
+    closures = f"{robot.machine.rows} closures for {robot.machine.m} coordinates"
+    spare = pose_steps.surplus(robot)
+    joints = f"over-constrained by {over - spare}" if over > spare else ""
+    if not spare:
+        return f"{joints}: {closures}; with errors the joints yield, each by its `soft`"
     return (
-        f"over-constrained by {over}: {robot.machine.rows} closures for {robot.machine.m}"
-        " coordinates; with errors the joints yield, each by its `soft`"
+        f"{joints}{joints and '; '}{robot.n_actuators} actuators, {spare} more than needed:"
+        f" {closures}; what they read can contradict itself: the joints then yield, each by its"
+        " `soft`, and it can calibrate itself by their readings"
     )
 
 
@@ -117,6 +155,14 @@ def _ways(robot: Robot, q: FloatArray) -> int:
         return 0
     sigma = np.linalg.svd(twists, compute_uv=False)
     return int((sigma > _NONE * sigma[0]).sum())
+
+
+def _has_idle_tail(robot: Robot) -> bool:
+    assert robot.model.chains is not None
+    machine = robot.machine
+    wanted = machine.m + min(0, machine.actuators - machine.rows)  # as `complete` takes them
+    ways = _ways(robot, _away(robot)[1])
+    return bool(robot.model.chains.tail) and machine.rows <= machine.m and 0 < ways < wanted
 
 
 def _free_ways(robot: Robot, own: FloatArray, q: FloatArray) -> FloatArray:

@@ -24,7 +24,7 @@ def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any],
     Raises
     ------
     ArgumentError
-        A machine with joints behind its platform, or passive joints that chains share.
+        A machine with joints behind its platform, or with joints by which one chain holds another.
     """
     model, n = robot.model, robot.n_actuators
     assert model.chains is not None
@@ -33,10 +33,9 @@ def contents(robot: Robot, prefix: str, number: Number) -> tuple[dict[str, Any],
         raise ArgumentError(
             f"robot: {robot.name} has joints behind its platform; a header holds none"
         )
-    if layout.shared:
+    if layout.shared or layout.loose:
         raise ArgumentError(
-            f"robot: {robot.name} shares passive joints between chains; a header takes each chain"
-            " alone"
+            f"robot: {robot.name} shares joints between chains; a header takes each chain alone"
         )
     one, several, whole = c_source.writers(number)
     wide = number == "double"
@@ -135,5 +134,6 @@ def _calls(layout: ChainLayout) -> list[str]:
         calls.append("chain_ball" if ball else "chain_closure")
         for joint in layout.member[layout.first[chain] : layout.first[chain + 1]]:
             calls += ["motion_compose"]
-            calls += ["arm_slid"] if layout.prismatic[joint] else ["arm_turned", "chain_turn"]
+            slides = layout.prismatic[joint]
+            calls += ["arm_slid"] if slides else ["sincos", "arm_turned", "chain_turn"]
     return calls

@@ -9,8 +9,8 @@ import numpy as np
 from pkmcal._core import ffi, lib
 from pkmcal.arrays import FloatArray, Int32Array, IntArray
 from pkmcal.core import screws
+from pkmcal.core.chain_actuators import coordinates
 from pkmcal.core.chain_readings import readings
-from pkmcal.core.chain_tail import coordinates
 from pkmcal.core.core_machine import CoreMachine, known_rows
 from pkmcal.core.library import COORDINATE_UNITS, ISA, MAPS, call, pointer
 from pkmcal.core.machine import CLOSURE_TOLERANCE, Closure, Machine
@@ -118,6 +118,15 @@ class ChainLayout:
         return int((self.coordinate >= 0).sum())
 
     @property
+    def loose(self) -> bool:
+        """Whether a chain that shares a joint has more joints than rows: others must hold it."""
+        of = np.repeat(np.arange(len(self.ball)), np.diff(self.first))
+        users = [len(set(of[self.member == joint].tolist())) for joint in range(len(self.place))]
+        shares = np.array(users)[self.member] > 1
+        more = np.diff(self.first) > np.where(self.ball != 0, 3, GROUPS[self.map])
+        return bool((shares & more[of]).any())
+
+    @property
     def rows(self) -> int:
         """How many rows the chains leave when each has eliminated the passive joints of its own."""
         own = self.coordinate[self.member] >= self.shared
@@ -144,7 +153,7 @@ class ChainMachine(CoreMachine):
         self, layout: ChainLayout, closure_tolerance: float | None = None, isa: int = ISA
     ) -> None:
         struct = ffi.new("pkm_chains *")
-        self.layout = layout
+        self.layout, self._together = layout, layout.loose or layout.tail < len(layout.zero)
         self._kept = {  # C has pointers to these
             each.name: np.ascontiguousarray(value)
             for each in fields(layout)
@@ -177,18 +186,18 @@ class ChainMachine(CoreMachine):
     def inverse(
         self, slots: FloatArray, pose: FloatArray, near: FloatArray | None = None
     ) -> FloatArray:
-        """Poses (N, 6) to actuator coordinates (N, n), each chain alone from its home.
+        """Poses (N, 6) to actuator coordinates (N, n), from home; chains one by one if that does.
 
         Angles as `pkmcal.core.machine.Machine.inverse` gives them.
         """
-        if self.layout.tail < self.actuators:
-            return known_rows(self.nearest_turns(slots, self._with_tail(slots, pose), near))
+        if self._together:
+            return known_rows(self.nearest_turns(slots, self._all_at_once(slots, pose), near))
         q = np.empty((len(pose), self.actuators))
         call("chain_inverse", self.struct, len(pose), slots, 0, pose, q, isa=self.isa)
         return known_rows(self.nearest_turns(slots, q, near))
 
-    def _with_tail(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
-        """`inverse` of a machine with joints behind the platform."""
+    def _all_at_once(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """`inverse` of a machine whose chains cannot be taken one by one."""
         arms = np.append(np.ones(self.actuators), self.layout.length)
         arms[self._angles] = self.layout.length
         arms[:-1] *= np.abs(self.slopes(slots, pose[:1])[0]) if len(pose) else 1.0
@@ -198,7 +207,7 @@ class ChainMachine(CoreMachine):
         if status[0] != 0:
             return np.full((len(pose), self.actuators), np.nan)
         return coordinates(
-            lambda there, near: self.forward(slots, there, near, 1)[:2],
+            lambda there, near: self.forward(slots, there, guess if near is None else near, 1)[:2],
             lambda at, there: self.forward_jacobian(slots, at, there, twists=True),
             pose, (home[0], q), self.layout.size, arms,
         )  # fmt: skip

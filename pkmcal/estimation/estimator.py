@@ -149,6 +149,7 @@ class Estimator:
         if near is not None:
             self.equations.warm_start(near)
             u = (near.theta - self.start.theta) / self.scale
+        risen: set[tuple[int, int]] = set()
         for _ in range(_ROUNDS):
             # rows that nothing contradicts pin what is not determined
             kept = state.fitted.unidentifiable
@@ -159,6 +160,11 @@ class Estimator:
             if self.equations.closures.unknowns and self._at_first is None:
                 self._at_first = estimate.freedom
             revised = self._revised(estimate)
+            rise = state.fitted.rank, revised.fitted.rank
+            if rise in risen:
+                break  # what is fitted decides what can be: the fewer combinations are kept
+            if rise[0] < rise[1]:
+                risen.add(rise)
             settled = self._settled(state, revised)
             state = revised
             if settled:

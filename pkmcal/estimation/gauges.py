@@ -14,6 +14,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import AXES, SLOTS
+from pkmcal.estimation.chain_gauges import frame_motions
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.parameters import Parameters
@@ -62,7 +63,10 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
     if not unidentifiable.shape[1] or not isinstance(robot, Robot):
         return Gauges((), unidentifiable)
     if robot.model.chains is not None:  # whose numbers are errors of joints, not places of points
-        return Gauges((), unidentifiable)
+        found, free = frame_motions(parameters, robot, unidentifiable)
+        rest = np.linalg.svd(found, full_matrices=True)[0][:, found.shape[1] :]
+        of_all = np.insert(free, _SCALE, 0.0, axis=0)
+        return Gauges(tuple(_texts(of_all)), unidentifiable @ rest)
     moves = _motions(robot)
     beside = _swivel_zeros(parameters)
     numbers = moves.reshape(-1, moves.shape[2])[robot.geometry.slot_index]

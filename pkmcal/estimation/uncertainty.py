@@ -20,6 +20,8 @@ from pkmcal.statistics.noise import Noise, Split, joined, noise, split
 from pkmcal.statistics.pseudo_residuals import PseudoResiduals, pseudo_residuals
 from pkmcal.statistics.variance_components import told_apart, variance_components
 
+_ROUNDED = 1e3  # times rounding errors, below which residuals are nothing else
+
 
 def stated_variances(measured: Measurements) -> FloatArray | None:
     """Mean variance of the lengths of each row (N,), mm², as sigma says; None where it does not.
@@ -74,6 +76,12 @@ class Uncertainty:
     def known(self) -> bool:
         """Whether there is noise to state the uncertainty: stated, or shown by spare equations."""
         return not self.unknown.any()
+
+    @property
+    def rounded(self) -> bool:
+        """Whether the residuals are nothing but rounding errors."""
+        limit = _ROUNDED * self.equations.rounding(self.factors)
+        return bool(np.linalg.norm(self.fit.residual) < limit)
 
     @property
     def mixed(self) -> bool:

@@ -30,33 +30,36 @@ def feasibility(
     """
     passive, frames = machine.frames(slots, own, q)
     drive = machine.drives(slots, q)
-    shape = (len(own), len(chains.limbs))
+    shape = (len(own), len(chains.limbs) + (chains.tail > 0))
     stroke, before, last = (np.full(shape, np.inf) for _ in range(3))
     in_stroke = np.ones(shape, dtype=bool)
     turned, platform = _turned(machine, frames), _platform(machine, own)
     for i, limb in enumerate(chains.limbs):
         at = 0
         for k, joint in enumerate(limb):
+            column = len(chains.limbs) if k >= len(limb) - chains.tail else i
             count = 0 if joint.ball and joint is limb[-1] else joint.parts
             if joint.stroke is not None:
                 value = _value(chains, machine, i, k, passive, drive)
                 margin = margin_of(joint.stroke, value)
-                stroke[:, i] = np.fmin(stroke[:, i], margin)
-                in_stroke[:, i] &= kept(margin, joint.unit, chains.size) | np.isnan(margin)
+                stroke[:, column] = np.fmin(stroke[:, column], margin)
+                in_stroke[:, column] &= kept(margin, joint.unit, chains.size) | np.isnan(margin)
             if joint.cone is not None:
                 start = machine.layout.first[i] + i + at
                 behind = turned[:, start + count] if count else platform
                 bend = _bend(limb, k, turned[:, start], behind)
                 where = last if joint is limb[-1] else before
-                where[:, i] = np.fmin(where[:, i], joint.cone - bend)
+                where[:, column] = np.fmin(where[:, column], joint.cone - bend)
             at += count
     reach = np.asarray(np.isfinite(q).all(axis=1) & np.isfinite(frames).all(axis=(1, 2)))
-    first = np.array([_first_actuator(limb) for limb in chains.limbs])
+    first = np.array([_first_actuator(limb[: len(limb) - chains.tail]) for limb in chains.limbs])
+    if chains.tail:
+        first = np.append(first, machine.layout.tail)
     shown = np.where(first >= 0, drive[:, np.maximum(first, 0)], 0.0)
     return Feasibility(
         np.broadcast_to(reach[:, None], shape).copy(), in_stroke,
         kept(before, "rad", chains.size), kept(last, "rad", chains.size),
-        np.where(reach[:, None], shown, np.nan), stroke, before, last,
+        np.where(reach[:, None], shown, np.nan), stroke, before, last, tail=chains.tail > 0,
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
 
 BLOCK = 20_000  # poses at a time
+_NONE = 1e-9  # of the largest: a singular value that is none
 _SUMMARY = (np.min, np.median, np.max)
 
 
@@ -38,7 +39,9 @@ class Dexterity(Result):
         more closures than free coordinates.
     transmission : ndarray (...)
         The least, over the limbs, of abs(cos) of the angle between limb and motion of its actuator;
-        0 at a type-1 singularity, 1 for a limb whose own length is driven.
+        0 at a type-1 singularity, 1 for a limb whose own length is driven. Of a joint behind the
+        platform the sine of the angle between its motion and what the other actuators can do: 0
+        where a wrist's axes are in line.
     """
 
     conditioning: FloatArray
@@ -120,7 +123,35 @@ def _measures(robot: Robot, poses: FloatArray) -> FloatArray:
         out[4, good] = _transmission(robot, closure.by_q[good], slopes)
     else:
         out[4, good] = _chain_transmission(robot, closure.by_q[good], slopes)
+        if robot.model.chains.tail:
+            out[4, good] = np.fmin(
+                out[4, good], _tail_transmission(robot, own[good], q[good], slopes)
+            )
     return out
+
+
+def _tail_transmission(
+    robot: Robot, own: FloatArray, q: FloatArray, slopes: FloatArray
+) -> FloatArray:
+    """What of the motion of each tail joint no other actuator does, the least; (N,).
+
+    With more than six actuators others can always do it, and this says nothing: infinite.
+    """
+    chains, machine = robot.model.chains, robot.machine
+    assert chains is not None
+    least = np.full(len(own), np.inf)
+    if robot.n_actuators > own.shape[1]:
+        return least
+    arms = slopes * [1.0 if joint.unit == "mm" else robot.length for joint, _ in chains.arms]
+    twists = machine.forward_jacobian(robot.slots, own, q, twists=True) / arms[:, None]
+    twists[:, :3] *= robot.length
+    for a in range(robot.n_actuators - chains.tail, robot.n_actuators):
+        mine, others = twists[:, :, a], np.delete(twists, a, axis=2)
+        axes, sigma, _ = np.linalg.svd(others, full_matrices=False)
+        axes *= (sigma > _NONE * sigma[:, :1])[:, None]
+        rest = mine - (axes @ (axes.swapaxes(1, 2) @ mine[..., None]))[..., 0]
+        least = np.fmin(least, np.linalg.norm(rest, axis=1) / np.linalg.norm(mine, axis=1))
+    return least
 
 
 def _chain_transmission(robot: Robot, by_q: FloatArray, slopes: FloatArray) -> FloatArray:

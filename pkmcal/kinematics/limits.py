@@ -18,7 +18,9 @@ AT_LIMIT = 1e-10  # of the machine's size, or rad: so near a limit it is kept
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Feasibility(Result):
-    """Limits kept, for each pose and limb; every array but the last is (..., limbs).
+    """Limits kept, for each pose and limb; arrays are (..., limbs), that of the workspace is (...).
+
+    Joints behind the platform are one more, the last, in a machine that has such a tail.
 
     Attributes
     ----------
@@ -35,6 +37,8 @@ class Feasibility(Result):
         limb states none.
     workspace : ndarray of bool (...)
         The pose is in the box of the robot file, ``[workspace]``; True where it states none.
+    tail : bool
+        Whether the last column is that of joints behind the platform.
     """
 
     reach: BoolArray
@@ -46,6 +50,7 @@ class Feasibility(Result):
     base_cone_margin: FloatArray
     platform_cone_margin: FloatArray
     workspace: BoolArray = field(default_factory=lambda: np.array(True))
+    tail: bool = False
 
     LIMITS = ("reach", "stroke", "base_cone", "platform_cone")
 
@@ -56,7 +61,7 @@ class Feasibility(Result):
         return np.asarray(kept.all(axis=-1) & self.workspace)
 
     def broken(self) -> list[str]:
-        """What is broken, one line per limit and limb, over all poses."""
+        """What is broken, one line per limit and limb, or the tail, over all poses."""
         lines = []
         outside = np.flatnonzero(~self.workspace.reshape(-1))
         if outside.size:
@@ -67,8 +72,13 @@ class Feasibility(Result):
                 rows = np.flatnonzero(~kept[:, limb])
                 if rows.size:
                     what = limit.replace("_", " ")
-                    lines.append(f"limb {limb + 1}: {what} broken in rows {first_rows(rows)}")
+                    place = "tail" if self.is_tail(limb) else f"limb {limb + 1}"
+                    lines.append(f"{place}: {what} broken in rows {first_rows(rows)}")
         return lines
+
+    def is_tail(self, column: int) -> bool:
+        """Whether a column, counted from 0, is that of the tail."""
+        return self.tail and column == self.reach.shape[-1] - 1
 
     def _parts(self) -> Iterator[str | Table]:
         yield f"{int(self.ok.sum())} of {self.ok.size} poses keep all limits"

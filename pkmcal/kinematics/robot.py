@@ -164,8 +164,8 @@ class Robot(Kinematics, Result):
             self._limb_limits(own, q) if self.model.chains is None else self._chain_limits(own, q)
         )
         found = replace(limits, workspace=box.in_box(self.model.workspace, given))
-        each = (getattr(found, field.name) for field in fields(Feasibility))
-        return Feasibility(*(array.reshape((*shape, *array.shape[1:])) for array in each))
+        arrays = {f.name: getattr(found, f.name) for f in fields(Feasibility) if f.name != "tail"}
+        return replace(found, **{k: a.reshape((*shape, *a.shape[1:])) for k, a in arrays.items()})
 
     def _limb_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
         """Limits of limbs in closed form at own poses (N, 6), by actuators (N, n) or without."""

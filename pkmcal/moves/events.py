@@ -65,7 +65,8 @@ class Event(Result):
     what : {"reach", "stroke", "base_cone", "platform_cone", "singularity"}
         The limit.
     limb : int or None
-        Which limb, counted from 1; None for the machine as a whole.
+        Which limb, counted from 1, joints behind the platform as one more; None for the machine as
+        a whole.
     """
 
     time: float
@@ -110,7 +111,9 @@ def events(move: Sampled) -> list[Event]:
 
 
 def _names(move: Sampled) -> list[tuple[str, int | None]]:
-    limbs = range(1, len(move.robot.model.limbs) + 1)
+    chains = move.robot.model.chains
+    tail = chains is not None and chains.tail > 0
+    limbs = range(1, len(move.robot.model.limbs) + tail + 1)
     names: list[tuple[str, int | None]] = [
         (what, limb) for what in Feasibility.LIMITS for limb in limbs
     ]

@@ -18,7 +18,7 @@ from pkmcal.measurements.calibratable import as_given
 from pkmcal.report.drawing import sample
 from pkmcal.report.exaggerated import middle_exaggerated
 from pkmcal.report.residual_vectors import measured_places, residual_vectors
-from pkmcal.view import page
+from pkmcal.view import page, parallel
 
 _NAMED = 100  # outliers, which have the names of their lines; others have numbers
 _MORE = 10  # times the exaggeration that is drawn at first
@@ -31,7 +31,7 @@ def element(found: Identification) -> tuple[str, str]:
     Both are empty for a machine that the page cannot hold: the still pictures stay.
     """
     robot = found.robot
-    if isinstance(robot, Robot) and robot.model.bent:
+    if isinstance(robot, Robot) and parallel.beyond(robot.model):
         return "", ""
     data = page.machine(robot, cloud=False)  # the report has its own pictures of the workspace
     data["places"] = _measured(found)

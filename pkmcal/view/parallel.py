@@ -13,7 +13,7 @@ from pkmcal.core.machine import Machine
 from pkmcal.core.poses import invert
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.model import Cone
+from pkmcal.geometry.model import Cone, Model
 from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.frames import NOWHERE
 from pkmcal.kinematics.robot import Robot
@@ -24,6 +24,15 @@ _OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 _TRACK = 25  # points of the path of a crank's end
 
 
+def beyond(model: Model) -> str:
+    """What of a machine the page cannot hold; empty where it holds all."""
+    if model.bent:
+        return "tackles" if model.limbs[model.bent[0]].parts else "pulleys"
+    if model.chains is not None and model.chains.layout.loose:
+        return "chains that hold each other by joints they share"
+    return ""
+
+
 def data(robot: Robot, cloud: bool) -> dict[str, Any]:
     """All that the page needs of a robot, as JSON has it; mm and rad.
 
@@ -32,8 +41,7 @@ def data(robot: Robot, cloud: bool) -> dict[str, Any]:
     model = robot.model
     machine, slots = drives.within(robot)
     laws = drives.laws(robot)
-    if model.bent:
-        what = "tackles" if model.limbs[model.bent[0]].parts else "pulleys"
+    if what := beyond(model):
         raise ArgumentError(f"robot: {model.name} has {what}, which the page cannot hold")
     size = float(machine.struct.size)
     if isinstance(machine, Machine):

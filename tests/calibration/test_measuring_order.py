@@ -141,6 +141,12 @@ def test_too_few_rows_say_nothing(hexapod: pk.Robot) -> None:
     assert found_of(hexapod, data.select(np.arange(7))).measuring_order is None
 
 
+def test_rounding_errors_have_no_order(hexapod: pk.Robot) -> None:
+    q = hexapod.inverse(hexapod_poses(hexapod, 20, np.random.default_rng(0)))
+    exact = pk.Measurements(q, hexapod.forward(q).pose[:, :3])
+    assert found_of(hexapod, exact).measuring_order is None
+
+
 def test_the_test_has_the_chance_it_states() -> None:
     """Exact beside a fit with few spare equations: 1 % at 1 % of 2000 series of 12 visits."""
     rng = np.random.default_rng(0)

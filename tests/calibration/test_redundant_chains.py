@@ -135,6 +135,11 @@ def test_what_readings_of_actuators_leave_open_is_said(tmp_path: Path) -> None:
     measured = pk.Measurements(read, None, "closure", actuator_sigma=0.01)
     found = pk.identify(robot, measured, ["limb*.joint1.d[xy]", "limb*.platform.d[xy]"])
     assert len(found.free) == 16 and found.rank == 10
+    three = "moved along x and y and turned about z: nothing that was measured says where"
+    assert [three in text for text in found.gauges] == [True, True]
+    assert found.gauges[0].startswith("the base frame") and "platform" in found.gauges[1]
+    own = pk.identify(robot, measured)  # of other numbers, which do the same
+    assert own.gauges == found.gauges
     assert np.isinf(found.stderr).all()
 
 
@@ -154,3 +159,12 @@ def test_a_tricept_with_a_fourth_leg_calibrates_itself(tmp_path: Path) -> None:
     found = pk.identify(robot, measured, names)
     assert np.abs((found.values - list(wrong.values())) / found.stderr).max() < 4.0
     assert (found.stderr < 0.1).all()
+
+
+def test_check_tells_spare_actuators_from_spare_closures(tmp_path: Path) -> None:
+    said = {made_of: str(pk.check_geometry(loaded(as_chains(made_of()), tmp_path)))
+            for made_of in (eight_legs, four_planes, four_cranks)}  # fmt: skip
+    assert "8 actuators, 2 more than needed: 8 closures for 6 coordinates" in said[eight_legs]
+    assert "4 actuators, 1 more than needed: 4 closures for 3 coordinates" in said[four_cranks]
+    assert "over-constrained by 1; 4 actuators, 1 more than needed" in said[four_planes]
+    assert "more than needed" not in str(pk.check_geometry(pk.load("exechon")))

@@ -136,21 +136,41 @@ def test_rank_and_cost_of_a_reference_computed_elsewhere(
     assert 0.5 * found.chi2_per_dof * found.dof == pytest.approx(cost, abs=2e-8)
 
 
-@pytest.mark.parametrize(("kind", "rows"), [("all", 30), ("third", 60), ("mixed", 60)])
+READ = pytest.mark.parametrize(("kind", "rows"), [("all", 30), ("third", 60), ("mixed", 60)])
+
+
+@READ
 def test_intervals_of_a_redundant_machine_cover_and_it_goes_where_it_says(
     cables: pk.Robot, kind: Kind, rows: int
 ) -> None:
+    off, covered = compared(cables, kind, rows, 12)
+    assert off <= 0.29  # mm; from the readings alone it is 0.60
+    assert 0.90 <= covered <= 0.99  # of 192 that are not independent
+
+
+@pytest.mark.slow
+@READ
+def test_intervals_of_many_machines_cover_what_they_say(
+    cables: pk.Robot, kind: Kind, rows: int
+) -> None:
+    off, covered = compared(cables, kind, rows, 200)
+    print(f"{kind}: cables elsewhere {off:.3f} mm off, 95 % intervals hold {covered:.3f}")
+    assert off <= 0.29 and 0.93 <= covered <= 0.97
+
+
+def compared(cables: pk.Robot, kind: Kind, rows: int, machines: int) -> tuple[float, float]:
+    """How far cables are off at other poses, rms in mm, and the share of intervals that hold."""
     off, covered = [], []
-    for seed in range(12):
+    for seed in range(machines):
         drawn = simulated(seed, rows, kind)
         found = pk.identify(cables, measured(drawn))
         true = np.array([drawn.true[name] for name in found.free])
-        covered.append(np.abs(found.values - true) < 1.96 * found.stderr)
+        low, high = found.interval95.T
+        covered.append((low < true) & (true < high))
         at, needed = drawn.elsewhere
         asked = found.robot.inverse(np.c_[at, np.zeros((len(at), 3))])
         off.append(np.sqrt(np.mean((asked - needed) ** 2)))
-    assert np.mean(off) <= 0.29  # mm; from the readings alone it is 0.60
-    assert 0.90 <= np.mean(covered) <= 0.99  # of 192 that are not independent
+    return float(np.mean(off)), float(np.mean(covered))
 
 
 def test_noise_of_cables_and_of_the_camera_is_told_apart(cables: pk.Robot) -> None:

@@ -17,10 +17,9 @@ STRETCH, WEIGHT, NOISE, CABLE = 2e-5, (0.0, 0.0, -196.2), 0.1, 0.2
 STRETCHES = ("drive1.stretch", "drive2.stretch", "drive3.stretch")
 
 
-def hung(anchors: np.ndarray) -> pk.Robot:
+def hung(anchors: np.ndarray, kind: str = "cable") -> pk.Robot:
     limbs = [
-        {"kind": "cable", "base": a, "platform": [0, 0, 0], "drive": {"stretch": 0.0}}
-        for a in anchors
+        {"kind": kind, "base": a, "platform": [0, 0, 0], "drive": {"stretch": 0.0}} for a in anchors
     ]
     return made("translation", {"z": 800.0}, limbs)
 
@@ -151,16 +150,18 @@ def test_deviations_of_stretch_are_honest(three: pk.Robot, kind: str) -> None:
     assert 0.9 < z < 1.1 and 0.93 < held < 0.97
 
 
-OF_CABLES = ["base4.*", "base3.x", "base3.z", "base2.z", "drive*"]
+MOVED = {"base4.x": (3, 0), "base4.y": (3, 1), "base3.x": (2, 0)}
+MORE = MOVED | {"base4.z": (3, 2), "base3.z": (2, 2), "base2.z": (1, 2)}  # hardly determined
 
 
-def by_cells(robot: pk.Robot, seed: int) -> tuple[pk.Identification, np.ndarray]:
+def by_cells(
+    robot: pk.Robot, seed: int, numbers: dict[str, tuple[int, int]]
+) -> tuple[pk.Identification, np.ndarray]:
     """Nothing but cables and load cells read, of a machine with a cable more than needed."""
     rng = np.random.default_rng(seed)
     anchors = FOUR.copy()
-    moved = [(3, 0), (3, 1), (3, 2), (2, 0), (2, 2), (1, 2)]
-    for i, k in moved:
-        anchors[i, k] += rng.normal(0, 10)
+    for place in numbers.values():
+        anchors[place] += rng.normal(0, 10)
     at = places(seed + 2000, 40)
     length, u = ways(anchors, at)
     tension = np.empty(length.shape)
@@ -173,26 +174,32 @@ def by_cells(robot: pk.Robot, seed: int) -> tuple[pk.Identification, np.ndarray]
     q = length / (1.0 + stretch * tension) + rng.normal(0, CABLE, length.shape)
     cells = tension + rng.normal(0, 0.5, tension.shape)
     log = pk.Measurements(q, None, "closure", actuator_sigma=CABLE, tension=cells)
-    found = pk.identify(robot, log, OF_CABLES, covariance="classical")
-    numbers = {f"base{i + 1}.{'xyz'[k]}": anchors[i, k] for i, k in moved}
-    numbers |= {f"drive{i}.stretch": STRETCH for i in (1, 2, 3, 4)}
-    return found, np.array([numbers[name] for name in found.free])
+    found = pk.identify(robot, log, [*numbers, "drive*"], covariance="classical")
+    true = {name: anchors[place] for name, place in numbers.items()}
+    true |= {f"drive{i}.stretch": STRETCH for i in (1, 2, 3, 4)}
+    return found, np.array([true[name] for name in found.free])
 
 
 def test_load_cells_and_cables_alone_find_anchors_and_stretch(four: pk.Robot) -> None:
-    found, true = by_cells(four, 3)
-    assert found.rank == len(found.free) == 10
+    found, true = by_cells(four, 3, MOVED)
+    assert found.rank == len(found.free) == 7
     assert np.abs((found.values - true) / found.stderr).max() < 4.5
     read = found.fit.equations.sets[0].actuators
     blind = pk.Measurements(read, None, "closure", actuator_sigma=CABLE)
     with pytest.warns(pk.CalibrationWarning, match="times what sigma says"):
-        pk.identify(four, blind, [name for name in OF_CABLES if name != "drive*"])
+        pk.identify(four, blind, [*MOVED])
+
+
+def test_combinations_at_the_limit_of_what_is_determined_are_kept_out() -> None:
+    """With them in the fit they are not determined, without them they are: it does not go round."""
+    found, _ = by_cells(hung(FOUR, "UPS"), 9, MORE)
+    assert found.evaluations < 100 and found.rank == 9 < len(found.free)
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:cables read longer")  # in one fit of a hundred, by chance
-def test_deviations_with_load_cells_are_honest(four: pk.Robot) -> None:
-    pairs = [by_cells(four, seed) for seed in range(200)]
+def test_deviations_with_load_cells_are_honest() -> None:
+    legs = hung(FOUR, "UPS")  # what is no cable is not looked at for slack
+    pairs = [by_cells(legs, seed, MOVED) for seed in range(200)]
     z = np.array([(found.values - true) / found.stderr for found, true in pairs])
     held = np.array([
         (found.interval95[:, 0] < true) & (true < found.interval95[:, 1]) for found, true in pairs

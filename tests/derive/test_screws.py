@@ -235,9 +235,8 @@ def test_links_are_what_lies_between_the_joints_frames() -> None:
 
 
 def test_a_joint_moves_by_its_screw() -> None:
-    R, p, (c, s) = rotation(), vector(), circle()
-    theta, q = sp.Symbol("theta", real=True), sp.Rational(3, 7)
-    turned = value("arm_turned", "turned", R=R).subs({sp.sin(theta): s, sp.cos(theta): c})
+    R, p, (c, s), q = rotation(), vector(), circle(), sp.Rational(3, 7)
+    turned = value("arm_turned", "turned", R=R, s=s, c=c)
     assert turned.reshape(3, 3) == R * rot_z(c, s)
     assert value("arm_slid", "slid", R=R, p=p, q=q) == p + q * R[:, 2]
     frame = motion(R, p)

@@ -18,7 +18,7 @@ from random import Random
 from .damage import damaged
 from .doors import DOORS, emptied
 
-SLOW = 5.0  # s of processor time for one input
+SLOW = 30.0  # s of processor time for one input; commands that draw take 6 on a busy machine
 MEMORY = Path("/dev/shm")  # files that no disk waits for, where there are such
 
 

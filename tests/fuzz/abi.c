@@ -333,7 +333,7 @@ static void of_rows(ptrdiff_t n, unsigned strange, int isas)
     const double *a = numbers(6 * n + 6, strange), *b = numbers(6 * n + 6, strange);
     const double *c = numbers(6 * n + 6, strange), *motion = numbers(16 * n + 9, strange);
     const ptrdiff_t six = byte() & 1 ? 6 : 0, three = byte() & 1 ? 3 : 0;
-    one_of(25);
+    one_of(26);
     EACH_ISA(compose, n, a, six, b, 6 - six, D(0, 6 * n));
     EACH_ISA(invert, n, a, D(0, 6 * n));
     EACH_ISA(compose_rates, n, a, b, c, six, a, D(0, 36 * n));

@@ -61,7 +61,7 @@ def test_ranks_are_those_counted(machine: dict[str, Any], tmp_path: Path) -> Non
 
 
 def test_a_tricept_s_errors_are_found(tmp_path: Path) -> None:
-    """All 153 joint errors at once, of which poses determine 45."""
+    """All 153 joint errors at once, of which poses determine 45: to what noise leaves of them."""
     machines = [case.values[0] for case in reference()]
     machine = next((m for m in machines if m and m["name"].startswith("Tricept")), None)
     if machine is None:
@@ -71,18 +71,21 @@ def test_a_tricept_s_errors_are_found(tmp_path: Path) -> None:
     names = [name for name in robot.geometry.names if not name.startswith("gain")]
     random = np.random.default_rng(3)
     units = dict(zip(robot.geometry.names, robot.geometry.units, strict=True))
-    sigma = {"mm": 0.1, "rad": 3e-4}
-    true = robot.replace({name: random.normal(0, sigma[units[name]]) for name in names})
-    q = commands(robot, 160, share=4.0)
-    measured = pk.VirtualMachine(true, noise=0.01).measure(q[:60], kind="pose")
-    with pytest.warns(pk.CalibrationWarning, match="no better than"):  # some far weaker than others
-        found = pk.identify(robot, measured, free=names)
+    sigma = {name: {"mm": 0.1, "rad": 5e-4}[units[name]] for name in names}
+    true = robot.replace({name: random.normal(0, sigma[name]) for name in names})
+    q = commands(robot, 160, share=5.0)
+    there = true.forward(q).pose
+    noise = np.repeat([0.01, 1e-5], 3)  # mm, rad
+    read = there[:60] + random.normal(0, noise, (60, 6))
+    measured = pk.Measurements(q[:60], read, "pose", sigma=noise)
+    found = pk.identify(robot, measured, free=names, prior=sigma)
     assert len(names) == 153 and found.rank == 45
-    there = true.forward(q[60:]).pose
 
     def off(other: pk.Robot) -> float:
-        miss = (other.forward(q[60:]).pose - there)[:, :3]
+        miss = (other.forward(q[60:]).pose - there[60:])[:, :3]
         return float(np.sqrt((miss**2).sum(axis=1).mean()))
 
+    # of 45 numbers from 60 poses noise leaves this much, if all six of a pose weighed alike
+    left = 0.01 * np.sqrt(3 * 45 / (6 * 60))
     assert off(robot) > 0.3
-    assert off(found.robot) < 0.02
+    assert off(found.robot) < 1.5 * left

@@ -16,7 +16,14 @@ from pkmcal.core.library import ISAS
 from pkmcal.geometry import robot_file
 from pkmcal.kinematics import overconstrained
 from pkmcal.screw import from_pose
-from tests.chain_files import all_errors, as_chains, described, same_errors
+from tests.chain_files import (
+    BOOMS,
+    all_errors,
+    as_chains,
+    described,
+    leg_on_leg,
+    same_errors,
+)
 from tests.chain_twin import Twin
 
 DIGITS = Path(__file__).parents[3] / "shared" / "design" / "chains.json"
@@ -294,3 +301,32 @@ def test_modes_of_chains_are_those_that_are_proven_of_legs(tmp_path: Path) -> No
     assert len(proven) == len(found) == 16 and proven.complete
     assert np.abs(proven.poses[:, :3] - found.poses[:, :3]).max() < 1e-7
     assert np.abs(proven.sign - proven.sign[0] * found.sign[0] * found.sign).max() == 0
+
+
+@pytest.mark.parametrize("name", ("tricept", "eclipse", "agile-eye", "exechon"))
+def test_what_a_row_comes_to_does_not_depend_on_its_neighbours(name: str) -> None:
+    """Near and far rows side by side: one keeps its matrix where another needs a new one."""
+    robot = disturbed(pk.load(name))
+    q = np.concatenate([commands(robot, 12, share=s) for s in (0.01, 0.3, 2.0)])
+    q = q.reshape(3, 12, -1).swapaxes(0, 1).reshape(36, -1)
+    together = robot.forward(q)
+    alone = [robot.forward(row) for row in q]
+    assert np.array_equal(together.pose, [each.pose for each in alone], equal_nan=True)
+    assert np.array_equal(together.iterations, [each.iterations for each in alone])
+    assert len(set(together.iterations)) > 1
+
+
+@pytest.mark.parametrize("boom", BOOMS)
+def test_forward_undoes_inverse_where_a_chain_is_held_by_another(boom: str, tmp_path: Path) -> None:
+    """The leg on the boom alone would be assembled in as many ways as the boom can turn."""
+    robot = loaded(leg_on_leg(boom), tmp_path)
+    rng = np.random.default_rng(3)
+    poses = robot.home + rng.uniform(-1, 1, (50, 6)) * [40, 40, 0, 0, 0, 0.2]
+    q = robot.inverse(poses)
+    found = robot.forward(q, guess=poses)
+    assert (found.status == 0).all()
+    np.testing.assert_allclose(found.pose, poses, atol=1e-8)
+    cos, sin = np.cos(poses[:, 5]), np.sin(poses[:, 5])
+    x, y = poses[:, 0] - 30 * cos + 20 * sin, poses[:, 1] - 30 * sin - 20 * cos
+    first = np.hypot(x, y) if boom == "passive" else np.arctan2(-x, y)
+    np.testing.assert_allclose(np.ptp(q[:, 0] - first), 0, atol=1e-8)

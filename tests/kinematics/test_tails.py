@@ -223,3 +223,29 @@ def test_the_page_says_which_joints_are_behind_the_platform(tmp_path: Path) -> N
     assert said.endswith(
         "Six actuators move the tool along x, y, z and turn it about x, y, z (α, β, γ)."
     )
+
+
+def test_a_limit_of_the_wrist_is_told_once_and_is_no_limb_s(tmp_path: Path) -> None:
+    text = tricept().replace("actuator = 5\n", "actuator = 5\nstroke = [-60.0, 60.0]\n")
+    robot = loaded(text, tmp_path)
+    q = robot.inverse(robot.home) + np.array([[0, 0, 0, 0, 0.5, 0], [0, 0, 0, 0, 1.5, 0]])
+    found = robot.feasible(robot.forward(q).pose, q)
+    assert found.stroke.shape == (2, len(robot.model.limbs) + 1)
+    assert found.broken() == ["tail: stroke broken in rows 1"]
+    assert found.stroke_margin[:, -1] == pytest.approx(np.pi / 3 - np.array([0.5, 1.5]))
+    assert list(found.ok) == [True, False]
+    off = text.replace("[-60.0, 60.0]", "[30.0, 60.0]")
+    assert "at home the tail breaks a stroke" in str(pk.check_geometry(loaded(off, tmp_path)))
+
+
+def test_dexterity_sees_axes_of_a_wrist_in_line(tmp_path: Path) -> None:
+    """The sine of the angle by which the middle joint bends; the limbs do not turn the tool so."""
+    aligned = tricept().replace("[0.0, 10.0, 1150.0]", "[0.0, 0.0, 1150.0]")
+    robot = loaded(aligned, tmp_path)
+    bent = np.array([0.02, 0.05, 0.2])
+    q = robot.inverse(robot.home) * np.array([1, 1, 1, 0, 0, 0]) + np.outer(bent, np.eye(6)[4])
+    found = pk.dexterity(robot, robot.forward(q).pose)
+    ratio = found.transmission / np.sin(bent)
+    assert (np.abs(ratio / ratio[0] - 1) < 0.1).all() and 0.1 < ratio[0] < 10
+    straight = pk.dexterity(robot, robot.forward(q[0] * [1, 1, 1, 0, 0, 0]).pose)
+    assert straight.transmission < 1e-6 and straight.conditioning > 1e-3
