@@ -95,6 +95,35 @@ def tree(path: str | PathLike[str]) -> ElementTree.Element:
     return root
 
 
+def comments_around(path: str | PathLike[str]) -> tuple[str, str]:
+    """What is said before and behind the root element, a comment a line; a tree holds neither."""
+    parser = ElementTree.XMLParser(target=_Around())
+    parser.feed(reading.content(path, reading.MOST_URDF))
+    found: tuple[str, str] = parser.close()
+    return found
+
+
+class _Around:
+    """Keeps the comments outside the root element."""
+
+    def __init__(self) -> None:
+        self._said = ["", ""]
+        self._depth, self._begun = 0, False
+
+    def start(self, tag: str, attrs: dict[str, str]) -> None:
+        self._depth, self._begun = self._depth + 1, True
+
+    def end(self, tag: str) -> None:
+        self._depth -= 1
+
+    def comment(self, text: str) -> None:
+        if not self._depth:
+            self._said[self._begun] += f"<!--{text}-->\n"
+
+    def close(self) -> tuple[str, str]:
+        return self._said[0], self._said[1]
+
+
 class _Builder(ElementTree.TreeBuilder):
     """Builds the tree, and refuses what a URDF file has not."""
 
