@@ -35,6 +35,8 @@ def axes(found: Identification) -> list[dict[str, Any]]:
         good = np.isfinite(measured.values).all(axis=1) & ~np.isin(rows, found.outliers)
         run = _runs(equations.pose_of[i], targets(measured))
         run[~good] = -1
+        if not good.any():  # partly read rows alone
+            continue
         first = _deviations(found.fit.start, i, run, measured.kind)
         last = _deviations(found.fit.end, i, run, measured.kind)
         before.append(first)

@@ -80,14 +80,16 @@ def instrument_identified(found: Identification) -> bool:
 
 
 def directions(found: Identification) -> list[dict[str, Any]]:
-    """List mean, rms and largest residual of each component, before and after; mm and rad."""
+    """List mean, rms and largest residual of each component read, before and after; mm and rad."""
     names: dict[str, tuple[str, list[FloatArray], list[FloatArray]]] = {}
     parts = zip(found.fit.equations.sets, found.fit.start.residuals, found.residuals, strict=True)
     for measured, first, last in parts:
         pairs = zip(measured.components, measured.units, strict=True)
         for k, (name, unit) in enumerate(pairs):
-            entry = names.setdefault(name, (unit, [], []))
             read = np.isfinite(measured.values.reshape(first.shape)[:, k])
+            if not read.any():  # such as the height of a planar machine
+                continue
+            entry = names.setdefault(name, (unit, [], []))
             entry[1].append(first[read, k])
             entry[2].append(last[read, k])
     rows = []

@@ -9,8 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
+from pkmcal.report.axes import axes
 from pkmcal.report.contents import (
     as_seen,
+    directions,
     expected,
     instrument_identified,
     over_the_workspace,
@@ -97,3 +99,23 @@ def test_where_no_stroke_ends_the_workspace_it_is_what_was_measured() -> None:
 def test_rows_that_were_not_read_are_not_among_the_worst() -> None:
     rows = [{"row": k, "after": after} for k, after in enumerate([np.nan, 0.2, 0.5, np.nan])]
     assert [row["row"] for row in worst(rows)] == [2, 1]
+
+
+def test_what_was_never_read_is_not_scored(tmp_path: Path) -> None:
+    """The height of a planar machine is an empty column, beside rows of nothing."""
+    sled, random = pk.load("examples/belts/robot.toml"), np.random.default_rng(0)
+    at = np.zeros((12, 6))
+    at[:, :2] = random.uniform([600, 400], [2400, 1600], (12, 2))
+    seen = at[:, :3] + random.normal(0.0, 0.3, (12, 3))
+    seen[:, 2], seen[::3] = np.nan, np.nan
+    q = sled.inverse(at) + random.normal(0.0, 0.3, (12, 4))
+    found = pk.identify(sled, pk.Measurements(q, seen, "position", sigma=0.3, actuator_sigma=0.3))
+    scored = directions(found)
+    assert [row["name"] for row in scored] == ["x", "y"]
+    read = np.isfinite(seen[:, 0])
+    for k, row in enumerate(scored):
+        off = found.residuals[0][read, k]
+        assert row["mean_after"] == pytest.approx(off.mean(), rel=1e-12)
+        assert row["largest_after"] == pytest.approx(np.abs(off).max(), rel=1e-12)
+    assert axes(found) == []
+    assert all(Path(file).is_file() for file in found.report(tmp_path))
