@@ -36,6 +36,10 @@ def likely_mistakes(
 
     Readings of data that fit far better are named.
     """
+    tensions = [data.measured.tension for data in datasets]
+    pulled = any(tension is not None and tension.any() for tension in tensions)
+    if not pulled and all(name.endswith(".stretch") for name in parameters.names):
+        return ["no row states a tension: columns tension.q1 [N] … (tension=)"]
     found = likely_unit_errors(datasets, parameters, evaluation)
     found = found or likely_row_errors(datasets, parameters)
     size = GROSS * parameters.robot.length

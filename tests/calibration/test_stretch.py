@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.exceptions import FileError
+from pkmcal.exceptions import ArgumentError, FileError
 from tests.robots import made
 
 THREE = np.array([[2000.0, 0, 2500], [-1100, 1700, 2600], [-900, -1800, 2400]])
@@ -239,6 +239,13 @@ def test_what_is_no_tension_is_refused(three: pk.Robot) -> None:
         three.tensioned(np.ones((2, 3))).forward(np.full((3, 3), 1500.0))
     with pytest.raises(pk.ArgumentError, match="under tension, which the page cannot hold"):
         pk.show(three.tensioned([1.0, 1.0, 1.0]), "page.html")
+
+
+def test_without_tensions_it_is_said_what_is_missing(three: pk.Robot) -> None:
+    at = places(2, 10)
+    rows = pk.Measurements(ways(THREE, at)[0], at, "position", sigma=0.1)
+    with pytest.raises(ArgumentError, match=r"no row states a tension: columns tension\.q1 \[N\]"):
+        pk.identify(three, rows, "drive*")
 
 
 def test_what_turns_does_not_stretch() -> None:
