@@ -97,17 +97,18 @@ def tree(path: str | PathLike[str]) -> ElementTree.Element:
 
 def comments_around(path: str | PathLike[str]) -> tuple[str, str]:
     """What is said before and behind the root element, a comment a line; a tree holds neither."""
-    parser = ElementTree.XMLParser(target=_Around())
+    around = _Around()
+    parser = ElementTree.XMLParser(target=around)
     parser.feed(reading.content(path, reading.MOST_URDF))
-    found: tuple[str, str] = parser.close()
-    return found
+    parser.close()
+    return around.said[0], around.said[1]
 
 
 class _Around:
     """Keeps the comments outside the root element."""
 
     def __init__(self) -> None:
-        self._said = ["", ""]
+        self.said = ["", ""]
         self._depth, self._begun = 0, False
 
     def start(self, tag: str, attrs: dict[str, str]) -> None:
@@ -118,10 +119,7 @@ class _Around:
 
     def comment(self, text: str) -> None:
         if not self._depth:
-            self._said[self._begun] += f"<!--{text}-->\n"
-
-    def close(self) -> tuple[str, str]:
-        return self._said[0], self._said[1]
+            self.said[self._begun] += f"<!--{text}-->\n"
 
 
 class _Builder(ElementTree.TreeBuilder):

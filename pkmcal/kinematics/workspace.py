@@ -243,7 +243,7 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
 
 def _middle(robot: Robot) -> FloatArray:
     """Home, with coordinates that the stated workspace leaves out in the middle of their range."""
-    middle = robot.home.copy()
+    middle: FloatArray = robot.home.copy()
     for name, (low, high) in robot.model.workspace.items():
         k = POSE.index(name)
         if not low <= middle[k] <= high:
