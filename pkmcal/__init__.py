@@ -83,6 +83,7 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.modes.assemblies import Assemblies as Assemblies
     from pkmcal.modes.certificate import Certificate as Certificate
     from pkmcal.moves.events import Event as Event
+    from pkmcal.moves.jumps import Jump as Jump
     from pkmcal.moves.move import Move as Move
     from pkmcal.moves.move import MoveSample as MoveSample
     from pkmcal.planning.plan_poses import Plan as Plan
@@ -143,6 +144,7 @@ _HOMES = {
     "modes.assemblies": ("Assemblies",),
     "modes.certificate": ("Certificate",),
     "moves.events": ("Event",),
+    "moves.jumps": ("Jump",),
     "moves.move": ("Move", "MoveSample"),
     "view.show": ("show",),
 }

@@ -528,6 +528,7 @@ def test_every_public_call_is_among_them() -> None:
             "CorrectionGrid",
             "Dexterity",
             "Event",
+            "Jump",
             "Feasibility",
             "Finding",
             "Forward",

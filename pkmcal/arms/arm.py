@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from pkmcal import screw
 from pkmcal.arms import arm_file
-from pkmcal.arms.denavit_hartenberg import Convention, DHTable, screws_of, table_of
+from pkmcal.arms.denavit_hartenberg import Convention, DHTable, normals, screws_of, table_of
 from pkmcal.arms.inputs import motion
 from pkmcal.arms.serial_chain import SerialChain
 from pkmcal.arrays import FloatArray
@@ -203,7 +203,8 @@ class SerialArm(SerialChain, Result):
         """Denavit–Hartenberg numbers of the arm, its joint errors built in.
 
         Any arm has them, between a base and a tool. Where neighbouring axes are nearly parallel,
-        a and d are large, far-off numbers that cancel, and small errors change them much.
+        a and d are large, far-off numbers that cancel, and small errors change them much. Frames
+        have their x on the side where the arm without joint errors has it.
 
         Parameters
         ----------
@@ -222,8 +223,9 @@ class SerialArm(SerialChain, Result):
         >>> arm.dh().a.tolist(), arm.dh().d.tolist()
         ([300.0, 200.0], [0.0, 50.0])
         """
+        nominal = table_of(self._axes, self._points, self._home, "standard")
         real = self.corrected()
-        return table_of(real.axes, real.points, real.home, convention)
+        return table_of(real.axes, real.points, real.home, convention, normals(nominal))
 
     def show(
         self, path: str | PathLike[str] | None = None, *, poses: ArrayLike | None = None

@@ -78,13 +78,18 @@ class DHTable:
 
 
 def table_of(
-    axes: FloatArray, points: FloatArray, home: FloatArray, convention: Convention
+    axes: FloatArray,
+    points: FloatArray,
+    home: FloatArray,
+    convention: Convention,
+    sides: FloatArray | None = None,
 ) -> DHTable:
     """The numbers of an arm: the inverse of `screws_of`, for any axes.
 
-    Of each pair of neighbouring axes the common normal is x, on the side where x was before; of
-    parallel ones that through the frame before, or at last through the tool. Axes that are nearly
-    parallel have it far away: a and d are then large and cancel. The tool's z counts as an axis.
+    Of each pair of neighbouring axes the common normal is x, on the side of `sides` (n, 3), without
+    them where x was before; of parallel ones that through the frame before, or at last through the
+    tool. Axes that are nearly parallel have it far away: a and d are then large and cancel. The
+    tool's z counts as an axis.
     """
     word("convention", convention, get_args(Convention))
     z = np.vstack([axes, home[:3, 2]])
@@ -95,7 +100,8 @@ def table_of(
     rows = np.empty((len(axes), 4))
     for i in range(len(axes)):
         near = on[-1] if i + 1 == len(axes) else origin  # where the normal of parallel axes is
-        normal, foot, end = _normal(z[i], on[i], z[i + 1], on[i + 1], x, near)
+        side = x if sides is None else sides[i]
+        normal, foot, end = _normal(z[i], on[i], z[i + 1], on[i + 1], side, near)
         rows[i, 3] = np.arctan2(z[i] @ np.cross(x, normal), x @ normal)  # θ
         rows[i, 2] = (foot - origin) @ z[i]  # d
         rows[i, 0] = (end - foot) @ normal  # a
@@ -112,12 +118,23 @@ def table_of(
     return DHTable(a, alpha, d, theta, convention, base, tool)
 
 
+def normals(table: DHTable) -> FloatArray:
+    """The x axes (n, 3) of a standard table behind its joints, in the base at zero."""
+    frame = table.base[:3, :3]
+    found = np.empty((len(table.theta), 3))
+    for i, (theta, alpha) in enumerate(zip(table.theta, table.alpha, strict=True)):
+        frame = frame @ screw.exp([0.0, 0.0, 0.0, 0.0, 0.0, theta])[:3, :3]
+        found[i] = frame[:, 0]
+        frame = frame @ screw.exp([0.0, 0.0, 0.0, alpha, 0.0, 0.0])[:3, :3]
+    return found
+
+
 def _normal(
     z: FloatArray,
     on: FloatArray,
     other: FloatArray,
     beyond: FloatArray,
-    before: FloatArray,
+    side: FloatArray,
     origin: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Common normal of two axes, and where it leaves the one and meets the other."""
@@ -128,13 +145,13 @@ def _normal(
         end = beyond + other * ((foot - beyond) @ other)
         apart = end - foot
         far = np.linalg.norm(apart)
-        normal = apart / far if far > _SAME else _across(z, before)
+        normal = apart / far if far > _SAME else _across(z, side)
     else:
         normal = cross / sine
         ways = np.stack([z, -other, normal], axis=1)
         s, t, _ = np.linalg.solve(ways, beyond - on)
         foot, end = on + s * z, beyond + t * other
-    if normal @ before < -_SAME:
+    if normal @ side < -_SAME:
         normal = -normal
     return normal, foot, end
 

@@ -79,8 +79,9 @@ def write(
             origin = ElementTree.SubElement(element, "origin")
         origin.set("xyz", _text(pose[:3] / _METRE))
         origin.set("rpy", _text(pose[3:]))
-    text: str = ElementTree.tostring(root, encoding="unicode", xml_declaration=True)
-    write_whole(path, text + "\n")
+    before, behind = urdf_file.comments_around(source)
+    text: str = ElementTree.tostring(root, encoding="unicode")
+    write_whole(path, f'<?xml version="1.0" encoding="utf-8"?>\n{before}{text}\n{behind}')
 
 
 def _text(numbers: FloatArray) -> str:

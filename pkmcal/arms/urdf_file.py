@@ -95,6 +95,33 @@ def tree(path: str | PathLike[str]) -> ElementTree.Element:
     return root
 
 
+def comments_around(path: str | PathLike[str]) -> tuple[str, str]:
+    """What is said before and behind the root element, a comment a line; a tree holds neither."""
+    around = _Around()
+    parser = ElementTree.XMLParser(target=around)
+    parser.feed(reading.content(path, reading.MOST_URDF))
+    parser.close()
+    return around.said[0], around.said[1]
+
+
+class _Around:
+    """Keeps the comments outside the root element."""
+
+    def __init__(self) -> None:
+        self.said = ["", ""]
+        self._depth, self._begun = 0, False
+
+    def start(self, tag: str, attrs: dict[str, str]) -> None:
+        self._depth, self._begun = self._depth + 1, True
+
+    def end(self, tag: str) -> None:
+        self._depth -= 1
+
+    def comment(self, text: str) -> None:
+        if not self._depth:
+            self.said[self._begun] += f"<!--{text}-->\n"
+
+
 class _Builder(ElementTree.TreeBuilder):
     """Builds the tree, and refuses what a URDF file has not."""
 

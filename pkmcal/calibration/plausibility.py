@@ -7,9 +7,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, largest_first, mm_per_unit, rms
+from pkmcal.core.library import POSE
 from pkmcal.display import chance_text, first_rows, printable
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
@@ -113,6 +115,26 @@ def other_readings(
         values = measured.values.copy()
         values[:, [one, other]] = values[:, [other, one]]
         yield f"{names[one]} and {names[other]} are exchanged", replace(measured, values=values)
+    yield from _other_turns(measured)
+
+
+def _other_turns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
+    """Read orientations as quaternions in the other order, and as those of the base."""
+    angles = [k for k, name in enumerate(measured.components) if name in POSE[3:]]
+    if len(angles) < 3 or measured.values is None:
+        return
+    turned = measured.values[:, angles]
+    good = np.isfinite(turned).all(axis=1)
+    given = Rotation.from_euler("xyz", turned[good])
+    q = given.as_quat()  # x y z w
+    for words, other in (
+        ("the scalar of the quaternions is their last number", q[:, [3, 0, 1, 2]]),
+        ("the scalar of the quaternions is their first number", q[:, [1, 2, 3, 0]]),
+        ("orientations are those of the base in the platform's frame", given.inv().as_quat()),
+    ):
+        values = measured.values.copy()
+        values[np.ix_(good, np.array(angles))] = Rotation.from_quat(other).as_euler("xyz")
+        yield words, replace(measured, values=values)
 
 
 def exchanges(measured: Measurements) -> Iterator[tuple[str, Measurements]]:

@@ -84,7 +84,35 @@ def axes_in_line(robot: Robot) -> Iterator[Finding]:
         )
 
 
-CHAIN_CHECKS = (outside_workspace, mobility, home_values, strokes, turning, singular, axes_in_line)
+def idle_tail(robot: Robot) -> Iterator[Finding]:
+    """Joints behind the platform that move the tool as the limbs do already."""
+    if _has_idle_tail(robot):
+        ways = _ways(robot, _away(robot)[1])
+        yield Finding(
+            "mobility",
+            (),
+            f"{robot.n_actuators} actuators, but the tool moves in {ways} ways: joints of the tail"
+            " move it as the limbs do already, so no pose says where they are",
+            "turn their axes, or take them out",
+        )
+
+
+def singular_anywhere(robot: Robot) -> Iterator[Finding]:
+    """`singular`, of machines whose poses determine their actuators."""
+    if not _has_idle_tail(robot):
+        yield from singular(robot)
+
+
+CHAIN_CHECKS = (
+    outside_workspace,
+    mobility,
+    idle_tail,
+    home_values,
+    strokes,
+    turning,
+    singular_anywhere,
+    axes_in_line,
+)
 
 
 def surplus(robot: Robot) -> str:
@@ -127,6 +155,14 @@ def _ways(robot: Robot, q: FloatArray) -> int:
         return 0
     sigma = np.linalg.svd(twists, compute_uv=False)
     return int((sigma > _NONE * sigma[0]).sum())
+
+
+def _has_idle_tail(robot: Robot) -> bool:
+    assert robot.model.chains is not None
+    machine = robot.machine
+    wanted = machine.m + min(0, machine.actuators - machine.rows)  # as `complete` takes them
+    ways = _ways(robot, _away(robot)[1])
+    return bool(robot.model.chains.tail) and machine.rows <= machine.m and 0 < ways < wanted
 
 
 def _free_ways(robot: Robot, own: FloatArray, q: FloatArray) -> FloatArray:

@@ -36,6 +36,8 @@ def code(error: BaseException, json: bool = False) -> int:
         where = _WHERE.match(message)
         parts = where.groupdict() if where else dict.fromkeys(("file", "line", "column"))
         parts["line"] = parts["line"] and int(parts["line"])
+        if isinstance(error, OSError) and not where:
+            parts["file"] = error.filename or message.partition(": ")[0]
         said = {"message": message, "kind": _KINDS[how], "exit_code": how, **parts}
         print(as_json({"error": said}, schema="error"))
     return how

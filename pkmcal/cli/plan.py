@@ -19,7 +19,7 @@ from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
 from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.exceptions import ArgumentError
-from pkmcal.geometry.box import Box, in_box
+from pkmcal.geometry.box import Box
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import sample_poses
@@ -133,11 +133,6 @@ def plan(
     box = _box(machine, within or [])
     if isinstance(machine, Robot):
         machine = machine.within(box)
-        if poses is None and not in_box(box, machine.home):
-            raise ArgumentError(
-                f"--within {','.join(within or [])}: leaves out the home of {machine.name}, around"
-                " which poses are drawn; give those to choose from with --poses"
-            )
     seen = as_machine(machine)
     chosen = free_names(seen, free)
     candidates = _drawn(machine, box, seed) if poses is None else _places(machine, read.file(poses))

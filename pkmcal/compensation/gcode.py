@@ -23,7 +23,18 @@ _PLAIN = re.compile(rf"\s*(?:{_WORD.pattern}\s*)*")
 _NUMBERED = r"\s*(?:N\s*\d+\s*)?"
 _SETTING = re.compile(_NUMBERED + r"M\s*\d\d", re.IGNORECASE)  # its X, Y, Z are no axes
 _MESSAGE = re.compile(_NUMBERED + r"M\s*(?:0*23|28|30|32|36|117|118|291|928)\b.*", re.IGNORECASE)
-_OFFSET = re.compile(_NUMBERED + r"(M\s*(?:206|428)\b|SET_GCODE_OFFSET\b)", re.IGNORECASE)
+_OFFSET = re.compile(
+    _NUMBERED + r"(M\s*(?:206|218|290|428|556|579)\b|SET_GCODE_OFFSET\b)", re.IGNORECASE
+)
+_RESTORED = re.compile(
+    _NUMBERED + r"(RESTORE_GCODE_STATE\b|M\s*(?:72|121)\b|M\s*73\s*$)", re.IGNORECASE
+)
+_BLOCK = re.compile(r"\s*(if|elif|else|while)\b", re.IGNORECASE)
+# what may move the machine: macros, all but those that set something, and changes of tools
+_MACRO = re.compile(
+    r"\s*(?!SET_|EXCLUDE_OBJECT|echo\b|global\b|set\b|var\b)([A-Za-z_]{2,}\w*)", re.IGNORECASE
+)
+_CHANGE = re.compile(_NUMBERED + r"(T\s*\d+|M\s*(?:0*6|9[6-9]|125|600|701|702))\b", re.IGNORECASE)
 _GEOMETRY = re.compile(_NUMBERED + r"(M\s*66[569])\b(?=.*[A-Z])", re.IGNORECASE)
 _HOMED = re.compile(_NUMBERED + r"G\s*28(?:\s*[A-Z])*\s*", re.IGNORECASE)  # axes without numbers
 _CHECKSUM = re.compile(r".*\*\s*\d+\s*")
@@ -32,6 +43,7 @@ _INCH = 25.4
 _LOST = {28.0, 28.1, 29.0, 30.0, 30.1, 32.0}  # homing and probing: the machine is elsewhere then
 _PASSED = {4.0, 10.0, 11.0, 17.0, 18.0, 19.0, 40.0, 49.0, 54.0, 61.0, 61.1, 64.0, 69.0, 80.0}
 _PASSED |= {94.0, 98.0, 99.0}
+_MODES = {20.0, 21.0, 90.0, 91.0}
 
 
 class Word(NamedTuple):
@@ -129,6 +141,15 @@ class Program:
     place : str
         What messages call it.
 
+    Attributes
+    ----------
+    lines : list of str
+        Its lines with their ends.
+    moves : list of Move
+        Its moves.
+    left : dict
+        Macros and changes of tools, which may move the machine, by the line where each is first.
+
     Raises
     ------
     FileError
@@ -140,6 +161,7 @@ class Program:
     ) -> None:
         self.lines = lines_of(text)
         self.moves: list[Move] = []
+        self.left: dict[str, int] = {}
         self._letters = letters
         self._start = start
         self._stated = stated
@@ -159,12 +181,20 @@ class Program:
         if _MESSAGE.match(code):
             return
         if offset := _OFFSET.match(code):
-            raise self.wrong(i, f"{offset[1]} moves the origin, which cannot be followed")
+            raise self.wrong(
+                i, f"{offset[1]} moves the origin, or skews axes, which cannot be followed"
+            )
+        if restored := _RESTORED.match(code):
+            raise self.wrong(i, f"{restored[1]} restores modes, which cannot be followed")
+        if block := _BLOCK.match(code):
+            raise self.wrong(i, f"{block[1]}: conditions and loops cannot be followed")
         if geometry := _GEOMETRY.match(code):
             raise self.wrong(i, f"{geometry[1]} gives the controller other numbers than ROBOT has")
         if _HOMED.fullmatch(code):
             code = ""
             self._lose(state)
+        if left := _MACRO.match(code) or _CHANGE.match(code):
+            self.left.setdefault(left[1], i)
         if _NAMED.match(code) or not code.strip() or code.strip() == "%":
             return
         plain = _PLAIN.fullmatch(code)
@@ -179,6 +209,7 @@ class Program:
             raise self.wrong(i, f"{line.strip()!r:.40} is no plain G-code: words and numbers alone")
         words = self._words(code)
         axes = {letter: word for letter, word in words if letter in "XYZABCUVW"}
+        self._require_one_meaning(i, words)
         codes = [word.value for letter, word in words if letter == "G"]
         for value in codes:
             self._code(i, value, axes, words, state)
@@ -187,6 +218,18 @@ class Program:
             self._lose(state)
         elif 92.0 not in codes and 4.0 not in codes:
             self._move(i, axes, words, state)
+
+    def _require_one_meaning(self, i: int, words: list[tuple[str, Word]]) -> None:
+        """Refuse lines of which controllers make different things."""
+        seen: set[str] = set()
+        for letter, word in words:
+            motion = letter == "G" and word.value in (0.0, 1.0)
+            name = "G0 or G1" if motion else letter
+            if name in seen and name not in ("G", "M"):
+                raise self.wrong(i, f"{name} stands twice in it")
+            if letter == "G" and word.value in _MODES and seen & set("XYZABCUVW"):
+                raise self.wrong(i, f"G{word.value:g} stands behind axis words")
+            seen.add(name)
 
     def _lose(self, state: _State) -> None:
         """The machine was homed or probed."""

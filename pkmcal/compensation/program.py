@@ -23,6 +23,7 @@ from pkmcal.result import Result
 _DECIMALS = 5  # 10 nm, 0.04 arc seconds
 _ROUNDS = 12
 _MOST_PARTS = 10_000
+_MOST_LEFT = 5  # of macros that are named
 _INSIDE = (0.25, 0.5, 0.75)
 
 
@@ -42,6 +43,9 @@ class CorrectedProgram(Result):
         How far the calibrated machine leaves the straight lines between the points: the largest
         found at quarters of every segment, and where it passes a node of a drive's table. No bound:
         beside these places it may be a sixteenth more. mm, an angle as its arc at ``robot.length``.
+    left : tuple of str
+        Macros and changes of tools that stay as they are, with the line where each is first. What
+        they move is not known: the moves behind them are taken to begin where those before ended.
     """
 
     text: str
@@ -49,12 +53,18 @@ class CorrectedProgram(Result):
     segments: int
     correction: float
     chord_error: float
+    left: tuple[str, ...] = ()
 
     def _parts(self) -> Iterator[str]:
         parts = f"{self.moves} moves in {self.segments} segments"
         if np.isfinite(self.correction):
             parts += f"; corrections up to {self.correction:.3g} mm"
         yield f"{parts}; found off the straight lines by up to {self.chord_error:.2g} mm"
+        if self.left:
+            named = ", ".join(self.left[:_MOST_LEFT])
+            more = len(self.left) - _MOST_LEFT
+            named += f" and {more} more" if more > 0 else ""
+            yield f"left as they are, and taken not to move the machine: {named}"
 
 
 def compensate_program(
@@ -144,8 +154,9 @@ def _corrected(program: Program, machine: CommandedMachine, chord: float) -> Cor
     odd = next((move for move in moves if move.relative or move.scale != 1.0), None)
     if machine.joints and odd is not None:
         raise program.wrong(odd.line, "joint moves are made of absolute coordinates in mm")
+    left = tuple(f"{name} (line {line + 1})" for name, line in program.left.items())
     if not moves:
-        return CorrectedProgram("".join(program.lines), 0, 0, 0.0, 0.0)
+        return CorrectedProgram("".join(program.lines), 0, 0, 0.0, 0.0, left)
     starts = np.array([move.start for move in moves])
     targets = np.array([move.target for move in moves])
     parts, chord_error = _parts(program, machine, starts, targets, chord)
@@ -168,7 +179,7 @@ def _corrected(program: Program, machine: CommandedMachine, chord: float) -> Cor
         at += count
     if machine.joints:
         lines.insert(0, "G93\n")
-    return CorrectedProgram("".join(lines), len(moves), len(points), largest, chord_error)
+    return CorrectedProgram("".join(lines), len(moves), len(points), largest, chord_error, left)
 
 
 def _require(program: Program, which: IntArray, commands: FloatArray) -> None:

@@ -27,13 +27,15 @@ from pkmcal.kinematics.robot import Robot, require_parallel
 
 # benchmarks of the hexapod: docs/controllers.md says how
 _MEASURED = (
-    "double 3.9 kB, 720 instructions an inverse, 10 000 a forward from home;\n"
-    " * float 3.7 kB, 780 and 8 100"
+    "double 3.9 kB, 590 instructions an inverse, 10 000 a forward from home;\n"
+    " * float 3.7 kB, 660 and 8 100"
 )
 _ENUMERATORS = tuple(slot.upper().replace(".", "_") for slot in SLOTS)
 _GAIN = SLOTS.index("gain")
 _GROOVE = [SLOTS.index(slot) for slot in OWN_SLOTS]
 _NEARER, _TIE = 1e-12, 1e-15  # of turns that agree, as agreed_turn of csrc/inverse.h has them
+# rad, of sines: below it the multiples of the parts of π/2 that they take off are exact
+_MOST_ANGLE: dict[Number, float] = {"double": 1e5, "float": 6e3}
 _UNUSED_FRAME = np.zeros(9)
 
 
@@ -100,6 +102,7 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
     machine, model = robot.machine, robot.model
     map = model.map
     laws = _laws(robot)
+    _require_sines(robot, laws, number)
     made = c_limbs if model.chains is None else c_chains
     own, called = made.contents(robot, prefix, number)
     needed = ["pose_frame", *([] if robot.frames.trivial else ["pose_compose"])]
@@ -169,7 +172,7 @@ def _contents(robot: Robot, prefix: str, number: Number) -> dict[str, Any]:
         "half": one(0.5),
         "one": one(1.0),
         "shift": one(1.5 * 2.0 ** (52 if wide else 23)),
-        "most_angle": one(1e5 if wide else 1e3),
+        "most_angle": one(_MOST_ANGLE[number]),
         "c": {name: one(value) for name, value in _constants(number).items()},
         "rounding": f"{4e-7 * size:.1g}",
         "inverse_operations": _counted(functions, inverse),
@@ -197,6 +200,25 @@ def _laws(robot: Robot) -> list[LawNumbers]:
         limb = robot.model.limb_of_drive(d) + 1
         raise ArgumentError(f"robot: limb {limb} of {robot.name}: its drive law: {why}")
     return machine.laws.numbers_of(robot.slots)
+
+
+def _require_sines(robot: Robot, laws: list[LawNumbers], number: Number) -> None:
+    """Refuse harmonics of so many waves over a stroke that their sines are not known."""
+    for d, law in enumerate(laws):
+        stroke = robot.model.drives[d].stroke
+        if stroke is None or not law.waves:
+            continue
+        machine = robot.machine
+        assert isinstance(machine, DrivenMachine)
+        ends = machine.laws.reading(robot.slots, np.array(stroke), d)
+        angle = max(abs(k) for k, _, _ in law.waves) * float(np.abs(ends).max())
+        if angle > _MOST_ANGLE[number]:
+            limb = robot.model.limb_of_drive(d) + 1
+            raise ArgumentError(
+                f"robot: limb {limb} of {robot.name}: its drive law: k q of a harmonic goes to"
+                f" {angle:.4g} rad, a header in {number} knows sines up to"
+                f" {_MOST_ANGLE[number]:g} rad"
+            )
 
 
 def _any(laws: list[LawNumbers], part: str) -> bool:

@@ -28,6 +28,7 @@ from pkmcal.controllers.gcode_words import (
     number,
     numbers,
     off_towers,
+    require_positive,
     settings,
 )
 from pkmcal.controllers.linear_delta import FirmwareDelta, of_robot
@@ -196,7 +197,8 @@ def _delta(
     size: Settings, radius: float, arms: list[float], endstops: list[float], place: str
 ) -> FirmwareDelta:
     """The delta whose nozzle is at `endstops` with a carriage at its switch."""
-    if not 0.0 < radius < min(arms):
+    require_positive([radius], "R", "M665", place)
+    if not radius < min(arms):
         found = size["L"].value
         raise FileError(f"{place}: L of M665 must be rods longer than R, found {found}")
     pairs = zip(TOWERS, "XYZ", strict=True)

@@ -22,6 +22,8 @@ _START = re.compile(  # as M503 lists it, or numbered
     MARK + r"?(?:[^;]*\becho:|\s*N\s*\d+)?\s*", re.IGNORECASE
 )
 _CODE = re.compile(r"([GM])\s*0*(\d+)(?![\d.])", re.IGNORECASE)
+_BLOCK = re.compile(r"\s*(?:if|elif|else|while)\b", re.IGNORECASE)  # lines indented more are in it
+_TEXTS = ("M23", "M28", "M30", "M32", "M117", "M118")  # what follows is a name or a message
 _WORD = re.compile(
     r'\s*([A-Za-z])\s*(\{[^}]*\}|"[^"]*"|(?:[^A-Za-z\s]|(?<=[\d.])[eE](?=[-+]?\d))*)\s*'
 )
@@ -74,14 +76,21 @@ def settings(text: str, command: str, place: str, missing: bool = False) -> Sett
     Raises
     ------
     FileError
-        There is no such command, or something beside words in it.
+        There is no such command, something beside words in it, another command in its line, or a
+        condition above it.
     """
     found: Settings = {}
     times = 0
+    inner = re.compile(rf"(?<![A-Za-z]){command[0]}\s*0*{command[1:]}(?![\d.])", re.IGNORECASE)
     for line, code in _codes(text):
         if code[0] != command:
+            others = re.sub(r'"[^"]*"', "", _without_remarks(line[0])[code[1] :])
+            if code[0] not in _TEXTS and inner.search(others):
+                raise _wrong(line, place, f"{command} must begin its line")
             continue
         times += 1
+        if _in_a_block(text, line):
+            raise _wrong(line, place, f"{command} under a condition, which cannot be followed")
         new = _words_of(line, code[1], command, place)
         if "K" in new and new["K"].value != found.get("K", new["K"]).value:
             found = {}
@@ -163,6 +172,12 @@ def number(
     return numbers(found, letter, command, place, default)[0]
 
 
+def require_positive(values: Sequence[float], letter: str, command: str, place: str) -> None:
+    """Refuse numbers that are not above 0."""
+    if not min(values) > 0.0:
+        raise FileError(f"{place}: {letter} of {command} must be above 0, found {min(values):g}")
+
+
 def _codes(text: str) -> list[tuple[re.Match[str], tuple[str, int]]]:
     """Lines that begin with a G or M code: the line, the code, and where it ends in the line."""
     found = []
@@ -174,14 +189,42 @@ def _codes(text: str) -> list[tuple[re.Match[str], tuple[str, int]]]:
     return found
 
 
+def _in_a_block(text: str, line: re.Match[str]) -> bool:
+    """Whether a line is indented under an `if` or a `while`."""
+    indent = _indent(line[0])
+    for above in reversed(_LINE.findall(text, 0, line.start())):
+        if above.strip() and _indent(above) < indent:
+            if _BLOCK.match(above):
+                return True
+            indent = _indent(above)
+    return False
+
+
+def _indent(line: str) -> int:
+    return len(line) - len(line.lstrip())
+
+
+def _without_remarks(line: str) -> str:
+    return _REMARK.sub(lambda found: " " * len(found[0]), line)
+
+
+def _wrong(line: re.Match[str], place: str, message: str) -> FileError:
+    where = f"{place}, line {line.string.count(chr(10), 0, line.start()) + 1}"
+    return FileError(f"{where}: {_without_remarks(line[0]).strip()!r:.60}: {message}")
+
+
 def _words_of(line: re.Match[str], start: int, command: str, place: str) -> Settings:
-    code = _REMARK.sub(lambda found: " " * len(found[0]), line[0])
+    code = _without_remarks(line[0])
     at, found = start, {}
     while code[at:].strip():
         word = _WORD.match(code, at)
         if word is None:
-            where = f"{place}, line {line.string.count(chr(10), 0, line.start()) + 1}"
-            raise FileError(f"{where}: {code.strip()!r:.60}: {command} must have words alone")
-        found[word[1].upper()] = Setting(word[2], *(line.start() + end for end in word.span(2)))
+            raise _wrong(line, place, f"{command} must have words alone")
+        letter = word[1].upper()
+        if letter in ("G", "M"):
+            raise _wrong(line, place, f"{command} must be alone in its line")
+        if letter in found:
+            raise _wrong(line, place, f"{command} must have {letter} once")
+        found[letter] = Setting(word[2], *(line.start() + end for end in word.span(2)))
         at = word.end()
     return found

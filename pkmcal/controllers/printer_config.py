@@ -298,8 +298,10 @@ def step_of(printer: PrinterConfig, section: str) -> float:
         try:
             for pair in text.split(","):
                 one, other = map(float, pair.split(":"))
+                if not all(0.0 < teeth < math.inf for teeth in (one, other)):
+                    raise ValueError
                 gearing *= one / other
-        except (ValueError, ZeroDivisionError):
+        except ValueError:
             raise printer.wrong(
                 section, "gear_ratio", f"must be like 57:11, found {text!r}"
             ) from None

@@ -178,9 +178,12 @@ def text_of(delta: RotaryDelta, home: float, name: str, head: str) -> str:
     parameters = {"radius": delta.radius} | ({"height": delta.heights[0]} if alike else {})
     parameters |= {f"angle{i}": angle for i, angle in enumerate(delta.angles, 1)}
     heights = ["height"] if alike else ["base*.z"]
-    free = ["radius", *heights, "offset1", "offset2", "offset3"]
+    free = [*heights, "offset1", "offset2", "offset3"]
     pose = {"map": "translation", "home": {"z": home}}
-    remark = "# The angles stay: the axes of the cranks would not turn with them.\n"
+    remark = (
+        "# The radius stays: heights hardly tell it from the others. So do the angles: the axes\n"
+        "# of the cranks would not turn with them.\n"
+    )
     limbs = []
     for i in range(_TOWERS):
         angle = np.radians(delta.angles[i])

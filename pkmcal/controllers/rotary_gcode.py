@@ -18,6 +18,7 @@ from pkmcal.controllers.gcode_words import (
     number,
     numbers,
     off_towers,
+    require_positive,
     settings,
 )
 from pkmcal.controllers.rotary_delta import RotaryDelta
@@ -63,10 +64,12 @@ def of_reprap(text: str, place: str = "M669") -> RotaryDelta:
 
     def three(letter: str) -> tuple[float, ...]:
         found = numbers(size, letter, "M669", place, counts=(1, 3))
+        require_positive(found, letter, "M669", place)
         return tuple(found * (3 // len(found)))
 
     cranks, rods, heights = (three(letter) for letter in "ULH")
     radius = number(size, "R", "M669", place)
+    require_positive([radius], "R", "M669", place)
     _, greatest = numbers(size, "A", "M669", place, counts=(2,))
     elbows = tuple(
         -float(np.radians(greatest + number(ends, letter, "M666", place, 0.0))) for letter in "XYZ"

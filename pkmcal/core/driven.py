@@ -161,8 +161,9 @@ class DrivenMachine(CoreMachine):
 
     def reference(self, slots: FloatArray) -> FloatArray:
         """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
-        near = self.inner.reference(self._bare(slots))
-        anyhow = self._with(approach=None, tension=None)
+        turning = [drive.angle for drive in self.laws.drives]
+        near = np.where(turning, self.inner.reference(self._bare(slots)), np.nan)
+        anyhow = self._with(approach=None, tension=None)  # whatever those of the rows are
         q: FloatArray = anyhow.at_drives(slots, near[None])[0]
         angle = np.array([self.laws.drives[drives[0]].angle for drives in self._driven])
         return np.where(angle, q, 0.0)

@@ -464,7 +464,8 @@ class Laws:
             last = done  # one more step, and none that another row needs
             done = np.where(over, done, np.abs(off) <= ROUNDING * scale)
             moved = np.where(inside, step, np.where(done, q, 0.5 * (low + high)))
-            q, over = np.where(over, q, moved), over | last
+            ended = ~done & (moved == q)  # a bracket without a reading: it stays so
+            q, over = np.where(over, q, moved), over | last | ended
             if (over | ~np.isfinite(q)).all():
                 break
         q[~done | (q < span[0]) | (q > span[1])] = np.nan

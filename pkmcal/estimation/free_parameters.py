@@ -5,6 +5,7 @@ And with which start, prior and bounds, by the names that the user states.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -113,7 +114,11 @@ def _numbers_of_a_row(robot: Calibratable, datasets: Sequence[FitData], asked: A
     if free is None:
         free = robot.model.free
         if not free:
-            raise ArgumentError(f"free: {robot.name} declares no free parameters, name some")
+            stems = dict.fromkeys(re.sub(r"[0-9].*", "*", name) for name in geometry.names)
+            raise ArgumentError(
+                f"free: {robot.name} declares no free parameters, name some of {', '.join(stems)};"
+                " or state them in its file: [calibration] free = [...]"
+            )
     chosen = geometry.match(free, "free")
     if not chosen:
         raise ArgumentError("free: name at least one parameter")

@@ -60,7 +60,7 @@ _SYNONYMS: dict[str, str] = {
     "|satz|prog line|program line",
     "collection": "collection name",
     "comment": "comments|note|notes|remark|remarks|description",
-    "index": "no|nr|frame|sub frame|sample|number|#|line|row|count|item",
+    "index": "idx|no|nr|frame|sub frame|sample|number|#|line|row|count|item",
     "time": "timestamp|time stamp|datetime|date time|time seconds|time s|time utc|utc|date and time"
     "|measurement time|meas time|clock|uhrzeit|zeit|heure|datum zeit|datum uhrzeit"
     "|datum und uhrzeit",

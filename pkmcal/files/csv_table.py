@@ -173,6 +173,9 @@ class Table:
             )
         if not heading and not any(cells):
             return  # what a separator at the ends of lines makes
+        if not heading and i == 0 and _number_rows(cells):
+            self.notes.append("the first column, which has no name, numbers the rows: left out")
+            return
         name, unit = parted(heading)
         if not name:
             raise self.header_error(f"column {i + 1} is headed {heading!r}: expected 'name [unit]'")
@@ -327,7 +330,9 @@ class Table:
     ) -> tuple[str, tuple[float, float]]:
         known = {unit: q for q in reversed(quantities) for unit in units.factors(q)}
         usual = ", ".join(
-            u for q in quantities for u in units.factors(q) if u.isascii() and u.isalnum()
+            dict.fromkeys(
+                u for q in quantities for u in units.factors(q) if u.isascii() and u.isalnum()
+            )
         )
         if not column.unit and "1" in quantities:
             return "1", (1.0, 1.0)
@@ -399,6 +404,11 @@ class Table:
             if not re.fullmatch(r"[+-]?[0-9]{1,18}", cell):
                 raise self.cell_error(name, row, f"expected a whole number, found {cell!r}")
         return np.array([int(cell) for cell in cells], dtype=np.int64)
+
+
+def _number_rows(cells: Sequence[str]) -> bool:
+    """Whether cells are what tables of data frames put in front: whole numbers, no two alike."""
+    return all(cell.isdecimal() for cell in cells) and len({*cells}) == len(cells)
 
 
 def _fitted(cells: list[str], names: Sequence[str], packed: bool) -> list[str]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -126,7 +126,7 @@ class _Edit:
         if not polar or x is None or y is None:
             if polar and z is not None and self._concerns(z.name):
                 self._put(table[key], "z", self._written(z.name), [])
-                self._comment(table[key], [z.name])
+                self._comment(table[key], [z.name], ["z "])
             elif not polar:
                 self._list(table, key, numbers)
             return
@@ -142,7 +142,7 @@ class _Edit:
             self._put(found, "angle", turned / self._units.angle, [])
         if z is not None and self._changed(z.name):
             self._put(found, "z", self._written(z.name), [])
-        self._comment(found, [n.name for n in (x, y, z) if n is not None])
+        self._comment(found, [n.name for n in (x, y, z) if n is not None], ("x ", "y ", "z "))
 
     def _list(self, table: Any, key: str | int, numbers: list[LimbNumber | None]) -> None:
         names = [number.name for number in numbers if number is not None]
@@ -177,14 +177,18 @@ class _Edit:
         if names:
             self._comment(item, names)
 
-    def _comment(self, item: Item, names: list[str]) -> None:
-        """Say the deviations behind what the user says there."""
+    def _comment(self, item: Item, names: list[str], of: Sequence[str] = ()) -> None:
+        """Say the deviations behind what the user says there.
+
+        `of` says before each what it is of, where the line holds other numbers than `names`: x and
+        y beside a radius and an angle.
+        """
         sigmas = [self._deviations.get(name) for name in names]
         said = _DEVIATION.sub("", item.trivia.comment.lstrip("#").strip()).strip()
         if any(sigma is not None for sigma in sigmas):
             shown = ", ".join(
-                "fixed" if sigma is None else self._deviation(name, sigma)
-                for name, sigma in zip(names, sigmas, strict=True)
+                what + ("fixed" if sigma is None else self._deviation(name, sigma))
+                for name, sigma, what in zip(names, sigmas, of or [""] * len(names), strict=False)
             )
             said = f"{said}; ± {shown}" if said else f"± {shown}"
         if said != item.trivia.comment.lstrip("#").strip():

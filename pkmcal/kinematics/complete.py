@@ -105,7 +105,12 @@ def complete(
         raise ArgumentError(f"match: {POSE[unknown[0]]} is not free on this machine")
     freedom = len(free) + min(0, machine.actuators - machine.rows)  # joints of a tail may be more
     if len(matched) != freedom and machine.rows <= len(free):
-        raise ArgumentError(f"match must name {freedom} coordinates here, found {len(matched)}")
+        why = (
+            "" if len(matched) > freedom else ": check_geometry says if a joint adds no way to move"
+        )
+        raise ArgumentError(
+            f"match must name {freedom} coordinates here, found {len(matched)}{why}"
+        )
     wanted = pose[:, matched]
     own = frames.inward(pose).copy()
     if not frames.trivial and fixed:

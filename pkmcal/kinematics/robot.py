@@ -645,7 +645,7 @@ _COMPUTED = frozenset(
 
 def determines_others(robot: Robot) -> bool:
     """Whether the limbs determine coordinates beside the commanded ones, which are not constant."""
-    constant = robot.model.match is None and robot.model.map in ("translation", "planar")
+    constant = robot.model.match is None and robot.model.map in ("translation", "planar", "xy")
     return len(robot.moved) < len(POSE) and not constant
 
 

@@ -13,6 +13,7 @@ from pkmcal.arrays import BoolArray, FloatArray, as_rows
 from pkmcal.core.library import POSE
 from pkmcal.display import Table, displayed
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.geometry.box import in_box
 from pkmcal.kinematics.dexterity import BLOCK, Dexterity, dexterity
 from pkmcal.kinematics.limits import Feasibility
 from pkmcal.kinematics.perturbed import completed
@@ -151,7 +152,8 @@ def sample_poses(robot: Robot, count: int = 30, seed: int = 0, *, share: float =
     seed : int
         Of the draws.
     share : float
-        How much of the way from home to the end of each coordinate is used, up to 1.
+        How much of the way from home to the end of each coordinate is used, up to 1. Where the
+        stated workspace leaves out home, from its middle.
 
     Returns
     -------
@@ -178,11 +180,12 @@ def sample_poses(robot: Robot, count: int = 30, seed: int = 0, *, share: float =
     random = np.random.default_rng(checked_seed(seed))
     box = reach(robot)
     columns = [POSE.index(name) for name in box]
-    home = robot.home[columns]
-    low, high = home + share * (np.transpose(list(box.values())) - home)
+    middle = _middle(robot)
+    start = middle[columns]
+    low, high = start + share * (np.transpose(list(box.values())) - start)
     kept = np.empty((0, 6))
     for _ in range(_PATIENCE):
-        drawn = np.repeat(robot.home[None], 2 * count, axis=0)
+        drawn = np.repeat(middle[None], 2 * count, axis=0)
         drawn[:, columns] = random.uniform(low, high, (2 * count, len(columns)))
         drawn = completed(robot, drawn)
         kept = np.concatenate([kept, drawn[good_poses(robot, drawn)]])
@@ -194,6 +197,8 @@ def sample_poses(robot: Robot, count: int = 30, seed: int = 0, *, share: float =
 def reach(robot: Robot) -> dict[str, tuple[float, float]]:
     """How far each coordinate alone goes from home, mm and rad.
 
+    Where the stated workspace leaves out home, from its middle.
+
     Returns
     -------
     dict of str to (float, float)
@@ -203,9 +208,15 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
     Raises
     ------
     ValueError
-        Home is no good pose.
+        Home, or that middle, is no good pose.
     """
-    if not good_poses(robot, robot.home[None])[0]:
+    middle = _middle(robot)
+    if not good_poses(robot, middle[None])[0]:
+        if not in_box(robot.model.workspace, robot.home):
+            raise ArgumentError(
+                f"{robot.name}: the stated workspace leaves out home, and its middle is no pose"
+                " that the machine can take"
+            )
         broken = robot.feasible(robot.home[None]).broken()
         why = f"home breaks a limit: {'; '.join(broken)}" if broken else "home is singular"
         raise ArgumentError(f"{robot.name}: {why.replace(' in rows 0', '')}")
@@ -216,16 +227,30 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
         size = float(joints.max() + np.abs(robot.home[:3]).sum())
     found = {}
     for name in robot.moved:
+        stated = robot.model.workspace.get(name, (-np.inf, np.inf))
         step = np.radians(90.0) / _STEPS if name in POSE[3:] else 2 * size / _STEPS
         ends = []
         for sign in (-1.0, 1.0):
-            ray = np.repeat(robot.home[None], _STEPS, axis=0)
-            ray[:, POSE.index(name)] += sign * step * np.arange(_STEPS)
+            ray = np.repeat(middle[None], _STEPS, axis=0)
+            far = ray[:, POSE.index(name)] + sign * step * np.arange(_STEPS)
+            ray[:, POSE.index(name)] = np.clip(far, *stated)
             good = good_poses(robot, completed(robot, ray))
             last = int(np.argmin(good)) - 1 if not good.all() else _STEPS - 1
             ends.append(float(ray[last, POSE.index(name)]))
         found[name] = (ends[0], ends[1])
     return found
+
+
+def _middle(robot: Robot) -> FloatArray:
+    """Home, with coordinates that the stated workspace leaves out in the middle of their range."""
+    middle: FloatArray = robot.home.copy()
+    for name, (low, high) in robot.model.workspace.items():
+        k = POSE.index(name)
+        if not low <= middle[k] <= high:
+            middle[k] = (low + high) / 2.0
+    if (middle != robot.home).any():
+        middle = completed(robot, middle[None])[0]
+    return middle
 
 
 def require_moved(robot: Robot, axes: Mapping[str, object]) -> None:

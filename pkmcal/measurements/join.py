@@ -11,6 +11,7 @@ import numpy as np
 from pkmcal.arguments import word
 from pkmcal.arrays import IntArray
 from pkmcal.exceptions import FileError
+from pkmcal.files.column_names import BESIDE
 from pkmcal.files.csv_table import Table
 from pkmcal.measurements.actuator_columns import actuators_in
 from pkmcal.measurements.point_names import split
@@ -114,8 +115,20 @@ def _put(table: Table, log: Table, actuators: Sequence[str], rows: Rows, said: s
     ]
     for name in [*actuators, *beside]:
         table.put(name, log.columns[name].take(chosen))
-    table.elsewhere += [f"{log.path}: {note}" for note in log.notes]
+    table.elsewhere += [f"{log.path}: {note}" for note in [*log.notes, *_not_used(log, actuators)]]
     table.notes.append(said)
+
+
+def _not_used(log: Table, actuators: Sequence[str]) -> list[str]:
+    """A line that names the columns of a log of which nothing is taken."""
+    looked_at = {*actuators, *BESIDE, "group", "target", *_BESIDE}
+    rest = [
+        repr(column.name)
+        for name, column in log.columns.items()
+        if name not in looked_at and name.partition(".")[0] not in _BESIDE
+    ]
+    more = f" and {len(rest) - _LISTED} more" if len(rest) > _LISTED else ""
+    return [f"not used: {', '.join(rest[:_LISTED])}{more}"] if rest else []
 
 
 def _by_name(table: Table, log: Table) -> tuple[Rows, str] | str:

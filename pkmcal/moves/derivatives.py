@@ -57,6 +57,28 @@ def straight(
     return out
 
 
+def written(pose: FloatArray, speed: FloatArray, bend: FloatArray) -> FloatArray:
+    """Of x y z α β γ (N, 6) that have speeds and accelerations; regular at β = ±90° too.
+
+    Returns
+    -------
+    ndarray (N, 3, 4, 4)
+    """
+    out = np.zeros((len(pose), 3, 4, 4))
+    out[:, 0, 3, 3] = 1.0
+    out[:, :, :3, 3] = np.stack([pose[:, :3], speed[:, :3], bend[:, :3]], axis=1)
+    R, R1, R2 = np.tile(np.eye(3), (len(pose), 1, 1)), np.zeros((3, 3)), np.zeros((3, 3))
+    for k in (2, 1, 0):  # R = Rz(γ) Ry(β) Rx(α)
+        axis = np.eye(3)[k]
+        spin = cross_matrix(axis)
+        angle, rate, change = (each[:, 3 + k, None, None] for each in (pose, speed, bend))
+        turn = screw.exp(np.append(axis, np.zeros(3)), angle[:, 0, 0])[:, :3, :3]
+        turn1, turn2 = rate * spin @ turn, (change * spin + rate**2 * spin @ spin) @ turn
+        R, R1, R2 = R @ turn, R1 @ turn + R @ turn1, R2 @ turn + 2 * R1 @ turn1 + R @ turn2
+    out[:, 0, :3, :3], out[:, 1, :3, :3], out[:, 2, :3, :3] = R, R1, R2
+    return out
+
+
 def twists(motion: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Twist and its rate, (N, 6) each: (ω, v) with v of the platform's origin, rad/s and mm/s."""
     R, R1, R2 = (motion[:, k, :3, :3] for k in range(3))

@@ -92,6 +92,10 @@ def events(move: Sampled) -> list[Event]:
     a limit is found however briefly it is broken. What can be missed lasts less than 1/1000 of
     the duration, in a margin that has more than one minimum in that time or falls more than four
     times as far as from one look to the next; or it goes less than 1e-9 mm or rad too far.
+
+    Strokes are looked at as the inverse kinematics has the pose: straight in joint space, where no
+    pose is found or a limb has gone over to its other branch, one may be said to be broken though
+    the actuator keeps it.
     """
     times = np.linspace(0.0, move.duration, _STEPS + 1)
     times = np.unique(np.concatenate([times, _dips(move, times)]))

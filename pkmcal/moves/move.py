@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -21,6 +21,7 @@ from pkmcal.kinematics.perturbed import ON_THE_MANIFOLD, off
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.moves import derivatives
 from pkmcal.moves.events import Event, events
+from pkmcal.moves.jumps import Jump, jumps, said
 from pkmcal.moves.peaks import STEPS, largest, peaks
 from pkmcal.moves.time_laws import (
     CUBIC,
@@ -87,6 +88,9 @@ class Move(Result):
         What is straight: "pose", "coordinates" or "joint".
     law : Polynomial or JerkLimited
         Of the actuators in joint space, else of the share of the way.
+    jumps : tuple of Jump
+        Where a drive law passes a node of its table, and speeds jump: of the actuators, or in joint
+        space of the platform. Accelerations, and limits of these, are those between.
     """
 
     robot: Robot
@@ -94,6 +98,7 @@ class Move(Result):
     end: FloatArray
     space: Space
     law: Polynomial | JerkLimited
+    jumps: tuple[Jump, ...] = ()
 
     @property
     def duration(self) -> float:
@@ -142,6 +147,8 @@ class Move(Result):
         worse = largest(
             lambda t: -self.conditioning(t)[:, None], times, -self.conditioning(times)[:, None]
         )
+        if self.jumps:
+            yield said(self.jumps)
         yield f"conditioning {-worse[0]:.3g} at least"
         yield from map(str, self.events())
 
@@ -170,9 +177,13 @@ class Move(Result):
         robot, frames, slots = self.robot, self.robot.frames, self.robot.slots
         share, speed, bend = (each[:, None] for each in self.law.sample(times))
         matched = [POSE.index(name) for name in robot.moved]
+        near = self._turns_at(share[:, 0])
+        if len(matched) == len(POSE) and robot.machine.rows == robot.machine.m:
+            way = off(self.end, self.start)  # all are known, and at β = ±90° rates by them are not
+            motion = derivatives.written(self.start + share * way, speed * way, bend * way)
+            return motion, (robot.inverse(to_pose(motion[:, 0]), near=near), *robot.rates(motion))
         way = off(self.end, self.start)[matched]
         at = self._completed(share)
-        near = self._turns_at(share[:, 0])
         q = at.q if near is None else robot.nearest_turns(at.q, near=near)
         at = at._replace(q=q)
         velocity, acceleration = completed_rates(
@@ -283,7 +294,8 @@ def move(
     duration, and a change of less than 1e-11 of the largest position or velocity is rounding.
 
     The speed of an actuator jumps where its drive law passes a node of a table: accelerations, and
-    limits of these, are those of the pieces between.
+    limits of these, are those of the pieces between. ``.jumps`` has these times, and ``print`` says
+    that there are some.
 
     Examples
     --------
@@ -314,7 +326,7 @@ def move(
                 " and jerk, no duration"
             )
         smooth = jerk_limited(q[0], q[1], **limits)
-        return _followed(Move(robot, ends[0], ends[1], space, smooth))
+        return _with_jumps(_followed(Move(robot, ends[0], ends[1], space, smooth)))
     if "jerk" in limits:
         raise ArgumentError("jerk is limited by the law 'jerk-limited' alone")
     sides = (q[0], q[1]) if space == "joint" else (np.array(0.0), np.array(1.0))
@@ -324,7 +336,7 @@ def move(
         return Move(robot, ends[0], ends[1], space, made)
 
     unit = _followed(lasting(1.0))
-    return lasting(duration if duration is not None else _fastest(unit, limits))
+    return _with_jumps(lasting(duration if duration is not None else _fastest(unit, limits)))
 
 
 def _pose(robot: Robot, name: str, pose: ArrayLike) -> FloatArray:
@@ -369,6 +381,11 @@ def _followed(made: Move) -> Move:
                 f" lead from start to end but to another assembly mode"
             )
     return made
+
+
+def _with_jumps(made: Move) -> Move:
+    found = jumps(made.robot, lambda t: made.sample(t).actuators, made.duration)
+    return replace(made, jumps=found)
 
 
 def _fastest(unit: Move, limits: dict[str, FloatArray]) -> float:

@@ -21,7 +21,8 @@ from pkmcal.arrays import FloatArray
 STEPS = 2000  # along a move
 _HALVINGS = 20  # of a step: to 5e-10 of the duration
 _PLACES = 2000  # that are halved at once, those of the largest means
-_THIRDS = 80  # taken off two steps around a local maximum
+_CUTS = 64  # of two steps around a local maximum, in the golden section: to 4e-14 of them
+_GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 _RISE = 4.0  # times what a size rises by in a step: no peak between samples is higher
 _HIDDEN = 1e-9  # relative: by so much a mean must exceed all samples
 _ROUNDING = 1e-11  # of the largest position or speed: what a completed pose leaves open of it
@@ -68,10 +69,13 @@ def peaks(sample: Callable[[FloatArray], Sample], duration: float) -> tuple[Floa
             for old, new in ((q, more.actuators), (v, more.velocities), (a, more.accelerations))
         )
         times = np.insert(times, places + 1, middle)
-    return (
-        largest(lambda t: np.abs(sample(t).velocities), times, np.abs(v)),
-        largest(lambda t: np.abs(sample(t).accelerations), times, np.abs(a)),
-    )
+
+    def sizes(t: FloatArray) -> FloatArray:
+        at = sample(t)
+        return np.abs(np.hstack([at.velocities, at.accelerations]))
+
+    speed, acceleration = np.split(largest(sizes, times, np.abs(np.hstack([v, a]))), 2)
+    return speed, acceleration
 
 
 def _hides(values: FloatArray, rates: FloatArray, steps: FloatArray) -> FloatArray:
@@ -109,11 +113,20 @@ def largest(
         rise = np.maximum(here - before, here - after)
         top = (here >= before) & (here >= after) & (here + _RISE * rise > most)
     rows, columns = np.nonzero(top)
-    low, high = times[rows], times[rows + 2]
+    if not len(rows):
+        return np.asarray(most)
     own = np.arange(len(rows)), columns
-    for _ in range(_THIRDS if len(rows) else 0):
-        left, right = low + (high - low) / 3, high - (high - low) / 3
-        first, second = function(left)[own], function(right)[own]
+    low, high = times[rows], times[rows + 2]
+    left, right = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+    first, second = function(left)[own], function(right)[own]
+    for _ in range(_CUTS):
         np.maximum.at(most, columns, np.maximum(first, second))
-        low, high = np.where(first < second, left, low), np.where(first < second, high, right)
+        rises = first < second
+        low, high = np.where(rises, left, low), np.where(rises, high, right)
+        way = _GOLDEN * (high - low)
+        new = np.where(rises, low + way, high - way)
+        found = function(new)[own]
+        left, right = np.where(rises, right, new), np.where(rises, new, left)
+        first, second = np.where(rises, second, found), np.where(rises, found, first)
+    np.maximum.at(most, columns, np.maximum(first, second))
     return np.asarray(most)

@@ -112,9 +112,9 @@ class Design:
         total = sum(counts)
         grown = [list(itertools.islice(self._growing(worth, counts), total)) for worth in _STARTS]
         ridge = self._lacking(grown[0])
-        found = [self._exchanged(chosen, ridge) for chosen in grown]
-        costs = np.array([self._log_cost(chosen, ridge) for chosen in found])
-        return found[first_largest(-costs, _ALIKE)]
+        found = [self._settled(chosen, ridge) for chosen in grown]
+        costs = np.array([self._log_cost(np.sort(chosen), ridge) for chosen in found])
+        return self._exchanged(found[first_largest(-costs, _ALIKE)], ridge)
 
     def reaching(self, error: float) -> IntArray:
         """As few candidates as predict an error (mm) that all together do."""
@@ -193,11 +193,15 @@ class Design:
         """
         exchanged = True
         while exchanged:
-            short = self._shortlist(chosen, ridge)
-            while exchanged and len(short) < len(self._all):
-                chosen, exchanged = self._exchange(chosen, ridge, short)
-            chosen, exchanged = self._exchange(chosen, ridge, self._all)
+            chosen, exchanged = self._exchange(self._settled(chosen, ridge), ridge, self._all)
         return np.sort(np.array(chosen, dtype=np.intp))
+
+    def _settled(self, chosen: list[int], ridge: FloatArray) -> list[int]:
+        """The same of candidates on a shortlist."""
+        short, exchanged = self._shortlist(chosen, ridge), True
+        while exchanged:
+            chosen, exchanged = self._exchange(chosen, ridge, short)
+        return chosen
 
     def _shortlist(self, chosen: list[int], ridge: FloatArray) -> IntArray:
         """In order the members, and of each sort the candidates that add most to them."""

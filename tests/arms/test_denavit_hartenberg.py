@@ -112,6 +112,23 @@ def test_the_lists_of_universal_robots_added_to_nominal_numbers_are_the_calibrat
     )
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_numbers_of_a_calibrated_arm_are_on_the_side_of_its_nominal_ones(seed: int) -> None:
+    """Axes that errors make skew have their common normal anywhere; what follows does not turn.
+
+    Controllers solve near the nominal numbers: a twist from 90° to -90° is another arm to them.
+    """
+    rng = np.random.default_rng(seed)
+    arm = pk.SerialArm.from_dh(**UR10E)  # type: ignore[arg-type]
+    real = arm.replace(rng.normal(size=(6, 6)) * [0.5, 0.5, 0.5, 1e-3, 1e-3, 1e-3])
+    for convention in ("standard", "modified"):
+        nominal, table = arm.dh(convention), real.dh(convention)  # type: ignore[arg-type]
+        assert np.abs(table.alpha - nominal.alpha).max() < 0.02
+        turned = (table.theta[1:4].sum() + np.pi) % (2 * np.pi) - np.pi
+        assert abs(turned) < 0.02
+        assert np.abs(table.tool[:3, :3] - np.eye(3)).max() < 0.02
+
+
 def test_an_arm_of_another_maker_is_no_universal_robot(tmp_path: Path) -> None:
     with pytest.raises(pk.ArgumentError, match="six turning joints"):
         pk.export.universal_robots(pk.load("3r"), tmp_path / "c.conf")

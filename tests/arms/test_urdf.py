@@ -91,6 +91,18 @@ def test_errors_go_into_the_origins(source: Path, tmp_path: Path) -> None:
     assert np.abs(again.forward(THETA) - arm.forward(THETA)).max() < 1e-11
 
 
+def test_comments_around_the_robot_stay(source: Path, tmp_path: Path) -> None:
+    """Licences stand above the first element."""
+    text = source.read_text(encoding="utf-8")
+    head, _, body = text.rpartition("<robot")
+    around = tmp_path / "around.urdf"
+    around.write_text(f"{head}<!-- ours: © -->\n<robot{body}\n<!-- the end -->\n", "utf-8")
+    pk.SerialArm.from_urdf(around, tip="tool0").save_urdf(tmp_path / "n.urdf", around, tip="tool0")
+    new = (tmp_path / "n.urdf").read_text(encoding="utf-8")
+    assert new.index("<!-- ours: © -->") < new.index("<robot") < new.index("</robot>")
+    assert new.index("</robot>") < new.index("<!-- the end -->")
+
+
 def test_all_else_stays_in_the_file(source: Path, tmp_path: Path) -> None:
     arm = pk.SerialArm.from_urdf(source, tip="tool0")
     arm.save_urdf(tmp_path / "same.urdf", source, tip="tool0")

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
 from pkmcal.calibration.identify import identify
@@ -92,6 +93,26 @@ def test_exchanged_angles_are_named() -> None:
     measured = VirtualMachine(robot).measure(q, kind="pose")
     wrong = dataclasses.replace(measured, values=measured.values[:, [0, 1, 2, 4, 3, 5]])
     assert any("alpha and beta are exchanged" in text for text in said(robot, wrong))
+
+
+@pytest.mark.parametrize(
+    ("read_as", "words"),
+    [
+        ([1, 2, 3, 0], "the scalar of the quaternions is their last number"),
+        ([3, 0, 1, 2], "the scalar of the quaternions is their first number"),
+        (None, "orientations are those of the base in the platform's frame"),
+    ],
+)
+def test_quaternions_under_wrong_headings_are_named(read_as: list[int] | None, words: str) -> None:
+    """A 3-RPS tilts about axes of one plane: a frame and a tool would hide it, but none is free."""
+    robot = pk.load("3rps")
+    q = np.random.default_rng(3).uniform(1500, 1700, (20, 3))
+    measured = VirtualMachine(robot).measure(q, kind="pose")
+    turned = Rotation.from_euler("xyz", measured.values[:, 3:])
+    other = turned.inv() if read_as is None else Rotation.from_quat(turned.as_quat()[:, read_as])
+    values = np.hstack([measured.values[:, :3], other.as_euler("xyz")])
+    wrong = dataclasses.replace(measured, values=values)
+    assert any(words in text for text in said(robot, wrong))
 
 
 def test_actuators_out_of_their_strokes_are_named(paper: Robot) -> None:

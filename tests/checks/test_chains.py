@@ -6,9 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+import tomllib
 
 import pkmcal as pk
 from pkmcal.geometry import robot_file
+from tests.driven import parsed
 from tests.robots import made
 
 BUILT_IN = (
@@ -124,3 +126,22 @@ def _read(text: str) -> pk.Robot:
     from pkmcal.files.toml_lines import Source
 
     return pk.Robot(robot_file.parse(Source(text.encode(), "changed.toml"), "changed.toml"))
+
+
+@pytest.mark.parametrize("name", ["tricept", "delta-parallelograms"])
+def test_a_tail_that_adds_no_way_to_move_is_said(name: str) -> None:
+    """A slide behind a machine that goes along it already; a turn is another way."""
+    plain = pk.load(name)
+    place = {"at": plain.home[:3].tolist(), "axis": Z, "actuator": plain.n_actuators + 1}
+    for kind, ok in (("P", False), ("R", True)):
+        data = tomllib.loads(robot_file.located(name)[0].decode())
+        data["pose"].pop("match", None)
+        robot = parsed(data | {"tail": [{"kind": kind, **place}]})
+        found = pk.check_geometry(robot)
+        assert found.ok == ok and found.kinds == (() if ok else ("mobility",)), str(found)
+        if ok:
+            assert np.isfinite(robot.inverse(robot.home, match=True)).all()
+        else:
+            assert "tail" in found.findings[0].what and "3 ways" in found.findings[0].what
+            with pytest.raises(ValueError, match="check_geometry"):
+                robot.inverse(robot.home, match=True)

@@ -38,9 +38,21 @@ def test_a_plan_stays_within_what_is_stated(run: Any, refused: Any) -> None:
     assert "expected NAME=LO:HI" in refused(*command, "--within", "z=5")
     assert "'w' is no coordinate" in refused(*command, "--within", "w=5:6")
     assert "from 9 to 2 is nothing" in refused(*command, "--within", "z=9:2")
-    assert "--within z=5000:6000: leaves out the home" in refused(
+    assert "its middle is no pose that the machine can take" in refused(
         *command, "--within", "z=5000:6000"
     )
+
+
+def test_a_plan_near_the_bed_needs_no_home_there(run: Any) -> None:
+    """Printers have home far above the bed on which they probe."""
+    command = ("plan", "linear-delta", "--kind", "height", "--free", "offset*", "--count", "6")
+    home = pk.load("linear-delta").home[2]
+    low, high = home - 60.0, home - 57.0
+    poses = np.array(
+        json.loads(run(*command, "--within", f"z={low}:{high}", "--json").stdout)["poses"]
+    )
+    assert len(poses) == 6 and (poses[:, 2] >= low).all() and (poses[:, 2] <= high).all()
+    assert np.ptp(poses[:, 2]) > 0.5 * (high - low) and np.ptp(poses[:, 0]) > 100
 
 
 def test_an_arm_stays_within_the_limits_of_its_urdf_file(

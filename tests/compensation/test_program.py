@@ -252,6 +252,13 @@ def test_after_homing_the_pose_is_as_stated_or_has_to_be_named(tmp_path: Path) -
         ("M665 L360", "M665 gives the controller other numbers"),
         ("N2 G1 X1*71", "the checksum would no longer be right"),
         ("G1 A5", "A is no axis of the robot, which has XYZ"),
+        ("M290 Z0.1", "M290 moves the origin"),
+        ("RESTORE_GCODE_STATE NAME=a", "RESTORE_GCODE_STATE restores modes"),
+        ("M121", "M121 restores modes"),
+        ("if move.axes[0].homed", "if: conditions and loops cannot be followed"),
+        ("G1 X0 X5", "X stands twice"),
+        ("G0 G1 X5", "G0 or G1 stands twice"),
+        ("G1 X5 G91", "G91 stands behind axis words"),
         ("G1 X900", "the machine does not reach a pose of this move"),
     ],
 )
@@ -280,6 +287,18 @@ def test_what_is_no_move_moves_nothing(line: str, tmp_path: Path) -> None:
     assert found.moves == 2
     plain = corrected(tmp_path, text.format("M400"))
     assert found.text == plain.text.replace("M400", line)
+
+
+def test_what_may_move_the_machine_is_left_and_said(tmp_path: Path) -> None:
+    """Once each with its line; what only sets something is not."""
+    text = 'T1 ; knife\nG1 X1 Y1 Z20 F600\nPARK_HEAD\n{}PARK_HEAD\nM98 P"a.g"\nG1 X-30 Y20\n'
+    settings = "SET_FAN_SPEED FAN=a SPEED=1\nM204 P500 T500\nM104 S200 T0\nM117 PARK\n; PARK\n"
+    found = corrected(tmp_path, text.format(settings))
+    assert found.left == ("T1 (line 1)", "PARK_HEAD (line 3)", "M98 (line 10)")
+    assert "taken not to move the machine: T1 (line 1), PARK_HEAD" in str(found)
+    kept = [line for line in text.format(settings).splitlines() if line[:2] != "G1"]
+    assert [line for line in found.text.splitlines() if line[:2] != "G1"] == kept
+    assert corrected(tmp_path, settings + "G1 X1 Y1 Z20\n").left == ()
 
 
 def test_axes_that_are_homed_need_no_numbers(tmp_path: Path) -> None:

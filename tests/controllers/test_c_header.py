@@ -311,6 +311,27 @@ def test_floats_lose_no_more_than_floats_must(case: str, library: Any) -> None:
     assert np.abs(found - poses)[:, :3].max() < 5e-6 * size
 
 
+def test_screws_of_many_turns_are_held_or_refused(tmp_path: Path) -> None:
+    """Sines of periodic errors at the end of a stroke are known, or no header is written."""
+
+    def screws(k: float) -> pk.Robot:
+        law = {"drive": {"harmonics": [{"k": k, "cos": 0.05, "sin": 0.02}]}}
+        return robots.hexapod(*[law | {"stroke": [300.0, 1500.0]}] * 6)
+
+    robot = screws(3.0)
+    poses = poses_of(robot)
+    status, found = compiled(robot, tmp_path, "float").inverse(poses)
+    assert (status == 0).all()
+    np.testing.assert_allclose(found, robot.inverse(poses), rtol=0, atol=1e-2)
+    fine = screws(5.0)
+    pk.export.c_header(fine, tmp_path / "fine.h")
+    with pytest.raises(
+        pk.ArgumentError, match=r"limb 1 of .*: k q .* goes to 75\d\d rad, .* float"
+    ):
+        pk.export.c_header(fine, tmp_path / "no.h", "float")
+    assert not (tmp_path / "no.h").exists()
+
+
 @pytest.mark.parametrize("number", ["double", "float"])
 @pytest.mark.parametrize("case", SOME)
 def test_clang_too_has_nothing_to_say(case: str, number: str, tmp_path: Path) -> None:

@@ -174,6 +174,13 @@ def test_a_rod_among_three_that_is_no_number_is_named(tmp_path: Path) -> None:
         ("M665 L250 R1.2e2 H300\nM666 X0\n", "R of M665 must be a number, found '1.2e2'"),
         ("M665 L250 R125 H300\nM666 X{-0.2}\n", r"X of M666 must be a number, found '\{-0.2}'"),
         ("\nM665 L250 R125 ?\nM666 X0\n", "line 2: .*: M665 must have words alone"),
+        ("M665 L250 R125 H300 M666 X1\nM666 Y0\n", "line 1: .*: M665 must be alone in its line"),
+        ("M665 L250 R125 H300\nM666 X0\nM84 M666 X1\n", "line 3: .*: M666 must begin its line"),
+        ("M665 L250 R125 R126 H300\nM666 X0\n", "line 1: .*: M665 must have R once"),
+        (
+            "if exists(var.a)\n  G4 P1\n\n  M665 L250 R125 H300\nelse\n  M665 L250 R120 H300\n",
+            "line 4: .*: M665 under a condition",
+        ),
     ],
 )
 def test_mistakes_are_named(text: str, message: str, tmp_path: Path) -> None:
@@ -192,6 +199,7 @@ def test_mistakes_are_named(text: str, message: str, tmp_path: Path) -> None:
         "\ufeffM665 L250 R125 H300 (as M665 R9) X0.5 ; R8\nM666 Y-0.2\n; M666 Y9\n",
         "M665 L250 H300\nM665 R125 X0.5\nM666 Y-0.2\nM666 Z0\n",  # each sets what it names
         "M665 L 250 R 125 H300 X.5\n  M666 Y-.2\n",
+        'if true\n  G4\nM665 L250 R125 H300 X0.5\n  M666 Y-0.2\nM117 M666 X9\nM98 P"M665.g"\n',
         "12:01 < echo:  M665 L250 R125 H300 X0.5\n12:01 < echo:  M666 Y-0.2\n",
     ],
 )

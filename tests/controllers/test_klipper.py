@@ -312,6 +312,10 @@ def test_other_machines_are_refused(tmp_path: Path) -> None:
         ),
         ("arm_length: 333.0", "arm_length: 150", "line 12: [stepper_a] arm_length must be above"),
         ("57:19", "57/19", "line 10: [stepper_a] gear_ratio must be like"),
+        *(
+            ("57:19", ratio, "line 10: [stepper_a] gear_ratio must be like")
+            for ratio in ("0:19", "57:0", "-57:19", "57:nan", "inf:1", "57:19:2")
+        ),
         ("microsteps: 32", "microsteps: 0", "line 15: [stepper_b] microsteps must be above 0"),
         ("1000.500,2000.250,3000.000", "1,2", "[delta_calibrate] height0_pos must be 3 numbers"),
     ],

@@ -147,3 +147,26 @@ def test_mistakes_are_named_with_their_line(
     with pytest.raises(pk.FileError) as caught:
         pk.import_printer(written(tmp_path, ROTARY.replace(old, new)))
     assert message in str(caught.value)
+
+
+def test_noisy_heights_lead_sideways_errors_down_too(tmp_path: Path) -> None:
+    """Heights hardly tell the radius from height and end stops: it is not free."""
+    text = ROTARY.replace("shoulder_radius: 180.0", "shoulder_radius: 33.9")
+    text = text.replace("shoulder_height: 520.0", "shoulder_height: 412.9")
+    text = text.replace("er_arm_length: 40", "er_arm_length: 32").replace("320.0", "320")
+    robot = pk.import_printer(written(tmp_path, text)).robot
+    turns = [(r, t) for r, n in ((0.0, 1), (57.0, 6), (95.0, 6)) for t in np.arange(n) / n]
+    poses = np.zeros((len(turns), 6))
+    poses[:, :2] = [[r * np.cos(2 * np.pi * t), r * np.sin(2 * np.pi * t)] for r, t in turns]
+    q = robot.inverse(poses)
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        off = {f"offset{i}": robot.geometry[f"offset{i}"] + rng.normal(0, 0.003) for i in (1, 2, 3)}
+        true = robot.replace(off | {"height": robot.geometry["height"] + rng.normal(0, 0.3)})
+        heights = true.forward(q, poses).pose[:, 2] + rng.normal(0, 0.02, len(q))
+        found = pk.identify(robot, pk.Measurements(q, heights, "height")).robot
+        before, after = (
+            np.abs(true.forward(each.inverse(poses), poses).pose - poses)[:, :2].max()
+            for each in (robot, found)
+        )
+        assert after < 0.25 * before, (seed, before, after)

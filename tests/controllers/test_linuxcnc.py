@@ -48,6 +48,15 @@ CASES["pulleys"] = pulleys
 CASES["eight pulleys"] = eight
 CASES["chains"] = lambda: pk.load("trivariant")
 CASES["geared"] = lambda: geared(0.5)
+CASES["sled on four belts"] = lambda: robots.made(
+    "xy",
+    {"x": 1500.0, "y": 1000.0},
+    [
+        {"kind": "cable", "base": [x, y, 0.0], "platform": [0.0, 0.0, 0.0]}
+        for x in (0.0, 3000.0)
+        for y in (0.0, 2000.0)
+    ],
+)
 CASES["framed"] = lambda: robots.hexapod({"offset": 12.0, "gain": -1.01}, frames=FRAMES)
 
 

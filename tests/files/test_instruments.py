@@ -377,3 +377,12 @@ def test_what_was_assumed_of_the_log_names_the_log(tmp_path: Path) -> None:
     notes = pk.read_measurements(points, controller=log).notes
     assert notes[0] == f"{log}: not UTF-8, read as Windows-1252"
     assert notes[-1].startswith(f"{points}: joined with {log} by name")
+
+
+def test_columns_of_a_log_that_nothing_is_taken_of_are_named(tmp_path: Path) -> None:
+    """A tension that is misspelt is not missing in silence."""
+    points = written(tmp_path, "points.csv", b"Point,X [mm],Y [mm],Z [mm]\nP1,1,2,3\nP2,1,2,4\n")
+    heads = b"idx,Point,q1 [mm],tensoin.q1 [N],lag,speed,load"
+    log = written(tmp_path, "log.csv", heads + b"\n1,P1,1,5,0,0,0\n2,P2,2,5,0,0,0\n")
+    notes = pk.read_measurements(points, controller=log).notes
+    assert notes[0] == f"{log}: not used: 'tensoin.q1', 'lag', 'speed' and 1 more"

@@ -124,6 +124,25 @@ def test_a_second_calibration_replaces_what_the_first_said(source: Path, tmp_pat
     assert text.count("±") == 1 and "# new belts; ± 2\n" in text
 
 
+def test_deviations_beside_a_radius_and_an_angle_say_what_they_are_of(tmp_path: Path) -> None:
+    """A joint at 90° has its radius along y: what is said of x is no deviation of the radius."""
+    source = tmp_path / "3rps.toml"
+    text = (Path(pk.__file__).parent / "builtin" / "machines" / "3rps.toml").read_text("utf-8")
+    source.write_text(text, "utf-8")
+    robot = pk.load(source)
+    moved = robot.replace({"platform2.y": robot.geometry["platform2.y"] + 0.1})
+    said = {"platform2.x": 0.004, "platform2.y": 0.02, "base3.z": 0.3}
+    out = tmp_path / "out.toml"
+    moved.save(out, like=source, deviations=said)
+    (line,) = [each for each in out.read_text("utf-8").splitlines() if "±" in each]
+    assert line.startswith("platform = { radius = ")
+    assert line.endswith("# ± x 0.004, y 0.02, z fixed")
+    again = tmp_path / "again.toml"
+    moved.save(again, like=out, deviations={"platform2.y": 0.5})
+    assert "± x fixed, y 0.5, z fixed" in again.read_text("utf-8")
+    assert again.read_text("utf-8").count("±") == 1
+
+
 def test_line_ends_of_windows_stay(source: Path, tmp_path: Path) -> None:
     source.write_bytes(FILE.replace("\n", "\r\n").encode())
     pk.load(source).replace({"radius": 160.0}).save(tmp_path / "new.toml", like=source)

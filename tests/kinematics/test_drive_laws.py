@@ -449,3 +449,15 @@ def test_what_actuators_would_read_follows_poses_and_numbers(name: str) -> None:
         slope = (ends[1] - ends[0]) / (2 * e)
         size = 1.0 + abs(by_number[:, :, j]).max()
         assert abs(slope - by_number[:, :, j]).max() < 1e-4 * size, number.name
+
+
+@pytest.mark.parametrize("kind", ("six", "pairs", "planar"))
+def test_each_row_may_be_approached_from_its_own_side(kind: str) -> None:
+    rng = np.random.default_rng(4)
+    robot = with_laws(generated.machine(kind, rng), rng)
+    pose = robot.frames.outward(generated.poses(kind, robot, 4, rng))
+    approach = rng.choice([-1.0, 0.0, 1.0], (4, robot.n_actuators))
+    together = robot.approaching(approach).inverse(pose)
+    alone = [robot.approaching(a).inverse(p) for a, p in zip(approach, pose, strict=True)]
+    np.testing.assert_array_equal(together, alone)
+    assert np.nanmax(np.abs(together - robot.inverse(pose))) > 0.0

@@ -292,6 +292,8 @@ ERRORS = [
     ("q1 [mm],z [mm],group [mm]\n1,2,3\n", "line 1: column 'group' takes no unit"),
     ("q1 [mm],z [mm],q1 [mm]\n1,2,3\n", "line 1: column 'q1' appears twice (columns 1 and 3)"),
     ("q1 [mm],z [mm],\n1,2,3\n", "line 1: column 3 is headed ''"),
+    (",q1 [mm],z [mm]\n0.5,1,2\n", "line 1: column 1 is headed ''"),
+    (",q1 [mm],z [mm]\n7,1,2\n7,2,3\n", "line 1: column 1 is headed ''"),
     ("q1 [mm],z mm]\n1,2\n", "line 1: column 2 is headed 'z mm]'"),
     ("qq1 [mm],z [mm]\n1,2\n", "line 1: unknown column 'qq1'"),
     ("q1 [mm],z [mm],sigmas [mm]\n1,2,3\n", "unknown column 'sigmas'; did you mean 'sigma'?"),
@@ -367,3 +369,22 @@ def test_a_column_of_sessions_is_read_and_written(tmp_path: Path) -> None:
     (tmp_path / "blank.csv").write_text("q1 [mm],z [mm],session\n1,2,mon\n3,4,\n")
     with pytest.raises(ValueError, match=r"blank\.csv, line 3, column 'session': found an empty"):
         read_measurements(tmp_path / "blank.csv")
+
+
+def test_the_index_of_a_data_frame_is_left_out_with_a_word(tmp_path: Path) -> None:
+    """`DataFrame.to_csv` puts it first, without a name; of chosen rows it has gaps."""
+    path = tmp_path / "frame.csv"
+    path.write_text(",q1_mm,z_mm\n4,1.0,2.0\n0,1.5,2.5\n17,2.0,3.0\n")
+    read = read_measurements(path)
+    np.testing.assert_array_equal(read.actuators, [[1.0], [1.5], [2.0]])
+    assert any("numbers the rows: left out" in note for note in read.notes)
+
+
+def test_units_that_are_expected_are_each_named_once(tmp_path: Path) -> None:
+    """A turn is a unit of angles and of counts."""
+    path = tmp_path / "m.csv"
+    path.write_text("q1,z [mm]\n1,2\n")
+    with pytest.raises(ValueError, match="column 'q1' has no unit") as raised:
+        read_measurements(path)
+    units = str(raised.value).partition("another of ")[2].partition(")")[0].split(", ")
+    assert "rev" in units and len(set(units)) == len(units)

@@ -131,6 +131,19 @@ def test_the_page_begins_with_what_is_stated(folder: Path, found: pk.Identificat
     assert 'id="certificate"' not in plain
 
 
+def test_it_states_which_rows_were_left_out(stated: Path, tmp_path: Path) -> None:
+    """Who signs has to see it, above the signature and not only in the report behind."""
+    measured = calibrated(2)[1].fit.equations.sets[0]
+    gross = measured.values.copy()
+    gross[4] += 2.0
+    rows = pk.Measurements(measured.actuators, gross)
+    robot = pk.load("hexapod")
+    pk.identify(robot, rows, free="offset*", drop=[4]).report(tmp_path, certificate=stated)
+    page = (tmp_path / "report.html").read_text("utf-8")
+    sheet = page[page.index('id="certificate"') : page.index('class="signatures"')]
+    assert "1 row was left out, as asked: row 4" in sheet
+
+
 def test_the_worst_pose_is_stated_beside_the_workspace(
     found: pk.Identification, folder: Path, stated: Path
 ) -> None:
