@@ -294,11 +294,12 @@ def _warnings(
     notes += insufficient_data(
         estimator.equations, result.rank, result.dof, bool(len(estimate.prior))
     )
-    if result.chi2_per_dof > _NOISY:
-        notes.append(
-            f"residuals are {np.sqrt(result.chi2_per_dof):.3g} times what sigma says:"
-            f" {_remedy(result)}"
-        )
+    scale = float(np.sqrt(result.chi2_per_dof))
+    if estimator.loss != "linear" and equations.sigma_stated:
+        # of pseudo-residuals: rows that are weighed down say nothing about sigma
+        scale = fit.uncertainty.covariance.scale
+    if scale**2 > _NOISY:
+        notes.append(f"residuals are {scale:.3g} times what sigma says: {_remedy(result)}")
     notes += in_other_modes(equations, fit.end)
     notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
     notes += distant_points(fit.end, equations.parameters)
@@ -315,9 +316,10 @@ def _warnings(
         )
     kept = estimate.state.determined.rank - estimate.state.fitted.rank
     if kept:
+        which = "combinations of parameters are" if kept > 1 else "combination of parameters is"
         notes.append(
-            f"{kept} combinations of parameters are determined to no better than {size:.0f} mm,"
-            " the machine's size, and were kept as they were: state a prior or measure more poses"
+            f"{kept} {which} determined to no better than {size:.0f} mm, the machine's size, and"
+            " kept as before: state a prior or measure more poses"
         )
     if not result.converged:
         notes.append("the least squares did not converge: the result is not to be trusted")
@@ -342,7 +344,8 @@ def _remedy(result: Identification) -> str:
     if not np.isfinite(scatter):
         cure += ", or state the true sigma"
     if result.outliers:
-        cure = "look at the outliers, fit with --loss cauchy (loss='cauchy'), or " + cure
+        robust = "" if result.loss == "cauchy" else " fit with --loss cauchy (loss='cauchy'),"
+        cure = f"look at the outliers,{robust} or {cure}"
     return cure
 
 

@@ -47,7 +47,8 @@ def _cells(before: Distances, after: Distances, outliers: Sequence[int]) -> list
     numbers = before.rms, after.rms, after.median, after.quantile95, after.rms_without_outliers
     cells = [_short(number) for number in numbers]
     if outliers:
-        cells[-1] += f" ({len(outliers)})"
+        left = cells[-1] if np.isfinite(numbers[-1]) else "none is left"
+        cells[-1] = f"{left} ({len(outliers)})"
     return cells
 
 

@@ -30,7 +30,7 @@ State = Literal["calibrated", "doubtful", "not calibrated"]
 
 _GAIN = 0.9  # of the misfit that must not be left for a calibration to be worth it
 _ABSURD = 0.02  # share of the spread of the commanded positions that no sound fit leaves
-_SMALL = 0.5  # times sigma, below which residuals are worth a word
+_SMALL, _LARGE = 0.5, 1.5  # times sigma, below and above which residuals are worth a word
 _LONGEST = 1000  # letters of a reason: names of others may be in it
 
 
@@ -330,13 +330,9 @@ def _remarks(
             f"{again} of the held-out points are at poses that were fitted as well: they show how"
             " these repeat, not how good the machine is elsewhere"
         )
-    scale = found.fit.uncertainty.covariance.scale
     stated = not found.fit.uncertainty.equations.unstated.any()
-    if stated and found.covariance_rule == "classical" and scale > 1.0:
-        remarks.append(
-            f"± are {scale:.2g} times as wide as sigma alone would make them, since the residuals"
-            " are so much larger"
-        )
+    if stated and (refuted := _refuted(found)):
+        remarks.append(refuted)
     if stated and found.fit.estimate.state.loss.name == "linear" and _larger_sigma(found) < _SMALL:
         remarks.append(
             f"the residuals are only {_larger_sigma(found):.2g} times what sigma says: if it is the"
@@ -350,6 +346,21 @@ def _remarks(
             f"{found.idle} {say} nothing: what was read there determines the pose at most"
         )
     return tuple(printable(text, _LONGEST) for text in remarks)
+
+
+def _refuted(found: Parts) -> str:
+    """What residuals larger than the stated sigma mean, whichever covariance counts them; or ""."""
+    scale = found.fit.uncertainty.covariance.scale
+    causes = "sigma is too small, or numbers that are not free are wrong"
+    if found.covariance_rule == "classical" and scale > 1.0:
+        also = f": {causes}" if scale > _LARGE else ""
+        return (
+            f"± are {scale:.2g} times as wide as sigma alone would make them, since the residuals"
+            f" are that much larger{also}"
+        )
+    if found.covariance_rule == "cluster" and scale > _LARGE:
+        return f"± allow for residuals that are {scale:.2g} times what sigma says: {causes}"
+    return ""
 
 
 def _larger_sigma(found: Parts) -> float:

@@ -67,6 +67,15 @@ def test_points_that_contradict_the_fit_are_the_first_line(
     assert "moved, or the model is wrong there: offset5 by +0.5" in found.verdict.reasons[1]
 
 
+def test_a_table_says_in_words_that_all_held_out_points_are_outliers(
+    hexapod: pk.Robot, true: pk.Robot
+) -> None:
+    later = session(hexapod, true.replace({"offset5": 3.0}), 12, 1)
+    found = fitted(hexapod, session(hexapod, true, 40, 0), free="offset*", holdout=later)
+    assert len(found.holdout_outliers) == 12
+    assert "none is left (12)" in str(found) and "nan" not in str(found)
+
+
 def test_all_offsets_that_move_alike_are_named_together(hexapod: pk.Robot, true: pk.Robot) -> None:
     names = [f"offset{i}" for i in range(1, 7)]
     later = true.replace({name: true.geometry[name] + 0.4 for name in names})
@@ -291,6 +300,61 @@ def test_numbers_that_do_not_help_are_doubtful(hexapod: pk.Robot, true: pk.Robot
 def test_a_machine_that_was_right_is_calibrated_where_sigma_says_so(hexapod: pk.Robot) -> None:
     measured = replace(session(hexapod, hexapod, 40, 0), sigma=0.02)
     assert fitted(hexapod, measured, free="offset*").verdict.state == "calibrated"
+
+
+# --- a stated sigma that the residuals refute -----------------------------------------------------
+
+
+@pytest.mark.parametrize("rule", ["classical", "cluster"])
+@pytest.mark.parametrize("loss", ["linear", "huber", "cauchy"])
+def test_a_sigma_too_small_by_two_and_a_half_is_always_noted(
+    hexapod: pk.Robot, true: pk.Robot, loss: str, rule: str
+) -> None:
+    """Whichever covariance makes ± right, the reader learns that sigma or the model is not."""
+    measured = replace(session(hexapod, true, 40, 0), sigma=0.02 / 2.5)
+    found = fitted(hexapod, measured, free="offset*", loss=loss, covariance=rule)
+    assert found.verdict.state == "calibrated"
+    (note,) = found.verdict.remarks
+    assert note.endswith(": sigma is too small, or numbers that are not free are wrong")
+    sound = replace(session(hexapod, true, 40, 0), sigma=0.02)
+    right = fitted(hexapod, sound, free="offset*", loss=loss, covariance=rule)
+    assert not any("sigma is too small" in text for text in right.verdict.remarks)
+
+
+def test_errors_that_poses_share_do_not_hide_that_sigma_is_too_small() -> None:
+    """Their covariance needs no sigma, so nothing was widened, and nothing was said."""
+    arm, q, _ = of_arm(24, 5)
+    rng = np.random.default_rng(5)
+    errors = rng.normal(0, 0.02, (24, 3, 3)) + rng.normal(0, 0.05, (24, 1, 3))
+    measured = replace(seen_by_tracker(arm, q, errors), sigma=0.02)
+    found = fitted(arm, measured, **UNKNOWN)
+    assert found.covariance_rule == "cluster" and found.verdict.state == "calibrated"
+    assert any("times what sigma says" in text for text in found.verdict.remarks)
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+@pytest.mark.parametrize("seed", range(4))
+def test_rows_that_a_robust_loss_weighs_down_say_nothing_about_sigma(
+    hexapod: pk.Robot, true: pk.Robot, loss: str, seed: int
+) -> None:
+    measured = session(hexapod, true, 30, seed)
+    values = measured.values.copy()
+    values[[4, 17]] += 5.0  # 250 times sigma
+    gross = replace(measured, values=values, sigma=0.02)
+    found = fitted(hexapod, gross, free="offset*", loss=loss)
+    assert {4, 17} <= set(found.outliers)
+    assert found.verdict.state == "calibrated" and not found.verdict.remarks
+
+
+@pytest.mark.parametrize("loss", ["linear", "huber", "cauchy"])
+def test_a_sigma_that_no_slip_explains_is_doubtful(
+    hexapod: pk.Robot, true: pk.Robot, loss: str
+) -> None:
+    measured = replace(session(hexapod, true, 40, 0), sigma=0.02 / 6)
+    found = fitted(hexapod, measured, free="offset*", loss=loss)
+    assert found.verdict.state == "doubtful"
+    assert "times what sigma says" in found.verdict.reasons[0]
+    assert loss != "cauchy" or "cauchy" not in found.verdict.reasons[0]  # it was fitted with it
 
 
 # --- a prior that is contradicted ----------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,16 @@ def test_all_joint_errors(arm: pk.SerialArm, log: Measurements) -> None:
     assert (found.rank, len(found.free)) == (33, 51)
     assert found.rms == pytest.approx(0.161, abs=0.001)
     assert found.repeatability == pytest.approx(0.090 / np.sqrt(3), rel=0.02)
+
+
+def test_what_its_repeats_scatter_is_not_what_the_model_leaves(
+    arm: pk.SerialArm, log: Measurements
+) -> None:
+    """Their deviation as sigma is refuted, and said to be: ± of clusters, which need none."""
+    scatter = identify(arm, log, **UNKNOWN).repeatability
+    found = identify(arm, replace(log, sigma=scatter), **UNKNOWN)
+    assert found.covariance_rule == "cluster" and found.verdict.state == "calibrated"
+    assert any("times what sigma says" in text for text in found.verdict.remarks)
 
 
 @pytest.mark.filterwarnings("ignore:the measurements contradict the prior")  # joint2.dphi
