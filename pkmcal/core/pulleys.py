@@ -151,8 +151,9 @@ class PulleyMachine(Machine):
         narrow = slots[..., : len(SLOTS)]
         out = np.array(np.broadcast_to(narrow, (len(pose), *narrow.shape[-2:])), order="C")
         out[:, self._over, 0:3] = cables.end - cables.length[..., None] * cables.pull
-        for number in (_OFFSET, _GAIN):
-            out[:, self._over, number] /= cables.parts
+        with np.errstate(invalid="ignore", divide="ignore"):  # parts that pull against each other
+            for number in (_OFFSET, _GAIN):
+                out[:, self._over, number] /= cables.parts
         return out, cables
 
     def _on_map(self, pose: FloatArray) -> FloatArray:

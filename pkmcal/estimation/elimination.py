@@ -25,6 +25,8 @@ from pkmcal.estimation.closures import RowStates
 from pkmcal.estimation.session_machines import Machines, SessionClosures
 
 _STEPS = 50  # of finding the best poses
+_STRAIGHT = 12  # of these, as if equations were straight; then as they bend
+_NEAR = 1e-4  # share of the way on which equations are as large as what is left, to see them bend
 _SETTLED = 1e-12  # share of a pose's cost that a further step would gain
 _CLOSE = 1e-6  # the same where steps have become too short to gain anything
 _ROUNDING = 1e-15  # of a whitened equation, of the largest number it was made of
@@ -223,6 +225,9 @@ class Blocks:
         """The states of least squares, each pose by itself.
 
         Levenberg's and Marquardt's steps for all poses at once, each with a damping of its own.
+        Where a reading is far off, equations bend by more than Gauss's and Newton's matrix, whose
+        steps then are too long or, damped, too short: poses that have not settled by it go on with
+        Newton's.
 
         Parameters
         ----------
@@ -244,8 +249,17 @@ class Blocks:
         residual, by_unknown = system(states)
         cost = self._sums(residual**2)
         rounded = _ROUNDING * _size(states) * np.sqrt(self._sums((by_unknown**2).sum(axis=1)))
-        for _ in range(_STEPS):
+        settled = np.zeros(self.poses, dtype=bool)
+        for k in range(_STEPS):
             matrix, pull = self._normal(residual, by_unknown)
+            if k >= _STRAIGHT:
+
+                def pulled(by: FloatArray, at: RowStates = states) -> FloatArray:
+                    return self._normal(*system(closures.moved(machines, at, by)))[1]
+
+                _bend(matrix, pull, np.where(settled, 0.0, cost), pulled)
+            if k == _STRAIGHT:
+                damping[:] = 0.0
             step, gain = _steps(matrix, pull, damping)
             floor = rounded * (rounded + np.sqrt(cost))
             settled = (gain <= _SETTLED * cost + floor) | ~np.isfinite(cost)
@@ -313,6 +327,31 @@ def _reflect(mirror: FloatArray, parts: FloatArray) -> None:
     behind = parts[:, parts.shape[1] - mirror.shape[1] :]
     along = np.einsum("gk,gkc->gc", mirror, behind)
     behind -= mirror[:, :, None] * along[:, None, :]
+
+
+def _bend(
+    matrix: FloatArray,
+    pull: FloatArray,
+    cost: FloatArray,
+    pulled: Callable[[FloatArray], FloatArray],
+) -> None:
+    """Make JᵀJ (K, u, u) the second derivatives of half the squares, of poses with a cost (K,).
+
+    By differences of `pull` (K, u), which `pulled` tells at steps (K, u). Directions in which the
+    squares are curved downwards count as if they were curved upwards: steps go down.
+    """
+    size = np.einsum("kii->ki", matrix)
+    way = np.zeros_like(size)
+    np.divide(cost[:, None], size, out=way, where=size > 0.0)
+    way = _NEAR * np.sqrt(way)
+    bent = np.empty_like(matrix)
+    for i in range(matrix.shape[1]):
+        by = np.zeros_like(way)
+        by[:, i] = way[:, i]
+        bent[:, i] = (pulled(by) - pull) / np.where(way[:, i], way[:, i], 1.0)[:, None]
+    mine = np.flatnonzero((way > 0.0).all(axis=1) & np.isfinite(bent).all(axis=(1, 2)))
+    curved, axes = np.linalg.eigh(0.5 * (bent + bent.transpose(0, 2, 1))[mine])
+    matrix[mine] = (axes * np.abs(curved)[:, None]) @ axes.transpose(0, 2, 1)
 
 
 def _size(states: RowStates) -> float:

@@ -34,8 +34,11 @@ def columns_of_actuators(table: Table, what: str, count: int) -> list[str]:
         return given
     each = [f"{what}.q{i + 1}" for i in range(count)]
     table.require(each)
-    if len(given) > count:
+    if what in given:
         raise table.header_error(f"column {what!r} does not go with those of actuators")
+    more = [name for name in given if name not in each]
+    if more:
+        raise table.header_error(f"column {more[0]!r} goes with no actuator: the last is q{count}")
     return each
 
 

@@ -132,6 +132,15 @@ def test_the_forward_kinematics_invert_it(plane: pk.Robot, three: pk.Robot) -> N
         np.testing.assert_allclose(found.pose, poses, atol=1e-9)
 
 
+@pytest.mark.filterwarnings("error")
+def test_between_points_that_pull_against_each_other_is_out_of_reach(plane: pk.Robot) -> None:
+    between = np.array([[1900.0, 0, 0, 0, 0, 0], [1900, 1300, 0, 0, 0, 0]])
+    q = plane.inverse(between)
+    assert np.isnan(q[0]).all() and np.isfinite(q[1]).all()
+    assert pk.tensions(plane, between, (0, -100, 0)).status[0] != 0
+    assert plane.forward(plane.inverse(between[1]), guess=between[0]).status != 0
+
+
 def test_equal_points_are_a_gain_of_the_cable(three: pk.Robot) -> None:
     """Three parts to one place let in a third of what the winch takes up."""
     anchors = three.slots[:, :3]

@@ -301,6 +301,14 @@ ERRORS = [
     ("q1 [mm],z [mm],distance [mm]\n1,2,3\n", "more than one thing measured"),
     (AB + ",z [mm]\n1,1,1,1,1,1,1,1\n", "more than one thing measured"),
     (AB + ",target\n1,1,1,1,1,1,1,1\n", "column 'target' does not go with 'A.x'"),
+    (
+        "q1 [mm],z [mm],tension.q1 [N],tension.q2 [N]\n1,2,3,4\n",
+        "line 1: column 'tension.q2' goes with no actuator: the last is q1",
+    ),
+    (
+        "q1 [mm],z [mm],tension [N],tension.q1 [N]\n1,2,3,4\n",
+        "line 1: column 'tension' does not go with those of actuators",
+    ),
     (AB + "\n1,1,1,1,1,,1\n", "line 2, column 'B.y': found an empty cell beside"),
     (POSITION + "\n1,2,3,4\n1,2,3\n", "line 3: 3 cells under 4 column names"),
     (POSITION + "\n1,5,2,3,4\n", "line 2: 5 cells under 4 column names (a decimal comma"),
