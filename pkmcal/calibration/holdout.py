@@ -22,13 +22,14 @@ from pkmcal.estimation.uncertainty import Uncertainty, stated_variances
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.distributions import f_tail
-from pkmcal.statistics.holdout_test import HoldoutTest, Lengths, holdout_test
+from pkmcal.statistics.holdout_test import RATIO, HoldoutTest, Lengths, holdout_test
 from pkmcal.statistics.linear_fit import numbered
 from pkmcal.statistics.noise import Noise, noise
 
 _LOOSE = 1e-6  # share of a number in combinations that its session's rows do not show
 _NOTHING = 1e-6  # share of a variance below which nothing is left of a reading
 _HUGE = 1e300
+_FEW_ODD = 0.25  # share of held-out points that may be off without the rest being so
 _ODD = 0.01  # chance of naming any held-out row that is as far off as expected
 
 
@@ -105,8 +106,11 @@ class HeldOut:
 
     @property
     def contradicts(self) -> bool:
-        """Whether the points contradict the fit."""
-        return self.test is not None and self.test.contradicts
+        """Whether the points contradict the fit, and not only through a few that are far off."""
+        if self.test is None or not self.test.contradicts:
+            return False
+        few = 0 < len(self.odd) <= _FEW_ODD * int(np.isfinite(self.off).sum())
+        return not (few and self.after.rms_without_outliers <= RATIO * self.expected)
 
     @property
     def chance(self) -> float:

@@ -100,6 +100,24 @@ def test_a_holdout_without_sigma_has_the_noise_of_the_fit(
     assert twice.holdout_expected == pytest.approx(stated.holdout_expected, rel=1e-6)
 
 
+def test_gross_rows_among_few_held_out_points_do_not_contradict_a_sound_fit(
+    hexapod: pk.Robot, true: pk.Robot
+) -> None:
+    """The median of six points is 1.2 times the usual by chance, in one session of five."""
+    high = 0
+    for seed in range(30):
+        few = session(hexapod, true, 6, 100 + seed)
+        values = few.values.copy()
+        values[2] += 3.0
+        first = session(hexapod, true, 30, seed)
+        found = fitted(hexapod, first, free="offset*", holdout=replace(few, values=values))
+        assert found.holdout.test is not None and 2 in found.holdout_outliers
+        high += found.holdout.test.contradicts
+        rest = found.holdout_distances.rms_without_outliers / found.holdout_expected
+        assert not found.holdout_contradicts or rest > 1.2
+    assert high  # else nothing was tested
+
+
 def test_a_few_held_out_points_that_are_off_are_named(hexapod: pk.Robot, true: pk.Robot) -> None:
     other = session(hexapod, true, 60, 1)
     values = other.values.copy()
