@@ -363,7 +363,7 @@ class Kinematics:
         parts = self.machine, self.model.map, self.slots, self.frames
         found = complete(*parts, rows, places, near)
         # what is not matched may have started on the other side of a singularity
-        lost = np.flatnonzero(np.isnan(found.q).any(axis=1))
+        lost = np.flatnonzero(np.isnan(found.q).any(axis=1) & np.isfinite(rows).all(axis=1))
         if lost.size:
             start = np.tile(self.home, (len(lost), 1))
             start[:, places] = rows[lost][:, places]
