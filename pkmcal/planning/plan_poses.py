@@ -263,7 +263,7 @@ def plan_poses(
         found = design.grown(*each)
     else:
         found = design.reaching(_accuracy(accuracy, everything, len(q)))
-    ways, home = _drives(machine, poses, q)
+    ways, home = _drives(machine, q)
     places = np.tile(ways, (len(kinds), 1))
     order, travel = short_tour(places[found], home)
     found = found[order]
@@ -332,7 +332,7 @@ def _of(name: str, given: Any, kind: Kind, kinds: Sequence[Kind]) -> Any:
     return given.get(kind)
 
 
-def _drives(robot: Calibratable, poses: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _drives(robot: Calibratable, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     """How far the drives are out (N, n), and at home, mm, angles as arcs; zero of an arm.
 
     Lengths and angles, whatever the actuators read: those may be steps or turns.
@@ -340,8 +340,8 @@ def _drives(robot: Calibratable, poses: FloatArray, q: FloatArray) -> tuple[Floa
     if not isinstance(robot, Robot):
         arcs = mm_per_unit(robot.actuator_units, robot.length)
         return q * arcs, np.zeros(robot.n_actuators)
-    home = robot.commanded(robot.home)[0]
-    drives = robot.feasible(np.vstack([home, poses])).drive
+    home = robot.commanded(robot.home)[1]
+    drives = robot.machine.drives(robot.slots, np.vstack([home, q]))
     drives = drives * np.array([robot.length if d.angle else 1.0 for d in robot.model.drives])
     return drives[1:], drives[0]
 
