@@ -72,7 +72,7 @@ def test_the_report_states_its_schema(run: Any) -> None:
 ERRORS = [
     (("check", "hexapd"), "input", 2, (None, None, None)),
     (("check", "linear-delta", "m.csv"), "input", 2, ("m.csv", 2, "z")),
-    (("check", "absent.toml"), "input", 2, (None, None, None)),
+    (("check", "absent.toml"), "input", 2, ("absent.toml", None, None)),
     (("chek", "hexapod"), "input", 2, (None, None, None)),
 ]
 
