@@ -277,15 +277,11 @@ class Identification(Parts, Result):
         return str(self)
 
     def _parts(self) -> Iterator[str | Table]:
-        count, verdict = len(self.rows), self.verdict
+        verdict = self.verdict
         yield summary.filled("", str(verdict))
         yield from (summary.filled("  also: ", text) for text in verdict.reasons[1:])
         yield from (summary.filled("  note: ", text) for text in verdict.remarks)
-        what = "row" if np.isnan(self.rms) else "measured point"
-        yield (
-            f"{self.robot.name}: {len(self.free)} parameters from {count} {what}"
-            f"{'s' if count > 1 else ''}"
-        )
+        yield f"{self.robot.name}: {len(self.free)} parameters from {summary.counts(self.read)}"
         if self.sessions:
             yield summary.sessions(self.sessions)
         if heat := in_words(self.fit.equations.sets, self.expansion, self.fit.parameters.robot):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.calibration.datum import NO_DATUM, Datum
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.fit_statistics import (
@@ -151,6 +151,12 @@ class Parts(MisfitNames):
     def sessions(self) -> tuple[str, ...]:
         """The fitted sessions, in the order of their first rows; empty without `per_session`."""
         return self.fit.parameters.sessions
+
+    @property
+    def read(self) -> BoolArray:
+        """Of which fitted rows (N,) more is known than where the actuators were."""
+        read: BoolArray = self.fit.equations.count > 0
+        return read
 
     @property
     def expansion(self) -> dict[str, float]:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from pkmcal import display
+from pkmcal.arrays import BoolArray
 from pkmcal.calibration.distances import Distances
 from pkmcal.calibration.fit_statistics import Identifiability, Misfit, ParameterTable, Repeats
 from pkmcal.calibration.holdout import HeldOut
@@ -41,6 +42,19 @@ def misfit_table(misfit: Misfit, holdout: HeldOut) -> Table:
         or (k == 6 and any(row[6] for row in rows))
     ]  # fmt: skip
     return Table([heads[k] for k in kept], [[row[k] for k in kept] for row in rows], left=1)
+
+
+def counts(read: BoolArray) -> str:
+    """How many rows were fitted, and in how many of them more was read than the actuators."""
+    points, others = int(read.sum()), int((~read).sum())
+    found = []
+    if points:
+        found.append(f"{points} measured point{'s' if points > 1 else ''}")
+    if others:
+        found.append(f"{others} row{'s' if others > 1 else ''}")
+        if points:
+            found[-1] += " where only actuators were read"
+    return " and ".join(found)
 
 
 def _cells(before: Distances, after: Distances, outliers: Sequence[int]) -> list[str]:

@@ -268,7 +268,8 @@ def _misfit(found: Parts) -> tuple[float, float, str]:
         return found.closure_rms_before, found.closure_rms, what
     else:
         first, last = found.distances_before, found.distances
-        name = _points(len(found.rows), "fitted", len(found.outliers))
+        points = found.rows[found.read]
+        name = _points(len(points), "fitted", int(np.isin(points, found.outliers).sum()))
     return first.rms_without_outliers, last.rms_without_outliers, name
 
 

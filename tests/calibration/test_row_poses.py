@@ -395,6 +395,24 @@ def test_what_self_calibration_leaves_open_is_named(
     assert (found.rank < len(found.free)) == bool(told)
 
 
+@pytest.mark.parametrize(("kind", "said"), [
+    ("all", "from 60 measured points\n"),
+    ("third", "from 20 measured points and 40 rows where only actuators were read\n"),
+    ("mixed", "from 40 measured points and 20 rows where only actuators were read\n"),
+    ("none", "from 60 rows\n"),
+])  # fmt: skip
+def test_points_are_counted_where_something_was_read(
+    cables: pk.Robot, kind: Kind, said: str
+) -> None:
+    found = pk.identify(cables, measured(simulated(0, 60, kind)))
+    assert said in found.summary()
+    if kind != "none":
+        points = said.split()[1]
+        fitted = [*found.verdict.reasons, str(found.verdict)]
+        assert all(f"{points} fitted" in text for text in fitted if " fitted point" in text)
+        assert sum(" fitted point" in text for text in fitted) > 0
+
+
 def test_points_held_out_are_missed_as_expected(cables: pk.Robot) -> None:
     off, expected = [], []
     for seed in range(6):
