@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.checks.finding import Finding
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
-from pkmcal.kinematics.tensions import tensions
+from pkmcal.kinematics.tensions import Tensions, tensions
 
 _PRELOAD, _SOME = 1.0, 1e-3  # N: without a load, and with one of 1 N
 
@@ -48,13 +48,31 @@ def said_of_cables(robot: Robot) -> str:
     return said
 
 
+def unpulled(robot: Robot, poses: FloatArray) -> BoolArray:
+    """At which poses (N, 6) some cable of a machine on cables alone would have to push.
+
+    Against what holds it at home: each other, or a force along an axis. None where nothing does.
+    """
+    none = np.zeros(len(poses), dtype=bool)
+    held = _held_by(robot) if on_cables(robot) else None
+    if held is None:
+        return none
+    found = tensions(robot, poses, least=_PRELOAD) if held == "" else _loaded(robot, poses, held)
+    return ~found.ok
+
+
+def _loaded(robot: Robot, poses: FloatArray, axis: str) -> Tensions:
+    """Tensions with 1 N along an axis."""
+    force: FloatArray = np.zeros(3)
+    force["xyz".index(axis[1])] = 1.0 if axis[0] == "+" else -1.0
+    return tensions(robot, poses, force, least=_SOME)
+
+
 def _held_by(robot: Robot) -> str | None:
     """The axis of a force with which all cables pull at home; "" without one, None with none."""
     if tensions(robot, robot.home, least=_PRELOAD).ok:
         return ""
     for axis in ("-z", "-y", "-x", "+z", "+y", "+x"):
-        force: FloatArray = np.zeros(3)
-        force["xyz".index(axis[1])] = 1.0 if axis[0] == "+" else -1.0
-        if axis[1] in robot.coordinates and tensions(robot, robot.home, force, least=_SOME).ok:
+        if axis[1] in robot.coordinates and _loaded(robot, robot.home, axis).ok:
             return axis
     return None

@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import number, whole, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows, mm_per_unit
+from pkmcal.checks.cables import unpulled
 from pkmcal.core.library import POSE
-from pkmcal.display import Table, fixed
+from pkmcal.display import Table, first_rows, fixed
 from pkmcal.estimation.parameters import Parameters, Prior
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import ideal
@@ -141,6 +142,11 @@ class Plan(Result):
             yield "in the machine's own frame: nothing that is read says where it stands"
         if not np.isfinite(self.predicted):
             yield "too few to identify all of them"
+        if isinstance(self.robot, Robot) and (off := unpulled(self.robot, self.poses)).any():
+            yield (
+                f"some cable would have to push at {_poses(int(off.sum()))}, which plans do not"
+                f" leave out, but pk.tensions finds: candidates {first_rows(self.indices[off])}"
+            )
         yield Table(heads, rows)
 
 
