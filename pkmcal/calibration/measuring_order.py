@@ -112,15 +112,14 @@ def measuring_order(fit: Fit, odd: Collection[int]) -> MeasuringOrder | None:
     if not known:
         return None
     series, first, course = min(known, key=lambda each: each[2].chance)
-    sets = fit.uncertainty.equations.sets
-    units = {n: u for m in sets for n, u in zip(m.components, m.units, strict=True)}
+    names, units = zip(*_components(fit).items(), strict=True)
     read = np.flatnonzero(course.scatter)
     at = [] if course.jump is None else [visits.row[first + course.jump]]
     return MeasuringOrder(
-        components=tuple(list(units)[k] for k in read),
+        components=tuple(names[k] for k in read),
         shift=tuple(course.shift[read].tolist()),
         scatter=tuple(course.scatter[read].tolist()),
-        units=tuple(list(units.values())[k] for k in read),
+        units=tuple(units[k] for k in read),
         chance=min(1.0, len(known) * course.chance),
         share=course.share,
         jump=row_names(fit.equations.datasets, at),
@@ -192,12 +191,16 @@ def _series(datasets: Sequence[FitData]) -> tuple[IntArray, tuple[str, ...]]:
     return np.concatenate(found), tuple(names)
 
 
+def _components(fit: Fit) -> dict[str, str]:
+    """What was read, of all sets, and its unit."""
+    sets = fit.uncertainty.equations.sets
+    return {n: u for m in sets for n, u in zip(m.components, m.units, strict=True)}
+
+
 def _by_component(fit: Fit) -> FloatArray:
     """How equations (M, k) change if what was read does by 1, mm or rad."""
     equations = fit.uncertainty.equations
-    numbers = {
-        n: k for k, n in enumerate(dict.fromkeys(n for m in equations.sets for n in m.components))
-    }
+    numbers = {n: k for k, n in enumerate(_components(fit))}
     parts = []
     for m in equations.sets:
         one = np.eye(len(numbers))[[numbers[n] for n in m.components]]

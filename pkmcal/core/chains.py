@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from pkmcal._core import ffi, lib
-from pkmcal.arrays import FloatArray, Int32Array, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core import screws
 from pkmcal.core.chain_actuators import coordinates
 from pkmcal.core.chain_readings import readings
@@ -97,10 +97,19 @@ class ChainLayout:
     @property
     def shared(self) -> int:
         """How many passive joints are in several chains."""
-        chains = np.diff(self.first)
-        of = np.repeat(np.arange(len(chains)), chains)
-        users = [len(set(of[self.member == joint])) for joint in range(len(self.place))]
-        return int(((np.array(users) > 1) & (self.coordinate >= 0)).sum())
+        return int((self._in_several & (self.coordinate >= 0)).sum())
+
+    @property
+    def _chain(self) -> IntArray:
+        """Of each member the chain."""
+        return np.repeat(np.arange(len(self.ball)), np.diff(self.first))
+
+    @property
+    def _in_several(self) -> BoolArray:
+        """Of each joint whether it is in several chains."""
+        of = self._chain
+        users = [len(set(of[self.member == joint].tolist())) for joint in range(len(self.place))]
+        return np.array(users) > 1
 
     @property
     def steps(self) -> FloatArray:
@@ -120,18 +129,19 @@ class ChainLayout:
     @property
     def loose(self) -> bool:
         """Whether a chain that shares a joint has more joints than rows: others must hold it."""
-        of = np.repeat(np.arange(len(self.ball)), np.diff(self.first))
-        users = [len(set(of[self.member == joint].tolist())) for joint in range(len(self.place))]
-        shares = np.array(users)[self.member] > 1
-        more = np.diff(self.first) > np.where(self.ball != 0, 3, GROUPS[self.map])
-        return bool((shares & more[of]).any())
+        more = np.diff(self.first) > self._closing
+        return bool((self._in_several[self.member] & more[self._chain]).any())
+
+    @property
+    def _closing(self) -> IntArray:
+        """In how many ways each chain is closed."""
+        return np.where(self.ball != 0, 3, GROUPS[self.map])
 
     @property
     def rows(self) -> int:
         """How many rows the chains leave when each has eliminated the passive joints of its own."""
         own = self.coordinate[self.member] >= self.shared
-        most = np.where(self.ball != 0, 3, GROUPS[self.map])
-        return int(most.sum() - own.sum())
+        return int(self._closing.sum() - own.sum())
 
 
 class ChainMachine(CoreMachine):

@@ -179,7 +179,7 @@ class Laws:
             found.way[...] -= 0.5 * approach * numbers[:, self._backlash]
         if tension is None:
             return found
-        longer = 1.0 + tension * numbers[:, self._stretch]
+        longer = self._longer(numbers, tension)
         return Ways(found.way * longer, found.slope * longer, found.bend * longer)
 
     def by_number(
@@ -205,8 +205,10 @@ class Laws:
             elif kind == "backlash":
                 out[:, i] = 0.0 if approach is None else -0.5 * np.atleast_2d(approach)[:, d]
             elif kind == "stretch":
-                out[:, i] = 0.0 if tension is None else self.ways(slots, q, approach).way[:, d]
-                out[:, i] *= 0.0 if tension is None else np.atleast_2d(tension)[:, d]
+                out[:, i] = 0.0
+                if tension is not None:
+                    way = self.ways(slots, q, approach).way[:, d]
+                    out[:, i] = way * np.atleast_2d(tension)[:, d]
             elif kind in base:
                 x = np.empty((len(q), 5))
                 x[:, 0], x[:, 1:] = at[:, d], numbers[:, self._base[d]]
@@ -220,8 +222,13 @@ class Laws:
                 x = np.column_stack([at[:, d], np.full(len(q), k), np.zeros((len(q), 2))])
                 out[:, i] = rows("law_harmonic", x)[1][:, 1 if kind == "cos" else 2]
             if tension is not None and kind != "stretch":
-                out[:, i] *= (1.0 + tension * numbers[:, self._stretch])[:, d]
+                out[:, i] *= self._longer(numbers, tension)[:, d]
         return out
+
+    def _longer(self, numbers: FloatArray, tension: FloatArray) -> FloatArray:
+        """How many times as long the ways are under a tension."""
+        longer: FloatArray = 1.0 + tension * numbers[:, self._stretch]
+        return longer
 
     def readings(
         self,
@@ -237,7 +244,7 @@ class Laws:
         """
         numbers = self._numbers(slots)
         if tension is not None:
-            way = way / (1.0 + tension * numbers[:, self._stretch])
+            way = way / self._longer(numbers, tension)
         rest = way - numbers[:, self._offset]
         if approach is not None:
             rest = rest + 0.5 * approach * numbers[:, self._backlash]

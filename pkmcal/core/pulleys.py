@@ -94,20 +94,28 @@ class PulleyMachine(Machine):
 
     # cables and the machine of limbs that stands for them -----------------------------------------
 
-    def cables(self, slots: FloatArray, pose: FloatArray) -> _Cables:
-        """Look at the cables at poses (N, 6) as given."""
+    def _ends(
+        self, slots: FloatArray, pose: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The cables' numbers, where they end at poses (N, 6), and by twists, (N, cables, ...)."""
         n, k, width = len(pose), len(self._over), slots.shape[-1]
         mine = np.broadcast_to(slots[..., self._over, :], (n, k, width))
         joints = np.ascontiguousarray(mine[..., 3:6]).reshape(n * k, 3)
         end, by_twist, _ = instruments.points(np.repeat(pose, k, axis=0), joints, self.isa)
+        return mine, end.reshape(n, k, 3), by_twist.reshape(n, k, 3, 6)
+
+    def cables(self, slots: FloatArray, pose: FloatArray) -> _Cables:
+        """Look at the cables at poses (N, 6) as given."""
+        mine, end, by_twist = self._ends(slots, pose)
+        n, k, width = mine.shape
         found = _Cables(
-            end.reshape(n, k, 3),
+            end,
             np.ones((n, k)),
             np.empty((n, k)),
             np.empty((n, k, 3)),
             np.zeros((n, k, width)),
             np.empty((n, k, 3, 3)),
-            by_twist.reshape(n, k, 3, 6),
+            by_twist,
         )
         if len(self._pulleys):
             length, pull, by_own, bend, *_ = self._over_pulleys(mine, found.end)
@@ -166,14 +174,11 @@ class PulleyMachine(Machine):
         By the platform's twist (ω, v) (N, pulleys, 6) and by the numbers of their limbs
         (N, pulleys, SLOTS).
         """
-        cables, p = self.cables(slots, pose), self._of_pulleys
-        mine = np.broadcast_to(
-            slots[..., self._over, :], (len(pose), len(self._over), slots.shape[-1])
-        )
-        found = _Swivels(*self._over_pulleys(mine, cables.end)[4:])
+        mine, end, by_twist = self._ends(slots, pose)
+        found = _Swivels(*self._over_pulleys(mine, end)[4:])
         by_number = np.zeros((*found.turned.shape, len(SLOTS)))
         by_number[..., 0:3] = -found.by_end
-        turned = np.einsum("nkj,nkjt->nkt", found.by_end, cables.by_twist[:, p])
+        turned = np.einsum("nkj,nkjt->nkt", found.by_end, by_twist[:, self._of_pulleys])
         frame = rows("points", pose, np.zeros(3), isa=self.isa)[2]  # R
         by_number[..., 3:6] = np.einsum("nkj,nji->nki", found.by_end, frame)
         by_number[..., _OWN] = found.by_own

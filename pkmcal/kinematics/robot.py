@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from copy import copy
 from dataclasses import fields, replace
 from functools import cached_property
@@ -525,11 +525,7 @@ class Robot(Kinematics, Result):
         rows, shape = as_rows("approach", approach, self.n_actuators)
         if not np.isin(rows, (-1.0, 0.0, 1.0)).all():
             raise ArgumentError("approach must be 1, -1 or 0 for each actuator")
-        if not self.model.driven:
-            return self
-        other = copy(self)
-        other.machine = self.machine.approaching(rows[0] if shape == () else rows)
-        return other
+        return self._with_drives(self.machine.approaching, rows[0] if shape == () else rows)
 
     def tensioned(self, tension: ArrayLike) -> Robot:
         """The robot with cables, belts or screws under tension, for laws with `stretch`.
@@ -560,10 +556,16 @@ class Robot(Kinematics, Result):
         rows, shape = as_rows("tension", tension, self.n_actuators)
         if not np.isfinite(rows).all():
             raise ArgumentError("tension must be finite")
+        return self._with_drives(self.machine.tensioned, rows[0] if shape == () else rows)
+
+    def _with_drives(
+        self, changed: Callable[[FloatArray], CompiledMachine], state: FloatArray
+    ) -> Robot:
+        """The robot with its drives, where they have laws, in another state."""
         if not self.model.driven:
             return self
         other = copy(self)
-        other.machine = self.machine.tensioned(rows[0] if shape == () else rows)
+        other.machine = changed(state)
         return other
 
     @cached_property

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.files.csv_table import Table
 from pkmcal.kinematics.reading_units import Actuated, gain_of
 
@@ -40,6 +41,17 @@ def columns_of_actuators(table: Table, what: str, count: int) -> list[str]:
     if more:
         raise table.header_error(f"column {more[0]!r} goes with no actuator: the last is q{count}")
     return each
+
+
+def read_of_actuators(
+    table: Table, what: str, count: int, read: Callable[[str], IntArray | FloatArray]
+) -> FloatArray | None:
+    """Columns of each actuator or one for all, (rows, n); None without any."""
+    names = columns_of_actuators(table, what, count)
+    if not names:
+        return None
+    columns = np.stack([read(name) for name in names], axis=1).astype(np.float64)
+    return np.broadcast_to(columns, (len(table), count))
 
 
 def read_actuators(table: Table, robot: Actuated | None) -> tuple[FloatArray, tuple[str, ...]]:

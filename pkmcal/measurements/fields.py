@@ -165,17 +165,11 @@ def actuator_sigma_array(given: ArrayLike | None, shape: tuple[int, ...]) -> Flo
     """Standard deviations of the actuators (N, n), of which some may be 0 in all rows."""
     if given is None:
         return None
-    sigma = numbers("actuator_sigma", given)
-    if sigma.shape not in ((), shape[1:], shape):
-        raise ArgumentError(
-            f"actuator_sigma must be a number or have shape {shape[1:]} or {shape}; found"
-            f" {sigma.shape}"
-        )
-    whole = np.array(np.broadcast_to(sigma, shape))
+    whole = _of_actuators("actuator_sigma", given, shape)
     if (whole < 0).any() or ((whole == 0).any(axis=0) & (whole > 0).any(axis=0)).any():
         raise ArgumentError(
             "actuator_sigma must be positive, or 0 for an actuator in all rows; found"
-            f" {sigma.min():g} (None means not known)"
+            f" {whole.min():g} (None means not known)"
         )
     return whole
 
@@ -269,25 +263,23 @@ def approach_array(given: ArrayLike | None, actuators: FloatArray) -> FloatArray
         for row, before in zip(moved[1:], moved[:-1], strict=True):
             row[row == 0.0] = before[row == 0.0]  # it stood still since
         return np.asarray(moved)
-    found = numbers("approach", given)
-    if found.shape not in ((), actuators.shape[1:], actuators.shape):
-        raise ArgumentError(
-            f"approach must be one number or have shape {actuators.shape[1:]} or"
-            f" {actuators.shape}; found {found.shape}"
-        )
+    found = _of_actuators("approach", given, actuators.shape)
     if not np.isin(found, (-1.0, 0.0, 1.0)).all():
         raise ArgumentError("approach must be 1, -1 or 0 for each actuator")
-    return np.array(np.broadcast_to(found, actuators.shape))
+    return found
 
 
 def tension_array(given: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None:
     """Tension of what each actuator drives (N, n), N."""
-    if given is None:
-        return None
-    found = numbers("tension", given)
+    return None if given is None else _of_actuators("tension", given, shape)
+
+
+def _of_actuators(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+    """Numbers of each actuator (N, n), given for all, for each or for each row."""
+    found = numbers(name, given)
     if found.shape not in ((), shape[1:], shape):
         raise ArgumentError(
-            f"tension must be one number or have shape {shape[1:]} or {shape}; found {found.shape}"
+            f"{name} must be one number or have shape {shape[1:]} or {shape}; found {found.shape}"
         )
     return np.array(np.broadcast_to(found, shape))
 

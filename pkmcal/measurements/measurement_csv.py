@@ -61,9 +61,9 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements import orientation_columns
 from pkmcal.measurements.actuator_columns import (
     actuators_in,
-    columns_of_actuators,
     compare,
     read_actuators,
+    read_of_actuators,
 )
 from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.components import KINDS, Kind
@@ -417,20 +417,12 @@ def _nominal(robot: Actuated | None, actuators: FloatArray) -> FloatArray | None
 
 def _read_approach(table: Table, count: int) -> FloatArray | None:
     """From where each actuator came (rows, n)."""
-    names = columns_of_actuators(table, "approach", count)
-    if not names:
-        return None
-    columns = np.stack([table.integers(name) for name in names], axis=1)
-    return np.broadcast_to(columns.astype(np.float64), (len(table), count))
+    return read_of_actuators(table, "approach", count, table.integers)
 
 
 def _read_tension(table: Table, count: int) -> FloatArray | None:
     """Tension of what each actuator drives (rows, n), N."""
-    names = columns_of_actuators(table, "tension", count)
-    if not names:
-        return None
-    columns = np.stack([table.numbers(name, "N")[0] for name in names], axis=1)
-    return np.broadcast_to(columns, (len(table), count))
+    return read_of_actuators(table, "tension", count, lambda name: table.numbers(name, "N")[0])
 
 
 def _read_session(table: Table) -> TextArray | None:

@@ -129,8 +129,13 @@ class Series:
 
     @cached_property
     def _left(self) -> FloatArray:
-        left: FloatArray = self.residual - self._known @ (self._known.T @ self.residual)
-        return left
+        """The residuals beside that."""
+        return self._beside(self.residual)
+
+    def _beside(self, columns: FloatArray) -> FloatArray:
+        """What of columns (E, ...) parameters and constants do not explain."""
+        beside: FloatArray = columns - self._known @ (self._known.T @ columns)
+        return beside
 
     def course(self) -> Course | None:
         """Test the series; None where too little is left to say."""
@@ -138,8 +143,7 @@ class Series:
         when = (np.arange(self.visits) + 0.5) / self.visits
         waves = np.cos(np.pi * when[:, None] * np.arange(1, WAVES + 1))
         columns = (self._own[:, :, None] * waves[self.visit][:, None]).reshape(len(self.visit), -1)
-        beside = columns - self._known @ (self._known.T @ columns)
-        turn, sizes, back = np.linalg.svd(beside, full_matrices=False)
+        turn, sizes, back = np.linalg.svd(self._beside(columns), full_matrices=False)
         new = sizes > _NEW * float(np.linalg.norm(columns, axis=0).max())
         taken = int(new.sum())
         freedom = len(self.residual) - self._known.shape[1] - taken

@@ -209,10 +209,8 @@ def told_apart(
     prior_residual : ndarray (q,)
         Residuals of the prior's rows.
     """
-    present, of_present = (
-        _Model(fit, candidates[0], prior_residual).highest(fit.freedom),
-        candidates[0],
-    )
+    of_present = candidates[0]
+    present = _Model(fit, of_present, prior_residual).highest(fit.freedom)
     found = None
     for classes in candidates[1:]:
         many = int(classes.max()) + 1

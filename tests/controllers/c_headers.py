@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 import shutil
 import subprocess
+from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,11 @@ STRICT = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror"
 PARALLEL = [
     name for name in pk.machines() if name not in CHAINS and isinstance(pk.load(name), pk.Robot)
 ]
+
+FRAMES = {
+    "base": {"x": 10.0, "y": -20.0, "z": 30.0, "alpha": 0.1, "beta": -0.2, "gamma": 2.5},
+    "tool": {"x": 1.0, "y": 2.0, "z": -40.0, "alpha": -0.3, "beta": 0.1, "gamma": 0.2},
+}
 
 _LIBRARY = """\
 #include "robot.h"
@@ -48,6 +55,18 @@ def compiled(robot: pk.Robot, folder: Path, number: Any = "double", compiler: st
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
     return Library(ctypes.CDLL(str(built)), robot, number)
+
+
+def compiled_once(
+    cases: Mapping[str, Callable[[], pk.Robot]], folders: pytest.TempPathFactory
+) -> Callable[[str, str], Any]:
+    """The functions of a case's header as compiled by gcc, once."""
+
+    @cache
+    def of_case(case: str, number: str) -> Any:
+        return compiled(cases[case](), folders.mktemp("header"), number)
+
+    return of_case
 
 
 class Library:

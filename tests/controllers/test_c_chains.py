@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -17,8 +16,7 @@ from .. import robots
 from ..chain_files import BOOMS, as_chains, leg_on_leg
 from ..driven import content, parsed, with_laws
 from ..workspaces import CHAINS
-from .c_headers import STRICT, compiled, needed
-from .test_c_header import FRAMES
+from .c_headers import FRAMES, STRICT, compiled, compiled_once, needed
 
 
 def disturbed(robot: pk.Robot) -> pk.Robot:
@@ -70,13 +68,8 @@ def poses_of(robot: pk.Robot) -> Any:
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Return a function that gives the header of a case as compiled by gcc, once."""
-
-    @cache
-    def of_case(case: str, number: str) -> Any:
-        return compiled(CASES[case](), tmp_path_factory.mktemp("header"), number)
-
-    return of_case
+    """Give the header of a case as compiled by gcc, once."""
+    return compiled_once(CASES, tmp_path_factory)
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import subprocess
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +13,7 @@ import pkmcal as pk
 
 from .. import generated, robots
 from ..driven import with_laws
-from .c_headers import PARALLEL, STRICT, compiled, needed
-
-FRAMES = {
-    "base": {"x": 10.0, "y": -20.0, "z": 30.0, "alpha": 0.1, "beta": -0.2, "gamma": 2.5},
-    "tool": {"x": 1.0, "y": 2.0, "z": -40.0, "alpha": -0.3, "beta": 0.1, "gamma": 0.2},
-}
+from .c_headers import FRAMES, PARALLEL, STRICT, compiled, compiled_once, needed
 
 
 def poses_of(robot: pk.Robot, count: int = 200) -> Any:
@@ -229,13 +223,8 @@ SOME = [
 
 @pytest.fixture(scope="module")
 def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Return a function that gives the header of a case as compiled by gcc, once."""
-
-    @cache
-    def of_case(case: str, number: str) -> Any:
-        return compiled(CASES[case](), tmp_path_factory.mktemp("header"), number)
-
-    return of_case
+    """Give the header of a case as compiled by gcc, once."""
+    return compiled_once(CASES, tmp_path_factory)
 
 
 @pytest.mark.parametrize("seed", range(2))

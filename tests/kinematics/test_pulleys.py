@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 import pkmcal as pk
 from pkmcal.core.library import rows
 
+from .paths import on_a_path
+
 CORNERS = np.array([
     [sx * 2000.0, sy * 1500.0, 2500.0 if up else 0.0]
     for up in (1, 0)
@@ -219,26 +221,13 @@ def test_the_jacobian_and_its_errors_by_differences(three: pk.Robot) -> None:
 
 def test_rates_and_accelerations_by_differences(eight: pk.Robot, three: pk.Robot) -> None:
     """Of the actuators along a path of the platform, and of the platform along one of these."""
-    h = 1e-3
     for robot in (eight, three):
-        free = np.array([1, 1, 1, 0, 0, 0]) if robot is three else np.ones(6)
-        a = POSES[1] * free
-        b = np.array([50.0, 80, -60, 0.2, -0.1, 0.15]) * free
-        c = np.array([30, -40, 20, -0.1, 0.2, 0.1]) * free
-        path = [a + b * t + c * t * t for t in (-h, 0.0, h)]
-        q = robot.inverse(np.array(path))
-        speed, bend = (q[2] - q[0]) / (2 * h), (q[2] - 2 * q[1] + q[0]) / h**2
-        frames = [pk.screw.from_pose(pose) for pose in path]
-        turned, accelerated = (
-            (frames[2] - frames[0]) / (2 * h),
-            (frames[2] - 2 * frames[1] + frames[0]) / h**2,
-        )
-        motion = np.array([frames[1], turned, accelerated])
+        at, q, speed, bend, motion = on_a_path(robot, POSES[1])
         velocity, acceleration = robot.rates(motion)
         np.testing.assert_allclose(velocity, speed, atol=1e-4)
         np.testing.assert_allclose(acceleration, bend, atol=1e-3)
     back, _, _ = robot.machine.motion(
-        robot.slots, a[None], q[1][None], velocity[None], acceleration[None]
+        robot.slots, at[None], q[None], velocity[None], acceleration[None]
     )
     np.testing.assert_allclose(back[0, :, :3], motion[:, :3], atol=1e-6)
 

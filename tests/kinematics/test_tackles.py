@@ -11,6 +11,7 @@ import pytest
 import pkmcal as pk
 from pkmcal.exceptions import FileError
 from pkmcal.kinematics import pose_steps
+from tests.kinematics.paths import on_a_path
 from tests.robots import made
 
 # A point in the plane on three cables over four anchors; numbers of parts as a real one has.
@@ -199,27 +200,13 @@ def test_errors_of_every_number_move_the_pose(three: pk.Robot) -> None:
 
 
 def test_rates_and_accelerations_by_differences(eight: pk.Robot, three: pk.Robot) -> None:
-    h = 1e-3
     for robot in (eight, three):
-        free = np.array([1, 1, 1, 0, 0, 0]) if robot is three else np.ones(6)
-        a = POSES[1] * free
-        b = np.array([50.0, 80, -60, 0.2, -0.1, 0.15]) * free
-        c = np.array([30, -40, 20, -0.1, 0.2, 0.1]) * free
-        path = [a + b * t + c * t * t for t in (-h, 0.0, h)]
-        q = robot.inverse(np.array(path))
-        frames = [pk.screw.from_pose(pose) for pose in path]
-        motion = np.array([
-            frames[1],
-            (frames[2] - frames[0]) / (2 * h),
-            (frames[2] - 2 * frames[1] + frames[0]) / h**2,
-        ])  # fmt: skip
+        at, q, speed, bend, motion = on_a_path(robot, POSES[1])
         velocity, acceleration = robot.rates(motion)
-        np.testing.assert_allclose(velocity, (q[2] - q[0]) / (2 * h), rtol=1e-6, atol=1e-4)
-        np.testing.assert_allclose(
-            acceleration, (q[2] - 2 * q[1] + q[0]) / h**2, rtol=2e-5, atol=1e-3
-        )
+        np.testing.assert_allclose(velocity, speed, rtol=1e-6, atol=1e-4)
+        np.testing.assert_allclose(acceleration, bend, rtol=2e-5, atol=1e-3)
         back, _, _ = robot.machine.motion(
-            robot.slots, a[None], q[1][None], velocity[None], acceleration[None]
+            robot.slots, at[None], q[None], velocity[None], acceleration[None]
         )
         np.testing.assert_allclose(back[0, :, :3], motion[:, :3], rtol=1e-6, atol=1e-4)
 
