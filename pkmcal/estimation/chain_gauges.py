@@ -15,6 +15,7 @@ from pkmcal.estimation.parameters import Parameters
 from pkmcal.kinematics.pose_steps import moved, step_units
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
+from pkmcal.statistics.linear_fit import column_basis
 
 _POSES = 12
 _WAY = 0.2  # rad, and of the characteristic length: how far they spread
@@ -55,19 +56,13 @@ def frame_motions(
     )
     if not (len(pose) and np.isfinite(effects).all()):
         return np.empty((changes.shape[1], 0)), np.empty((12, 0))
-    others = np.vstack([_across(motions, effects), np.abs(effects).max() * beside])
+    span = column_basis(motions)
+    outside = effects - span @ (span.T @ effects)
+    others = np.vstack([outside, np.abs(effects).max() * beside])
     _, size, rows = np.linalg.svd(others, full_matrices=True)
     size = np.append(size, np.zeros(len(rows) - len(size)))
     found = rows[size <= _OUTSIDE * np.linalg.norm(effects, axis=0).max()].T
     return found, np.linalg.qr(np.linalg.pinv(motions) @ effects @ found).Q
-
-
-def _across(span: FloatArray, columns: FloatArray) -> FloatArray:
-    """What of the columns is outside the span."""
-    axes, size, _ = np.linalg.svd(span, full_matrices=False)
-    axes = axes[:, size > 1e-9 * size.max(initial=0.0)]
-    outside: FloatArray = columns - axes @ (axes.T @ columns)
-    return outside
 
 
 def _around_home(robot: Robot) -> tuple[FloatArray, FloatArray]:
