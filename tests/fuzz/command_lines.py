@@ -99,11 +99,9 @@ def _no_json(word: str) -> None:
 
 
 _QUICK = """
-machines --json
 new hexapod mine.toml
 check robot.toml --json
 check hexapod
-show hexapod
 tolerance 2tpr2tps --sigma 0.1 --samples 100 --json
 plan robot.toml --count 8 --kind height --prior 0.5 --out plan --json
 calibrate robot.toml probe.csv --prior 0.5 --json
@@ -116,12 +114,14 @@ inverse 2tpr2tps desired.csv --match --out . --force
 forward hexapod 700,700,700,700,700,700 --json
 """
 _SLOW = """
+machines --json
+show hexapod
 demo --seed 3 --json
 sensitivity 2tpr2tps --step 0.1 --json
 tolerance hexapod --allowed 0.1
 calibrate robot.toml probe.csv --prior 0.5 --holdout 0.2 --report out --force
 """
-_QUICKER = 15  # times as often as those that draw or simulate, which take seconds
+_QUICKER = 15  # times as often as those that draw or simulate, which take up to seconds
 _WORDS = b"""
 --json --force --help --version --rad --match --common --project --seed --samples --out --report
 --free --prior --holdout --loss --frame --target --tracker --poses --targets --criterion --kind
