@@ -394,7 +394,7 @@ def _read_values(
     if KINDS[kind].turning is not None and names_in(table) not in ((), ANGLES):
         places = [table.numbers(axis, "mm")[0] for axis in _AXES] if kind == "pose" else []
         nominal = _nominal(robot, actuators)
-        from pkmcal.measurements import orientation_forms  # with SciPy's rotations, if there are any
+        from pkmcal.measurements import orientation_forms  # imports SciPy
 
         return np.column_stack([*places, orientation_forms.read(table, rotation, nominal)])
     columns = [table.numbers(*component, blank=True)[0] for component in value_columns(table, kind)]
