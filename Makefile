@@ -97,10 +97,15 @@ fuzz-abi: $(FUZZED)/abi
 	$(FUZZED)/abi -runs=$(COUNT) -seed=$(SEED) -len_control=0 -max_len=600 -print_final_stats=1 \
 		-artifact_prefix=$(FUZZED)/ $(FUZZED)/corpus
 
-$(FUZZED)/abi: tests/fuzz/abi.c $(wildcard tests/fuzz/*.h csrc/*.c csrc/*.h generated/*.h) | $(FUZZED)
-	for each in $(filter %.c,$^); do clang $(FUZZ_FLAGS) -fsanitize=fuzzer-no-link -c $$each \
-		-o $(FUZZED)/$$(basename $$(dirname $$each))-$$(basename $$each .c).o || exit 1; done
-	clang -fsanitize=fuzzer,address,undefined $(FUZZED)/*.o -lm -o $@
+FUZZ_HEADERS := $(wildcard tests/fuzz/*.h csrc/*.h generated/*.h)
+$(FUZZED)/abi: $(patsubst csrc/%.c,$(FUZZED)/csrc-%.o,$(wildcard csrc/*.c)) $(FUZZED)/fuzz-abi.o
+	clang -fsanitize=fuzzer,address,undefined $^ -lm -o $@
+
+$(FUZZED)/csrc-%.o: csrc/%.c $(FUZZ_HEADERS) | $(FUZZED)
+	clang $(FUZZ_FLAGS) -fsanitize=fuzzer-no-link -c $< -o $@
+
+$(FUZZED)/fuzz-%.o: tests/fuzz/%.c $(FUZZ_HEADERS) | $(FUZZED)
+	clang $(FUZZ_FLAGS) -fsanitize=fuzzer-no-link -c $< -o $@
 
 $(FUZZED):
 	mkdir -p $@
