@@ -67,13 +67,16 @@ test-linuxcnc: $(TESTS)
 		apt-get install -qq -y --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev; }
 	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py
 
-# What is deprecated in the lowest versions is not an error there.
+# The wheel, not this folder, with libraries as old as may be; of its own Python if LOWEST_PYTHON names
+# one. What is deprecated there is not an error, nor what old libraries say of each other.
+LOWEST_PYTHON ?= $(PYTHON)
 test-lowest: $(TESTS)
-	$(PYTHON) -m venv $(VENV)/lowest
+	$(LOWEST_PYTHON) -m venv $(VENV)/lowest
 	$(VENV)/lowest/bin/python -m pip --disable-pip-version-check --quiet install uv
 	$(VENV)/lowest/bin/uv pip install --quiet --python $(VENV)/lowest/bin/python \
 		--resolution lowest-direct ".[test]"
-	$(VENV)/lowest/bin/python -m pytest -m "not slow" -o filterwarnings=default tests
+	$(VENV)/lowest/bin/pytest -n auto --maxprocesses 8 --dist loadfile -m "not slow" \
+		-o filterwarnings=ignore tests
 
 COUNT ?= 10000
 SEED ?= 1
