@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, first_largest
-from pkmcal.statistics.linear_fit import triangle
 from pkmcal.statistics.robust_scale import median_ratio
 
 _FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
@@ -31,7 +30,8 @@ def outliers(
     residual : ndarray (M,)
         Measured less predicted at the solution, whitened.
     jacobian : ndarray (M, n)
-        Derivative of the predicted values to what is determined, scaled and whitened.
+        Derivative of the predicted values to what is determined, whitened, in a basis in which the
+        normal matrix, that of the prior included, is about the identity.
     components : ndarray of int (N,)
         Equations of each row.
     weights : ndarray (N,)
@@ -48,14 +48,12 @@ def outliers(
     rows = len(components)
     alike = [np.flatnonzero(components == k) for k in np.unique(components)]
     first = np.cumsum(components) - components
-    root = np.sqrt(np.repeat(weights, components))[:, None]
-    weighted = root**2 * jacobian
+    weighted = np.repeat(weights, components)[:, None] * jacobian
     pull = weighted.T @ residual  # of the prior: at the solution the two balance
     kept = np.ones(rows, dtype=bool)
     for _ in range(rows // _MOST + 1):
         use = np.repeat(kept, components)
-        factor = triangle(np.vstack([root[use] * jacobian[use], prior]))
-        normal = factor.T @ factor
+        normal = weighted[use].T @ jacobian[use] + prior.T @ prior
         # the ridge is for directions that only rows set aside determined
         covariance = np.linalg.inv(normal + 1e-14 * np.trace(normal) * np.eye(len(normal)))
         shift = covariance @ (weighted[use].T @ residual[use] - pull)
