@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from copy import copy
 from typing import Any, ClassVar, TypeVar
 
@@ -98,16 +97,6 @@ class CoreMachine(ABC):
     def tensioned(self: M, tension: FloatArray) -> M:
         """The same with tensions of what actuators drive, (n,) or (N, n): without laws it."""
         return self
-
-    def as_offsets(
-        self, slots: FloatArray, q: FloatArray, columns: Int32Array, units: Sequence[str]
-    ) -> tuple[Int32Array, list[str], FloatArray]:
-        """Numbers of drive laws as the offset of their drive; others as they are.
-
-        Returns the places of these and their units, and how far each number moves them,
-        (N, columns).
-        """
-        return columns, list(units), np.ones((len(q), len(columns)))
 
     @abstractmethod
     def turns(self, slots: FloatArray) -> FloatArray:
