@@ -169,9 +169,12 @@ class Estimator:
             state = revised
             if settled:
                 break
+        self.equations.forget_following()
         if self.loss == "linear" and not self.unstated.any():
             return replace(estimate, state=state)  # nothing that it was made with has changed
-        return self._estimate(u, state)
+        estimate = self._estimate(u, state)
+        self.equations.forget_following()
+        return estimate
 
     # between the least squares ------------------------------------------------------------------
 

@@ -220,12 +220,19 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
         theta, pose = evaluation.theta.copy(), evaluation.pose.copy()
         theta[np.array(own)[free]] = 2.0 * middle - values[free]
         pose[:, k] = 2.0 * (middle - joints[0, k]) - pose[:, k]
-        image = copy.copy(equations)
-        image.start_from(np.arange(len(pose)), pose)
-        there = image.at(theta, noise)
-        if there.ok and _cost(image, there, noise) <= (1.0 + _ALIKE) * cost:
+        if _cost_from(equations, theta, pose, noise) <= (1.0 + _ALIKE) * cost:
             return True
     return False
+
+
+def _cost_from(
+    equations: Equations, theta: FloatArray, pose: FloatArray, noise: FloatArray
+) -> float:
+    """Cost at other parameters, of poses that start at `pose`; inf if one is not reached."""
+    image = copy.copy(equations)
+    image.start_from(np.arange(len(pose)), pose)
+    there = image.at(theta, noise)
+    return _cost(image, there, noise) if there.ok else float("inf")
 
 
 def _cost(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> float:
