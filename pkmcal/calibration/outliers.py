@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, first_largest
-from pkmcal.statistics.linear_fit import triangle
 from pkmcal.statistics.robust_scale import median_ratio
 
 _FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
@@ -32,7 +31,8 @@ def outliers(
     residual : ndarray (M,)
         Measured less predicted at the solution, whitened.
     jacobian : ndarray (M, n)
-        Derivative of the predicted values to what is determined, scaled and whitened.
+        Derivative of the predicted values to what is determined, whitened, in a basis in which the
+        normal matrix, that of the prior included, is about the identity.
     components : ndarray of int (N,)
         Equations of each row.
     weights : ndarray (N,)
@@ -58,8 +58,7 @@ def outliers(
     kept = np.ones(rows, dtype=bool)
     for _ in range(rows // _MOST + 1):
         used = np.where(np.repeat(kept, components), weight, 0.0)
-        factor = triangle(np.vstack([triangle(np.sqrt(used)[:, None] * jacobian), prior]))
-        normal = factor.T @ factor
+        normal = (used[:, None] * jacobian).T @ jacobian + prior.T @ prior
         # the ridge is for directions that only rows set aside determined
         covariance = np.linalg.inv(normal + 1e-14 * np.trace(normal) * np.eye(len(normal)))
         shift = covariance @ (jacobian.T @ (used * residual) - pull)

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from pkmcal._core import ffi
-from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array
 from pkmcal.core.library import MAPS, call, in_threads, part
 
 M = TypeVar("M", bound="CoreMachine")
@@ -120,6 +120,15 @@ class CoreMachine(ABC):
     @abstractmethod
     def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """The ways q̃ of the drives at actuator coordinates (N, n), (N, drives)."""
+
+    @property
+    @abstractmethod
+    def turning(self) -> BoolArray:
+        """Which drives are angles, (drives,)."""
+
+    @abstractmethod
+    def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """The ways q̃ that poses (N, 6) ask of each drive by itself, (N, drives); any turn."""
 
     @abstractmethod
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:

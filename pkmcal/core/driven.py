@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array
 from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.core_machine import CoreMachine, known_rows, whole_turn
 from pkmcal.core.drive_turns import agreed_turns
 from pkmcal.core.laws import Drive, Laws, Ways
-from pkmcal.core.library import rows
 from pkmcal.core.machine import Closure, Machine
 from pkmcal.exceptions import ArgumentError
 
@@ -94,6 +93,15 @@ class DrivenMachine(CoreMachine):
         """Ways (N, drives) at readings (N, n)."""
         return self.ways(slots, q).way
 
+    @property
+    def turning(self) -> BoolArray:
+        """Which drives are angles, (drives,)."""
+        return np.array([drive.angle for drive in self.laws.drives])
+
+    def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """Ways (N, drives) that poses (N, 6) ask of each drive by itself; any turn."""
+        return self.inner.drives_at(self._bare(slots), pose)
+
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """How far the drives go by their actuators at readings (N, n), (N, drives)."""
         return self.ways(slots, q).slope
@@ -134,10 +142,9 @@ class DrivenMachine(CoreMachine):
         if len(self._driven) == len(self.laws.drives):
             return out
         there = self.laws.ways(slots, out, *state).way  # of all that share, as the first has it
-        angle = np.array([drive.angle for drive in self.laws.drives])
         with np.errstate(invalid="ignore"):  # ways that are infinite
             turned = way + 2 * np.pi * np.rint((there - way) / (2 * np.pi))
-        return self._mean(self.laws.readings(slots, np.where(angle, turned, way), *state))
+        return self._mean(self.laws.readings(slots, np.where(self.turning, turned, way), *state))
 
     def _mean(self, each: FloatArray) -> FloatArray:
         """Of drives (N, drives, ...) that share an actuator the mean, (N, n, ...)."""
@@ -161,8 +168,7 @@ class DrivenMachine(CoreMachine):
 
     def reference(self, slots: FloatArray) -> FloatArray:
         """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
-        turning = [drive.angle for drive in self.laws.drives]
-        near = np.where(turning, self.inner.reference(self._bare(slots)), np.nan)
+        near = np.where(self.turning, self.inner.reference(self._bare(slots)), np.nan)
         anyhow = self._with(approach=None, tension=None)  # whatever those of the rows are
         q: FloatArray = anyhow.at_drives(slots, near[None])[0]
         angle = np.array([self.laws.drives[drives[0]].angle for drives in self._driven])
@@ -275,11 +281,12 @@ class DrivenMachine(CoreMachine):
             by_q = self._sum(found.by_q * ways.slope[:, None])
         return found._replace(by_q=by_q)
 
-    def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rates(
+        self, slots: FloatArray, motion: FloatArray, q: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators, as `pkmcal.core.machine.Machine.rates`."""
-        way1, way2 = self.inner.rates(self._bare(slots), motion)
-        pose = rows("motion_pose", np.ascontiguousarray(motion[:, 0]).reshape(-1, 16))[0]
-        at = self.ways(slots, self.inverse(slots, pose))
+        at = self.ways(slots, q)
+        way1, way2 = self.inner.rates(self._bare(slots), motion, at.way)
         q1 = way1 / at.slope
         q2 = (way2 - at.bend * q1**2) / at.slope
         return self._mean(q1), self._mean(q2)

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pkmcal._core import ffi, lib
-from pkmcal.arrays import FloatArray, Int32Array, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core.core_machine import CoreMachine, whole_turn
 from pkmcal.core.library import (
     AXES,
@@ -171,6 +171,15 @@ class Machine(CoreMachine):
             found: FloatArray = slots[:, _GAIN] * q[:, of_limbs] + slots[:, _OFFSET]
         return found
 
+    @property
+    def turning(self) -> BoolArray:
+        """Which drives are angles, (limbs,)."""
+        return np.array(self.struct.angle[0 : self.struct.limbs], dtype=bool)
+
+    def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """q̃ (N, limbs) that poses (N, 6) ask of each limb by itself; any turn."""
+        return self.limbs(slots, pose)[0]
+
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """The gain of each limb, (N, limbs)."""
         return np.tile(slots[:, _GAIN], (len(q), 1))
@@ -197,11 +206,13 @@ class Machine(CoreMachine):
         call("forward_jacobian", self.struct, *given, isa=self.isa)
         return out if twists else self.as_written(pose, out, 1)
 
-    def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rates(
+        self, slots: FloatArray, motion: FloatArray, q: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators, (N, n) each.
 
         `motion` (N, 3, 4, 4) is the platform's homogeneous matrix and its first and second
-        derivative by time.
+        derivative by time. At coordinates q (N, n), whose turn matters to drive laws alone.
         """
         velocity, acceleration = np.empty((2, len(motion), self.actuators))
         given = (len(motion), slots, _by_row(slots), motion, velocity, acceleration)

@@ -333,11 +333,13 @@ class PulleyMachine(Machine):
 
     # along a path ---------------------------------------------------------------------------------
 
-    def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rates(
+        self, slots: FloatArray, motion: FloatArray, q: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators, as `Machine.rates`."""
         pose = rows("motion_pose", np.ascontiguousarray(motion[:, 0]).reshape(-1, 16))[0]
         limbs, cables = self._limbs_at(slots, pose)
-        velocity, acceleration = super().rates(limbs, motion)
+        velocity, acceleration = super().rates(limbs, motion, q)
         extra = self._bends(slots, cables, motion) / limbs[:, self._over, _GAIN]
         shared = np.array([self.struct.sharing[a] for a in self._of_actuator[self._over]])
         for k, limb in enumerate(self._over):

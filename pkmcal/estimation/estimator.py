@@ -20,7 +20,7 @@ from pkmcal.estimation.least_squares import Search
 from pkmcal.estimation.loss import Loss, LossName
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics import prior_test
-from pkmcal.statistics.linear_fit import column_basis, triangle
+from pkmcal.statistics.linear_fit import column_basis, unit_basis
 from pkmcal.statistics.robust_scale import median_ratio
 
 _ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
@@ -29,6 +29,9 @@ _LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
 LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
 FEW = 5.0  # below which residuals hardly show it
 LEAST_REDUNDANCY = 2.0  # the same of one group of several that share poses
+
+
+_AtNoise = tuple[FloatArray, tuple[Decomposed, Decomposed]]  # noise; without and with the prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +82,8 @@ class Estimate:
         Of each unit (`Equations.components`); 1 unless the loss is robust.
     prior : ndarray (p, n)
         A row for each prior, scaled, in units of its deviation.
-    covariance : ndarray (n, n)
-        Scaled; nothing along combinations that are not determined.
+    half : ndarray (n, r)
+        Scaled combinations whose covariance is 1, the best determined first.
     shares : Shares
         Of each group, the sum of squared residuals and what it says of the noise.
     """
@@ -91,13 +94,34 @@ class Estimate:
     jacobian: FloatArray
     weights: FloatArray
     prior: FloatArray
-    covariance: FloatArray
+    half: FloatArray
     shares: Shares
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Scaled (n, n); nothing along combinations that are not determined."""
+        matrix: FloatArray = self.half @ self.half.T
+        return matrix
 
     @property
     def freedom(self) -> FloatArray:
         """Equations of each group less the poses and parameters they went into, (G,)."""
         return self.shares.freedom
+
+    def with_noise(self, state: IterationState, factor: float) -> Estimate:
+        """The same of a linear loss where all noise is `factor` times what it was.
+
+        Of readings alone, unless `factor` is 1: neither prior nor closures go with it.
+        """
+        squares, freedom, information = self.shares
+        return replace(
+            self,
+            state=state,
+            residual=self.residual / factor,
+            jacobian=self.jacobian / factor,
+            half=self.half * factor,
+            shares=Shares(squares / factor**2, freedom, information),
+        )
 
 
 class Estimator:
@@ -120,7 +144,7 @@ class Estimator:
         self._priors = len(self.search.prior(start.theta))
         self.unstated = equations.unstated
         self._at_first: FloatArray | None = None
-        self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
+        self._first: _AtNoise | None = None
 
     @property
     def least_freedom(self) -> float:
@@ -169,12 +193,10 @@ class Estimator:
             state = revised
             if settled:
                 break
+        factor = self._common_factor(estimate.state, state)
+        found = self._estimate(u, state) if factor is None else estimate.with_noise(state, factor)
         self.equations.forget_following()
-        if self.loss == "linear" and not self.unstated.any():
-            return replace(estimate, state=state)  # nothing that it was made with has changed
-        estimate = self._estimate(u, state)
-        self.equations.forget_following()
-        return estimate
+        return found
 
     # between the least squares ------------------------------------------------------------------
 
@@ -241,8 +263,7 @@ class Estimator:
         size = self.start.robot.length
         noise_known = evaluation is not None or not self.unstated.any()
         worst = size if noise_known else np.inf
-        if self._first is None or (noise != self._first[0]).any():
-            self._first = noise, self._decomposed(self.start, noise)
+        self._first = noise, self._decomposed(self.start, noise, self._first)
         _, first = self._first
         now = (None, None) if evaluation is None else self._decomposed(evaluation, noise)
         measured = directions(first[0], now[0], size)
@@ -252,9 +273,19 @@ class Estimator:
         )
 
     def _decomposed(
-        self, evaluation: Evaluation, noise: FloatArray
+        self,
+        evaluation: Evaluation,
+        noise: FloatArray,
+        known: _AtNoise | None = None,
     ) -> tuple[Decomposed, Decomposed]:
-        """Decompose without and with the prior."""
+        """Decompose without and with the prior; `known` is that for another noise."""
+        if known is not None:
+            factors = noise / known[0]
+            if (factors == 1.0).all():
+                return known[1]
+            if not self._priors and (factors == factors[0]).all():
+                singular, basis = known[1][0]
+                return ((singular / factors[0], basis),) * 2
         jacobian = self.search.jacobian(evaluation, noise)
         data = decompose(jacobian)
         if not self._priors:
@@ -326,6 +357,15 @@ class Estimator:
             return False
         return self.loss == "linear" or np.allclose(old.loss.width, new.loss.width, rtol=1e-3)
 
+    def _common_factor(self, old: IterationState, new: IterationState) -> float | None:
+        """What the noise of all groups has grown by, if nothing but that distinguishes a fit."""
+        factors = new.noise / old.noise
+        factor = float(factors[0])
+        if self.loss != "linear" or old.determined.rank != new.determined.rank:
+            return None
+        alone = not (self._priors or self.equations.closures.unknowns)
+        return factor if (factors == factor).all() and (factor == 1.0 or alone) else None
+
     def scaled_jacobian(self, evaluation: Evaluation) -> FloatArray:
         """Scaled Jacobian (M, n), not whitened: mm per mm, angles as their arc.
 
@@ -349,13 +389,8 @@ class Estimator:
         weights = state.loss.weights(residual)
         root = np.sqrt(np.repeat(weights, self.equations.components))
         weighted = root[:, None] * jacobian
-        basis, prior = state.determined.identifiable, self.search.prior(evaluation.theta)
-        _, singular, rows = np.linalg.svd(
-            triangle(np.vstack([weighted, prior])) @ basis, full_matrices=False
-        )
-        half = basis @ (rows.T / singular)
+        prior = self.search.prior(evaluation.theta)
+        half = unit_basis(weighted, prior, state.determined.identifiable)
         taken = weighted @ half[:, : state.fitted.rank]
         shares = self.equations.by_groups(evaluation, state.noise, weights, root * residual, taken)
-        return Estimate(
-            evaluation, state, residual, jacobian, weights, prior, half @ half.T, shares
-        )
+        return Estimate(evaluation, state, residual, jacobian, weights, prior, half, shares)

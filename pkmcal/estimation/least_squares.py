@@ -12,7 +12,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.loss import Loss
 from pkmcal.exceptions import ArgumentError
 
-_FTOL = 1e-12  # of the cost: 1e-5 of a standard deviation
+_FTOL = 1e-10  # of the cost: 1e-4 of a standard deviation; rounding moves it by less
 _TOLERANCES = {"ftol": _FTOL, "xtol": 1e-10, "gtol": 1e-15}
 _MOST = 200  # evaluations
 _CONVERGED = (1, 2, 3, 4)  # as MINPACK says it

@@ -49,6 +49,8 @@ def surplus(robot: Robot) -> int:
     of an over-constrained machine they are those of passive joints, which give way, and the pose
     follows from that. None where chains share passive joints or carry a tail.
     """
+    if robot.machine.rows <= robot.machine.m:
+        return 0
     chains = robot.model.chains
     apart = chains is None or not (chains.layout.shared or chains.tail)
     return row_roles(robot).surplus if apart else 0

@@ -25,7 +25,6 @@ from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import box, robot_file
 from pkmcal.geometry.geometry import Geometry
-from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Model
 from pkmcal.kinematics import chain_limits, overconstrained
 from pkmcal.kinematics.kinematics import Kinematics, Match
@@ -148,8 +147,9 @@ class Robot(Kinematics, Result):
         pose : array_like (..., 6)
             x y z in mm, α β γ in rad.
         actuators : array_like (..., n), optional
-            The coordinates that lead to these poses: of a limb that turns, they say which turn its
-            stroke is compared with. By default it is the turn nearest to the middle of the stroke.
+            The coordinates that lead to these poses: strokes are compared with where they drive
+            the limbs. By default with what the poses ask of the limbs on their branches, angles at
+            the turn nearest to the middle of the stroke.
 
         Returns
         -------
@@ -170,13 +170,11 @@ class Robot(Kinematics, Result):
     def _limb_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
         """Limits of limbs in closed form at own poses (N, 6), by actuators (N, n) or without."""
         drive, on_base, on_platform = self.limb_machine.limbs(self.slots, own)
+        reach = np.isfinite(drive)
         if q is not None:
-            there = self.drives(q)
-            angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
-            with np.errstate(invalid="ignore"):  # infinite coordinates
-                drive = np.where(angle, there + wrapped(drive - there), drive)
+            drive = self.drives(q)
         size = self.machine.struct.size
-        return feasibility(self.model.limbs, drive, on_base, on_platform, size)
+        return feasibility(self.model.limbs, reach, drive, on_base, on_platform, size)
 
     def _chain_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
         """Limits of chains at own poses (N, 6) with coordinates (N, n), by default the inverse."""
