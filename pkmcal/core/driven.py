@@ -347,9 +347,13 @@ class DrivenMachine(CoreMachine):
             out[:, spheres[d], of_laws[i]] = -by_number[:, i] / slope[:, d]
         return residual, by_step, out
 
-    def moved(self, pose: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
         """Poses moved, as `pkmcal.core.machine.Machine.moved`."""
         return self.inner.moved(pose, step)
+
+    def step_twists(self, pose: FloatArray) -> FloatArray:
+        """Twists by a step, as `pkmcal.core.machine.Machine.step_twists`."""
+        return self.inner.step_twists(pose)
 
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """What the limbs are at readings (N, n), as `pkmcal.core.machine.Machine.spheres`."""

@@ -166,7 +166,7 @@ class PulleyMachine(Machine):
 
     def _on_map(self, pose: FloatArray) -> FloatArray:
         """Poses as the map has them."""
-        return super().moved(np.ascontiguousarray(pose), np.zeros((len(pose), self.m)))[0]
+        return super().moved(np.ascontiguousarray(pose), np.zeros((len(pose), self.m)))
 
     def swivels(self, slots: FloatArray, pose: FloatArray) -> tuple[FloatArray, ...]:
         """Swivel angles (N, pulleys) at poses (N, 6), with their derivatives.

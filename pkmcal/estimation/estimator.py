@@ -205,7 +205,9 @@ class Estimator:
             if settled:
                 break
         factor = self._common_factor(estimate.state, state)
-        return self._estimate(u, state) if factor is None else estimate.with_noise(state, factor)
+        found = self._estimate(u, state) if factor is None else estimate.with_noise(state, factor)
+        self.equations.forget_following()
+        return found
 
     # between the least squares ------------------------------------------------------------------
 
