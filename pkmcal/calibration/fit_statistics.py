@@ -193,9 +193,10 @@ def misfit(
         for m, relative, sigma in zip(equations.sets, equations.deviations, shown, strict=False)
     )
     named = outlying(estimator, estimate)
+    before, after = (distances(equations.distances(each), named) for each in (start, end))
     return Misfit(
-        rms=equations.rms(end),
-        rms_before=equations.rms(start),
+        rms=after.rms,
+        rms_before=before.rms,
         closure_rms=equations.closure_rms(estimate.evaluation),
         closure_rms_before=equations.closure_rms(estimator.start),
         closures=equations.worst_closures(estimate.evaluation),
@@ -213,8 +214,8 @@ def misfit(
         residuals=end.residuals,
         rows=equations.rows,
         outliers=tuple(equations.rows[named].tolist()),
-        before=distances(equations.distances(start), named),
-        after=distances(equations.distances(end), named),
+        before=before,
+        after=after,
     )
 
 
