@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, largest_first, mm_per_unit, rms
@@ -120,6 +119,8 @@ def other_readings(
 
 def _other_turns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
     """Read orientations as quaternions in the other order, and as those of the base."""
+    from scipy.spatial.transform import Rotation
+
     angles = [k for k, name in enumerate(measured.components) if name in POSE[3:]]
     if len(angles) < 3 or measured.values is None:
         return
@@ -302,10 +303,10 @@ def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: b
             " freedom are left to show how good the fit is; measure more poses"
         )
     start = 0
-    for measured in equations.sets:
+    for measured, pose in zip(equations.sets, equations.pose_of, strict=True):
         rows = equations.rows[start : start + len(measured)]
         start += len(measured)
-        if not measured.components:
+        if not measured.components or len(np.unique(pose)) == len(pose):
             continue  # the same readings of actuators alone may well occur twice
         table = np.column_stack([
             measured.actuators,
