@@ -189,11 +189,11 @@ class Replicate:
         """Whitened residuals (M,) with the deviation that the noise has."""
         estimate = self._estimate
         root = np.sqrt(np.repeat(estimate.weights, self._equations.components))
+        taken = root[:, None] * estimate.jacobian @ estimate.half
         out = np.empty_like(estimate.residual)
         for pose in range(int(self._pose.max()) + 1):
             mine = np.flatnonzero(self._pose == pose)
-            jacobian = root[mine, None] * estimate.jacobian[mine]
-            left = np.eye(len(mine)) - jacobian @ estimate.covariance @ jacobian.T
+            left = np.eye(len(mine)) - taken[mine] @ taken[mine].T
             size, axes = np.linalg.eigh(left)
             factor = np.where(size > _LEFT, 1.0 / np.sqrt(np.maximum(size, _LEFT)), 0.0)
             out[mine] = axes @ (factor * (axes.T @ estimate.residual[mine]))

@@ -40,9 +40,10 @@ def distances(off: FloatArray, outliers: BoolArray) -> Distances:
     if not reached.any():
         return Distances()
     here = off[reached]
+    median, high = np.quantile(here, [0.5, 0.95]).tolist()
     return Distances(
         rms(here),
-        float(np.median(here)),
-        float(np.quantile(here, 0.95)),
+        median,
+        high,
         rms(off[reached & ~outliers]),
     )

@@ -140,7 +140,10 @@ def _tested(parts: Sequence[tuple[FitData, FloatArray]], odd: Collection[int]) -
     lengths = [k for k, unit in enumerate(measured.units) if unit == "mm"]
     if not lengths:
         return None
-    rows = _rows(parts, odd, lengths)
+    poses = [_poses(data.measured) for data, _ in parts]
+    if sum(len(pose) - len(np.unique(pose)) for pose in poses) <= LEAST:
+        return None
+    rows = _rows(parts, poses, odd, lengths)
     if len(rows.pose) <= len(np.unique(rows.pose)) + LEAST:
         return None  # no visit is a second one, or too few are
     visit = _visits(rows)
@@ -170,12 +173,14 @@ def _tested(parts: Sequence[tuple[FitData, FloatArray]], odd: Collection[int]) -
 
 
 def _rows(
-    parts: Sequence[tuple[FitData, FloatArray]], odd: Collection[int], lengths: Sequence[int]
+    parts: Sequence[tuple[FitData, FloatArray]],
+    poses_of: Sequence[IntArray],
+    odd: Collection[int],
+    lengths: Sequence[int],
 ) -> _Rows:
     first, values, poses, targets, times, order = 0, [], [], [], [], []
-    for data, residual in parts:
-        m = data.measured
-        pose = _poses(m) + first
+    for (data, residual), own in zip(parts, poses_of, strict=True):
+        m, pose = data.measured, own + first
         first = int(pose.max()) + 1
         use = np.isfinite(residual[:, lengths]).all(axis=1) & ~np.isin(data.rows, list(odd))
         values.append(residual[use][:, lengths])

@@ -51,6 +51,8 @@ def without(datasets: Sequence[FitData], rows: Sequence[int]) -> list[FitData]:
     ValueError
         A set of which nothing is left.
     """
+    if not len(rows):
+        return list(datasets)
     found = []
     for data in datasets:
         kept = np.flatnonzero(~np.isin(data.rows, rows))
@@ -70,7 +72,8 @@ def held_without(
 
 def outlying(estimator: Estimator, estimate: Estimate) -> BoolArray:
     """Which rows (N,) of the equations the others contradict."""
-    equations, fitted = estimator.equations, estimate.state.fitted.identifiable
+    equations = estimator.equations
+    fitted = estimate.half[:, : estimate.state.fitted.rank]
     odd = outliers(
         estimate.residual,
         estimate.jacobian @ fitted,

@@ -11,13 +11,14 @@ from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.dropped import outlying
 from pkmcal.estimation.estimator import Estimate, Estimator
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.gauges import MIRROR, Gauges, gauges, mirror_fits
+from pkmcal.estimation.gauges import Gauges, gauges
 from pkmcal.estimation.identifiability import (
     as_sum,
     held_errors,
     observability,
     sparse_basis,
 )
+from pkmcal.estimation.mirror import MIRROR, mirror_fits
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle
@@ -192,9 +193,10 @@ def misfit(
         for m, relative, sigma in zip(equations.sets, equations.deviations, shown, strict=False)
     )
     named = outlying(estimator, estimate)
+    before, after = (distances(equations.distances(each), named) for each in (start, end))
     return Misfit(
-        rms=equations.rms(end),
-        rms_before=equations.rms(start),
+        rms=after.rms,
+        rms_before=before.rms,
         closure_rms=equations.closure_rms(estimate.evaluation),
         closure_rms_before=equations.closure_rms(estimator.start),
         closures=equations.worst_closures(estimate.evaluation),
@@ -212,8 +214,8 @@ def misfit(
         residuals=end.residuals,
         rows=equations.rows,
         outliers=tuple(equations.rows[named].tolist()),
-        before=distances(equations.distances(start), named),
-        after=distances(equations.distances(end), named),
+        before=before,
+        after=after,
     )
 
 

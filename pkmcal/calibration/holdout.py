@@ -161,17 +161,18 @@ def evaluate(
     usable = uncertainty.known and spare >= LEAST_FREEDOM
     test = _test(points, named, good[row], uncertainty) if usable else None
     odd = good & _odd(points, row, count, uncertainty)
+    in_short = [distances(each, odd) for each in (off_before, off)]
     return HeldOut(
-        rms_before=equations.rms(before),
-        rms=equations.rms(after),
+        rms_before=in_short[0].rms,
+        rms=in_short[1].rms,
         expected=float(np.sqrt(np.mean(expected[good]))) if usable else float("nan"),
         failures=equations.failures(after),
         off_before=off_before,
         off=off,
         rows=equations.rows,
         odd=tuple(equations.rows[odd].tolist()),
-        before=distances(off_before, odd),
-        after=distances(off, odd),
+        before=in_short[0],
+        after=in_short[1],
         test=test,
         later=rows,
         end=after,

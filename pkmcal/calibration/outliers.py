@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, first_largest
-from pkmcal.statistics.linear_fit import triangle
 from pkmcal.statistics.robust_scale import median_ratio
 
 _FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
 _ALIKE = 1e-9  # share by which rows are further off than others that are not equally far off
 _NONE = np.finfo(float).tiny
 _MOST = 4  # at most one row in so many can be odd
+_TOGETHER = 4096  # rows that are looked at at once, to bound memory
 
 
 def outliers(
@@ -31,7 +31,8 @@ def outliers(
     residual : ndarray (M,)
         Measured less predicted at the solution, whitened.
     jacobian : ndarray (M, n)
-        Derivative of the predicted values to what is determined, scaled and whitened.
+        Derivative of the predicted values to what is determined, whitened, in a basis in which the
+        normal matrix, that of the prior included, is about the identity.
     components : ndarray of int (N,)
         Equations of each row.
     weights : ndarray (N,)
@@ -46,19 +47,21 @@ def outliers(
         further than most.
     """
     rows = len(components)
-    alike = [np.flatnonzero(components == k) for k in np.unique(components)]
+    alike = [
+        mine[start : start + _TOGETHER]
+        for mine in (np.flatnonzero(components == k) for k in np.unique(components))
+        for start in range(0, len(mine), _TOGETHER)
+    ]
     first = np.cumsum(components) - components
-    root = np.sqrt(np.repeat(weights, components))[:, None]
-    weighted = root**2 * jacobian
-    pull = weighted.T @ residual  # of the prior: at the solution the two balance
+    weight = np.repeat(weights, components)
+    pull = jacobian.T @ (weight * residual)  # of the prior: at the solution the two balance
     kept = np.ones(rows, dtype=bool)
     for _ in range(rows // _MOST + 1):
-        use = np.repeat(kept, components)
-        factor = triangle(np.vstack([root[use] * jacobian[use], prior]))
-        normal = factor.T @ factor
+        used = np.where(np.repeat(kept, components), weight, 0.0)
+        normal = (used[:, None] * jacobian).T @ jacobian + prior.T @ prior
         # the ridge is for directions that only rows set aside determined
         covariance = np.linalg.inv(normal + 1e-14 * np.trace(normal) * np.eye(len(normal)))
-        shift = covariance @ (weighted[use].T @ residual[use] - pull)
+        shift = covariance @ (jacobian.T @ (used * residual) - pull)
         left = residual - jacobian @ shift
         part = np.where(kept, -weights, 1.0)  # a fitted row has pulled the fit to itself
         squares = np.empty(rows)

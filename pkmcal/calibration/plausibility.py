@@ -303,10 +303,10 @@ def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: b
             " freedom are left to show how good the fit is; measure more poses"
         )
     start = 0
-    for measured in equations.sets:
+    for measured, pose in zip(equations.sets, equations.pose_of, strict=True):
         rows = equations.rows[start : start + len(measured)]
         start += len(measured)
-        if not measured.components:
+        if not measured.components or len(np.unique(pose)) == len(pose):
             continue  # the same readings of actuators alone may well occur twice
         table = np.column_stack([
             measured.actuators,

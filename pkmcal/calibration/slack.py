@@ -169,8 +169,7 @@ def taut(
 def _longer(equations: Equations, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
     """By how much cables read longer than needed (K, equations), whitened, and redundancy."""
     root = np.sqrt(np.repeat(estimate.weights, equations.components))
-    sizes, axes = np.linalg.eigh(estimate.covariance)
-    taken = root[:, None] * estimate.jacobian @ (axes * np.sqrt(np.maximum(sizes, 0.0)))
+    taken = root[:, None] * estimate.jacobian @ estimate.half
     every = np.ones(len(estimate.weights))  # what a robust loss sets aside is looked at as well
     off, redundancy = equations.closure_residuals(
         estimate.evaluation, estimate.state.noise, every, taken

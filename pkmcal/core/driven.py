@@ -251,18 +251,6 @@ class DrivenMachine(CoreMachine):
             out[..., of_laws] = by_way[..., drive] * by_number[:, None]
         return out
 
-    def as_offsets(
-        self, slots: FloatArray, q: FloatArray, columns: Int32Array, units: Sequence[str]
-    ) -> tuple[Int32Array, list[str], FloatArray]:
-        """As `CoreMachine.as_offsets`: a law moves its drive, however large its numbers are."""
-        _, of_laws, drive = self._sorted(columns)
-        alike, unit, factor = columns.copy(), list(units), np.ones((len(q), len(columns)))
-        for i, d in zip(of_laws, drive, strict=True):
-            alike[i] = self.laws.drives[d].offset
-            unit[i] = "rad" if self.laws.drives[d].angle else "mm"
-        factor[:, of_laws] = self._by_number(slots, q, columns[of_laws])
-        return alike, unit, factor
-
     def _sorted(self, columns: Int32Array) -> tuple[list[int], list[int], list[int]]:
         """Which of the columns are the inner machine's, which those of laws, and their drives."""
         drives = [self.laws.drive_of(column) for column in columns.tolist()]
@@ -359,9 +347,13 @@ class DrivenMachine(CoreMachine):
             out[:, spheres[d], of_laws[i]] = -by_number[:, i] / slope[:, d]
         return residual, by_step, out
 
-    def moved(self, pose: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
         """Poses moved, as `pkmcal.core.machine.Machine.moved`."""
         return self.inner.moved(pose, step)
+
+    def step_twists(self, pose: FloatArray) -> FloatArray:
+        """Twists by a step, as `pkmcal.core.machine.Machine.step_twists`."""
+        return self.inner.step_twists(pose)
 
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """What the limbs are at readings (N, n), as `pkmcal.core.machine.Machine.spheres`."""

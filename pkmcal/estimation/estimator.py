@@ -20,15 +20,20 @@ from pkmcal.estimation.least_squares import Search
 from pkmcal.estimation.loss import Loss, LossName
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics import prior_test
-from pkmcal.statistics.linear_fit import column_basis, triangle
+from pkmcal.statistics.linear_fit import column_basis, unit_basis
 from pkmcal.statistics.robust_scale import median_ratio
 
 _ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
+_LESS = 0.1  # of the deviation to which combinations are fitted, after a search without an end
+_LEAST_WORST = 5e-3  # of the machine's size: where that is not for want of measurements
 _LEAST_FALL = 0.1  # of a mean square, which a step of scoring does not go below
 _LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
 LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
 FEW = 5.0  # below which residuals hardly show it
 LEAST_REDUNDANCY = 2.0  # the same of one group of several that share poses
+
+
+_AtNoise = tuple[FloatArray, tuple[Decomposed, Decomposed]]  # noise; without and with the prior
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +52,9 @@ class IterationState:
     determined : Directions
         Identifiable from measurements and prior.
     fitted : Directions
-        Determined to the machine's size or better; the rest is kept at its start.
+        Determined to `worst` or better; the rest is kept at its start.
+    worst : float
+        A standard deviation, mm: the machine's size, or less where searches did not end.
     """
 
     noise: FloatArray
@@ -55,6 +62,7 @@ class IterationState:
     measured: Directions
     determined: Directions
     fitted: Directions
+    worst: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +87,8 @@ class Estimate:
         Of each unit (`Equations.components`); 1 unless the loss is robust.
     prior : ndarray (p, n)
         A row for each prior, scaled, in units of its deviation.
-    covariance : ndarray (n, n)
-        Scaled; nothing along combinations that are not determined.
+    half : ndarray (n, r)
+        Scaled combinations whose covariance is 1, the best determined first.
     shares : Shares
         Of each group, the sum of squared residuals and what it says of the noise.
     """
@@ -91,13 +99,34 @@ class Estimate:
     jacobian: FloatArray
     weights: FloatArray
     prior: FloatArray
-    covariance: FloatArray
+    half: FloatArray
     shares: Shares
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Scaled (n, n); nothing along combinations that are not determined."""
+        matrix: FloatArray = self.half @ self.half.T
+        return matrix
 
     @property
     def freedom(self) -> FloatArray:
         """Equations of each group less the poses and parameters they went into, (G,)."""
         return self.shares.freedom
+
+    def with_noise(self, state: IterationState, factor: float) -> Estimate:
+        """The same of a linear loss where all noise is `factor` times what it was.
+
+        Of readings alone, unless `factor` is 1: neither prior nor closures go with it.
+        """
+        squares, freedom, information = self.shares
+        return replace(
+            self,
+            state=state,
+            residual=self.residual / factor,
+            jacobian=self.jacobian / factor,
+            half=self.half * factor,
+            shares=Shares(squares / factor**2, freedom, information),
+        )
 
 
 class Estimator:
@@ -119,8 +148,9 @@ class Estimator:
         self.scale = self.search.scale
         self._priors = len(self.search.prior(start.theta))
         self.unstated = equations.unstated
+        self._worst = self.start.robot.length
         self._at_first: FloatArray | None = None
-        self._first: tuple[FloatArray, tuple[Decomposed, Decomposed]] | None = None
+        self._first: _AtNoise | None = None
 
     @property
     def least_freedom(self) -> float:
@@ -157,6 +187,13 @@ class Estimator:
             u = self.search.best(u, state.noise, state.loss, pins)
             u = u - kept @ (kept.T @ u)
             estimate = self._estimate(u, state)
+            if not self.search.converged and self._worst > _LEAST_WORST * self.start.robot.length:
+                # what is hardly determined goes on for ever, far from any machine: less is fitted
+                self._worst *= _LESS
+                state = self._state(self._revised(estimate).noise, state.loss, None)
+                self.equations.warm_start(self.start)
+                u = np.zeros(len(self.scale))
+                continue
             if self.equations.closures.unknowns and self._at_first is None:
                 self._at_first = estimate.freedom
             revised = self._revised(estimate)
@@ -169,9 +206,10 @@ class Estimator:
             state = revised
             if settled:
                 break
-        if self.loss == "linear" and not self.unstated.any():
-            return replace(estimate, state=state)  # nothing that it was made with has changed
-        return self._estimate(u, state)
+        factor = self._common_factor(estimate.state, state)
+        found = self._estimate(u, state) if factor is None else estimate.with_noise(state, factor)
+        self.equations.forget_following()
+        return found
 
     # between the least squares ------------------------------------------------------------------
 
@@ -236,22 +274,30 @@ class Estimator:
     ) -> IterationState:
         """Split the directions for this noise, before (`evaluation` None) or after a fit."""
         size = self.start.robot.length
-        noise_known = evaluation is not None or not self.unstated.any()
-        worst = size if noise_known else np.inf
-        if self._first is None or (noise != self._first[0]).any():
-            self._first = noise, self._decomposed(self.start, noise)
+        noise_known = evaluation is not None or not self.unstated.any() or self._worst < size
+        worst = self._worst if noise_known else np.inf
+        self._first = noise, self._decomposed(self.start, noise, self._first)
         _, first = self._first
         now = (None, None) if evaluation is None else self._decomposed(evaluation, noise)
         measured = directions(first[0], now[0], size)
         determined = directions(first[1], now[1], size)
-        return IterationState(
-            noise, loss, measured, determined, directions(first[1], now[1], size, worst)
-        )
+        fitted = directions(first[1], now[1], size, worst)
+        return IterationState(noise, loss, measured, determined, fitted, self._worst)
 
     def _decomposed(
-        self, evaluation: Evaluation, noise: FloatArray
+        self,
+        evaluation: Evaluation,
+        noise: FloatArray,
+        known: _AtNoise | None = None,
     ) -> tuple[Decomposed, Decomposed]:
-        """Decompose without and with the prior."""
+        """Decompose without and with the prior; `known` is that for another noise."""
+        if known is not None:
+            factors = noise / known[0]
+            if (factors == 1.0).all():
+                return known[1]
+            if not self._priors and (factors == factors[0]).all():
+                singular, basis = known[1][0]
+                return ((singular / factors[0], basis),) * 2
         jacobian = self.search.jacobian(evaluation, noise)
         data = decompose(jacobian)
         if not self._priors:
@@ -323,6 +369,15 @@ class Estimator:
             return False
         return self.loss == "linear" or np.allclose(old.loss.width, new.loss.width, rtol=1e-3)
 
+    def _common_factor(self, old: IterationState, new: IterationState) -> float | None:
+        """What the noise of all groups has grown by, if nothing but that distinguishes a fit."""
+        factors = new.noise / old.noise
+        factor = float(factors[0])
+        if self.loss != "linear" or old.determined.rank != new.determined.rank:
+            return None
+        alone = not (self._priors or self.equations.closures.unknowns)
+        return factor if (factors == factor).all() and (factor == 1.0 or alone) else None
+
     def scaled_jacobian(self, evaluation: Evaluation) -> FloatArray:
         """Scaled Jacobian (M, n), not whitened: mm per mm, angles as their arc.
 
@@ -346,13 +401,8 @@ class Estimator:
         weights = state.loss.weights(residual)
         root = np.sqrt(np.repeat(weights, self.equations.components))
         weighted = root[:, None] * jacobian
-        basis, prior = state.determined.identifiable, self.search.prior(evaluation.theta)
-        _, singular, rows = np.linalg.svd(
-            triangle(np.vstack([weighted, prior])) @ basis, full_matrices=False
-        )
-        half = basis @ (rows.T / singular)
+        prior = self.search.prior(evaluation.theta)
+        half = unit_basis(weighted, prior, state.determined.identifiable)
         taken = weighted @ half[:, : state.fitted.rank]
         shares = self.equations.by_groups(evaluation, state.noise, weights, root * residual, taken)
-        return Estimate(
-            evaluation, state, residual, jacobian, weights, prior, half @ half.T, shares
-        )
+        return Estimate(evaluation, state, residual, jacobian, weights, prior, half, shares)

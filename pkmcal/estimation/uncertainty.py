@@ -15,7 +15,7 @@ from pkmcal.estimation.set_noise import slipped
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.clusters import shared_error_score
 from pkmcal.statistics.covariance import SHARED, Covariance, CovarianceRule, covariance
-from pkmcal.statistics.linear_fit import LinearFit, linear_fit, numbered
+from pkmcal.statistics.linear_fit import LinearFit, in_unit_basis, numbered, unit_basis
 from pkmcal.statistics.noise import Noise, Split, joined, noise, split
 from pkmcal.statistics.pseudo_residuals import PseudoResiduals, pseudo_residuals
 from pkmcal.statistics.variance_components import told_apart, variance_components
@@ -166,6 +166,11 @@ class Uncertainty:
         stated = stated_variances(self.equations.sets[i])
         return None if stated is None else self.equations.arcs[i] ** 2 * stated
 
+    @cached_property
+    def _repeated(self) -> IntArray:
+        """Number of the reading of each equation (M,): repeats of it have the same."""
+        return numbered(self.fit.key, self.labels.target)
+
     def repeats(self, plain: bool = False) -> Split:
         """Pure error and lack of fit, whitened; `plain`: of lengths in mm.
 
@@ -173,8 +178,10 @@ class Uncertainty:
         """
         if self.mixed:
             return joined([])
+        key = self._repeated
+        if int(key.max()) + 1 == len(key):
+            return joined([])
         values = self.in_units(self.fit.residual) if plain else self.fit.residual
-        key = numbered(self.fit.key, self.labels.target)
         parts = []
         for i in range(len(self.equations.sets)):
             mine = self.lengths_of(i) if plain else self.labels.set_of == i
@@ -256,13 +263,11 @@ def solved(estimator: Estimator, estimate: Estimate) -> Solution:
             state.loss.decline(estimate.residual),
             state.determined.rank,
         )
-    fit = linear_fit(
-        estimate.jacobian,
-        pseudo.residual,
-        estimate.prior,
-        state.determined.identifiable,
-        named.pose,
-        named.component,
+    back = estimate.half
+    if estimator.loss != "linear":  # equations count alike, their residuals are other ones
+        back = unit_basis(estimate.jacobian, estimate.prior, state.determined.identifiable)
+    fit = in_unit_basis(
+        estimate.jacobian, pseudo.residual, estimate.prior, back, named.pose, named.component
     )
     return Solution(named, fit, pseudo)
 

@@ -17,6 +17,7 @@ from pkmcal.core.driven import CompiledMachine
 from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Closure
 from pkmcal.core.path_differences import along_path
+from pkmcal.core.poses import rates_of_twists
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.frames import Frames
 from pkmcal.screw import from_pose
@@ -365,7 +366,7 @@ def _correct_actuators(
             break
         slope = machine.forward_jacobian(slots, own[live], q[live], twists=True)
         slope = frames.twists_outward(own[live], slope)
-        slope = frames.rates_of_twists(seen[live], slope)[:, matched]
+        slope = rates_of_twists(seen[live], slope)[:, matched]
         good = np.isfinite(slope).all(axis=(1, 2))
         live, slope = live[good], slope[good]
         q[live] -= (np.linalg.pinv(slope) @ missing[live][..., None])[..., 0]

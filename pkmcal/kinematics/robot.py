@@ -19,6 +19,7 @@ from pkmcal.arrays import FloatArray, as_rows, wrapped
 from pkmcal.core.chains import ChainMachine
 from pkmcal.core.driven import CompiledMachine
 from pkmcal.core.library import POSE
+from pkmcal.core.poses import rates_of_twists
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
@@ -26,7 +27,7 @@ from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import box, robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import Model
-from pkmcal.kinematics import chain_limits, overconstrained
+from pkmcal.kinematics import chain_limits
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
@@ -212,7 +213,9 @@ class Robot(Kinematics, Result):
 
         Every complex solution of the closures is followed from a start system where all are known
         (parameter homotopy), each real one is certified by the theorem of Newton and Kantorovich.
-        Machines without a start system, and doubts, are given random starts, which prove nothing.
+        Machines without a start system, and doubts, are given random starts, which do not prove
+        that no mode is missing. Those of chains of joints are; where it is known how many modes
+        there can be, as many are all.
 
         Parameters
         ----------
@@ -293,12 +296,12 @@ class Robot(Kinematics, Result):
             pose which misses them least.
         """
         given, own, q, shape = self._commanded(pose, actuators)
-        if self.frames.trivial and self.machine.rows == self.machine.m:  # without copies
-            columns = self.geometry.slot_index.astype(np.int32)
+        columns = self.geometry.slot_index.astype(np.int32)
+        if self.frames.trivial:  # without copies
             errors = self.machine.error_jacobian(self.slots, own, q, columns)
         else:  # rates of the machine's own angles may be infinite where the user's are not
-            twists = self.frames.twists_outward(own, self._by_numbers(own, q))
-            errors = self.frames.rates_of_twists(given, twists)
+            twists = self.machine.error_jacobian(self.slots, own, q, columns, twists=True)
+            errors = rates_of_twists(given, self.frames.twists_outward(own, twists))
         errors = self._through_ties(errors)
         return errors.reshape(*shape, 6, len(self.geometry))
 
@@ -326,7 +329,9 @@ class Robot(Kinematics, Result):
         True
         """
         _, own, q, shape = self._commanded(pose, actuators)
-        errors = self._through_ties(self.frames.twists_outward(own, self._by_numbers(own, q)))
+        columns = self.geometry.slot_index.astype(np.int32)
+        twists = self.machine.error_jacobian(self.slots, own, q, columns, twists=True)
+        errors = self._through_ties(self.frames.twists_outward(own, twists))
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
@@ -351,11 +356,7 @@ class Robot(Kinematics, Result):
         True
         """
         _, own, q, shape = self._commanded(pose, actuators)
-        if self.machine.rows > self.machine.m:
-            given = (self.machine, self.slots, own, q, self.actuator_units)
-            by_q = overconstrained.actuator_twists(*given)
-        else:
-            by_q = self.machine.forward_jacobian(self.slots, own, q, twists=True)
+        by_q = self.machine.forward_jacobian(self.slots, own, q, twists=True)
         return self.frames.twists_outward(own, by_q).reshape(*shape, 6, self.n_actuators)
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
@@ -381,14 +382,6 @@ class Robot(Kinematics, Result):
         if q_shape != shape:
             raise ArgumentError(f"actuators are a batch {q_shape}, poses a batch {shape}")
         return q
-
-    def _by_numbers(self, own: FloatArray, q: FloatArray) -> FloatArray:
-        """Twist of the platform in the machine's own frame by each number, (N, 6, numbers)."""
-        columns = self.geometry.slot_index.astype(np.int32)
-        if self.machine.rows > self.machine.m:
-            units = self.geometry.units[: len(columns)]
-            return overconstrained.error_jacobian(self.machine, self.slots, own, q, columns, units)
-        return self.machine.error_jacobian(self.slots, own, q, columns, twists=True)
 
     def _through_ties(self, errors: FloatArray) -> FloatArray:
         """The same (N, 6, p) with the columns of named parameters after those of the numbers."""

@@ -194,7 +194,7 @@ def _balance(robot: Robot, poses: FloatArray, load: Load) -> _Balance:
     force, at = np.array(load.force), np.array(load.at)
     machine, slots = robot.limb_machine, robot.slots
     own = robot.on_map(robot.frames.inward(poses))
-    twists = machine.moved(own, np.zeros((len(own), machine.m)))[1]
+    twists = machine.step_twists(own)
     arcs = np.array([1.0 if name in "xyz" else robot.length for name in robot.coordinates])
 
     def generalised(pull: FloatArray, point: FloatArray) -> FloatArray:

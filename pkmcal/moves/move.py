@@ -324,7 +324,7 @@ def move(
         for name, value in (("velocity", velocity), ("acceleration", acceleration), ("jerk", jerk))
         if value is not None
     }
-    q = robot.inverse(np.stack(ends))
+    q = np.stack([_actuators(robot, pose) for pose in ends])
     q[1] = robot.short_way(q[0], q[1])
     if law == "jerk-limited":
         if space != "joint" or duration is not None or len(limits) < 3:
@@ -350,14 +350,29 @@ def _pose(robot: Robot, name: str, pose: ArrayLike) -> FloatArray:
     rows, shape = as_rows(name, pose, 6)
     if shape != ():
         raise ArgumentError(f"{name} must be one pose (6,), found {(*shape, 6)}")
-    off = float(robot.violation(rows[0]))
-    if not off <= ON_THE_MANIFOLD:
-        why = f"its closures miss by {off:.3g} mm" if np.isfinite(off) else "out of reach"
+    if np.isnan(_actuators(robot, rows[0])).any():
+        missed = float(robot.violation(rows[0]))
+        why = f"its closures miss by {missed:.3g} mm" if np.isfinite(missed) else "out of reach"
         raise ArgumentError(
             f"{name}: {robot.name} cannot take this pose, {why}; robot.complete(pose) makes one"
         )
     pose_given: FloatArray = rows[0]
     return pose_given
+
+
+def _actuators(robot: Robot, pose: FloatArray) -> FloatArray:
+    """Coordinates (n,) that lead to a pose (6,); NaN where the machine cannot take it.
+
+    With more closures than free coordinates, and numbers that are not exact, a pose may be as near
+    to all closures as it gets: `Robot.complete` leaves it where it is, and limb by limb the inverse
+    kinematics has other coordinates for it.
+    """
+    if robot.violation(pose) <= ON_THE_MANIFOLD:
+        return robot.inverse(pose)
+    over = robot.machine.rows > robot.machine.m
+    if over and np.abs(off(robot.complete(pose), pose)).max() <= ON_THE_MANIFOLD:
+        return robot.inverse(pose, match=True)
+    return np.full(robot.n_actuators, np.nan)
 
 
 def _followed(made: Move) -> Move:

@@ -109,17 +109,38 @@ def linear_fit(
     >>> bool(np.allclose(fit.back @ fit.back.T, np.linalg.inv(jacobian.T @ jacobian)))
     True
     """
-    design, rows = jacobian @ basis, prior @ basis
-    _, singular, turned = np.linalg.svd(triangle(np.vstack([design, rows])))
-    half = turned.T / singular
+    back = unit_basis(jacobian, prior, basis)
+    return in_unit_basis(jacobian, residual, prior, back, cluster, component)
+
+
+def in_unit_basis(
+    jacobian: FloatArray,
+    residual: FloatArray,
+    prior: FloatArray,
+    back: FloatArray,
+    cluster: IntArray,
+    component: IntArray,
+) -> LinearFit:
+    """`linear_fit` where its `unit_basis` is known, `back` (n, p)."""
     return LinearFit(
-        design=design @ half,
+        design=jacobian @ back,
         residual=residual,
-        prior=rows @ half,
-        back=basis @ half,
+        prior=prior @ back,
+        back=back,
         cluster=np.unique(cluster, return_inverse=True)[1].reshape(-1),
         component=component,
     )
+
+
+def unit_basis(jacobian: FloatArray, prior: FloatArray, basis: FloatArray) -> FloatArray:
+    """Combinations (n, p) in which the normal matrix is the identity, the best determined first.
+
+    Arguments are those of `linear_fit`.
+    """
+    whole = triangle(np.vstack([jacobian, prior])) @ basis
+    _, singular, turned = np.linalg.svd(whole, full_matrices=False)
+    back: FloatArray = basis @ (turned.T / singular)
+    return back
 
 
 def numbered(*keys: IntArray) -> IntArray:

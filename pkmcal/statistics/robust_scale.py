@@ -28,8 +28,8 @@ def _medians(components: IntArray) -> FloatArray:
     """Medians of chi squared variables with so many degrees of freedom."""
     from scipy.special import gammaincinv
 
-    medians: FloatArray = 2 * gammaincinv(components / 2, 0.5)
-    return medians
+    medians: FloatArray = 2 * gammaincinv(np.arange(int(components.max()) + 1) / 2, 0.5)
+    return medians[components]
 
 
 def robust_ratio(design: FloatArray, residual: FloatArray, components: IntArray) -> float:

@@ -127,21 +127,25 @@ class _Model:
         self._inner = np.array([fit.design[mine].T @ fit.design[mine] for mine in rows])
         self._pulls = np.array([fit.design[mine].T @ fit.residual[mine] for mine in rows])
         self._prior, self._missed = fit.prior, prior_residual
+        self._known, self._drawn = fit.prior.T @ fit.prior, fit.prior.T @ prior_residual
         self.square = np.bincount(classes, fit.residual**2)
         self.floor = _TINY * float(self.square.sum() / self.count.sum())
 
     def at(self, theta: FloatArray) -> _Point | None:
         """At variances (c,); None where a class has no freedom left."""
-        normal = np.tensordot(1.0 / theta, self._inner, 1) + self._prior.T @ self._prior
+        weighted = self._inner / theta[:, None, None]
+        normal = weighted.sum(axis=0) + self._known
         plain = np.linalg.inv(normal)
-        shift = plain @ (self._pulls.T @ (1.0 / theta) + self._prior.T @ self._missed)
-        left = self.square - 2.0 * self._pulls @ shift + (self._inner @ shift) @ shift
-        slopes = self._inner / theta[:, None, None] ** 2
-        turned = plain @ slopes
-        spent = np.trace(turned, axis1=1, axis2=2) * theta
+        shift = plain @ (self._pulls.T @ (1.0 / theta) + self._drawn)
+        moved = self._inner @ shift
+        left = self.square - (2.0 * self._pulls - moved) @ shift
+        slopes = weighted / theta[:, None, None]
+        turned = (plain @ slopes).reshape(len(theta), -1)
+        spent = slopes.reshape(len(theta), -1) @ plain.reshape(-1) * theta
         if (self.count - spent < _SPENT * self.count).any():
             return None
-        information = 0.5 * np.tensordot(turned, turned, ((1, 2), (2, 1)))
+        crossed = turned.reshape(slopes.shape).transpose(0, 2, 1).reshape(len(theta), -1)
+        information = 0.5 * turned @ crossed.T
         every = np.arange(len(theta))
         information[every, every] += 0.5 * (self.count - 2.0 * spent) / theta**2
         rest = self._missed - self._prior @ shift
@@ -151,7 +155,7 @@ class _Model:
             + float((left / theta).sum() + rest @ rest)
         )
         slope = 0.5 * (left / theta - (self.count - spent))
-        pulled = (self._pulls - self._inner @ shift) / theta[:, None]
+        pulled = (self._pulls - moved) / theta[:, None]
         curvature = -(pulled @ plain @ pulled.T) - information * np.outer(theta, theta)
         curvature[every, every] += left / theta - slope
         return _Point(theta, likelihood, slope, curvature, information, plain, slopes)
@@ -181,18 +185,26 @@ class _Model:
             here = further
         return here
 
-    def score_chance(self, coarse: IntArray, theta: FloatArray) -> float:
-        """Chance of a slope as steep if variances theta of coarser classes (M,) were right.
+    def among(self, coarse: IntArray, theta: FloatArray) -> _Point | None:
+        """Where coarser classes (M,) have variances theta; None as `at`."""
+        return self.at(theta[self._containing(coarse)])
 
-        Rao's score test; NaN where a class has no freedom left.
+    def score_chance(self, here: _Point, classes: IntArray, coarse: int) -> float:
+        """Chance of a slope as steep if variances of so many coarse classes were right.
+
+        Rao's score test of `classes` (M,), which are parts of the coarse ones and have those of the
+        model as parts; `here` is where they are.
         """
-        of_class = np.zeros(len(self.count), dtype=np.intp)
-        of_class[self.classes] = coarse
-        here = self.at(theta[of_class])
-        if here is None:
-            return float("nan")
-        steep = float(here.slope @ np.linalg.solve(here.by_logarithms, here.slope))
-        return chi2_tail(max(steep, 0.0), len(self.count) - len(theta))
+        mine = np.eye(int(classes.max()) + 1)[self._containing(classes)]
+        slope, information = here.slope @ mine, mine.T @ here.by_logarithms @ mine
+        steep = float(slope @ np.linalg.solve(information, slope))
+        return chi2_tail(max(steep, 0.0), mine.shape[1] - coarse)
+
+    def _containing(self, coarse: IntArray) -> IntArray:
+        """Which coarse class (M,) each class of the model is part of."""
+        found = np.empty(len(self.count), dtype=np.intp)
+        found[self.classes] = coarse
+        return found
 
 
 def told_apart(
@@ -205,26 +217,32 @@ def told_apart(
     fit : LinearFit
         The fit with the variances of the first classes.
     candidates : sequence of ndarray of int (M,)
-        Classes, coarse ones first.
+        Classes, coarse ones first; each are parts of those before.
     prior_residual : ndarray (q,)
         Residuals of the prior's rows.
     """
-    of_present = candidates[0]
-    present = _Model(fit, of_present, prior_residual).highest(fit.freedom)
-    found = None
-    for classes in candidates[1:]:
-        many = int(classes.max()) + 1
-        if present is None or fit.freedom < _LEAST_FREEDOM * many or many <= len(present.theta):
+    enough = fit.freedom / _LEAST_FREEDOM
+    shown = [classes for classes in candidates[1:] if int(classes.max()) + 1 <= enough]
+    if not shown:
+        return None
+    finest = _Model(fit, shown[-1], prior_residual)
+    present = _Model(fit, candidates[0], prior_residual).highest(fit.freedom)
+    if present is None:
+        return None
+    here, found = finest.among(candidates[0], present.theta), None
+    for classes in shown:
+        many, few = int(classes.max()) + 1, len(present.theta)
+        if many <= few:
             continue
-        model = _Model(fit, classes, prior_residual)
-        if model.score_chance(of_present, present.theta) > _NO_SLOPE:
+        if here is not None and finest.score_chance(here, classes, few) > _NO_SLOPE:
             continue
-        other = model.highest(fit.freedom)
+        other = _Model(fit, classes, prior_residual).highest(fit.freedom)
         if other is None:
             continue
         gained = 2.0 * (other.likelihood - present.likelihood)
-        if chi2_tail(gained, many - len(present.theta)) < _DIFFERENT:
+        if chi2_tail(gained, many - few) < _DIFFERENT:
             better = _at_best(classes, other)
             if better is not None:
-                present, of_present, found = other, classes, better
+                present, found = other, better
+                here = finest.among(classes, present.theta)
     return found

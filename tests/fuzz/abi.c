@@ -327,6 +327,33 @@ static void of_arm(ptrdiff_t n, unsigned strange, int isas)
     EACH_ISA(arm_error_jacobian, &arm, &links, error, frame, n, theta, D(0, 36 * n * joints));
 }
 
+/* Equations of poses, any number of each, in any order. */
+static void of_poses(ptrdiff_t n, unsigned strange, int isas)
+{
+    enum { MOST = 9 };
+    const int u = (int)(byte() % 7) + 1, columns = (int)(byte() % 4);
+    int64_t *first = fresh(sizeof *first * (size_t)(n + 1)), *place = fresh(sizeof *place * (size_t)n);
+    int64_t left = 0, total = first[0] = 0;
+    for (ptrdiff_t i = 0; i < n; i++) {
+        const int64_t count = byte() % (MOST + 1);
+        place[i] = left, left += count > u ? count - u : 0;
+        first[i + 1] = total += count;
+    }
+    int64_t *order = fresh(sizeof *order * (size_t)total);
+    for (int64_t e = 0; e < total; e++) order[e] = (int64_t)(bits() % (uint64_t)total);
+    const double *slopes = numbers(total * u, strange), *residual = numbers(total, strange);
+    const double *part = numbers(total * columns, strange), *rest = numbers(left * columns, strange);
+    const double *matrix = numbers(n * u * u, strange), *damping = numbers(n, strange);
+    double *work = fresh(sizeof *work * PKM_WIDEST * (MOST + (size_t)u) * ((size_t)u + 1));
+    one_of(4);
+    EACH_ISA(pose_normals, n, u, first, order, residual, slopes, D(0, n * u * u), D(1, n * u), D(2, n),
+             work);
+    EACH_ISA(pose_steps, n, u, matrix, matrix, damping, D(0, n * u), D(1, n), work);
+    EACH_ISA(pose_left, n, u, first, order, slopes, columns, part, place, D(0, left * columns),
+             D(1, n * u * columns), work);
+    EACH_ISA(pose_spread, n, u, first, order, slopes, columns, place, rest, D(0, total * columns), work);
+}
+
 #include "abi_chains.h"
 
 /* Calls that are one formula a row. */
@@ -387,13 +414,14 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
 #else
     const int isas = pkm_best_isa() + 1;
 #endif
-    switch (what % 16) {
+    switch (what % 17) {
     case 0: of_path(n, strange); break;
     case 1: of_swarm(n, strange, isas); break;
     case 2: of_arm(n, strange, isas); break;
     case 3:
     case 4: of_rows(n, strange, isas); break;
     case 5: of_chains(n, strange, isas); break; /* seldom: one takes as long as thirty others */
+    case 6: of_poses(n, strange, isas); break;
     default: of_machine(n, strange, isas);
     }
     forget();

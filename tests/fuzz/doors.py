@@ -154,10 +154,14 @@ def arm(folder: Path, content: bytes, chance: Random) -> bool:
 
 
 def printer(folder: Path, content: bytes, chance: Random) -> bool:
+    """The first line says whose file it is, or, where damage took it, chance does."""
+    line, _, inside = content.partition(b"\n")
+    firmware = line.decode("latin-1")
+    if firmware not in PRINTERS:
+        firmware, inside = chance.choice(tuple(PRINTERS)), content
     path = folder / "printer.cfg"
-    path.write_bytes(content)
-    firmware = chance.choice(("klipper", "reprap", "marlin"))
-    found = taken(path, lambda each: pk.import_printer(each, firmware))
+    path.write_bytes(inside)
+    found = taken(path, lambda each: pk.import_printer(each, firmware))  # type: ignore[arg-type]
     if found is None or chance.random() > USED:
         return found is not None
     assert repr(found) and visible(str(found)) == str(found)
@@ -201,7 +205,27 @@ _URDF = b"""<?xml version="1.0"?>
 <origin xyz="0.1 0 0" rpy="0 1.57 0.3"/><axis xyz="0 1 1"/></joint>
 <joint name="t" type="fixed"><parent link="b"/><child link="tool"/></joint></robot>
 """
-_GCODE = b"M665 R105.6 L217.5 H240.1 B85 X0.1 Y-0.2 Z0 ; delta\nM666 X-0.1 Y0.2 Z0.0\n"
+PRINTERS = {
+    "klipper": ((EXAMPLES / "linear-delta" / "printer.cfg").read_bytes(),),
+    "reprap": (
+        b"M665 R105.6 L217.5 H240.1 B85 X0.1 Y-0.2 Z0 ; delta\nM666 X-0.1 Y0.2 Z0.0\n",
+        b"M669 K10 U170:170.5:169.5 L400:401:400 H300:301:302 R100 A-90:60 X0.5 Y0 Z0 B120\n"
+        b"M666 X0.1 Y-0.3 Z0.2\n",
+    ),
+    "marlin": (b"M665 R105.6 L217.5 H240.1 S80 X0.1 Y-0.2 Z0\nM666 X-0.1 Y-0.2 Z0.0\n",),
+    "hangprinter": (
+        b"M669 K6 N4 P1800 ; mine\nM669 A16.4:-1610.9:-131.5 B1314.2:1268.1:-121.3\n"
+        b"m669 C-1415.7:707.6:-121.8 D1.5:-2.5:2299.8\nM666 A1 Q0.06875 R75.1:75.2:74.9:75.0 W0\n"
+        b"M666 U2:2:2:4 O1:1:1:1 L20:20:20:20 H255:250:255:255 J25:25:25:25 (full steps)\n",
+    ),
+    "maslow": (
+        b"kinematics:\n  MaslowKinematics:\n    tlX: -6.2\n    tlY: 2188.0\n    trX: 2991.2 # old\n"
+        b"    trY: 2197.4\n    blX: 0.0\n    blY: 0.0\n    brX: 2989.8\n    brY: 0.0\n",
+        b"$/Maslow_tlX=-6.2\n$/Maslow_tlY=2188.0\n$/Maslow_trX=2991.2\n$/Maslow_trY=2197.4\n"
+        b"$/Maslow_brX=2989.8\nCLBM:[{bl:1851.5, br:1843.25, tr:1.8e3, tl:1820},\n"
+        b"{bl:1700.0, br:1990.0, tr:1950.5, tl:1680.0},]\nok\n",
+    ),
+}
 _TOML_WORDS = rb"""
 [pose] [[limb]] [ties] [[joint]] ''' { [ ] } = . # \u001b true rod kind 'RUS' 'PRS' 'UPR' base
 platform units 'deg' 'm' 'planar' 'translation' home match free stroke branch gain name
@@ -218,7 +242,8 @@ _URDF_WORDS = b"""
 continuous base tool <!DOCTYPE <!-- --> &amp; &x; \xff
 """.split()
 _PRINTER_WORDS = b"""
-[stepper_a] [printer] kinematics:delta arm_length: angle: : = #*# # ; M665 M666 L R X gear_ratio:0:1
+[stepper_a] [printer] kinematics:delta arm_length: angle: : = #*# # ; M665 M666 M669 L R X U Q B G20
+gear_ratio:0:1 1:2:3 CLBM: bl: tlX: { }, hangprinter
 microsteps:0 rotation_distance:0 height0 [delta_calibrate] \xff
 """.split()
 _ZIP_WORDS = (b"PK\x03\x04", b"PK\x01\x02", b"\0\0", b"\xff\xff\xff\xff", b"\x08\0", b"xl/")
@@ -242,7 +267,13 @@ DOORS = {
     ),
     "urdf": Door((_URDF,), _URDF_WORDS, arm),
     "printer": Door(
-        ((EXAMPLES / "linear-delta" / "printer.cfg").read_bytes(), _GCODE), _PRINTER_WORDS, printer
+        tuple(
+            f"{firmware}\n".encode() + each
+            for firmware, seeds in PRINTERS.items()
+            for each in seeds
+        ),
+        _PRINTER_WORDS,
+        printer,
     ),
     "line": LINE,
 }

@@ -146,3 +146,30 @@ def test_a_pose_that_is_not_found_is_no_broken_stroke() -> None:
     for each in t[beyond]:
         assert any(event.time <= each <= event.until for event in lost)
     assert "stroke" not in {event.what for event in move.events()}
+
+
+@pytest.mark.parametrize("name", ["2tpr2tps-chains", "exechon", "tripteron"])
+@pytest.mark.parametrize("space", ["coordinates", "joint"])
+def test_machines_that_do_not_quite_close_move_between_poses_that_they_take(
+    name: str, space: Any
+) -> None:
+    """More closures than coordinates, numbers that are not exact: as after a calibration."""
+    robot, rng = pk.load(name), np.random.default_rng(1)
+    values = robot.geometry.values.copy()
+    lengths = np.array(robot.geometry.units) == "mm"
+    values += np.where(lengths, 0.3, 5e-4) * rng.normal(size=len(values))
+    robot = robot.replace(values)
+    ends = np.tile(robot.home, (2, 1))
+    moved = [generated.COORDINATES.index(each) for each in robot.moved]
+    room = np.array([20, 20, 20, 0.1, 0.1, 0.1])[moved]
+    ends[:, moved] += room * rng.uniform(-1, 1, (2, len(moved)))
+    ends = robot.complete(ends)
+    assert robot.violation(ends).min() > 1e-4  # limb by limb
+    way = pk.trajectory.move(robot, *ends, duration=1.0, space=space)
+    at = way.sample(np.linspace(0.0, 1.0, 11))
+    np.testing.assert_allclose(at.pose[[0, -1]], ends, atol=1e-8)
+    np.testing.assert_allclose(robot.forward(at.actuators).pose, at.pose, atol=1e-8)
+    with pytest.raises(pk.ArgumentError, match="cannot follow"):
+        pk.trajectory.move(robot, *ends, duration=1.0)
+    with pytest.raises(pk.ArgumentError, match=r"end: .* cannot take this pose"):
+        pk.trajectory.move(robot, ends[0], ends[1] + 0.01, duration=1.0, space=space)
