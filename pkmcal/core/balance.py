@@ -154,7 +154,8 @@ def _answer(machine: Balanced, slots: FloatArray, pose: FloatArray, q: FloatArra
 
         def moved(share: float, j: int = j) -> FloatArray:
             to = np.tile(share * step * arcs * (np.arange(machine.m) == j), (len(pose), 1))
-            return _balance(machine, slots, machine.moved(pose, to), q).sum(axis=1)
+            found: FloatArray = _balance(machine, slots, machine.moved(pose, to), q).sum(axis=1)
+            return found
 
         matrix[:, :, j] = _slope(moved) / step
     twists = machine.step_twists(pose) * arcs
