@@ -67,13 +67,16 @@ test-linuxcnc: $(TESTS)
 		apt-get install -qq -y --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev; }
 	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py
 
-# What is deprecated in the lowest versions is not an error there.
+# The wheel, not this folder, with libraries as old as may be; of its own Python if LOWEST_PYTHON names
+# one. What is deprecated there is not an error, nor what old libraries say of each other.
+LOWEST_PYTHON ?= $(PYTHON)
 test-lowest: $(TESTS)
-	$(PYTHON) -m venv $(VENV)/lowest
+	$(LOWEST_PYTHON) -m venv $(VENV)/lowest
 	$(VENV)/lowest/bin/python -m pip --disable-pip-version-check --quiet install uv
 	$(VENV)/lowest/bin/uv pip install --quiet --python $(VENV)/lowest/bin/python \
 		--resolution lowest-direct ".[test]"
-	$(VENV)/lowest/bin/python -m pytest -m "not slow" -o filterwarnings=default tests
+	$(VENV)/lowest/bin/pytest -n auto --maxprocesses 8 --dist loadfile -m "not slow" \
+		-o filterwarnings=ignore tests
 
 COUNT ?= 10000
 SEED ?= 1
@@ -94,10 +97,15 @@ fuzz-abi: $(FUZZED)/abi
 	$(FUZZED)/abi -runs=$(COUNT) -seed=$(SEED) -len_control=0 -max_len=600 -print_final_stats=1 \
 		-artifact_prefix=$(FUZZED)/ $(FUZZED)/corpus
 
-$(FUZZED)/abi: tests/fuzz/abi.c $(wildcard tests/fuzz/*.h csrc/*.c csrc/*.h generated/*.h) | $(FUZZED)
-	for each in $(filter %.c,$^); do clang $(FUZZ_FLAGS) -fsanitize=fuzzer-no-link -c $$each \
-		-o $(FUZZED)/$$(basename $$(dirname $$each))-$$(basename $$each .c).o || exit 1; done
-	clang -fsanitize=fuzzer,address,undefined $(FUZZED)/*.o -lm -o $@
+FUZZ_HEADERS := $(wildcard tests/fuzz/*.h csrc/*.h generated/*.h)
+$(FUZZED)/abi: $(patsubst csrc/%.c,$(FUZZED)/csrc-%.o,$(wildcard csrc/*.c)) $(FUZZED)/fuzz-abi.o
+	clang -fsanitize=fuzzer,address,undefined $^ -lm -o $@
+
+$(FUZZED)/csrc-%.o: csrc/%.c $(FUZZ_HEADERS) | $(FUZZED)
+	clang $(FUZZ_FLAGS) -fsanitize=fuzzer-no-link -c $< -o $@
+
+$(FUZZED)/fuzz-%.o: tests/fuzz/%.c $(FUZZ_HEADERS) | $(FUZZED)
+	clang $(FUZZ_FLAGS) -fsanitize=fuzzer-no-link -c $< -o $@
 
 $(FUZZED):
 	mkdir -p $@

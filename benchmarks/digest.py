@@ -80,7 +80,7 @@ def of_machine(name: str) -> Iterator[Call]:
         "error_jacobian, twists",
         lambda: machine.error_jacobian(slots, solved, own, columns, True),
     )
-    yield "rates", lambda: machine.rates(slots, motion)
+    yield "rates", lambda: machine.rates(slots, motion, q)
     yield "motion", lambda: machine.motion(slots, solved, own, bend[0], bend[1])
     yield "closure", lambda: machine.closure(slots, poses, q)
     yield "spheres", lambda: machine.spheres(slots, q)

@@ -56,9 +56,35 @@ int CALL(readings)(const pkm_machine *machine, ptrdiff_t n, const double *geomet
                    double *by_number);
 
 /* pose (n, 6), step of a pose map (n, m) [mm, rad] -> the pose moved by it (n, 6), and the twist
- * (omega, v) by a step at the pose (n, 6, m). */
+ * (omega, v) by a step at the pose (n, 6, m; NULL: not wanted). */
 int CALL(moved)(int map, ptrdiff_t n, const double *pose, const double *step, double *moved,
                 double *twist);
+
+/* Equations of n poses with as many unknowns each: those of pose i are order[first[i]] to order[first[i
+ * + 1] - 1], places in arrays of all equations. `work` is PKM_WIDEST (k + unknowns) (unknowns + 1)
+ * numbers, k the most equations of a pose.
+ *
+ * residual, by_unknown (equations, unknowns) -> JᵀJ (n, unknowns, unknowns), Jᵀr (n, unknowns) and rᵀr
+ * (n). */
+int CALL(pose_normals)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,
+                       const double *residual, const double *by_unknown, double *matrix,
+                       double *pull, double *cost, double *work);
+
+/* These, and damping (n) of each pose -> the step (n, unknowns), and what it should take off rᵀr (n): of
+ * a pose with numbers that are not finite 0 and NaN. */
+int CALL(pose_steps)(ptrdiff_t n, int unknowns, const double *matrix, const double *pull,
+                     const double *damping, double *step, double *gain, double *work);
+
+/* part (equations, columns) -> what is left of it when by_unknown is a triangle: of pose i the rows from
+ * place[i] on; and -R⁻¹ times what is not left (n, unknowns, columns), not finite where R is singular. */
+int CALL(pose_left)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,
+                    const double *by_unknown, int columns, const double *part, const int64_t *place,
+                    double *left, double *following, double *work);
+
+/* The reverse of what is left: part (order, columns), pose by pose. */
+int CALL(pose_spread)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,
+                      const double *by_unknown, int columns, const int64_t *place,
+                      const double *left, double *part, double *work);
 
 /* q (n, actuators) -> the limbs (n, limbs, PKM_SPHERE); lengths are NaN where one of them is not
  * positive. */

@@ -172,10 +172,10 @@ INLINE void chain_cut(const pkm_chains *machine, int l, const real *twist, real 
 }
 
 /* The hybrid twist by a joint, an angle as its arc. */
-INLINE void chain_column(const pkm_chains *machine, int l, int joint, const motion *at,
-                         const motion *end, real *out)
+INLINE void chain_twist(const pkm_chains *machine, int joint, const motion *at, const motion *end,
+                        real *twist)
 {
-    real twist[6], w[3];
+    real w[3];
     for (int i = 0; i < 3; i++) w[i] = at->R[3 * i + 2];
     if (machine->prismatic[joint]) {
         for (int i = 0; i < 3; i++) twist[i] = fill(0.0), twist[3 + i] = w[i];
@@ -184,6 +184,14 @@ INLINE void chain_column(const pkm_chains *machine, int l, int joint, const moti
         FN(chain_turn)(w, at->p, end->p, twist + 3);
         for (int i = 0; i < 3; i++) twist[3 + i] *= 1.0 / machine->length;
     }
+}
+
+/* Its rows that close. */
+INLINE void chain_column(const pkm_chains *machine, int l, int joint, const motion *at,
+                         const motion *end, real *out)
+{
+    real twist[6];
+    chain_twist(machine, joint, at, end, twist);
     chain_cut(machine, l, twist, out);
 }
 

@@ -2,6 +2,7 @@
  *
  * core_base.c, core_v3.c and core_v4.c each include this with their own LANES and ISA.
  */
+#include "elimination.h"
 #include "forward.h"
 #include "inspect.h"
 #include "motion.h"

@@ -81,7 +81,7 @@ INLINE void closure_map(int map, const pkm_machine *machine, ptrdiff_t n, const 
                     kinds &= kinds - 1;
                 }
                 if (k && moves) by_q *= machine->weight[r];
-                else by_q *= rough_reciprocal(sphere[i].rho) * machine->weight[r];
+                else by_q *= machine->weight[r] / sphere[i].rho;
                 for (int a = 0; a < actuators; a++)
                     scatter(a == machine->actuator[i] ? by_q : fill(0.0),
                             out->by_q + r * actuators + a, rows * actuators, row, count);

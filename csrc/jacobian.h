@@ -160,7 +160,7 @@ INLINE void response_block(int map, const pkm_machine *machine, const limb_numbe
     const int rows = pose_response(map, machine, sphere, state, twists, response);
     for (int k = 0; k < 6 * columns; k++) out[k] = fill(0.0);
     for (int i = 0; i < machine->limbs; i++) {
-        real by_q, by_g[SLOTS], scale = rough_reciprocal(sphere[i].rho) * machine->weight[r];
+        real by_q, by_g[SLOTS], scale = machine->weight[r] / sphere[i].rho;
         sphere_derivatives(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
         const int a = machine->actuator[i];
         int end = c;

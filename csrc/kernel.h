@@ -147,7 +147,7 @@ INLINE int FN(closure_rows)(int map, int scaling, const pkm_machine *machine,
         const FN(limb_sphere) *one = &limb[i];
         FN(sphere_row)(R, p, one->b, one->c, one->rho * one->rho, &phi, omega, v);
         /* Φ is mm² */
-        const real scale = FN(rough_reciprocal)(one->rho) * (NUMBER)machine->weight[r];
+        const real scale = (NUMBER)machine->weight[r] / one->rho;
         FN(store_row)(map, scaling == SCALED, state, phi, omega, v, scale, scale * inverse_length,
                       &residual[machine->order[r]],
                       jacobian ? &jacobian[machine->order[r] * m] : NULL);

@@ -135,10 +135,6 @@ INLINE wide part(narrow x, int which)
 #endif
 }
 
-/* 1/x to the precision of floats: enough for a scale, and cheaper. */
-INLINE narrow rough_reciprocal_narrow(narrow x) { return 1.0f / x; }
-INLINE wide rough_reciprocal_wide(wide x) { return part(1.0f / join(x, x), 0); }
-
 enum { PLAIN, SCALED }; /* systems of closure rows: see kernel.h */
 
 /* The kernel, first for floats, then for doubles, which `real` means from here on. */
@@ -162,7 +158,6 @@ enum { PLAIN, SCALED }; /* systems of closure rows: see kernel.h */
 #define select(m, yes, no) select_wide(m, yes, no)
 #define absolute(x) absolute_wide(x)
 #define larger(a, b) larger_wide(a, b)
-#define rough_reciprocal(x) rough_reciprocal_wide(x)
 #define fill(x) fill_wide(x)
 
 INLINE mask fill_mask(int64_t x) { return (mask){0} + x; }

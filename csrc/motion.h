@@ -98,7 +98,7 @@ SHARED int limb_bends(const pkm_machine *machine, int i, const limb_numbers *lim
         NO_OTHER_CASE;
 #undef CASE
     }
-    bend[r] *= rough_reciprocal(sphere->rho) * weight[r];
+    bend[r] *= weight[r] / sphere->rho;
     r++;
     memcpy(turning, T, sizeof turning);
     for (int k = 0; k < 3; k++) /* an axis has no place */
@@ -151,7 +151,7 @@ INLINE void motion_at(int map, const pkm_machine *machine, const limb_numbers *l
     for (int i = 0, r = 0; i < machine->limbs; i++) {
         real by_q, by_g[SLOTS];
         sphere_derivatives_called(machine, i, &limb[i], R, p, q[machine->actuator[i]], &by_q, by_g);
-        real scale = rough_reciprocal(sphere[i].rho) * machine->weight[r];
+        real scale = machine->weight[r] / sphere[i].rho;
         for (int kind = 0; kind <= ALL_ROWS; kind = kind ? 2 * kind : 1) {
             if (kind && !(machine->rows[i] & kind)) continue;
             if (kind && driver_moves(machine->driver[i])) {

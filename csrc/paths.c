@@ -16,7 +16,6 @@
 enum { PLAIN, SCALED };
 
 INLINE double complex root_complex(double complex x) { return csqrt(x); }
-INLINE double complex rough_reciprocal_complex(double complex x) { return 1.0 / x; }
 
 #define COMPLEX
 #define NARROW /* without the formulas that need sines */

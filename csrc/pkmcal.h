@@ -124,6 +124,9 @@ ptrdiff_t pkm_swarm_size(const pkm_swarm *swarm);
  * axes, in that order. Zero where it has no axis. */
 enum { PKM_SPHERE = 7 + 3 * AXES };
 
+/* Numbers that the widest lanes hold: memory that is lent to a call is a multiple of that. */
+enum { PKM_WIDEST = 8 };
+
 /* What became of a path. */
 enum { PKM_ARRIVED, PKM_LOST, PKM_FAR };
 

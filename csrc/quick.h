@@ -229,7 +229,7 @@ INLINE void steps_in_doubles(int map, const pkm_machine *machine, batch *all)
         closures_of_block(map, machine, all, t, phi[t]);
         narrow worst = fill_narrow(0);
         for (int i = 0, r = 0; i < machine->limbs; i++) { /* in mm */
-            narrow scale = rough_reciprocal_narrow(all->sphere[t][i].rho);
+            narrow scale = 1.0f / all->sphere[t][i].rho;
             for (int kinds = 2 * machine->rows[i] + 1; kinds; kinds &= kinds - 1) {
                 worst = larger_narrow(worst, absolute_narrow(phi[t][machine->order[r++]]) * scale);
                 scale = fill_narrow((float)(1.0 / machine->size));

@@ -2,24 +2,15 @@
 #ifndef RANDOM_H
 #define RANDOM_H
 
-#include "lanes.h"
+#include "rows.h"
 
 typedef uint64_t bits __attribute__((vector_size(8 * LANES)));
 
 /* xoshiro256+ of Blackman and Vigna, a state for each lane. */
 typedef struct { bits s[4]; } generator;
 
-INLINE real load(const double *from)
-{
-    real r;
-    memcpy(&r, from, sizeof r);
-    return r;
-}
-
 /* `fill` for numbers from memory: x - 0 is x for every x, which the compiler leaves out. */
 INLINE real spread(double x) { return x - (real){0}; }
-
-INLINE void store(real x, double *to) { memcpy(to, &x, sizeof x); }
 
 /* The next number of each lane, uniform in [0, 1): 52 bits as the fraction of a double in [1, 2). */
 INLINE real draw(generator *g)

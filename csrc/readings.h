@@ -125,6 +125,7 @@ INLINE void moved_map(int map, ptrdiff_t n, const double *pose, const double *st
         FN(map_tidy)(map, after, state); /* long steps leave the manifold by more than rounding */
         map_to_pose(map, state, found);
         scatter_row(found, 6, moved, 6, row, count);
+        if (!twist) continue;
         map_from_pose(map, lane_pose, state);
         for (int j = 0; j < m; j++) {
             real unit[6], of_unit[6];

@@ -4,6 +4,16 @@
 
 #include "lanes.h"
 
+/* LANES numbers one after another in memory. */
+INLINE real load(const double *from)
+{
+    real r;
+    memcpy(&r, from, sizeof r);
+    return r;
+}
+
+INLINE void store(real x, double *to) { memcpy(to, &x, sizeof x); }
+
 /* One number of each of the given rows of a row-major array. */
 INLINE real gather(const double *column, ptrdiff_t stride, const ptrdiff_t *row)
 {

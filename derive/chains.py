@@ -3,6 +3,9 @@
 A limb is a product of exponentials with joint errors (`screws`); it ends on the platform, whose
 frame it has at (C, c) while the platform has it at (R, p). The rows are what is between the two,
 and the columns hybrid twists: the turning, and the velocity of the limb's own end.
+
+Where limbs cannot close, joints yield, and the pose depends on how rows and columns turn as well: a
+column x pairs with a wrench u as x·u, and what a joint moves behind it turns and shifts rigidly.
 """
 
 from __future__ import annotations
@@ -10,7 +13,7 @@ from __future__ import annotations
 import sympy as sp
 
 from .emit import Function
-from .rotation import axial
+from .rotation import axial, skew
 
 
 def _closure() -> Function:
@@ -54,6 +57,57 @@ def _turn() -> Function:
     return f
 
 
+def _turned() -> Function:
+    f = Function(
+        "chain_turned",
+        "how a limb's vee follows turns of its end and of the platform, per arc",
+        "∂vee([ω] C Rᵀ), ∂vee(C Rᵀ [ω]ᵀ) by ω",
+    )
+    C = f.matrix("C", "platform's axes as the limb has them")
+    R = f.matrix("R", "platform to base, row by row")
+    w = f.perturbation("w", 3)
+    D = f.let("D", C * R.T)
+    for name, product, doc in (
+        ("by_end", skew(w) * D, "by the limb's end, row by row"),
+        ("by_platform", D * skew(w).T, "by the platform"),
+    ):
+        f.output(name, (axial(product) / 2).jacobian(w), doc)
+    return f
+
+
+def _pairing() -> Function:
+    f = Function(
+        "chain_pairing",
+        "how x·u of a joint's column x follows what moves the joint and the end",
+        "∂(x·u) = ω·by_turn where joint and end turn with ω, v·by_shift where the end alone moves",
+    )
+    x = f.vector("x", 6, "column: turning as arc, velocity of the end")
+    u = f.vector("u", 6, "wrench")
+    inverse = 1 / f.scalar("length", "λ [mm]")
+    w, v = f.perturbation("w", 3), f.perturbation("v", 3)
+    carried = sp.Matrix([*w.cross(x[:3, :]), *w.cross(x[3:, :])])
+    lifted = sp.Matrix([0, 0, 0, *(inverse * x[:3, :].cross(v))])
+    f.output("by_turn", sp.Matrix([carried.dot(u)]).jacobian(w), "by ω")
+    f.output("by_shift", sp.Matrix([lifted.dot(u)]).jacobian(v), "by v")
+    return f
+
+
+def _bend() -> Function:
+    f = Function(
+        "chain_bend",
+        "how what a joint yields to a wrench u follows its lever d to the end, both as arcs",
+        "K u = (t, t × d + f), t = m + d × f, of u = (m, f): ∂(K u) as d changes by δ",
+    )
+    d, change = f.vector("d", 3, "lever over λ"), f.vector("change", 3, "δ")
+    u = f.vector("u", 6, "wrench (m, f)")
+    at = f.perturbation("t", 1)
+    lever = d + at[0] * change
+    turned = u[:3, :] + lever.cross(u[3:, :])
+    yielded = sp.Matrix([*turned, *(turned.cross(lever) + u[3:, :])])
+    f.output("bent", yielded.jacobian(at), "∂(K u)")
+    return f
+
+
 def functions() -> list[Function]:
     """The emitted functions of chains."""
-    return [_closure(), _ball(), _turn()]
+    return [_closure(), _ball(), _turn(), _turned(), _pairing(), _bend()]

@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+from pkmcal.display import visible
 
-class Error(Exception):
+
+class _Shown(Exception):
+    """Its message steers no terminal, whatever names from files it quotes."""
+
+    def __str__(self) -> str:
+        return visible(super().__str__())
+
+
+class Error(_Shown):
     """What pkmcal raises about its arguments and files."""
 
 
@@ -22,6 +31,8 @@ class FileError(ArgumentError):
 class MissingFileError(FileNotFoundError, FileError):
     """There is no such file, or no folder to write it to."""
 
+    __str__ = Error.__str__  # before that of OSError
 
-class CalibrationWarning(UserWarning):
+
+class CalibrationWarning(_Shown, UserWarning):
     """What `identify` has to say about a fit that succeeded."""

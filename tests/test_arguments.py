@@ -99,7 +99,11 @@ CALLS: dict[str, Call] = {
         {"q": FLAT.inverse(AWAY), "starts": 10},
         {"q": "numbers", "starts": "count"},
     ),
-    "rates": (ROBOT.rates, {"motion": np.stack([np.eye(4)] * 3)}, {"motion": "numbers"}),
+    "rates": (
+        ROBOT.rates,
+        {"motion": np.stack([np.eye(4)] * 3), "near": ROBOT.inverse(ROBOT.home)},
+        {"motion": "numbers", "near": "numbers"},
+    ),
     "replace": (ROBOT.replace, {"changes": ROBOT.geometry.values}, {"changes": "changes"}),
     "Robot.save": (
         ROBOT.save,

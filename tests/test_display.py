@@ -9,6 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pkmcal import display
+from pkmcal.exceptions import (
+    ArgumentError,
+    ArgumentTypeError,
+    CalibrationWarning,
+    FileError,
+    MissingFileError,
+)
 
 
 @pytest.mark.parametrize(
@@ -71,3 +78,10 @@ def test_long_tables_fold_into_columns_side_by_side() -> None:
         "b     1   e     4",
         "c     2",
     ]
+
+
+@pytest.mark.parametrize(
+    "kind", [ArgumentError, ArgumentTypeError, FileError, MissingFileError, CalibrationWarning]
+)
+def test_a_message_that_quotes_a_file_steers_no_terminal(kind: type[Exception]) -> None:
+    assert str(kind("joint '\x1b[31m\u202e' of\ntwo lines")) == "joint '�[31m�' of\ntwo lines"

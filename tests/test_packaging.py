@@ -144,6 +144,7 @@ except SystemExit:
     assert "pkmcal.calibration.identification" in loaded
     assert not loaded & {"pkmcal.view", "pkmcal.report.report", "pkmcal.report.certificate"}
     assert not loaded & {"jinja2", "matplotlib"}
+    assert "rich" not in loaded  # of bars on a terminal
 
 
 def test_version_is_stated_once() -> None:

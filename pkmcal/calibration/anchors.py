@@ -22,7 +22,7 @@ from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 _MAPS = {"translation": 3, "xy": 2}
-_LEAST = 1e-3  # of the largest eigenvalue of the Gram matrix: below it noise has the sign
+_LEAST = 1e-3  # of the largest eigenvalue of the Gram matrix, for one that no rows tell
 _SAME = 1e-9  # of the machine's size: platform joints that are one point
 _FREE = 1e-4  # weight of a free coordinate, where a fixed one has 1
 _FLAT = 1e-6  # of the largest singular value: fewer dimensions than the map has
@@ -40,7 +40,9 @@ class LocatedAnchors:
         Where it then is at each row.
     misfit : float
         Share of the lengths' pattern that m dimensions do not explain: some thousandths where
-        lengths are good, hundredths where a constant is missing or rows are wrong.
+        lengths are good, hundredths where a constant is missing or rows are wrong. The pattern of
+        m + 1 anchors is always explained: what counts then is the share of the first squared
+        lengths, which is about half as much; NaN where rows are no more than that needs.
     mirrored : float
         How much better the anchors lie on those of the file as they are than mirrored: rms
         distance mirrored over rms distance. Near 1 the file does not say which of the two it is.
@@ -100,6 +102,9 @@ def locate_anchors(robot: Robot, actuators: ArrayLike) -> LocatedAnchors:
     """
     require_parallel(robot)
     q, _ = as_rows("actuators", actuators, robot.n_actuators)
+    if not np.isfinite(q).all():
+        row = int(np.argmin(np.isfinite(q).all(axis=1)))
+        raise ArgumentError(f"actuators: must be finite, found {q[row].tolist()} in row {row}")
     m = _dimensions(robot)
     if len(q) < m * (m + 3) // 2 + 1:
         raise ArgumentError(
@@ -144,7 +149,6 @@ def _solved(squares: FloatArray, m: int) -> tuple[FloatArray, FloatArray, float]
     left, size, right = np.linalg.svd(pattern, full_matrices=False)
     if not size[m - 1] > _FLAT * size[0]:
         raise ArgumentError(f"actuators: rows or anchors span fewer than {m} dimensions")
-    misfit = float(size[m] / size[m - 1]) if len(size) > m else 0.0
     u, v = left[:, :m] * size[:m], right[:m].T  # of the poses, of the anchors, about the first
     # l_i0² - l_00² = uᵀ M u + 2 wᵀ u, M = GᵀG the Gram matrix of the map x = G u
     rows, columns = np.triu_indices(m)
@@ -153,12 +157,25 @@ def _solved(squares: FloatArray, m: int) -> tuple[FloatArray, FloatArray, float]
     table = np.hstack([twice * u[:, rows] * u[:, columns] / scale, 2.0 * u])
     table, target = table[1:], squares[1:, 0] - squares[0, 0]
     found = np.linalg.lstsq(table, target, rcond=None)[0]
+    missed, surplus = np.linalg.norm(table @ found - target), len(table) - table.shape[1]
+    misfit = float("nan")
+    if len(size) > m:
+        misfit = float(size[m] / size[m - 1])
+    elif surplus > 0:
+        misfit = float(missed / np.linalg.norm(target - target.mean()))
     gram = np.zeros((m, m))
     gram[rows, columns] = gram[columns, rows] = found[: len(rows)] / scale
     values, axes = np.linalg.eigh(gram)
     if not values[-1] > 0:
         raise ArgumentError("actuators: lengths that no anchors have; check offsets, gains, order")
-    root = np.sqrt(np.maximum(values, _LEAST * values[-1]))
+    least = np.where(values > 0, 0.0, _LEAST * values[-1])
+    if surplus > 0:  # what noise makes of an eigenvalue: below that its sign is noise
+        slopes = np.zeros((table.shape[1], m))
+        slopes[: len(rows)] = twice[:, None] * axes[rows] * axes[columns] / scale
+        half = np.linalg.lstsq(table.T, slopes, rcond=None)[0]
+        least = missed / np.sqrt(surplus) * np.linalg.norm(half, axis=0)
+    values = np.maximum(values, least)
+    root = np.sqrt(values)
     to_space = axes * root  # xᵀ = uᵀ · this
     start = (found[len(rows) :] @ axes) / root  # x_0 - a_0
     anchors = np.vstack([np.zeros(m), (v @ axes) / root])

@@ -11,13 +11,14 @@ from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.dropped import outlying
 from pkmcal.estimation.estimator import Estimate, Estimator
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.gauges import MIRROR, Gauges, gauges, mirror_fits
+from pkmcal.estimation.gauges import Gauges, gauges
 from pkmcal.estimation.identifiability import (
     as_sum,
     held_errors,
     observability,
     sparse_basis,
 )
+from pkmcal.estimation.mirror import MIRROR, mirror_fits
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.statistics.distributions import t_factor
 from pkmcal.statistics.linear_fit import triangle

@@ -321,8 +321,10 @@ def _warnings(
     kept = estimate.state.determined.rank - estimate.state.fitted.rank
     if kept:
         which = "combinations of parameters are" if kept > 1 else "combination of parameters is"
+        worst = estimate.state.worst
+        why = "the machine's size" if worst == size else "and the search did not end with them"
         notes.append(
-            f"{kept} {which} determined to no better than {size:.0f} mm, the machine's size, and"
+            f"{kept} {which} determined to no better than {worst:.3g} mm, {why}, and"
             " kept as before: state a prior or measure more poses"
         )
     if not result.converged:

@@ -11,6 +11,7 @@ _FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as sta
 _ALIKE = 1e-9  # share by which rows are further off than others that are not equally far off
 _NONE = np.finfo(float).tiny
 _MOST = 4  # at most one row in so many can be odd
+_TOGETHER = 4096  # rows that are looked at at once, to bound memory
 
 
 def outliers(
@@ -46,17 +47,21 @@ def outliers(
         further than most.
     """
     rows = len(components)
-    alike = [np.flatnonzero(components == k) for k in np.unique(components)]
+    alike = [
+        mine[start : start + _TOGETHER]
+        for mine in (np.flatnonzero(components == k) for k in np.unique(components))
+        for start in range(0, len(mine), _TOGETHER)
+    ]
     first = np.cumsum(components) - components
-    weighted = np.repeat(weights, components)[:, None] * jacobian
-    pull = weighted.T @ residual  # of the prior: at the solution the two balance
+    weight = np.repeat(weights, components)
+    pull = jacobian.T @ (weight * residual)  # of the prior: at the solution the two balance
     kept = np.ones(rows, dtype=bool)
     for _ in range(rows // _MOST + 1):
-        use = np.repeat(kept, components)
-        normal = weighted[use].T @ jacobian[use] + prior.T @ prior
+        used = np.where(np.repeat(kept, components), weight, 0.0)
+        normal = (used[:, None] * jacobian).T @ jacobian + prior.T @ prior
         # the ridge is for directions that only rows set aside determined
         covariance = np.linalg.inv(normal + 1e-14 * np.trace(normal) * np.eye(len(normal)))
-        shift = covariance @ (weighted[use].T @ residual[use] - pull)
+        shift = covariance @ (jacobian.T @ (used * residual) - pull)
         left = residual - jacobian @ shift
         part = np.where(kept, -weights, 1.0)  # a fitted row has pulled the fit to itself
         squares = np.empty(rows)

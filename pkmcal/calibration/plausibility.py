@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, largest_first, mm_per_unit, rms
@@ -144,6 +143,8 @@ def _of_column(name: str, words: str) -> str:
 
 def _other_turns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:
     """Read orientations as quaternions in the other order, and as those of the base."""
+    from scipy.spatial.transform import Rotation
+
     angles = [k for k, name in enumerate(measured.components) if name in POSE[3:]]
     if len(angles) < 3 or measured.values is None:
         return

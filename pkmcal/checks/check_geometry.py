@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pkmcal.arguments import instance
 from pkmcal.arms.arm import SerialArm
 from pkmcal.checks.arm import ARM_CHECKS
-from pkmcal.checks.cables import not_pulled, on_cables, said_of_cables
+from pkmcal.checks.cables import not_pulled, said_of_cables
 from pkmcal.checks.chains import CHAIN_CHECKS, surplus
 from pkmcal.checks.finding import Finding
 from pkmcal.checks.function import (
@@ -30,6 +30,7 @@ from pkmcal.checks.layout import (
     unlike,
 )
 from pkmcal.display import Table
+from pkmcal.kinematics.pulled import on_cables
 from pkmcal.kinematics.robot import Robot
 from pkmcal.result import Result
 

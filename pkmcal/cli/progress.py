@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 from pkmcal.error_model.monte_carlo import Progress
+
+_TAKEN_FOR_ONE = {"FORCE_COLOR", "TTY_COMPATIBLE"}  # by rich, which takes long to import
 
 
 @contextmanager
@@ -23,13 +27,17 @@ def progress(work: str) -> Iterator[Progress]:
         Moves the bar, called with what is done and the whole. Until then the bar shows only that
         the work goes on, and for how long.
     """
+    nothing: Progress = lambda done, total: None  # noqa: E731
+    if not (sys.stderr.isatty() or _TAKEN_FOR_ONE & os.environ.keys()):
+        yield nothing
+        return
     from rich.console import Console
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
     from rich.progress import Progress as Bar
 
     console = Console(stderr=True)
     if not console.is_terminal:  # a bar that is disabled still ends its line, before rich 14
-        yield lambda done, total: None
+        yield nothing
         return
     columns = (
         TextColumn("{task.description}"),

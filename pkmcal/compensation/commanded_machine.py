@@ -69,12 +69,19 @@ class CommandedMachine:
 
     def continuous(self, commands: FloatArray) -> FloatArray:
         """Commands (..., N, n) of which actuators take the short way from each to the next."""
+        robot = self._calibrated
         found: FloatArray = commands.copy()
         if not self.joints:
             return found
-        turns = self._controller.turns * self._degrees
+        turns = robot.turns * self._degrees
         for k in np.flatnonzero(np.isfinite(turns)):
             found[..., k] = np.unwrap(found[..., k], period=abs(turns[k]))
+        angles = np.array(robot.actuator_units) == "rad"
+        if np.isinf(turns[angles]).any():  # whose drive laws are others after a turn
+            q = found / self._degrees
+            for i in range(1, q.shape[-2]):
+                q[..., i, :] = robot.nearest_turns(q[..., i, :], near=q[..., i - 1, :])
+            found = q * self._degrees
         return found
 
     def reached(self, command: FloatArray, near: FloatArray) -> FloatArray:

@@ -217,8 +217,7 @@ def compensate(
         reached: Any = measured(sent) if callable(measured) else measured
         at = _pose_of(reached, poses, shape, orientation)
         gross |= np.linalg.norm((at - poses)[:, :3], axis=1) > robot.length
-        there = robot.inverse(at, match)
-        off = robot.nearest_turns(ideal, near=there) - there
+        off = ideal - robot.inverse(at, match, near=ideal)  # at the turn that is commanded
         if common:
             off = about_their_mean(robot.turns, off)
         if method == "pso":

@@ -208,12 +208,12 @@ def _commands(found: Hangprinter) -> Commands:
     return commands
 
 
-def as_robot(machine: Hangprinter, name: str = "hangprinter", head: str = "") -> Robot:
+def as_robot(machine: Hangprinter) -> Robot:
     """The robot with these numbers."""
-    return robot_files.robot_of(robot_text(machine, name, head), "M669")
+    return robot_files.robot_of(robot_text(machine, "hangprinter"), "M669")
 
 
-def robot_text(machine: Hangprinter, name: str, head: str) -> str:
+def robot_text(machine: Hangprinter, name: str, head: str = "") -> str:
     """A robot file with these numbers; home is below the highest anchor."""
     home = round(0.2 * float(machine.anchors[:, 2].max()), 3)
     pose = {"map": "translation", "home": {"z": home}}

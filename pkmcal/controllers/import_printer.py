@@ -14,7 +14,7 @@ from pkmcal.arguments import path as as_path
 from pkmcal.arguments import word
 from pkmcal.controllers import hangprinter, maslow, rotary_delta, rotary_gcode
 from pkmcal.controllers.delta_gcode import of_marlin, of_reprap
-from pkmcal.controllers.linear_delta import FirmwareDelta, as_robot, text_of
+from pkmcal.controllers.linear_delta import FirmwareDelta, text_of
 from pkmcal.controllers.printer_config import (
     ANGLES,
     STEPPERS,
@@ -24,7 +24,9 @@ from pkmcal.controllers.printer_config import (
     read,
     step_of,
 )
+from pkmcal.controllers.robot_files import robot_of
 from pkmcal.controllers.rotary_delta import RotaryDelta, elbow_at
+from pkmcal.exceptions import FileError
 from pkmcal.files.text_lines import text_in
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -151,14 +153,13 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
         machine = hangprinter.of_text(text_in(path, "replace"), str(where))
         head = _ANCHORS_HEAD if machine.spools is None else _SPOOLS_HEAD
         text = hangprinter.robot_text(machine, where.stem, head.format(file=where.name))
-        robot = hangprinter.as_robot(machine, where.stem)
-        return Printer(robot, None, 0, text, machine.notes)
+        return _printer(where, text, None, 0, machine.notes)
     if firmware == "maslow":
         where = as_path("path", path)
         anchors, belts = maslow.of_text(text_in(path), str(where))
         text = maslow.robot_text(anchors, where.stem, _BELTS_HEAD.format(file=where.name))
         log = Measurements(belts, None, "closure") if len(belts) else None
-        return Printer(maslow.as_robot(anchors, where.stem), log, 0, text)
+        return _printer(where, text, log, 0)
     if firmware != "klipper":
         where, text = as_path("path", path), text_in(path, "replace")  # of comments
         if firmware == "reprap" and rotary_gcode.is_rotary(text, str(where)):
@@ -166,7 +167,7 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
             return _turning(where, crank, _DEGREES_HEAD, None, 0)
         parse = of_reprap if firmware == "reprap" else of_marlin
         found = parse(text, str(where))
-        return _printer(where, found, [-1.0] * 3, _GCODE_HEAD, None, 0)
+        return _rising(where, found, [-1.0] * 3, _GCODE_HEAD, None, 0)
     printer = read(path)
     absent = tuple(f"{file}, included, is not there and was not read" for file in printer.absent)
     where = Path(printer.place)
@@ -185,7 +186,7 @@ def import_printer(path: str | PathLike[str], firmware: Firmware = "klipper") ->
         carriages.append(_first(printer, section, "position_endstop") + height)
         steps.append(-step_of(printer, section))
     delta = FirmwareDelta(radius, tuple(angles), tuple(arms), tuple(carriages))
-    return _printer(where, delta, steps, _HEAD, *measured)
+    return _rising(where, delta, steps, _HEAD, *measured)
 
 
 def _turning(
@@ -198,8 +199,7 @@ def _turning(
 ) -> Printer:
     home = round(0.5 * max(delta.endstops), 3)
     text = rotary_delta.text_of(delta, home, file.stem, head.format(file=file.name))
-    robot = rotary_delta.as_robot(delta, home, file.stem)
-    return Printer(robot, measurements, distances, text, notes)
+    return _printer(file, text, measurements, distances, notes)
 
 
 def _rotary(printer: PrinterConfig) -> RotaryDelta:
@@ -223,7 +223,7 @@ def _rotary(printer: PrinterConfig) -> RotaryDelta:
     return RotaryDelta(radius, (height,) * 3, *parts)
 
 
-def _printer(
+def _rising(
     file: Path,
     delta: FirmwareDelta,
     gains: list[float],
@@ -233,7 +233,22 @@ def _printer(
     notes: tuple[str, ...] = (),
 ) -> Printer:
     text = text_of(delta, gains, file.stem, head.format(file=file.name), bed=True)
-    robot = as_robot(delta, gains, file.stem, bed=True)
+    return _printer(file, text, measurements, distances, notes)
+
+
+def _printer(
+    file: Path,
+    text: str,
+    measurements: Measurements | None,
+    distances: int,
+    notes: tuple[str, ...] = (),
+) -> Printer:
+    """With the robot of a robot file that was made of the numbers of `file`."""
+    try:
+        robot = robot_of(text, "robot file")
+    except FileError as error:  # each number is right, and what follows from them is not
+        wrong = str(error).partition(": ")[2]
+        raise FileError(f"{file}: its numbers are of no machine: {wrong}") from None
     return Printer(robot, measurements, distances, text, notes)
 
 

@@ -140,20 +140,18 @@ def _with_numbers(x: FloatArray) -> FirmwareDelta:
     return FirmwareDelta(float(x[0]), angles, arms, carriages)
 
 
-def as_robot(
-    firmware: FirmwareDelta,
-    gains: Sequence[float],
-    name: str = "linear delta",
-    head: str = "",
-    bed: bool = False,
-) -> Robot:
-    """The robot with the firmware's numbers; the others as in `text_of`."""
-    text = text_of(firmware, gains, name, head, bed)
+def as_robot(firmware: FirmwareDelta, gains: Sequence[float]) -> Robot:
+    """The robot with the firmware's numbers."""
+    text = text_of(firmware, gains, "linear delta")
     return robot_files.robot_of(text, "the firmware's numbers")
 
 
 def text_of(
-    firmware: FirmwareDelta, gains: Sequence[float], name: str, head: str, bed: bool = False
+    firmware: FirmwareDelta,
+    gains: Sequence[float],
+    name: str,
+    head: str = "",
+    bed: bool = False,
 ) -> str:
     """A robot file with the firmware's numbers.
 

@@ -138,12 +138,12 @@ def of_text(text: str, place: str) -> tuple[FloatArray, FloatArray]:
     return anchors, belts
 
 
-def as_robot(anchors: FloatArray, name: str = "maslow", head: str = "") -> Robot:
+def as_robot(anchors: FloatArray) -> Robot:
     """The robot with these anchors (4, 2)."""
-    return robot_files.robot_of(robot_text(anchors, name, head), "maslow.yaml")
+    return robot_files.robot_of(robot_text(anchors, "maslow"), "maslow.yaml")
 
 
-def robot_text(anchors: FloatArray, name: str, head: str) -> str:
+def robot_text(anchors: FloatArray, name: str, head: str = "") -> str:
     """A robot file with these anchors; home is in their middle."""
     home = dict(zip("xy", np.round(anchors.mean(axis=0), 3).tolist(), strict=True))
     limbs = [

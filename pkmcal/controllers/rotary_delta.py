@@ -157,12 +157,13 @@ def as_built(robot: Robot, one_height: bool = True) -> RotaryDelta:
     )
 
 
-def as_robot(delta: RotaryDelta, home: float, name: str = "rotary delta", head: str = "") -> Robot:
+def as_robot(delta: RotaryDelta, home: float) -> Robot:
     """The robot with these numbers, as it is in `text_of`."""
-    return robot_files.robot_of(text_of(delta, home, name, head), "the firmware's numbers")
+    text = text_of(delta, home, "rotary delta")
+    return robot_files.robot_of(text, "the firmware's numbers")
 
 
-def text_of(delta: RotaryDelta, home: float, name: str, head: str) -> str:
+def text_of(delta: RotaryDelta, home: float, name: str, head: str = "") -> str:
     """A robot file with these numbers.
 
     Parameters

@@ -245,6 +245,17 @@ class ChainMachine(CoreMachine):
         found: FloatArray = numbers[place + 1] * q + numbers[place]
         return found
 
+    @property
+    def turning(self) -> BoolArray:
+        """Which actuators are angles, (n,)."""
+        found = np.zeros(self.actuators, dtype=bool)
+        found[self._angles] = True
+        return found
+
+    def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """What the actuators read at poses (N, 6) with gain and offset, (N, n)."""
+        return self.drives(slots, self.inverse(slots, pose))
+
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """The gain of each actuator, (N, n)."""
         return np.tile(slots.ravel()[self.layout.drive_place + 1], (len(q), 1))
@@ -323,7 +334,9 @@ class ChainMachine(CoreMachine):
         """Which row of `readings` is that of each actuator's coordinate."""
         return np.arange(self.actuators)
 
-    def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rates(
+        self, slots: FloatArray, motion: FloatArray, q: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators, as `pkmcal.core.machine.Machine.rates`."""
 
         def inverse(pose: FloatArray) -> FloatArray:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from copy import copy
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
 from pkmcal._core import ffi
-from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array
 from pkmcal.core.library import MAPS, call, in_threads, part
 
 M = TypeVar("M", bound="CoreMachine")
@@ -99,16 +98,6 @@ class CoreMachine(ABC):
         """The same with tensions of what actuators drive, (n,) or (N, n): without laws it."""
         return self
 
-    def as_offsets(
-        self, slots: FloatArray, q: FloatArray, columns: Int32Array, units: Sequence[str]
-    ) -> tuple[Int32Array, list[str], FloatArray]:
-        """Numbers of drive laws as the offset of their drive; others as they are.
-
-        Returns the places of these and their units, and how far each number moves them,
-        (N, columns).
-        """
-        return columns, list(units), np.ones((len(q), len(columns)))
-
     @abstractmethod
     def turns(self, slots: FloatArray) -> FloatArray:
         """How far each actuator goes in a whole turn, (n,); infinite where it is no angle."""
@@ -120,6 +109,15 @@ class CoreMachine(ABC):
     @abstractmethod
     def drives(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """The ways q̃ of the drives at actuator coordinates (N, n), (N, drives)."""
+
+    @property
+    @abstractmethod
+    def turning(self) -> BoolArray:
+        """Which drives are angles, (drives,)."""
+
+    @abstractmethod
+    def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """The ways q̃ that poses (N, 6) ask of each drive by itself, (N, drives); any turn."""
 
     @abstractmethod
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
@@ -201,11 +199,16 @@ class CoreMachine(ABC):
         call(self._ERRORS, self.struct, *given, out, isa=self.isa)
         return out if twists else self.as_written(pose, out, 1)
 
-    def moved(self, pose: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Poses (N, 6) moved by steps of the map (N, m), mm and rad.
+    def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
+        """Poses (N, 6) moved by steps of the map (N, m), mm and rad."""
+        moved = np.empty((len(pose), 6))
+        call("moved", self.struct.map, len(pose), pose, step, moved, None, isa=self.isa)
+        return moved
 
-        And the platform's twist (ω, v) by a step at the poses, (N, 6, m).
-        """
-        moved, twist = np.empty((len(pose), 6)), np.empty((len(pose), 6, self.m))
-        call("moved", self.struct.map, len(pose), pose, step, moved, twist, isa=self.isa)
-        return moved, twist
+    def step_twists(self, pose: FloatArray) -> FloatArray:
+        """The platform's twist (ω, v) by a step of the map at poses (N, 6), (N, 6, m)."""
+        n, m = len(pose), self.m
+        twist = np.empty((n, 6, m))
+        given = (pose, np.zeros((n, m)), np.empty((n, 6)))
+        call("moved", self.struct.map, n, *given, twist, isa=self.isa)
+        return twist

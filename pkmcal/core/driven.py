@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array
 from pkmcal.core.chains import AnyMachine, ChainMachine
 from pkmcal.core.core_machine import CoreMachine, known_rows, whole_turn
 from pkmcal.core.drive_turns import agreed_turns
 from pkmcal.core.laws import Drive, Laws, Ways
-from pkmcal.core.library import rows
 from pkmcal.core.machine import Closure, Machine
 from pkmcal.exceptions import ArgumentError
 
@@ -94,6 +93,15 @@ class DrivenMachine(CoreMachine):
         """Ways (N, drives) at readings (N, n)."""
         return self.ways(slots, q).way
 
+    @property
+    def turning(self) -> BoolArray:
+        """Which drives are angles, (drives,)."""
+        return np.array([drive.angle for drive in self.laws.drives])
+
+    def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """Ways (N, drives) that poses (N, 6) ask of each drive by itself; any turn."""
+        return self.inner.drives_at(self._bare(slots), pose)
+
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """How far the drives go by their actuators at readings (N, n), (N, drives)."""
         return self.ways(slots, q).slope
@@ -134,10 +142,9 @@ class DrivenMachine(CoreMachine):
         if len(self._driven) == len(self.laws.drives):
             return out
         there = self.laws.ways(slots, out, *state).way  # of all that share, as the first has it
-        angle = np.array([drive.angle for drive in self.laws.drives])
         with np.errstate(invalid="ignore"):  # ways that are infinite
             turned = way + 2 * np.pi * np.rint((there - way) / (2 * np.pi))
-        return self._mean(self.laws.readings(slots, np.where(angle, turned, way), *state))
+        return self._mean(self.laws.readings(slots, np.where(self.turning, turned, way), *state))
 
     def _mean(self, each: FloatArray) -> FloatArray:
         """Of drives (N, drives, ...) that share an actuator the mean, (N, n, ...)."""
@@ -161,8 +168,7 @@ class DrivenMachine(CoreMachine):
 
     def reference(self, slots: FloatArray) -> FloatArray:
         """The coordinate (n,) that an angle is given nearest to; 0 where it is none."""
-        turning = [drive.angle for drive in self.laws.drives]
-        near = np.where(turning, self.inner.reference(self._bare(slots)), np.nan)
+        near = np.where(self.turning, self.inner.reference(self._bare(slots)), np.nan)
         anyhow = self._with(approach=None, tension=None)  # whatever those of the rows are
         q: FloatArray = anyhow.at_drives(slots, near[None])[0]
         angle = np.array([self.laws.drives[drives[0]].angle for drives in self._driven])
@@ -245,18 +251,6 @@ class DrivenMachine(CoreMachine):
             out[..., of_laws] = by_way[..., drive] * by_number[:, None]
         return out
 
-    def as_offsets(
-        self, slots: FloatArray, q: FloatArray, columns: Int32Array, units: Sequence[str]
-    ) -> tuple[Int32Array, list[str], FloatArray]:
-        """As `CoreMachine.as_offsets`: a law moves its drive, however large its numbers are."""
-        _, of_laws, drive = self._sorted(columns)
-        alike, unit, factor = columns.copy(), list(units), np.ones((len(q), len(columns)))
-        for i, d in zip(of_laws, drive, strict=True):
-            alike[i] = self.laws.drives[d].offset
-            unit[i] = "rad" if self.laws.drives[d].angle else "mm"
-        factor[:, of_laws] = self._by_number(slots, q, columns[of_laws])
-        return alike, unit, factor
-
     def _sorted(self, columns: Int32Array) -> tuple[list[int], list[int], list[int]]:
         """Which of the columns are the inner machine's, which those of laws, and their drives."""
         drives = [self.laws.drive_of(column) for column in columns.tolist()]
@@ -275,11 +269,12 @@ class DrivenMachine(CoreMachine):
             by_q = self._sum(found.by_q * ways.slope[:, None])
         return found._replace(by_q=by_q)
 
-    def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rates(
+        self, slots: FloatArray, motion: FloatArray, q: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators, as `pkmcal.core.machine.Machine.rates`."""
-        way1, way2 = self.inner.rates(self._bare(slots), motion)
-        pose = rows("motion_pose", np.ascontiguousarray(motion[:, 0]).reshape(-1, 16))[0]
-        at = self.ways(slots, self.inverse(slots, pose))
+        at = self.ways(slots, q)
+        way1, way2 = self.inner.rates(self._bare(slots), motion, at.way)
         q1 = way1 / at.slope
         q2 = (way2 - at.bend * q1**2) / at.slope
         return self._mean(q1), self._mean(q2)
@@ -352,9 +347,13 @@ class DrivenMachine(CoreMachine):
             out[:, spheres[d], of_laws[i]] = -by_number[:, i] / slope[:, d]
         return residual, by_step, out
 
-    def moved(self, pose: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
         """Poses moved, as `pkmcal.core.machine.Machine.moved`."""
         return self.inner.moved(pose, step)
+
+    def step_twists(self, pose: FloatArray) -> FloatArray:
+        """Twists by a step, as `pkmcal.core.machine.Machine.step_twists`."""
+        return self.inner.step_twists(pose)
 
     def spheres(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """What the limbs are at readings (N, n), as `pkmcal.core.machine.Machine.spheres`."""

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pkmcal._core import ffi, lib
-from pkmcal.arrays import FloatArray, Int32Array, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from pkmcal.core import balance
 from pkmcal.core.core_machine import CoreMachine, whole_turn
 from pkmcal.core.library import (
     AXES,
@@ -21,6 +22,7 @@ from pkmcal.core.library import (
     pointer,
 )
 from pkmcal.core.path_differences import platform_motion
+from pkmcal.core.poses import rates_of_twists
 
 CLOSURE_TOLERANCE = 2e-3  # of a machine's size
 FAR_HOME = 10.0  # times the limbs' numbers: a home beyond is that of another geometry
@@ -171,6 +173,15 @@ class Machine(CoreMachine):
             found: FloatArray = slots[:, _GAIN] * q[:, of_limbs] + slots[:, _OFFSET]
         return found
 
+    @property
+    def turning(self) -> BoolArray:
+        """Which drives are angles, (limbs,)."""
+        return np.array(self.struct.angle[0 : self.struct.limbs], dtype=bool)
+
+    def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """q̃ (N, limbs) that poses (N, 6) ask of each limb by itself; any turn."""
+        return self.limbs(slots, pose)[0]
+
     def slopes(self, slots: FloatArray, q: FloatArray) -> FloatArray:
         """The gain of each limb, (N, limbs)."""
         return np.tile(slots[:, _GAIN], (len(q), 1))
@@ -192,16 +203,51 @@ class Machine(CoreMachine):
         self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool = False
     ) -> FloatArray:
         """∂pose/∂q at poses (N, 6): (N, 6, n), or of the twist (ω, v) of the platform by them."""
+        if self.rows == self.m:
+            return self._by_actuators(slots, pose, q, twists)
+        found = balance.by_actuators(self, slots, pose, q)
+        return found if twists else rates_of_twists(pose, found)
+
+    def error_jacobian(
+        self,
+        slots: FloatArray,
+        pose: FloatArray,
+        q: FloatArray,
+        columns: Int32Array,
+        twists: bool = False,
+    ) -> FloatArray:
+        """∂pose/∂(numbers at `columns` of the flattened geometry): (N, 6, columns).
+
+        Or of the twist (ω, v) of the platform by them. With more rows than free coordinates, where
+        the platform is at q.
+        """
+        if self.rows == self.m:
+            return self._by_numbers(slots, pose, q, columns, twists)
+        found = balance.by_numbers(self, slots, pose, q, columns)
+        return found if twists else rates_of_twists(pose, found)
+
+    def _by_actuators(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool
+    ) -> FloatArray:
+        """`forward_jacobian` with as many rows as free coordinates."""
         out = np.empty((len(pose), 6, self.actuators))
         given = (len(pose), slots, _by_row(slots), pose, q, twists, out)
         call("forward_jacobian", self.struct, *given, isa=self.isa)
         return out if twists else self.as_written(pose, out, 1)
 
-    def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _by_numbers(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, columns: Int32Array, twists: bool
+    ) -> FloatArray:
+        """`error_jacobian` with as many rows as free coordinates."""
+        return super().error_jacobian(slots, pose, q, columns, twists)
+
+    def rates(
+        self, slots: FloatArray, motion: FloatArray, q: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators, (N, n) each.
 
         `motion` (N, 3, 4, 4) is the platform's homogeneous matrix and its first and second
-        derivative by time.
+        derivative by time. At coordinates q (N, n), whose turn matters to drive laws alone.
         """
         velocity, acceleration = np.empty((2, len(motion), self.actuators))
         given = (len(motion), slots, _by_row(slots), motion, velocity, acceleration)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import call, rows
+
+_NOWHERE = np.zeros(6)
 
 
 def tpr2tps_lengths(size: FloatArray, free: FloatArray, out: FloatArray) -> None:
@@ -40,3 +44,11 @@ def compose_rates(
 def compose_twists(a: FloatArray, pose: FloatArray, c: FloatArray) -> FloatArray:
     """Twists (N, 6, 6) of A T C by those of T, for T = `pose` (N, 6); A and C are (6,)."""
     return rows("compose_twists", a, pose, c)[0]
+
+
+def rates_of_twists(pose: FloatArray, twists: FloatArray) -> FloatArray:
+    """Rates (N, 6, k) of x y z α β γ of poses (N, 6) that move with twists (ω, v), (N, 6, k)."""
+    level = np.zeros_like(pose)  # turns about the axes are rates of its angles
+    rates = compose_rates(_NOWHERE, level, _NOWHERE, pose)
+    moved: FloatArray = rates @ np.concatenate([twists[:, 3:], twists[:, :3]], axis=1)
+    return moved

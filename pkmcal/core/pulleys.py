@@ -7,7 +7,7 @@ about it has the same value and the same gradient. So at a known pose all first 
 those of the machine of limbs with these points as its anchors, and offsets and gains over s. The
 forward kinematics go from one such machine to the next, each solved in the core, as Newton's method
 goes from one linear system to the next. What spheres bend otherwise than l/s is added where second
-derivatives count.
+derivatives count; with more rows than coordinates `balance` has it of the rows at displaced poses.
 """
 
 from __future__ import annotations
@@ -166,7 +166,7 @@ class PulleyMachine(Machine):
 
     def _on_map(self, pose: FloatArray) -> FloatArray:
         """Poses as the map has them."""
-        return super().moved(np.ascontiguousarray(pose), np.zeros((len(pose), self.m)))[0]
+        return super().moved(np.ascontiguousarray(pose), np.zeros((len(pose), self.m)))
 
     def swivels(self, slots: FloatArray, pose: FloatArray) -> tuple[FloatArray, ...]:
         """Swivel angles (N, pulleys) at poses (N, 6), with their derivatives.
@@ -272,26 +272,19 @@ class PulleyMachine(Machine):
         pose = self._on_map(pose)
         return super().jacobian(self._limbs_at(slots, pose)[0], pose)
 
-    def forward_jacobian(
-        self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool = False
+    def _by_actuators(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool
     ) -> FloatArray:
-        """∂pose/∂q at poses (N, 6): (N, 6, n), or of the twist (ω, v) of the platform by them."""
         pose = self._on_map(pose)
-        return super().forward_jacobian(self._limbs_at(slots, pose)[0], pose, q, twists)
+        return super()._by_actuators(self._limbs_at(slots, pose)[0], pose, q, twists)
 
-    def error_jacobian(
-        self,
-        slots: FloatArray,
-        pose: FloatArray,
-        q: FloatArray,
-        columns: Int32Array,
-        twists: bool = False,
+    def _by_numbers(
+        self, slots: FloatArray, pose: FloatArray, q: FloatArray, columns: Int32Array, twists: bool
     ) -> FloatArray:
-        """∂pose/∂(numbers at `columns` of the flattened geometry): (N, 6, columns)."""
         pose = self._on_map(pose)
         limbs, cables = self._limbs_at(slots, pose)
         asked, back, own = self._columns(columns, slots.shape[-1])
-        found = super().error_jacobian(limbs, pose, q, asked, twists)
+        found = super()._by_numbers(limbs, pose, q, asked, twists)
         return self._put_back(found, back, own, cables)
 
     def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> Closure:
@@ -333,11 +326,13 @@ class PulleyMachine(Machine):
 
     # along a path ---------------------------------------------------------------------------------
 
-    def rates(self, slots: FloatArray, motion: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rates(
+        self, slots: FloatArray, motion: FloatArray, q: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators, as `Machine.rates`."""
         pose = rows("motion_pose", np.ascontiguousarray(motion[:, 0]).reshape(-1, 16))[0]
         limbs, cables = self._limbs_at(slots, pose)
-        velocity, acceleration = super().rates(limbs, motion)
+        velocity, acceleration = super().rates(limbs, motion, q)
         extra = self._bends(slots, cables, motion) / limbs[:, self._over, _GAIN]
         shared = np.array([self.struct.sharing[a] for a in self._of_actuator[self._over]])
         for k, limb in enumerate(self._over):

@@ -287,7 +287,8 @@ class FreePoses:
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units; the other rows are in mm."""
-        of_actuators = mm_per_unit(robot.actuator_units, robot.length)
+        units = robot.actuator_units
+        of_actuators = mm_per_unit(units, robot.length if "rad" in units else 1.0)
         return np.array([of_actuators[a] if a >= 0 else 1.0 for a in self.actuators])
 
     def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
@@ -352,8 +353,10 @@ class FreePoses:
                     break
             pose = np.where(short[:, None], pose, np.nan)
         known = np.isfinite(pose).all(axis=1)
-        lost = np.where(status == 0, 1, status)
-        return RowStates(pose, self.read, np.where(known, 0, lost).astype(np.int32))
+        found = np.zeros(len(pose), dtype=np.int32)
+        if not known.all():
+            found[~known] = np.where(status == 0, 1, status)[~known]
+        return RowStates(pose, self.read, found)
 
 
 def _machine(robot: Calibratable) -> Robot:

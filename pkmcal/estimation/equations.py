@@ -9,6 +9,7 @@ themselves, set by set and row by row.
 from __future__ import annotations
 
 import copy
+import weakref
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -37,7 +38,7 @@ from pkmcal.measurements.observation import by_difference, corrected, distance_p
 from pkmcal.result import failed_rows
 
 # Whose, where, with which noise, and what `_system` says there; copies have another "whose".
-_Last = tuple["Equations", Evaluation, FloatArray, tuple[FloatArray, FloatArray]]
+_Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, tuple[FloatArray, FloatArray]]
 
 
 class Equations(Readings):
@@ -86,6 +87,8 @@ class Equations(Readings):
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
         self._last: _Last | None = None
+        self._from: Evaluation | None = None  # that the states are of
+        self._follow: tuple[Evaluation, FloatArray] | None = None  # and how they follow theta
         self._no_sigma = np.array([
             m.sigma is None and bool(np.isfinite(m.values).any()) for m in self.sets
         ])  # fmt: skip
@@ -100,6 +103,7 @@ class Equations(Readings):
     def _take(self, closures: SessionClosures, estimated: bool) -> None:
         """Build the units for these closures; `estimated`: their deviations are not known."""
         self.closures = closures
+        self._counting = np.flatnonzero(~self._slack) if self._slack.any() else None
         if closures.unknowns:
             if any(growth is not None for growth in self._growth):
                 raise ArgumentError(
@@ -149,7 +153,7 @@ class Equations(Readings):
 
     def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
         """Evaluate where the same with commanded poses has been started."""
-        self.parameters, self._states = commanded.parameters, start.states
+        self.parameters, self._states, self._from = commanded.parameters, start.states, None
         if self.closures.unknowns:  # closures that contradict each other may still have a best pose
             self.start_from(np.flatnonzero(start.status), self.parameters.robot.home)
         return start if commanded is self else self.at(start.theta)
@@ -180,19 +184,34 @@ class Equations(Readings):
         p = self.parameters
         robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
         machines = Machines(tuple(robots), self._own, self.state)
-        states = self.closures.settled(machines, self._states)
+        states, self._last = self._states_ahead(machines, theta), None
         if self.closures.unknowns:
             factors = np.ones(len(self.unstated)) if noise is None else noise
 
             def system(states: RowStates) -> tuple[FloatArray, FloatArray]:
                 return self._system(machines, states, theta, factors)
 
-            states = self._blocks.best(self.closures, machines, states, system)
+            states, there = self._blocks.best(self.closures, machines, states, system)
         predicted = self.predicted(states.pose, theta)
         residuals = self.residuals(predicted)
-        return Evaluation(
+        found = Evaluation(
             theta, machines, states.pose, states.actuators, states.status, predicted, residuals
         )
+        if self.closures.unknowns and there is not None:
+            self._last = weakref.ref(self), found, factors, there
+        return found
+
+    def _states_ahead(self, machines: Machines, theta: FloatArray) -> RowStates:
+        """Where to look for the states: as they follow the parameters from the last step taken."""
+        if self._follow is None or self._follow[0] is not self._from:
+            return self.closures.settled(machines, self._states)
+        begin, following = self._follow
+        step = following @ (theta - begin.theta)
+        step[~np.isfinite(step).all(axis=1)] = 0.0
+        ahead = self.closures.moved(machines, self._states, step)
+        if ahead.status.any():
+            ahead = ahead.chosen(ahead.status == 0, self.closures.settled(machines, self._states))
+        return ahead
 
     def _system(
         self, machines: Machines, states: RowStates, theta: FloatArray, noise: FloatArray
@@ -221,12 +240,12 @@ class Equations(Readings):
     def _at(self, evaluation: Evaluation, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
         """The system at an evaluation; the last one is kept, which a step asks for three times."""
         last = self._last
-        mine = last is not None and last[0] is self and last[1] is evaluation
-        if last is not None and mine and np.array_equal(last[2], noise):
+        mine = last is not None and last[0]() is self and last[1] is evaluation
+        if last is not None and mine and (last[2] is noise or np.array_equal(last[2], noise)):
             return last[3]
         self._last = None
         found = self._system(evaluation.machines, evaluation.states, evaluation.theta, noise)
-        self._last = self, evaluation, noise, found
+        self._last = weakref.ref(self), evaluation, noise, found
         return found
 
     def residual(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
@@ -234,7 +253,7 @@ class Equations(Readings):
         if not self.closures.unknowns:
             return self.whitened(evaluation.residuals, noise)
         off, by_unknown = self._at(evaluation, noise)
-        return -self._blocks.left(by_unknown, off)
+        return -self._blocks.left(by_unknown, off[:, None])[0][:, 0]
 
     def squares(self, residual: FloatArray) -> FloatArray:
         """Squared length of the residuals (M,) of each unit, (U,)."""
@@ -244,18 +263,20 @@ class Equations(Readings):
 
     def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Derivative (M, n) of what is predicted by the parameters; of what is left likewise."""
-        readings = self.whitened(self.jacobian(evaluation), noise)
         if not self.closures.unknowns:
-            return readings
+            return self.whitened(self.jacobian(evaluation), noise)
         p, (_, by_unknown) = self.parameters, self._at(evaluation, noise)
         of_closures = self.closures.by_numbers(
             evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
         )
         of_closures /= noise[-1]
         by_all = self._counted(of_closures)
-        if len(readings):
+        if self.count.any():
+            readings = self.whitened(self.jacobian(evaluation), noise)
             by_all = np.concatenate([by_all, readings])
-        return self._blocks.left(by_unknown, by_all)
+        found, following = self._blocks.left(by_unknown, by_all)
+        self._follow = evaluation, following
+        return found
 
     @property
     def slack_cells(self) -> list[tuple[int, int]]:
@@ -266,7 +287,7 @@ class Equations(Readings):
     def _counted(self, part: FloatArray) -> FloatArray:
         """Equations of closures (K, equations, ...) that count, one after another."""
         whole = part.reshape(-1, *part.shape[2:])
-        return whole[~self._slack.reshape(-1)] if self._slack.any() else whole
+        return whole if self._counting is None else whole[self._counting]
 
     def closure_residuals(
         self, evaluation: Evaluation, noise: FloatArray, weights: FloatArray, taken: FloatArray
@@ -306,7 +327,7 @@ class Equations(Readings):
         """Start the forward kinematics of some distinct rows of actuators from poses (s, 6)."""
         guess = self._states.pose.copy()
         guess[rows] = poses
-        self._states = replace(self._states, pose=guess)
+        self._states, self._from = replace(self._states, pose=guess), None
 
     def redrawn(
         self,
@@ -381,6 +402,11 @@ class Equations(Readings):
     def warm_start(self, evaluation: Evaluation) -> None:
         """Start the forward kinematics of later calls of `at` from its poses."""
         self._states = evaluation.states.chosen(evaluation.status == 0, self._states)
+        self._from = evaluation
+
+    def forget_following(self) -> None:
+        """A search has ended: how poses follow the parameters takes memory."""
+        self._follow = None
 
     def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n).
@@ -450,7 +476,7 @@ class Equations(Readings):
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""
-        readings = super().rounding(noise)
+        readings = super().rounding(noise) if self.count.any() else 0.0
         sigma = self.closures.sigma
         if sigma is None:
             return readings
@@ -486,8 +512,18 @@ class Equations(Readings):
 
     def readings_off(self, evaluation: Evaluation) -> FloatArray:
         """What actuators would read at the poses less what they read (K, equations)."""
-        off, _ = self.closures.residual(evaluation.machines, evaluation.states)
-        return off if self.closures.sigma is None else off * self.closures.sigma
+        last = self._last
+        if (
+            last is not None
+            and last[0]() is self
+            and last[1] is evaluation
+            and self._counting is None
+        ):
+            off = last[3][0][: self._slack.size].reshape(self._slack.shape) * last[2][-1]
+        else:
+            off, _ = self.closures.residual(evaluation.machines, evaluation.states)
+        needed: FloatArray = off if self.closures.sigma is None else off * self.closures.sigma
+        return needed
 
     def closures_off(self, evaluation: Evaluation) -> FloatArray:
         """The same in mm."""

@@ -24,6 +24,8 @@ from pkmcal.statistics.linear_fit import column_basis, unit_basis
 from pkmcal.statistics.robust_scale import median_ratio
 
 _ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
+_LESS = 0.1  # of the deviation to which combinations are fitted, after a search without an end
+_LEAST_WORST = 5e-3  # of the machine's size: where that is not for want of measurements
 _LEAST_FALL = 0.1  # of a mean square, which a step of scoring does not go below
 _LEAST_NOISE = 1e-9  # mm; what is left of measurements without noise
 LEAST_FREEDOM = 0.5  # degrees of freedom from which the noise can be estimated
@@ -50,7 +52,9 @@ class IterationState:
     determined : Directions
         Identifiable from measurements and prior.
     fitted : Directions
-        Determined to the machine's size or better; the rest is kept at its start.
+        Determined to `worst` or better; the rest is kept at its start.
+    worst : float
+        A standard deviation, mm: the machine's size, or less where searches did not end.
     """
 
     noise: FloatArray
@@ -58,6 +62,7 @@ class IterationState:
     measured: Directions
     determined: Directions
     fitted: Directions
+    worst: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,6 +148,7 @@ class Estimator:
         self.scale = self.search.scale
         self._priors = len(self.search.prior(start.theta))
         self.unstated = equations.unstated
+        self._worst = self.start.robot.length
         self._at_first: FloatArray | None = None
         self._first: _AtNoise | None = None
 
@@ -181,6 +187,13 @@ class Estimator:
             u = self.search.best(u, state.noise, state.loss, pins)
             u = u - kept @ (kept.T @ u)
             estimate = self._estimate(u, state)
+            if not self.search.converged and self._worst > _LEAST_WORST * self.start.robot.length:
+                # what is hardly determined goes on for ever, far from any machine: less is fitted
+                self._worst *= _LESS
+                state = self._state(self._revised(estimate).noise, state.loss, None)
+                self.equations.warm_start(self.start)
+                u = np.zeros(len(self.scale))
+                continue
             if self.equations.closures.unknowns and self._at_first is None:
                 self._at_first = estimate.freedom
             revised = self._revised(estimate)
@@ -194,7 +207,9 @@ class Estimator:
             if settled:
                 break
         factor = self._common_factor(estimate.state, state)
-        return self._estimate(u, state) if factor is None else estimate.with_noise(state, factor)
+        found = self._estimate(u, state) if factor is None else estimate.with_noise(state, factor)
+        self.equations.forget_following()
+        return found
 
     # between the least squares ------------------------------------------------------------------
 
@@ -259,16 +274,15 @@ class Estimator:
     ) -> IterationState:
         """Split the directions for this noise, before (`evaluation` None) or after a fit."""
         size = self.start.robot.length
-        noise_known = evaluation is not None or not self.unstated.any()
-        worst = size if noise_known else np.inf
+        noise_known = evaluation is not None or not self.unstated.any() or self._worst < size
+        worst = self._worst if noise_known else np.inf
         self._first = noise, self._decomposed(self.start, noise, self._first)
         _, first = self._first
         now = (None, None) if evaluation is None else self._decomposed(evaluation, noise)
         measured = directions(first[0], now[0], size)
         determined = directions(first[1], now[1], size)
-        return IterationState(
-            noise, loss, measured, determined, directions(first[1], now[1], size, worst)
-        )
+        fitted = directions(first[1], now[1], size, worst)
+        return IterationState(noise, loss, measured, determined, fitted, self._worst)
 
     def _decomposed(
         self,

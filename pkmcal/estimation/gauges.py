@@ -7,7 +7,6 @@ Such combinations of parameters are named by what they are, not by their numbers
 
 from __future__ import annotations
 
-import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,16 +14,12 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import AXES, SLOTS
 from pkmcal.estimation.chain_gauges import frame_motions
-from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
 
-MIRROR = "its mirror image fits as well: which of the two it is, the robot file says alone"
 _OUTSIDE = 1e-6  # share of a motion outside what may move that does not count
-_ALIKE = 1e-6  # share by which costs differ that are the same
 _AXES = ("x", "y", "z")
 _BASE, _SCALE, _PLATFORM = 0, 6, 7  # first columns of the motions: shifts, turns; the common scale
 _MOTIONS = 13
@@ -192,42 +187,3 @@ def _texts(free: FloatArray) -> list[str]:
 
 def _listed(names: list[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
-def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> bool:
-    """Whether the mirror image of a point platform's machine fits as well as the machine.
-
-    All anchors and poses are reflected in a plane across x, y or z that keeps what is not free,
-    and the poses are fitted there. No derivative sees this: both are minima, apart from each other.
-    """
-    robot, parameters = evaluation.robot, equations.parameters
-    if not isinstance(robot, Robot) or not equations.closures.unknowns:
-        return False
-    joints = robot.slots[:, 3:6]
-    if robot.model.map not in ("translation", "xy") or np.ptp(joints, axis=0).any():
-        return False
-    if any(name.startswith("base") and "@" in name for name in parameters.names):
-        return False  # anchors of each session: not looked at
-    cost = _cost(equations, evaluation, noise)
-    for k, axis in enumerate(robot.coordinates):
-        names = [f"base{i + 1}.{axis}" for i in range(len(robot.slots))]
-        own = [parameters.names.index(n) if n in parameters.names else -1 for n in names]
-        values, free = robot.slots[:, k], np.array(own) >= 0
-        middle = float(values[~free].mean() if (~free).any() else values.mean())
-        held_apart = bool((values[~free] != middle).any())
-        if not free.any() or held_apart or not robot.frames.trivial:
-            continue
-        theta, pose = evaluation.theta.copy(), evaluation.pose.copy()
-        theta[np.array(own)[free]] = 2.0 * middle - values[free]
-        pose[:, k] = 2.0 * (middle - joints[0, k]) - pose[:, k]
-        image = copy.copy(equations)
-        image.start_from(np.arange(len(pose)), pose)
-        there = image.at(theta, noise)
-        if there.ok and _cost(image, there, noise) <= (1.0 + _ALIKE) * cost:
-            return True
-    return False
-
-
-def _cost(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> float:
-    prior = equations.parameters.prior_left(evaluation.theta)
-    return float((equations.residual(evaluation, noise) ** 2).sum() + prior @ prior)

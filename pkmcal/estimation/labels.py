@@ -14,6 +14,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, IntArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.measurements import repeats
+from pkmcal.measurements.poses import joined
 from pkmcal.statistics.linear_fit import numbered
 
 
@@ -93,13 +94,7 @@ def _of_mixtures(equations: Equations) -> Labels:
 
 def _poses_of_units(equations: Equations) -> IntArray:
     """Number of the pose of each unit (U,): units whose rows share a pose are of one."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     unit, pose = equations.unit_of_row, poses_of_rows(equations)
     used = unit >= 0
-    units = len(equations.components)
-    shape = (units + int(pose.max()) + 1,) * 2
-    joined = coo_array((np.ones(int(used.sum())), (unit[used], units + pose[used])), shape)
-    _, group = connected_components(joined, directed=False)
-    return numbered(group[:units])
+    group = joined(unit[used], pose[used])
+    return numbered(group[np.unique(unit[used], return_index=True)[1]])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable
 
 import numpy as np
 
@@ -13,6 +13,11 @@ from pkmcal.estimation.loss import Loss
 from pkmcal.exceptions import ArgumentError
 
 _FTOL = 1e-10  # of the cost: 1e-4 of a standard deviation; rounding moves it by less
+_TOLERANCES = {"ftol": _FTOL, "xtol": 1e-10, "gtol": 1e-15}
+_MOST = 200  # evaluations
+_CONVERGED = (1, 2, 3, 4)  # as MINPACK says it
+
+Function = Callable[[FloatArray], FloatArray]
 
 
 class Search:
@@ -50,8 +55,7 @@ class Search:
         self._stated = parameters.prior_rows(start.theta)[:, self._found].any(axis=1)
         lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
-        self._bounds = (lower, upper) if bounded else (-np.inf, np.inf)
-        self._method: Literal["trf", "lm"] = "trf" if bounded else "lm"
+        self._bounds = (lower, upper) if bounded else None
         ones = np.ones(len(equations.unstated))
         self._last: tuple[FloatArray, FloatArray, Evaluation]
         self._last = (np.zeros(len(self.scale)), ones, start)
@@ -63,8 +67,8 @@ class Search:
 
     def at(self, u: FloatArray, noise: FloatArray) -> Evaluation:
         """The equations at scaled parameters (n,), poses found with this noise (G,)."""
-        same = not self.equations.closures.unknowns or np.array_equal(noise, self._last[1])
-        if not (same and np.array_equal(u, self._last[0])):
+        same = not self.equations.closures.unknowns or _same(noise, self._last[1])
+        if not (same and _same(u, self._last[0])):
             there = self.equations.at(self._theta(u), noise)
             self._last = (u.copy(), noise, there)
             self.evaluations += 1
@@ -98,7 +102,7 @@ class Search:
     def _taken(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """The same, finite or not, and not kept: a search holds copies of its own."""
         last, self._last_jacobian = self._last_jacobian, None
-        if last is not None and last[0] is evaluation and np.array_equal(last[1], noise):
+        if last is not None and last[0] is evaluation and _same(last[1], noise):
             return last[2]
         del last
         found: FloatArray = self.equations.by_parameters(evaluation, noise)[:, self._found]
@@ -143,8 +147,6 @@ class Search:
         self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray, aside: BoolArray
     ) -> tuple[FloatArray, float]:
         """A minimum of the cost of the rows not set aside, and the cost."""
-        from scipy.optimize import least_squares
-
         equations = self.equations
         parameters = equations.parameters
         without = np.repeat(aside, equations.components)
@@ -174,30 +176,67 @@ class Search:
                 return np.full(len(first) + len(held) + 1, worse + floor)
             return np.concatenate([-loss.residual(data(evaluation)), held, [floor]])
 
+        taken: Evaluation | None = None
+
+        def take(evaluation: Evaluation) -> None:
+            """A step goes on from here."""
+            nonlocal taken
+            if evaluation is not taken:
+                taken = evaluation
+                equations.warm_start(evaluation)
+                self.history.append(equations.progress(evaluation))
+
         def jacobian(u: FloatArray) -> FloatArray:
             evaluation = self.at(u, noise)
-            equations.warm_start(evaluation)  # the step to it was taken
-            self.history.append(equations.progress(evaluation))
+            take(evaluation)
             by_u = self._taken(evaluation, noise)
             if aside.any():
                 by_u = np.where(without[:, None], 0.0, by_u)
             by_u = loss.jacobian(data(evaluation), _finite(by_u))
             return np.vstack([by_u, self.prior(evaluation.theta), pins, np.zeros(len(u))])
 
-        found = least_squares(
+        found, cost, self.converged = self._searched(residual, jacobian, u)
+        take(self.at(found, noise))
+        return found, cost
+
+    def _searched(
+        self, residual: Function, jacobian: Function, u: FloatArray
+    ) -> tuple[FloatArray, float, bool]:
+        """Where the squares of `residual` are least, half their sum, and whether steps ended."""
+        from scipy.optimize import least_squares, leastsq
+
+        if self._bounds is None:
+            # `least_squares` calls the same code, and takes longer than it: copies and checks
+            twice = [jacobian(u)] * 2  # which `leastsq` asks for as often
+
+            def once(at: FloatArray) -> FloatArray:
+                return twice.pop() if twice and np.array_equal(at, u) else jacobian(at)
+
+            found, _, said, _, end = leastsq(
+                residual,
+                u,
+                Dfun=once,
+                full_output=True,
+                **_TOLERANCES,
+                maxfev=_MOST,
+                diag=np.ones(len(u)),
+            )
+            return found, 0.5 * float(said["fvec"] @ said["fvec"]), end in _CONVERGED
+        trf = least_squares(
             residual,
             u,
             jacobian,
             bounds=self._bounds,
-            method=self._method,
+            method="trf",
             x_scale=1.0,
-            ftol=_FTOL,
-            xtol=1e-10,
-            gtol=1e-15,
-            max_nfev=200,
+            **_TOLERANCES,
+            max_nfev=_MOST,
         )
-        self.converged = bool(found.status > 0)
-        return found.x, float(found.cost)
+        return trf.x, float(trf.cost), bool(trf.status > 0)
+
+
+def _same(one: FloatArray, other: FloatArray) -> bool:
+    return one is other or np.array_equal(one, other)
 
 
 def _finite(jacobian: FloatArray) -> FloatArray:

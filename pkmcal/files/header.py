@@ -94,6 +94,8 @@ def find_header(path: Path, text: TextRows) -> Header:
 
 
 def _recognised(heading: str) -> bool:
+    if not heading or is_number(heading):  # most cells, and quickly told
+        return False
     heading = " ".join(heading.split())
     return len(heading) <= LONGEST_NAME and is_known(parted(heading)[0])
 

@@ -43,6 +43,9 @@ class _Layout:
         tied = np.zeros(len(self.names), dtype=bool)
         tied[[i for i, _ in self.ties]] = True
         self.tied = _frozen(tied)
+        own = np.eye(len(self.numbers), len(self.names))
+        own[[i for i, _ in self.ties]] = 0.0
+        self.own = _frozen(own)  # derivative of the numbers that are not tied
         self.n_limbs = 1 + max((number.limb for number in numbers), default=-1)
         if blank is None:
             blank = np.zeros((self.n_limbs, len(SLOTS)))
@@ -185,14 +188,12 @@ class Geometry:
     def chain(self) -> FloatArray:
         """Derivative of each limb number to each name that can be replaced, (k, p)."""
         layout = self._layout
-        chain = np.zeros((len(layout.numbers), len(layout.names)))
-        own = np.flatnonzero(~layout.tied[: len(layout.numbers)])
-        chain[own, own] = 1.0
-        if layout.ties:
-            parameters = {name: self[name] for name in layout.parameters}
-            for i, tie in layout.ties:
-                for name, slope in tie.derivatives(parameters):
-                    chain[i, layout.index[name]] += slope
+        if not layout.ties:
+            return layout.own
+        chain, parameters = layout.own.copy(), {name: self[name] for name in layout.parameters}
+        for i, tie in layout.ties:
+            for name, slope in tie.derivatives(parameters):
+                chain[i, layout.index[name]] += slope
         return _frozen(chain)
 
     def __getitem__(self, name: str) -> float:

@@ -18,6 +18,7 @@ from pkmcal.geometry.chains import Chains
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.laws import Law, drive
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.load import Load
 
 CHAIN = "chain"  # the kind of a limb that is a chain of joints: see `pkmcal.geometry.chains`
 
@@ -151,6 +152,8 @@ class Model:
     workspace : mapping of str to (float, float)
         Least and largest value of coordinates of the pose, mm and rad: where the machine may go,
         a bed or a frame being in the way. Empty where the file states none.
+    load : Load or None
+        What acts on the platform, of a machine on cables whose file states it.
     """
 
     name: str
@@ -167,6 +170,7 @@ class Model:
     file: str | None = None
     chains: Chains | None = None
     workspace: Box = field(default_factory=dict)
+    load: Load | None = None
 
     @property
     def n_actuators(self) -> int:

@@ -23,6 +23,7 @@ from pkmcal.files.toml_table import ANGLE_UNITS, LENGTH_UNITS, Table, Units, sho
 from pkmcal.geometry.box import read_box
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.load import Load, read_load
 from pkmcal.geometry.model import CHAIN, Limb, Model
 from pkmcal.geometry.robot_file_chains import chain_limbs, read_chains
 from pkmcal.geometry.robot_file_laws import refuse_turning
@@ -34,7 +35,7 @@ from pkmcal.geometry.robot_file_writer import text_of
 STATED_SIZES = ("base_radius", "base_diameter", "platform_radius", "platform_diameter", "length")
 INDEPENDENT = "independent"  # the default free set of a file that names none: found when loaded
 TOP = (
-    "name", "units", "closure_tolerance", "frames", "pose", "workspace", "parameters",
+    "name", "units", "closure_tolerance", "frames", "pose", "workspace", "load", "parameters",
     "calibration", "stated", "limb", "tail",
 )  # fmt: skip
 
@@ -176,6 +177,7 @@ def parse(source: Source, file: str | None) -> Model:
         tool_frame=_read_pose(frames, "tool", POSE) if "tool" in frames else None,
         closure_tolerance=_read_tolerance(top),
         workspace=read_box(_section(top, "workspace")),
+        load=_read_load(top, limbs.limbs),
         file=file,
     )
     refuse_turning(model, described)
@@ -189,6 +191,14 @@ def _read_tolerance(top: Table) -> float | None:
     if not found > 0.0:
         top.fail("closure_tolerance", f"must be positive, found {top['closure_tolerance']!r}")
     return found
+
+
+def _read_load(top: Table, limbs: tuple[Limb, ...]) -> Load | None:
+    if "load" not in top:
+        return None
+    if not any(limb.kind in KINDS and KINDS[limb.kind].cable for limb in limbs):
+        top.fail("load", "is what cables have to hold, and the robot has none")
+    return read_load(top.table("load"))
 
 
 def _section(top: Table, key: str) -> Table:

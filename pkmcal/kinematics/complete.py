@@ -6,7 +6,7 @@ are too many: the closures, with the matched coordinates held, determine the res
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from pkmcal.core.driven import CompiledMachine
 from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Closure
 from pkmcal.core.path_differences import along_path
+from pkmcal.core.poses import rates_of_twists
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.frames import Frames
 from pkmcal.screw import from_pose
@@ -75,6 +76,7 @@ def complete(
     pose: FloatArray,
     matched: Sequence[int],
     near: FloatArray | None = None,
+    start: Callable[[FloatArray], FloatArray] | None = None,
 ) -> Completed:
     """Poses on the machine's manifold that keep the matched coordinates, in the user's frames.
 
@@ -97,6 +99,9 @@ def complete(
         Places in x y z α β γ.
     near : ndarray (n,) or (N, n), optional
         Coordinates that angles are given nearest to, as for `Machine.inverse`.
+    start : callable, optional
+        Own poses (N, 6) to coordinates (N, n) to start at, near which angles are given then. By
+        default `Machine.inverse`.
     """
     free = [POSE.index(name) for name in MAPS[map]]
     fixed = [i for i in range(6) if i not in free]
@@ -115,7 +120,11 @@ def complete(
     own = frames.inward(pose).copy()
     if not frames.trivial and fixed:
         _to_map(machine, slots, frames, own, free, matched, wanted)
-    q = machine.inverse(slots, own, near)
+    if start is None:
+        q = machine.inverse(slots, own, near)
+    else:
+        near = start(own)
+        q = near.copy()
     size = machine.struct.size
     live: BoolArray = np.asarray(np.isfinite(q).all(axis=1))
     done = np.zeros(len(own), dtype=bool)
@@ -357,7 +366,7 @@ def _correct_actuators(
             break
         slope = machine.forward_jacobian(slots, own[live], q[live], twists=True)
         slope = frames.twists_outward(own[live], slope)
-        slope = frames.rates_of_twists(seen[live], slope)[:, matched]
+        slope = rates_of_twists(seen[live], slope)[:, matched]
         good = np.isfinite(slope).all(axis=(1, 2))
         live, slope = live[good], slope[good]
         q[live] -= (np.linalg.pinv(slope) @ missing[live][..., None])[..., 0]

@@ -100,7 +100,8 @@ class Forward(RowResult):
 
         ``.ok``, ``.error`` and ``.unique`` in mm: the solution is within `error` of the pose and is
         the only one within `unique`. Not ok with more closures than free coordinates, near a
-        singularity, and where the row was not solved. It costs some 12 µs a row.
+        singularity, and where the row was not solved. It costs some 12 µs a row. Of machines of
+        chains it is the only one with its passive joints that near.
         """
         problem = self._machine.assembly_problem(self._q)
         return certify_rows(problem, self._own.reshape(-1, 6)).reshape(self.status.shape)

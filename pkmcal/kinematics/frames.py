@@ -62,14 +62,6 @@ class Frames:
         outward: FloatArray = compose_rates(self._base, own, self._tool, pose) @ rates
         return outward
 
-    @staticmethod
-    def rates_of_twists(pose: FloatArray, twists: FloatArray) -> FloatArray:
-        """Rates (N, 6, k) of x y z α β γ of poses (N, 6) that move with twists (N, 6, k)."""
-        level = np.zeros_like(pose)  # turns about the axes are rates of its angles
-        rates = compose_rates(NOWHERE, level, NOWHERE, pose)
-        moved: FloatArray = rates @ np.concatenate([twists[:, 3:], twists[:, :3]], axis=1)
-        return moved
-
     def twists_outward(self, own: FloatArray, twists: FloatArray) -> FloatArray:
         """Twists (N, 6, k) of the machine's own poses to those of the user's poses."""
         if self.trivial:

@@ -72,8 +72,7 @@ def _independent(columns: FloatArray) -> list[int]:
 def near_home(robot: Robot) -> FloatArray:
     """Effects (N, 6, p) of every number at random coordinates near home, as twists (v, ω).
 
-    By the linear model, also where there are more closures than coordinates: which effects are
-    independent does not hang on what is missed. The coordinates are so near that the machine can be
+    The coordinates are so near that the machine can be
     solved at half of them, and so many that the poses do not limit what is independent.
     """
     home = robot.inverse(robot.home)

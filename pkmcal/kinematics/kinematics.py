@@ -24,6 +24,7 @@ from pkmcal.kinematics.frames import Frames
 from pkmcal.kinematics.limits import kept, margin_of
 from pkmcal.kinematics.machines import machine_of
 from pkmcal.modes.find import AssemblyProblem
+from pkmcal.screw import to_pose
 
 Match = bool | str | Sequence[str] | None
 
@@ -303,7 +304,9 @@ class Kinematics:
         free = [POSE.index(name) for name in self.coordinates]
         return by_q[:, free].reshape(*shape, len(free), self.n_actuators)
 
-    def rates(self, motion: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def rates(
+        self, motion: ArrayLike, *, near: ArrayLike | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Velocity and acceleration of the actuators as the platform moves, limb by limb.
 
         The closed-form inverse differentiated twice by time: exact, with dJ/dt in it.
@@ -312,6 +315,8 @@ class Kinematics:
         ----------
         motion : array_like (..., 3, 4, 4)
             The platform's homogeneous matrix and its first and second derivative by time; mm, s.
+        near : array_like (n,) or (..., n), optional
+            Which turn of an angle is meant, as for `inverse`: a drive law has a slope at each.
 
         Returns
         -------
@@ -339,9 +344,11 @@ class Kinematics:
         if given.shape[-3:] != (3, 4, 4):
             raise ArgumentError(f"motion must have shape (..., 3, 4, 4), found {given.shape}")
         rows, _ = as_rows("motion", given, 4)
-        own = self.frames.motion_inward(rows.reshape(-1, 3, 4, 4))
-        velocity, acceleration = self.machine.rates(self.slots, np.ascontiguousarray(own))
         shape = (*given.shape[:-3], self.n_actuators)
+        about = None if near is None else self._near(near, shape[:-1])
+        own = np.ascontiguousarray(self.frames.motion_inward(rows.reshape(-1, 3, 4, 4)))
+        q = self.machine.inverse(self.slots, to_pose(own[:, 0]), about)
+        velocity, acceleration = self.machine.rates(self.slots, own, q)
         return velocity.reshape(shape), acceleration.reshape(shape)
 
     # ----------------------------------------------------------------------------------------------

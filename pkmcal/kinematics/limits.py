@@ -34,7 +34,7 @@ class Feasibility(Result):
         q̃ of each limb, mm or rad; NaN out of reach.
     stroke_margin, base_cone_margin, platform_cone_margin : ndarray
         How far inside its limit each is, mm or rad; below 0 where it is broken, infinite where the
-        limb states none.
+        limb states none, NaN where it is not known.
     workspace : ndarray of bool (...)
         The pose is in the box of the robot file, ``[workspace]``; True where it states none.
     tail : bool
@@ -87,6 +87,7 @@ class Feasibility(Result):
 
 def feasibility(
     limbs: tuple[Limb, ...],
+    reach: BoolArray,
     drive: FloatArray,
     on_base: FloatArray,
     on_platform: FloatArray,
@@ -98,8 +99,10 @@ def feasibility(
     ----------
     limbs : tuple of Limb
         With strokes and cones, or without.
+    reach : ndarray of bool (N, limbs)
+        Whether a limb reaches the pose.
     drive : ndarray (N, limbs)
-        q̃, NaN out of reach.
+        q̃, NaN where it is not known.
     on_base, on_platform : ndarray (N, limbs, 3)
         Unit vectors from anchor to platform joint, in base and platform axes.
     size : float
@@ -119,11 +122,11 @@ def feasibility(
             if cone is not None:
                 margin[:, i] = _inside(cone, direction[:, i])
     return Feasibility(
-        np.isfinite(drive),
+        reach,
         in_stroke,
         kept(base_cone, "rad", size),
         kept(platform_cone, "rad", size),
-        drive,
+        np.where(reach, drive, np.nan),
         stroke,
         base_cone,
         platform_cone,

@@ -98,14 +98,13 @@ def step_units(robot: Robot) -> list[Unit]:
 def moved(robot: Robot, pose: FloatArray, step: FloatArray) -> FloatArray:
     """Poses (N, 6) after steps (N, m)."""
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    return robot.frames.outward(robot.machine.moved(own, np.ascontiguousarray(step))[0])
+    return robot.frames.outward(robot.machine.moved(own, np.ascontiguousarray(step)))
 
 
 def step_twists(robot: Robot, pose: FloatArray) -> FloatArray:
     """Twist of the platform by a step at poses (N, 6): (N, 6, m)."""
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    twists = robot.machine.moved(own, np.zeros((len(own), robot.machine.m)))[1]
-    return robot.frames.twists_outward(own, twists)
+    return robot.frames.twists_outward(own, robot.machine.step_twists(own))
 
 
 def readings(robot: Robot, pose: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:

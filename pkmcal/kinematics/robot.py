@@ -19,15 +19,15 @@ from pkmcal.arrays import FloatArray, as_rows, wrapped
 from pkmcal.core.chains import ChainMachine
 from pkmcal.core.driven import CompiledMachine
 from pkmcal.core.library import POSE
+from pkmcal.core.poses import rates_of_twists
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.toml_lines import Source
 from pkmcal.geometry import box, robot_file
 from pkmcal.geometry.geometry import Geometry
-from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.model import Model
-from pkmcal.kinematics import chain_limits, overconstrained
+from pkmcal.kinematics import chain_limits
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
@@ -148,8 +148,9 @@ class Robot(Kinematics, Result):
         pose : array_like (..., 6)
             x y z in mm, α β γ in rad.
         actuators : array_like (..., n), optional
-            The coordinates that lead to these poses: of a limb that turns, they say which turn its
-            stroke is compared with. By default it is the turn nearest to the middle of the stroke.
+            The coordinates that lead to these poses: strokes are compared with where they drive
+            the limbs. By default with what the poses ask of the limbs on their branches, angles at
+            the turn nearest to the middle of the stroke.
 
         Returns
         -------
@@ -170,13 +171,11 @@ class Robot(Kinematics, Result):
     def _limb_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
         """Limits of limbs in closed form at own poses (N, 6), by actuators (N, n) or without."""
         drive, on_base, on_platform = self.limb_machine.limbs(self.slots, own)
+        reach = np.isfinite(drive)
         if q is not None:
-            there = self.drives(q)
-            angle = np.array([KINDS[limb.kind].actuator_unit == "rad" for limb in self.model.limbs])
-            with np.errstate(invalid="ignore"):  # infinite coordinates
-                drive = np.where(angle, there + wrapped(drive - there), drive)
+            drive = self.drives(q)
         size = self.machine.struct.size
-        return feasibility(self.model.limbs, drive, on_base, on_platform, size)
+        return feasibility(self.model.limbs, reach, drive, on_base, on_platform, size)
 
     def _chain_limits(self, own: FloatArray, q: FloatArray | None) -> Feasibility:
         """Limits of chains at own poses (N, 6) with coordinates (N, n), by default the inverse."""
@@ -214,7 +213,9 @@ class Robot(Kinematics, Result):
 
         Every complex solution of the closures is followed from a start system where all are known
         (parameter homotopy), each real one is certified by the theorem of Newton and Kantorovich.
-        Machines without a start system, and doubts, are given random starts, which prove nothing.
+        Machines without a start system, and doubts, are given random starts, which do not prove
+        that no mode is missing. Those of chains of joints are; where it is known how many modes
+        there can be, as many are all.
 
         Parameters
         ----------
@@ -295,12 +296,12 @@ class Robot(Kinematics, Result):
             pose which misses them least.
         """
         given, own, q, shape = self._commanded(pose, actuators)
-        if self.frames.trivial and self.machine.rows == self.machine.m:  # without copies
-            columns = self.geometry.slot_index.astype(np.int32)
+        columns = self.geometry.slot_index.astype(np.int32)
+        if self.frames.trivial:  # without copies
             errors = self.machine.error_jacobian(self.slots, own, q, columns)
         else:  # rates of the machine's own angles may be infinite where the user's are not
-            twists = self.frames.twists_outward(own, self._by_numbers(own, q))
-            errors = self.frames.rates_of_twists(given, twists)
+            twists = self.machine.error_jacobian(self.slots, own, q, columns, twists=True)
+            errors = rates_of_twists(given, self.frames.twists_outward(own, twists))
         errors = self._through_ties(errors)
         return errors.reshape(*shape, 6, len(self.geometry))
 
@@ -328,7 +329,9 @@ class Robot(Kinematics, Result):
         True
         """
         _, own, q, shape = self._commanded(pose, actuators)
-        errors = self._through_ties(self.frames.twists_outward(own, self._by_numbers(own, q)))
+        columns = self.geometry.slot_index.astype(np.int32)
+        twists = self.machine.error_jacobian(self.slots, own, q, columns, twists=True)
+        errors = self._through_ties(self.frames.twists_outward(own, twists))
         return errors.reshape(*shape, 6, len(self.geometry))
 
     def actuator_twists(self, pose: ArrayLike, actuators: ArrayLike) -> FloatArray:
@@ -353,11 +356,7 @@ class Robot(Kinematics, Result):
         True
         """
         _, own, q, shape = self._commanded(pose, actuators)
-        if self.machine.rows > self.machine.m:
-            given = (self.machine, self.slots, own, q, self.actuator_units)
-            by_q = overconstrained.actuator_twists(*given)
-        else:
-            by_q = self.machine.forward_jacobian(self.slots, own, q, twists=True)
+        by_q = self.machine.forward_jacobian(self.slots, own, q, twists=True)
         return self.frames.twists_outward(own, by_q).reshape(*shape, 6, self.n_actuators)
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
@@ -383,14 +382,6 @@ class Robot(Kinematics, Result):
         if q_shape != shape:
             raise ArgumentError(f"actuators are a batch {q_shape}, poses a batch {shape}")
         return q
-
-    def _by_numbers(self, own: FloatArray, q: FloatArray) -> FloatArray:
-        """Twist of the platform in the machine's own frame by each number, (N, 6, numbers)."""
-        columns = self.geometry.slot_index.astype(np.int32)
-        if self.machine.rows > self.machine.m:
-            units = self.geometry.units[: len(columns)]
-            return overconstrained.error_jacobian(self.machine, self.slots, own, q, columns, units)
-        return self.machine.error_jacobian(self.slots, own, q, columns, twists=True)
 
     def _through_ties(self, errors: FloatArray) -> FloatArray:
         """The same (N, 6, p) with the columns of named parameters after those of the numbers."""

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pkmcal.arguments import number
-from pkmcal.arrays import FloatArray, Int32Array, IntArray, as_rows
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, as_rows
 from pkmcal.core import instruments
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.load import Load, Vector
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import RowResult
 from pkmcal.screw import from_pose
 
 _HELD, _SLACK, _TORN, _NOWHERE = range(4)
 _OPTIMAL, _INFEASIBLE = 0, 2  # of linprog
+_BALANCED = 1e-9  # of the forces: what rounding leaves of their balance
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,11 +62,11 @@ class Tensions(RowResult):
 def tensions(
     robot: Robot,
     poses: ArrayLike,
-    force: ArrayLike = (0.0, 0.0, 0.0),
+    force: ArrayLike | None = None,
     *,
-    at: ArrayLike = (0.0, 0.0, 0.0),
-    least: float = 0.0,
-    most: float = np.inf,
+    at: ArrayLike | None = None,
+    least: float | None = None,
+    most: float | None = None,
 ) -> Tensions:
     """Tensions of cables that hold the platform at poses.
 
@@ -72,18 +74,21 @@ def tensions(
     once, with `least` or more, and balance the force. Limbs that are no cables push as well, and
     joints that keep the platform in planes hold it there.
 
+    What is left out is that of the robot file, ``[load]``; where that states none, no force, at the
+    platform's origin, and any tension from 0 on.
+
     Parameters
     ----------
     robot : Robot
-        A machine with cables (kinds "cable" and "pulley").
+        A machine with cables (kinds "cable", "pulley" and "tackle").
     poses : array_like (..., 6)
         x y z in mm, α β γ in rad.
-    force : array_like (3,)
+    force : array_like (3,), optional
         What acts on the platform from outside, N, in the axes of the base: of a mass of 10 kg
         ``(0, 0, -98.1)``.
-    at : array_like (3,)
+    at : array_like (3,), optional
         Where it acts, in the platform's frame, mm: the centre of mass, for example.
-    least, most : float
+    least, most : float, optional
         Tension that every cable must have, and may have, N.
 
     Returns
@@ -115,40 +120,81 @@ def tensions(
     if not cables.any():
         raise ArgumentError(f"robot: {robot.name} has no cables")
     rows, shape = as_rows("poses", poses, 6)
-    pull, point = as_rows("force", force, 3)[0][0], as_rows("at", at, 3)[0][0]
-    for name, vector in (("force", pull), ("at", point)):
-        if not np.isfinite(vector).all():
-            raise ArgumentError(f"{name} must be finite, found {vector.tolist()}")
-    low = number("least", least, least=0.0)
-    if low == 0.0 and not pull.any():
-        raise ArgumentError(
-            "least must be above 0 where no force acts: no tension at all balances it"
-        )
-    high = np.inf if most == np.inf else number("most", most, above=low)
-    slopes, load, spheres = _balance(robot, rows, pull, point)
+    load = _stated(robot, force, at, least, most)
+    balance = _balance(robot, rows, load)
+    spheres = balance.limbs
     found = np.full((len(rows), len(cables)), np.nan)
     status = np.full(len(rows), _NOWHERE, dtype=np.int32)
-    for i in np.flatnonzero(np.isfinite(slopes).all(axis=(1, 2))):
-        forces = _least_largest(slopes[i], load[i], spheres[cables], low)
+    status[balance.reached] = _SLACK
+    for i in np.flatnonzero(_held(balance, spheres[cables], load.least, np.inf)):
+        forces = _least_largest(balance.slopes[i], balance.load[i], spheres[cables], load.least)
         if forces is None:
-            status[i] = _SLACK
             continue
         found[i] = forces[spheres]
-        status[i] = _TORN if (found[i, cables] > high).any() else _HELD
+        status[i] = _TORN if (found[i, cables] > load.most).any() else _HELD
     found[status != _HELD] = np.nan
     return Tensions(found.reshape(*shape, len(cables)), status.reshape(shape))
 
 
-def _balance(
-    robot: Robot, poses: FloatArray, force: FloatArray, at: FloatArray
-) -> tuple[FloatArray, FloatArray, IntArray]:
+def can_pull(robot: Robot, poses: FloatArray, load: Load) -> BoolArray:
+    """At which poses (N, 6) all cables can pull at once: where `tensions` would be ok.
+
+    Without tensions, which take some hundred times as long.
+    """
+    balance = _balance(robot, poses, load)
+    cables = np.array([KINDS[limb.kind].cable for limb in robot.model.limbs])
+    return _held(balance, balance.limbs[cables], load.least, load.most)
+
+
+def _stated(
+    robot: Robot, force: ArrayLike | None, at: ArrayLike | None, least: object, most: object
+) -> Load:
+    """The load of the robot file, with what was given in its place."""
+    load = robot.model.load or Load()
+    if force is not None:
+        load = replace(load, force=_vector("force", force))
+    if at is not None:
+        load = replace(load, at=_vector("at", at))
+    if least is not None:
+        load = replace(load, least=number("least", least, least=0.0))
+    if load.least == 0.0 and not any(load.force):
+        raise ArgumentError(
+            "least must be above 0 where no force acts: no tension at all balances it"
+        )
+    if most is not None:
+        high = np.inf if most == np.inf else number("most", most, above=load.least)
+        load = replace(load, most=high)
+    return load
+
+
+def _vector(name: str, given: ArrayLike) -> Vector:
+    x, y, z = as_rows(name, given, 3)[0][0].tolist()
+    if not np.isfinite((x, y, z)).all():
+        raise ArgumentError(f"{name} must be finite, found {[x, y, z]}")
+    return x, y, z
+
+
+class _Balance(NamedTuple):
     """Pulls of the closures by a unit force (N, m, rows), and the load (N, m); which are limbs'.
 
     Of the generalised forces of a step of the pose map, torques over the characteristic length.
     """
+
+    slopes: FloatArray
+    load: FloatArray
+    limbs: IntArray
+
+    @property
+    def reached(self) -> BoolArray:
+        """Which poses the machine can take (N,)."""
+        return np.asarray(np.isfinite(self.slopes).all(axis=(1, 2)))
+
+
+def _balance(robot: Robot, poses: FloatArray, load: Load) -> _Balance:
+    force, at = np.array(load.force), np.array(load.at)
     machine, slots = robot.limb_machine, robot.slots
     own = robot.on_map(robot.frames.inward(poses))
-    twists = machine.moved(own, np.zeros((len(own), machine.m)))[1]
+    twists = machine.step_twists(own)
     arcs = np.array([1.0 if name in "xyz" else robot.length for name in robot.coordinates])
 
     def generalised(pull: FloatArray, point: FloatArray) -> FloatArray:
@@ -168,7 +214,29 @@ def _balance(
     if robot.model.base_frame is not None:
         base = from_pose(robot.model.base_frame)
         points, force = (points - base[:3, 3]) @ base[:3, :3], force @ base[:3, :3]
-    return slopes, generalised(np.tile(force, (len(own), 1)), points), first
+    return _Balance(slopes, generalised(np.tile(force, (len(own), 1)), points), first)
+
+
+def _held(balance: _Balance, cables: IntArray, least: float, most: float) -> BoolArray:
+    """At which poses (N,) forces balance the load, those of `cables` from `least` to `most`."""
+    from scipy.optimize import nnls
+
+    count = balance.slopes.shape[2]
+    others = np.setdiff1d(np.arange(count), cables)
+    low = np.zeros(count)
+    low[cables] = least
+    held = np.zeros(len(balance.load), dtype=bool)
+    for i in np.flatnonzero(balance.reached):
+        slopes, rest = balance.slopes[i], balance.load[i] - balance.slopes[i] @ low
+        # tensions above the least; those of other limbs have either sign
+        parts = np.hstack([slopes[:, cables], slopes[:, others], -slopes[:, others]])
+        if np.isfinite(most):  # with what each cable has left up to the most
+            room, m = np.eye(len(cables), parts.shape[1]), len(parts)
+            parts = np.block([[parts, np.zeros((m, len(cables)))], [room, np.eye(len(cables))]])
+            rest = np.concatenate([rest, np.full(len(cables), most - least)])
+        size = np.linalg.norm(balance.load[i]) + np.linalg.norm(slopes[:, cables]) * least
+        held[i] = nnls(parts, rest)[1] <= _BALANCED * size
+    return held
 
 
 def _least_largest(

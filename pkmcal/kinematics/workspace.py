@@ -17,6 +17,7 @@ from pkmcal.geometry.box import in_box
 from pkmcal.kinematics.dexterity import BLOCK, Dexterity, dexterity
 from pkmcal.kinematics.limits import Feasibility
 from pkmcal.kinematics.perturbed import completed
+from pkmcal.kinematics.pulled import pulled
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
 
@@ -45,6 +46,9 @@ class Workspace(Result):
         Which limits are kept.
     dexterity : Dexterity
         How well the poses are held.
+    pulled : ndarray of bool (...)
+        At which of them no cable would have to push: under the load of the robot file or, where
+        that states none, against what holds it at home. True of machines without cables.
     """
 
     robot: Robot
@@ -53,11 +57,12 @@ class Workspace(Result):
     poses: FloatArray
     feasibility: Feasibility
     dexterity: Dexterity
+    pulled: BoolArray
 
     @property
     def inside(self) -> BoolArray:
-        """Which poses keep all limits and lie on the same side of all singularities as home."""
-        return _inside(self.robot, self.feasibility, self.dexterity)
+        """Which poses keep all limits, on home's side of all singularities; where cables pull."""
+        return _inside(self.robot, self.feasibility, self.dexterity) & self.pulled
 
     @property
     def cell(self) -> float:
@@ -135,13 +140,17 @@ def workspace(
     blocks = [completed(robot, rows[i : i + BLOCK]) for i in range(0, len(rows), BLOCK)]
     rows = np.concatenate(blocks)
     poses = rows.reshape(*shape, 6)
+    held = pulled(robot, rows).reshape(shape)
     return Workspace(
-        robot, tuple(axes), values, poses, robot.feasible(poses), dexterity(robot, poses)
+        robot, tuple(axes), values, poses, robot.feasible(poses), dexterity(robot, poses), held
     )
 
 
 def sample_poses(robot: Robot, count: int = 30, seed: int = 0, *, share: float = 0.5) -> FloatArray:
     """Random poses in the workspace: within all limits, and not near a singularity.
+
+    Of machines on cables poses at which no cable would have to push, under the load of the robot
+    file or, where that states none, against what holds the platform at home.
 
     Parameters
     ----------
@@ -219,6 +228,8 @@ def reach(robot: Robot) -> dict[str, tuple[float, float]]:
             )
         broken = robot.feasible(robot.home[None]).broken()
         why = f"home breaks a limit: {'; '.join(broken)}" if broken else "home is singular"
+        if not broken and not pulled(robot, robot.home[None])[0]:
+            why = "at home some cable would have to push, under the load of the file"
         raise ArgumentError(f"{robot.name}: {why.replace(' in rows 0', '')}")
     if robot.model.chains is not None:
         size = robot.model.chains.size
@@ -282,10 +293,15 @@ def _inside(robot: Robot, feasible: Feasibility, dexterity_there: Dexterity) -> 
 
 
 def good_poses(robot: Robot, poses: FloatArray) -> BoolArray:
-    """Which poses (N, 6) keep all limits, on home's side of all singularities and not near one."""
+    """Which poses (N, 6) keep all limits, on home's side of all singularities and not near one.
+
+    Of machines on cables those at which no cable would have to push.
+    """
     there = dexterity(robot, poses)
     least = _SMALLEST * float(dexterity(robot, robot.home).conditioning)
-    return _inside(robot, robot.feasible(poses), there) & (there.conditioning > max(least, 1e-9))
+    good = _inside(robot, robot.feasible(poses), there) & (there.conditioning > max(least, 1e-9))
+    good[good] = pulled(robot, poses[good])
+    return good
 
 
 def _middles(name: str, ends: tuple[float, float, int]) -> FloatArray:

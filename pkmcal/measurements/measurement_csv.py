@@ -58,7 +58,6 @@ from pkmcal.files.column_names import SYNONYMS
 from pkmcal.files.csv_table import Table
 from pkmcal.kinematics.reading_units import Actuated
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements import orientation_columns
 from pkmcal.measurements.actuator_columns import (
     actuators_in,
     compare,
@@ -395,7 +394,9 @@ def _read_values(
     if KINDS[kind].turning is not None and names_in(table) not in ((), ANGLES):
         places = [table.numbers(axis, "mm")[0] for axis in _AXES] if kind == "pose" else []
         nominal = _nominal(robot, actuators)
-        return np.column_stack([*places, orientation_columns.read(table, rotation, nominal)])
+        from pkmcal.measurements import orientation_forms  # imports SciPy
+
+        return np.column_stack([*places, orientation_forms.read(table, rotation, nominal)])
     columns = [table.numbers(*component, blank=True)[0] for component in value_columns(table, kind)]
     if not columns:
         return None

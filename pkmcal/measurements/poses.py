@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.arrays import FloatArray, Int64Array, IntArray
 
 
 def pose_index(
@@ -28,17 +28,25 @@ def pose_index(
     places = np.hstack([actuators, *(each for each in driven if each is not None)])
     pose = np.unique(places, axis=0, return_inverse=True)[1].reshape(-1)
     if group is not None:
-        pose = _joined(np.unique(group, return_inverse=True)[1].reshape(-1), pose)
+        pose = joined(np.unique(group, return_inverse=True)[1].reshape(-1), pose)
     return pose.astype(np.int64)
 
 
-def _joined(one: Int64Array, other: Int64Array) -> Int64Array:
-    """Rows that either of two numberings puts together, in the order of the first."""
+def joined(one: IntArray, other: IntArray) -> IntArray:
+    """Rows that either of two numberings puts together, in the order of the first.
+
+    Examples
+    --------
+    >>> joined(np.array([0, 1, 1, 2, 3]), np.array([0, 0, 1, 2, 2])).tolist()
+    [0, 0, 0, 1, 1]
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     size = int(one.max()) + 1
     nodes = size + int(other.max()) + 1
-    links = coo_array((np.ones(len(one)), (one, size + other)), (nodes, nodes))
+    # of 32 bits: before SciPy 1.12 graphs of longer ones had no links, and said so on stderr alone
+    ends = one.astype(np.int32), (size + other).astype(np.int32)
+    links = coo_array((np.ones(len(one)), ends), (nodes, nodes))
     found = connected_components(links, directed=False)[1][:size]
-    return np.asarray(np.unique(found, return_inverse=True)[1].reshape(-1)[one])
+    return np.unique(found, return_inverse=True)[1].reshape(-1)[one]

@@ -34,7 +34,8 @@ class Assemblies(Result):
         How far the solution is at most, mm; entries of R count times ``robot.length``. NaN where
         nothing is proven.
     unique : ndarray (k,)
-        No other solution is within this distance of the pose, in the same measure.
+        No other solution is within this distance of the pose, in the same measure; of machines of
+        chains none with its passive joints as near.
     complete : bool
         True only where it is known that no mode is missing and every mode is certified.
     reason : str

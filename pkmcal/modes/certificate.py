@@ -224,29 +224,46 @@ def newton(closures: Closures, u: Array, steps: int) -> Array:
     return u
 
 
-def certify(closures: Closures, u: Array) -> Certificate:
-    """Test u (N, 12), R row by row and p/length: real or complex."""
-    f, df, f_abs, df_abs, change = closures(u)
+def kantorovich(
+    f: Array, df: Array, f_abs: FloatArray, df_abs: FloatArray, change: FloatArray
+) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """How far solutions of N systems of k equations are at most, and are alone, and if there are.
+
+    Parameters
+    ----------
+    f, df : ndarray (N, k), (N, k, k)
+        F and F' where the solutions are to be near.
+    f_abs, df_abs : ndarray (N, k), (N, k, k)
+        What both are below if every term counts with its absolute value.
+    change : ndarray (k,) or (N, k)
+        How fast each row of F' changes at most.
+    """
     A = _inverses(df)
     A_abs = np.abs(A)
     Y = UP * (A_abs @ (np.abs(f) + ROUNDING * f_abs)[..., None])[..., 0].max(axis=1)
-    off = np.abs(np.eye(12) - A @ df) + A_abs @ (2.0 * ROUNDING * df_abs)
+    off = np.abs(np.eye(df.shape[1]) - A @ df) + A_abs @ (2.0 * ROUNDING * df_abs)
     Z0 = UP * off.sum(axis=2).max(axis=1)
-    Z2 = UP * (A_abs @ change).max(axis=1)
+    Z2 = UP * (A_abs @ change[..., None])[..., 0].max(axis=1)
     with np.errstate(invalid="ignore"):
         room = (1.0 - Z0) ** 2 - 2.0 * Y * Z2
         error = UP * 2.0 * Y / (1.0 - Z0 + np.sqrt(np.where(room > 0, room, np.nan)))
         unique = np.where(Z2 > 0, (1.0 - Z0) / (UP * np.where(Z2 > 0, Z2, 1.0)), np.inf)
         holds = (Y + Z0 * error + Z2 * error**2 / 2.0 <= error * DOWN) & (error < unique)
         holds &= (Z0 < 1.0) & A_abs.any(axis=(1, 2))
+    return error, unique, np.asarray(holds, dtype=bool)
+
+
+def certify(closures: Closures, u: Array) -> Certificate:
+    """Test u (N, 12), R row by row and p/length: real or complex."""
+    error, unique, holds = kantorovich(*closures(u))
+    with np.errstate(invalid="ignore"):
         turn = u[:, R].reshape(-1, 3, 3)
         # of the solution it is 1 or -1, and it changes by less than 18 (|R| + r)² r
         largest = np.abs(turn).max(axis=(1, 2)) + error
         holds &= np.abs(np.linalg.det(turn) - 1.0) + 18.0 * largest**2 * error < 1.0
-    ok = np.asarray(holds, dtype=bool)
     length = closures.length
     return Certificate(
-        ok, np.where(ok, length * error, np.nan), np.where(ok, length * unique, np.nan)
+        holds, np.where(holds, length * error, np.nan), np.where(holds, length * unique, np.nan)
     )
 
 

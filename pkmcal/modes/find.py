@@ -15,6 +15,7 @@ from pkmcal.core.library import SLOTS
 from pkmcal.core.machine import Machine
 from pkmcal.modes.assemblies import Assemblies, Signs
 from pkmcal.modes.certificate import Certificate, Closures, certify, newton
+from pkmcal.modes.chain_certificate import certify_chains, most_modes
 from pkmcal.modes.homotopy import Endpoints, endpoints, start_system
 
 NEARLY_REAL = 1e-3  # with smaller imaginary parts a solution counts as real unless proven otherwise
@@ -120,7 +121,8 @@ def find_modes(problem: AssemblyProblem, starts: int | None) -> Found:
     """Find all modes by paths; by random starts where paths prove nothing, or with `starts`."""
     if isinstance(problem.machine, ChainMachine):
         real = _of_chains(problem.machine, problem, STARTS if starts is None else starts)
-        return Found(*_certified(problem, real), False, "chains of joints: random starts", None)
+        poses, proof = _certified(problem, real)
+        return Found(poses, proof, *_all_of_chains(problem.machine, proof), None)
     square = problem.machine.rows == problem.machine.m
     spheres = problem.spheres()
     start = start_system(problem.map, problem.rows, spheres) if problem.provable else None
@@ -221,6 +223,16 @@ def _of_chains(machine: ChainMachine, problem: AssemblyProblem, starts: int) -> 
     return frames_of(poses[status == 0])
 
 
+def _all_of_chains(machine: ChainMachine, proof: Certificate) -> tuple[bool, str]:
+    """Whether modes with these certificates are all, and why or why not."""
+    if machine.rows != machine.m:
+        return False, "more closures than free coordinates"
+    most = most_modes(machine.layout)
+    if most is None or len(proof.ok) < most[0] or not proof.ok.all():
+        return False, "chains of joints: random starts"
+    return True, f"all {most[0]} certified, and there are no more: {most[1]}"
+
+
 def _certified(problem: AssemblyProblem, frames: FloatArray) -> tuple[FloatArray, Certificate]:
     """Poses of real frames, each once, and their certificates."""
     poses = poses_of(problem.map, frames[np.isfinite(frames).all(axis=1)])
@@ -232,14 +244,16 @@ def _certified(problem: AssemblyProblem, frames: FloatArray) -> tuple[FloatArray
         poses, u = poses[closed], u[closed]
         proof = certify(closures, u)
     else:
-        nothing = np.full(len(u), np.nan)
-        proof = Certificate(np.zeros(len(u), dtype=bool), nothing, nothing)
+        proof = certify_rows(problem._replace(q=np.tile(problem.q, (len(u), 1))), poses)
+    of_chains = isinstance(problem.machine, ChainMachine)
     kept: list[int] = []
     for k in np.lexsort((~proof.ok,)):
         apart = np.abs(u[kept] - u[k]).max(axis=1, initial=0.0) * problem.length
-        reach = np.where(proof.ok[kept], proof.unique[kept], BLURRED * problem.length)
-        # the same solution: within the ball in which there is only one, its own error included
-        if not (apart + np.nan_to_num(proof.error[k]) < reach).any():
+        if of_chains:  # other passive joints may have the platform as near
+            reach = proof.error[kept] + proof.error[k]
+        else:  # within the ball in which there is only one solution, its own error included
+            reach = proof.unique[kept] - np.nan_to_num(proof.error[k])
+        if not (apart < np.where(np.isnan(reach), BLURRED * problem.length, reach)).any():
             kept.append(int(k))
     return poses[kept], Certificate(proof.ok[kept], proof.error[kept], proof.unique[kept])
 
@@ -248,10 +262,15 @@ def certify_rows(problem: AssemblyProblem, poses: FloatArray) -> Certificate:
     """Certify poses (N, 6), each at its own coordinates: `problem.q` is (N, n)."""
     ok, error, unique = np.zeros(len(poses), dtype=bool), *np.full((2, len(poses)), np.nan)
     solved = np.isfinite(poses).all(axis=1)
-    if problem.provable and solved.any():
+    machine = problem.machine
+    of_chains = isinstance(machine, ChainMachine) and machine.rows == machine.m
+    if (problem.provable or of_chains) and solved.any():
         for part in np.array_split(np.flatnonzero(solved), 1 + solved.sum() // AT_ONCE):
-            u = _scaled(frames_of(poses[part]), problem.length)
-            proof = certify(problem._replace(q=problem.q[part]).closures(), u)
+            if isinstance(machine, ChainMachine):
+                proof = certify_chains(machine, problem.slots, poses[part], problem.q[part])
+            else:
+                u = _scaled(frames_of(poses[part]), problem.length)
+                proof = certify(problem._replace(q=problem.q[part]).closures(), u)
             ok[part], error[part], unique[part] = proof.ok, proof.error, proof.unique
     return Certificate(ok, error, unique)
 

@@ -62,8 +62,8 @@ class Event(Result):
         s; when it is first broken.
     until : float
         s; when it is kept again, or the end of the move.
-    what : {"reach", "stroke", "base_cone", "platform_cone", "singularity"}
-        The limit.
+    what : {"reach", "stroke", "base_cone", "platform_cone", "singularity", "pose"}
+        The limit; "pose": no pose is found.
     limb : int or None
         Which limb, counted from 1, joints behind the platform as one more; None for the machine as
         a whole.
@@ -75,10 +75,9 @@ class Event(Result):
     limb: int | None
 
     def _parts(self) -> Iterator[str]:
-        limb = "" if self.limb is None else f"limb {self.limb}: "
-        broken = "met" if self.what == "singularity" else "broken"
-        what = self.what.replace("_", " ")
-        yield f"{self.time:.4f} to {self.until:.4f} s  {limb}{what} {broken}"
+        machine = {"singularity": "singularity met", "pose": "no pose found"}
+        what = machine.get(self.what, f"limb {self.limb}: {self.what.replace('_', ' ')} broken")
+        yield f"{self.time:.4f} to {self.until:.4f} s  {what}"
 
 
 def events(move: Sampled) -> list[Event]:
@@ -93,9 +92,8 @@ def events(move: Sampled) -> list[Event]:
     the duration, in a margin that has more than one minimum in that time or falls more than four
     times as far as from one look to the next; or it goes less than 1e-9 mm or rad too far.
 
-    Strokes are looked at as the inverse kinematics has the pose: straight in joint space, where no
-    pose is found or a limb has gone over to its other branch, one may be said to be broken though
-    the actuator keeps it.
+    Strokes are compared with where the actuators drive the limbs. Where no pose is found, as it may
+    be straight in joint space, the event says so, and of reach and cones nothing is known.
     """
     times = np.linspace(0.0, move.duration, _STEPS + 1)
     times = np.unique(np.concatenate([times, _dips(move, times)]))
@@ -121,7 +119,7 @@ def _names(move: Sampled) -> list[tuple[str, int | None]]:
     names: list[tuple[str, int | None]] = [
         (what, limb) for what in Feasibility.LIMITS for limb in limbs
     ]
-    return [*names, ("singularity", None)]
+    return [*names, ("singularity", None), ("pose", None)]
 
 
 def _margins(move: Sampled, times: FloatArray) -> FloatArray:
@@ -131,13 +129,17 @@ def _margins(move: Sampled, times: FloatArray) -> FloatArray:
     """
     at = move.sample(times)
     pose, feasible = at.pose, move.robot.feasible(at.pose, at.actuators)
+    known = np.isfinite(pose).all(axis=1, keepdims=True)
     there = dexterity(move.robot, np.vstack([move.start, pose]))
-    found = [np.where(feasible.reach, np.nan_to_num(there.transmission[1:, None]), -1.0)]
+    reach = np.where(feasible.reach, np.nan_to_num(there.transmission[1:, None]), -1.0)
+    found = [np.where(known, reach, np.inf)]
     for what in Feasibility.LIMITS[1:]:
-        margin = np.maximum(getattr(feasible, f"{what}_margin"), 0.0)
-        found.append(np.where(getattr(feasible, what), margin, -1.0))
+        margin = getattr(feasible, f"{what}_margin")
+        inside = np.where(getattr(feasible, what), np.maximum(margin, 0.0), -1.0)
+        found.append(np.where(np.isnan(margin), np.inf, inside))
     side = there.determinant[1:] * np.sign(there.determinant[0])
-    return np.hstack([*found, np.where(np.isnan(side), np.inf, side)[:, None]])
+    side = np.where(np.isnan(side), np.inf, side)[:, None]
+    return np.hstack([*found, side, np.where(known, np.inf, -1.0)])
 
 
 def _dips(move: Sampled, times: FloatArray) -> FloatArray:

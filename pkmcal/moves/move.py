@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
@@ -32,6 +32,7 @@ from pkmcal.moves.time_laws import (
     limit,
     seconds,
 )
+from pkmcal.moves.turns import continued, unwrapped
 from pkmcal.result import Result
 from pkmcal.screw import from_pose, to_pose
 
@@ -157,9 +158,14 @@ class Move(Result):
     def _in_pose(self, times: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
         position, velocity, acceleration = self.law.sample(times)
         motion = derivatives.straight(self.start, self.end, (position, velocity, acceleration))
-        pose = to_pose(motion[:, 0])
-        q = self.robot.inverse(pose, near=self._turns_at(position))
-        return motion, (q, *self.robot.rates(motion))
+        return motion, self._driven(motion, position)
+
+    def _driven(self, motion: FloatArray, share: FloatArray) -> tuple[FloatArray, ...]:
+        """Actuators with their speeds and accelerations as the platform moves at shares (N,)."""
+        robot, slots, frames = self.robot, self.robot.slots, self.robot.frames
+        q = self._inverse(frames.inward(to_pose(motion[:, 0])), share)
+        own = np.ascontiguousarray(frames.motion_inward(motion))
+        return q, *robot.machine.rates(slots, own, q)
 
     def _in_joint(self, times: FloatArray) -> tuple[FloatArray, tuple[FloatArray, ...]]:
         robot, frames, slots = self.robot, self.robot.frames, self.robot.slots
@@ -177,59 +183,60 @@ class Move(Result):
         robot, frames, slots = self.robot, self.robot.frames, self.robot.slots
         share, speed, bend = (each[:, None] for each in self.law.sample(times))
         matched = [POSE.index(name) for name in robot.moved]
-        near = self._turns_at(share[:, 0])
         if len(matched) == len(POSE) and robot.machine.rows == robot.machine.m:
             way = off(self.end, self.start)  # all are known, and at β = ±90° rates by them are not
             motion = derivatives.written(self.start + share * way, speed * way, bend * way)
-            return motion, (robot.inverse(to_pose(motion[:, 0]), near=near), *robot.rates(motion))
+            return motion, self._driven(motion, share[:, 0])
         way = off(self.end, self.start)[matched]
         at = self._completed(share)
-        q = at.q if near is None else robot.nearest_turns(at.q, near=near)
-        at = at._replace(q=q)
         velocity, acceleration = completed_rates(
             robot.machine, robot.model.map, slots, frames, at, matched, (speed * way, bend * way)
         )
-        motion = robot.machine.motion(slots, at.own, q, velocity, acceleration)[0]
-        return frames.motion_outward(motion), (q, velocity, acceleration)
+        motion = robot.machine.motion(slots, at.own, at.q, velocity, acceleration)[0]
+        return frames.motion_outward(motion), (at.q, velocity, acceleration)
 
     def _completed(self, share: FloatArray) -> Completed:
         """Poses and actuators at shares (N, 1) of a way that is straight in coordinates."""
+        if self._turns is None:
+            return self._complete(share)
+        return self._complete(share, lambda own: self._inverse(own, share[:, 0]))
+
+    def _complete(
+        self, share: FloatArray, start: Callable[[FloatArray], FloatArray] | None = None
+    ) -> Completed:
         robot = self.robot
         matched = [POSE.index(name) for name in robot.moved]
         way = self.start + share * off(self.end, self.start)
-        return complete(robot.machine, robot.model.map, robot.slots, robot.frames, way, matched)
+        parts = robot.machine, robot.model.map, robot.slots, robot.frames
+        return complete(*parts, way, matched, start=start)
 
-    def _turns_at(self, share: FloatArray) -> FloatArray | None:
-        """Coordinates (N, n) near those at shares (N,) of the way, whose angles do not jump."""
-        if self._continuous is None:
-            return None
-        shares = np.linspace(0.0, 1.0, len(self._continuous))
-        return np.stack([np.interp(share, shares, q) for q in self._continuous.T], axis=1)
+    def _inverse(self, own: FloatArray, share: FloatArray) -> FloatArray:
+        """Coordinates (N, n) at own poses (N, 6) and shares (N,), at the turns of the way."""
+        machine, slots = self.robot.machine, self.robot.slots
+        if self._turns is None:
+            return machine.inverse(slots, own)
+        shares = np.linspace(0.0, 1.0, len(self._turns))
+        near = np.stack([np.interp(share, shares, each) for each in self._turns.T], axis=1)
+        return continued(machine, slots, machine.drives_at(slots, own), near)
 
     @cached_property
-    def _continuous(self) -> FloatArray | None:
-        """Coordinates (k, n) evenly along the way, each angle near the one before.
+    def _turns(self) -> FloatArray | None:
+        """q̃ of each drive (k, drives) evenly along the way, whose angles do not jump.
 
-        None where no actuator turns.
+        None where no drive turns.
         """
-        turns = self.robot.turns
-        if np.isinf(turns).all():
+        robot, machine, slots = self.robot, self.robot.machine, self.robot.slots
+        if not machine.turning.any():
             return None
         share = np.linspace(0.0, 1.0, STEPS + 1)
         if self.space == "coordinates":
-            q = self._completed(share[:, None]).q
+            own = self._complete(share[:, None]).own
         else:
             still = np.zeros_like(share)
             motion = derivatives.straight(self.start, self.end, (share, still, still))
-            q = self.robot.inverse(to_pose(motion[:, 0]))
-        known = np.isfinite(q).all(axis=1)
-        if not known.any():
-            return np.zeros_like(q)
-        for i in np.flatnonzero(np.isfinite(turns)).tolist():
-            q[known, i] = np.unwrap(q[known, i], period=turns[i])
-        for i in range(q.shape[1]):  # what is out of reach has no angle
-            q[:, i] = np.interp(share, share[known], q[known, i])
-        return q
+            own = robot.frames.inward(to_pose(motion[:, 0]))
+        start = machine.drives(slots, robot.inverse(self.start)[None])[0]
+        return unwrapped(machine, start, machine.drives_at(slots, own))
 
     @property
     def _straight(self) -> str:
@@ -317,7 +324,7 @@ def move(
         for name, value in (("velocity", velocity), ("acceleration", acceleration), ("jerk", jerk))
         if value is not None
     }
-    q = robot.inverse(np.stack(ends))
+    q = np.stack([_actuators(robot, pose) for pose in ends])
     q[1] = robot.short_way(q[0], q[1])
     if law == "jerk-limited":
         if space != "joint" or duration is not None or len(limits) < 3:
@@ -343,14 +350,29 @@ def _pose(robot: Robot, name: str, pose: ArrayLike) -> FloatArray:
     rows, shape = as_rows(name, pose, 6)
     if shape != ():
         raise ArgumentError(f"{name} must be one pose (6,), found {(*shape, 6)}")
-    off = float(robot.violation(rows[0]))
-    if not off <= ON_THE_MANIFOLD:
-        why = f"its closures miss by {off:.3g} mm" if np.isfinite(off) else "out of reach"
+    if np.isnan(_actuators(robot, rows[0])).any():
+        missed = float(robot.violation(rows[0]))
+        why = f"its closures miss by {missed:.3g} mm" if np.isfinite(missed) else "out of reach"
         raise ArgumentError(
             f"{name}: {robot.name} cannot take this pose, {why}; robot.complete(pose) makes one"
         )
     pose_given: FloatArray = rows[0]
     return pose_given
+
+
+def _actuators(robot: Robot, pose: FloatArray) -> FloatArray:
+    """Coordinates (n,) that lead to a pose (6,); NaN where the machine cannot take it.
+
+    With more closures than free coordinates, and numbers that are not exact, a pose may be as near
+    to all closures as it gets: `Robot.complete` leaves it where it is, and limb by limb the inverse
+    kinematics has other coordinates for it.
+    """
+    if robot.violation(pose) <= ON_THE_MANIFOLD:
+        return robot.inverse(pose)
+    over = robot.machine.rows > robot.machine.m
+    if over and np.abs(off(robot.complete(pose), pose)).max() <= ON_THE_MANIFOLD:
+        return robot.inverse(pose, match=True)
+    return np.full(robot.n_actuators, np.nan)
 
 
 def _followed(made: Move) -> Move:

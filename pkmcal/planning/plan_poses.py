@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import number, whole, word
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, as_rows, mm_per_unit
-from pkmcal.checks.cables import unpulled
 from pkmcal.core.library import POSE
-from pkmcal.display import Table, first_rows, fixed
+from pkmcal.display import Table, fixed
 from pkmcal.estimation.parameters import Parameters, Prior
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import ideal
+from pkmcal.kinematics.pulled import pulled
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.components import Kind
@@ -65,8 +65,8 @@ class Plan(Result):
     all_candidates : float
         The same for all candidates that keep the machine's limits.
     left_out : int
-        How many candidates break limits, are not found by forward kinematics from home, or are so
-        near a singularity that errors of the geometry bar the way there.
+        How many candidates break limits, are not found by forward kinematics from home, are so
+        near a singularity that errors of the geometry bar the way there, or are `unpulled`.
     parameters : tuple of str
         What the calibration is to find.
     travel : float
@@ -83,6 +83,10 @@ class Plan(Result):
         By what share the predicted error may grow for a tour that is shorter by a share, as given.
     predicted_unweighted, travel_unweighted : float
         Predicted error and length of the tour without this weight, mm.
+    unpulled : int
+        How many candidates within limits were left out because some cable would have to push there:
+        under the load of the robot file or, where that states none, against what holds the platform
+        at home.
     """
 
     robot: Robot | SerialArm
@@ -101,6 +105,7 @@ class Plan(Result):
     travel_weight: float = 0.0
     predicted_unweighted: float = float("nan")
     travel_unweighted: float = float("nan")
+    unpulled: int = 0
 
     def __len__(self) -> int:
         return len(self.indices)
@@ -142,11 +147,9 @@ class Plan(Result):
             yield "in the machine's own frame: nothing that is read says where it stands"
         if not np.isfinite(self.predicted):
             yield "too few to identify all of them"
-        if isinstance(self.robot, Robot) and (off := unpulled(self.robot, self.poses)).any():
-            yield (
-                f"some cable would have to push at {_poses(int(off.sum()))}, which plans do not"
-                f" leave out, but pk.tensions finds: candidates {first_rows(self.indices[off])}"
-            )
+        if self.unpulled:
+            load = "the load of its file" if _loaded(self.robot) else "what holds it at home"
+            yield f"under {load} some cable would have to push at {self.unpulled} of those left out"
         yield Table(heads, rows)
 
 
@@ -178,9 +181,10 @@ def plan_poses(
         The nominal machine, or as last calibrated.
     candidates : array_like (N, 6), for a serial arm (N, n)
         Poses that could be measured, mm and rad; of an arm its joint coordinates. Those that break
-        the machine's limits are left out, and those that machines with twice the errors of the
-        prior (0.5 mm without one) do not reach. A pose that its closures do not allow is completed
-        (`Robot.complete`). An arm's file has no limits: offer what it may take.
+        the machine's limits are left out, those at which some cable would have to push, and those
+        that machines with twice the errors of the prior (0.5 mm without one) do not reach. A pose
+        that its closures do not allow is completed (`Robot.complete`). An arm's file has no limits:
+        offer what it may take.
     count : int, optional
         How many to choose.
     accuracy : float, optional
@@ -243,7 +247,7 @@ def plan_poses(
     counts = _counts(kind, count, accuracy)
     kinds = list(counts)
     machine = as_machine(robot)
-    poses, q, inside, offered = _within_limits(machine, candidates)
+    poses, q, inside, offered, unpulled = _within_limits(machine, candidates)
     aims = (poses, q) if targets is None else _aims(machine, targets)
     distinct, place = np.unique(q, axis=0, return_inverse=True)
     stated = {each: _of("target", target, each, kinds) for each in kinds}
@@ -295,6 +299,7 @@ def plan_poses(
         travel_weight=weight,
         predicted_unweighted=unweighted[0],
         travel_unweighted=unweighted[1],
+        unpulled=unpulled,
     )
 
 
@@ -356,6 +361,10 @@ def _way(travel: float) -> str:
     return f"{travel:.4g}" if travel < 1e4 else f"{travel:.0f}"
 
 
+def _loaded(robot: Robot | SerialArm) -> bool:
+    return isinstance(robot, Robot) and robot.model.load is not None
+
+
 def _poses(count: int) -> str:
     return f"{count} pose{'s' * (count != 1)}"
 
@@ -379,20 +388,28 @@ def _aims(robot: Calibratable, targets: ArrayLike) -> tuple[FloatArray, FloatArr
 
 def _within_limits(
     robot: Calibratable, candidates: ArrayLike
-) -> tuple[FloatArray, FloatArray, IntArray, int]:
-    """Poses and actuators of the candidates that can be measured, which ones, and of how many."""
+) -> tuple[FloatArray, FloatArray, IntArray, int, int]:
+    """Poses and actuators of the candidates that can be measured, which ones, and of how many.
+
+    Last, at how many within limits some cable would have to push.
+    """
     there, q = _commanded("candidates", robot, candidates)
     good = np.asarray(np.isfinite(there).all(axis=1))
+    unpulled = 0
     if isinstance(robot, Robot):  # the file of an arm has no limits
         good[good] = robot.feasible(there[good]).ok
+        held = pulled(robot, there[good])
+        unpulled = int((~held).sum())
+        good[good] = held
     # `identify` starts from home, too, and must find them
     good[good] = np.abs(robot.forward(q[good]).pose - there[good]).max(axis=1) < _FOUND
     inside = np.flatnonzero(good)
     if not len(inside):
         raise ArgumentError(
             f"candidates: none of {len(there)} is within the limits of {robot.name}"
+            + (f"; at {unpulled} some cable would have to push" if unpulled else "")
         )
-    return there[inside], q[inside], inside, len(there)
+    return there[inside], q[inside], inside, len(there), unpulled
 
 
 def _safe(chosen: Parameters, poses: FloatArray, q: FloatArray) -> BoolArray:

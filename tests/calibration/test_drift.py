@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,17 @@ def test_a_machine_that_grows_while_it_is_measured_is_said_to(hexapod: pk.Robot)
     assert found.verdict.state == "doubtful"
     assert "a pose measured 10 times drifts by 0.0" in found.verdict.reasons[0]
     assert "most of it z" in str(drift) and "warm up" in str(drift)
+
+
+def test_its_hours_are_those_of_the_pose_that_was_watched_longest(hexapod: pk.Robot) -> None:
+    day = a_day(hexapod, 1, 0.1)
+    soon = np.arange(len(day)) // TARGETS == 12  # two visits, two minutes apart
+    q, values = day.actuators.copy(), day.values.copy()
+    before = np.arange(len(day)) // TARGETS == 10
+    q[soon], values[soon] = q[before], values[before] + 0.005
+    drift = of(hexapod, dataclasses.replace(day, actuators=q, values=values)).drift
+    assert drift is not None and (drift.poses, drift.visits) == (2, HOMES + 2)
+    assert drift.hours == pytest.approx(0.75)
 
 
 def test_a_drift_below_the_scatter_is_a_remark(hexapod: pk.Robot) -> None:

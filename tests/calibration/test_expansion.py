@@ -113,6 +113,8 @@ def test_what_does_not_go_with_expansion_is_refused(hexapod: pk.Robot) -> None:
     read = dataclasses.replace(measured, temperature=21.0)
     with pytest.raises(pk.ArgumentError, match=r"in 1/K, of steel 11.5e-6; found 11.5"):
         pk.identify(hexapod, read, expansion=11.5)
+    with pytest.raises(pk.ArgumentError, match=r"in 1/K, of steel 11.5e-6; found 0.0115"):
+        pk.identify(hexapod, read, expansion=0.0115)
     with pytest.raises(pk.ArgumentError, match=r"limb1 to limb6; found 'limb7'"):
         pk.identify(hexapod, read, expansion={"limb7": 1e-5})
     with pytest.raises(pk.ArgumentError, match=r"chains of joints"):

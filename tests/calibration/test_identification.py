@@ -79,6 +79,12 @@ def test_redchi_is_the_weighted_sum_of_squares_per_degree_of_freedom(
     assert found.redchi == pytest.approx(squares / found.dof, rel=1e-12)
 
 
+def test_correlations_are_the_covariance_over_both_deviations(found: pk.Identification) -> None:
+    expected = found.covariance / np.outer(found.stderr, found.stderr)
+    np.testing.assert_allclose(found.correlation_matrix, expected, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(np.diagonal(expected), 1.0)
+
+
 def test_json_has_every_name_of_the_result(found: pk.Identification) -> None:
     keys = re.findall(r'^  "(\w+)":', as_json(found, "parameters"), re.MULTILINE)
     assert keys[:4] == ["verdict", "robot", "free", "units"] and keys[-1] == "parameters"

@@ -99,6 +99,18 @@ def test_exchanged_angles_are_named() -> None:
     assert any("alpha and beta are exchanged" in text for text in said(robot, wrong))
 
 
+def test_exchanged_targets_are_named_and_no_other(hexapod: pk.Robot) -> None:
+    places = np.array([[80.0, 0.0, 30.0], [-60.0, 50.0, 30.0], [-20.0, -70.0, 30.0]])
+    q = np.repeat(hexapod.inverse(hexapod_poses(hexapod, 20, np.random.default_rng(9))), 3, axis=0)
+    read = VirtualMachine(hexapod).measure(q, target=np.tile(places, (20, 1))).values
+    wrong = Measurements(
+        q, read, target=places, target_index=np.tile([0, 2, 1], 20), target_names=("A", "B", "C")
+    )
+    verdict = identify(hexapod, wrong, free="offset*").verdict
+    assert verdict.state == "not calibrated"
+    assert verdict.reasons[0].endswith(" if target B is C, C is B")
+
+
 @pytest.mark.parametrize(
     ("read_as", "words"),
     [

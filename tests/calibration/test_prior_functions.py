@@ -204,6 +204,13 @@ def test_what_is_no_function_is_refused(sled: pk.Robot, prior: object, message: 
         fitted(sled, lengths, prior)
 
 
+def test_a_length_whose_direction_is_rounding_is_refused(sled: pk.Robot) -> None:
+    near = sled.replace({"base3.x": 3000.0 + 1e-4, "base3.y": 0.0})
+    _, lengths, _ = drawn(8, 6)
+    with pytest.raises(pk.ArgumentError, match=r"0\.0001 mm now, a length without a direction"):
+        fitted(near, lengths, {"|base2 - base3|": 1.0})
+
+
 def test_the_command_line_takes_a_tape_with_units(sled: pk.Robot) -> None:
     names = list(FREE)
     given = ["|base1 - base2|=3043±1", "gain1 - gain2 = 0 +- 1e-4", "base2.x=304.5cm±0.2cm"]

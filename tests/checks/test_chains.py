@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-import tomllib
 
 import pkmcal as pk
+from pkmcal.files.toml_lines import tomllib
 from pkmcal.geometry import robot_file
 from tests.driven import parsed
 from tests.robots import made

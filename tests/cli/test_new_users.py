@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import tomllib
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
+
+from pkmcal.files.toml_lines import tomllib
 
 ROOT = Path(__file__).resolve().parents[2]
 NOISE = 0.01

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -11,6 +14,7 @@ from pkmcal.compensation.compensate import compensate
 from pkmcal.core.swarm import CONSTRICTION
 from pkmcal.kinematics.robot import Robot
 
+from ..robots import made
 from ..simulated import hexapod_poses, tilted_poses, with_errors
 
 
@@ -295,3 +299,41 @@ def test_poses_of_any_leading_shape_are_corrected(shape: tuple[int, ...]) -> Non
         expected = np.broadcast_to([-0.2, 0, 0, 0, 0, 0], (*shape, 6))
         np.testing.assert_allclose(found.correction, expected, rtol=0, atol=1e-9)
         assert str(found).startswith(f"{max(1, int(np.prod(shape)))} pose")
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        {},
+        {"drive": {"quadratic": 0.02}},
+        {"drive": {"harmonics": [{"k": 1.5, "cos": 0.02, "sin": 0.01}]}},
+    ],
+)
+def test_corrections_are_those_at_the_turn_that_is_commanded(
+    law: dict[str, Any], tmp_path: Path
+) -> None:
+    """A crank on the far side of its axis, where desired and measured poses are of two turns."""
+    crank = {
+        "kind": "RUS", "base": [0.0, 0.0, 0.0], "platform": [0.0, 0.0, 0.0],
+        "axis": [0.0, 0.0, 1.0], "zero": [1.0, 0.0, 0.0], "crank": 100.0, "rod": 250.0,
+        "branch": 1,
+    }  # fmt: skip
+    leg = {"kind": "UPS", "base": [0.0, -700.0, 0.0], "platform": [0.0, 0.0, 0.0]}
+    robot = made("xy", {"x": 250.0, "y": 10.0}, [crank | law, leg])
+    real = robot.replace({"offset1": 0.03})
+    desired = np.zeros((41, 6))
+    desired[:, 0], desired[:, 1] = -250.0, np.linspace(-130.0, 130.0, 41)
+    turned = np.abs(np.diff(robot.inverse(desired)[:, 0])) > 3.0
+    assert turned.sum() == 1  # between two of them
+
+    def reached(q: np.ndarray) -> np.ndarray:
+        return real.forward(q, guess=desired).pose
+
+    before = np.abs(reached(robot.inverse(desired)) - desired).max()
+    found = pk.compensate(robot, desired, reached)
+    assert before > 1.0 and np.abs(reached(found.actuators) - desired).max() < 5e-3 * before
+    program = tmp_path / "across.gcode"
+    program.write_text("G90\nG1 X-250 Y60 F600\nG1 X-250 Y-60\n")
+    text = pk.compensate_program(robot, real, program, joints=True, chord=0.1).text
+    angles = np.array([float(word[1:]) for word in text.split() if word[0] == "X"])
+    assert np.abs(np.diff(angles)).max() < 10.0  # deg: it goes on

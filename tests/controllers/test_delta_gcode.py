@@ -224,6 +224,11 @@ def test_what_a_robot_file_cannot_hold_is_no_silent_zero(tmp_path: Path) -> None
         ),
         ("marlin", "G20\nM665 L10 R5 H12\nM666 X0\n", "G20: the numbers are in inches"),
         ("marlin", "M665 L250 R125 H300\nM666 X0.2\n", "must not be above 0, found 0.2"),
+        (
+            "reprap",
+            "M665 L250 R125 H100000000000000000000\nM666 X0\n",
+            r"c\.g: its numbers .* home\.z: must be at",
+        ),
     ):
         (tmp_path / "c.g").write_text(text)
         with pytest.raises(pk.FileError, match=message):

@@ -14,6 +14,7 @@ import pytest
 import pkmcal as pk
 from pkmcal import screw
 from pkmcal.core import instruments, library, screws
+from pkmcal.core.elimination import PoseEquations
 from pkmcal.core.poses import (
     tpr2tps_jacobian,
     tpr2tps_lengths,
@@ -122,13 +123,46 @@ def actuators_as_instruments(isa: int, part: slice, call: str) -> list[np.ndarra
         pose = robot.home + draw.uniform(-1, 1, (ROWS, 6)) * [200, 200, 200, 1, 1, 1]
         if call == "moved":
             step = draw.uniform(-1, 1, (ROWS, robot.machine.m))
-            found += [*robot.machine.moved(pose[part].copy(), step[part].copy())]
+            found.append(robot.machine.moved(pose[part].copy(), step[part].copy()))
+            found.append(robot.machine.step_twists(pose[part].copy()))
         else:
             q = robot.inverse(robot.home) + draw.uniform(-1, 1, (ROWS, robot.n_actuators))
             columns = robot.geometry.slot_index[::2].astype(np.int32)
             given = (robot.slots, pose[part].copy(), q[part].copy(), columns)
             found += [each for each in robot.machine.readings(*given) if each is not None]
     return found
+
+
+def poses_of_equations(isa: int, part: slice, call: str) -> list[np.ndarray]:
+    """Some with fewer equations than unknowns; what is left of each in a row of its own."""
+    found = []
+    for unknowns in (2, 6):
+        draw = np.random.default_rng([33, unknowns])
+        count, most = draw.integers(0, unknowns + 5, ROWS), unknowns + 5
+        slopes = draw.normal(size=(ROWS, most, unknowns))
+        columns = draw.normal(size=(ROWS, most, 3))
+        order = np.flatnonzero(np.arange(most) < count[part, None])
+        poses = PoseEquations(order, count[part], unknowns, isa)
+        by_unknown, columns = (each[part].reshape(-1, each.shape[2]) for each in (slopes, columns))
+        matrix, pull, cost = poses.normals(np.ascontiguousarray(columns[:, 0]), by_unknown)
+        left, following = poses.left(by_unknown, columns)
+        if call == "pose_normals":
+            found += [matrix, pull, cost]
+        elif call == "pose_steps":
+            found += [*poses.steps(matrix, pull, np.full(len(cost), 0.1))]
+        elif call == "pose_left":
+            found += [np.nan_to_num(following), _rows(left, poses.left_of)]
+        else:
+            found.append(_rows(poses.spread(by_unknown, left), count[part]))
+    return found
+
+
+def _rows(numbers: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Numbers of poses one after another, in as many rows as there are poses."""
+    wide = np.zeros((len(count), 16, numbers.shape[1]))
+    for row, mine in zip(wide, np.split(numbers, np.cumsum(count)[:-1]), strict=True):
+        row[: len(mine)] = mine
+    return wide
 
 
 def arm(isa: int, part: slice, call: str) -> list[np.ndarray]:
@@ -185,6 +219,10 @@ CASES: dict[str, Case] = {
     "tpr2tps_jacobian": lambda isa, part: closed_forms(isa, part, tpr2tps_jacobian, (4, 4)),
     "closure_cost": closure_cost,
     "spheres": spheres,
+    "pose_normals": lambda isa, part: poses_of_equations(isa, part, "pose_normals"),
+    "pose_steps": lambda isa, part: poses_of_equations(isa, part, "pose_steps"),
+    "pose_left": lambda isa, part: poses_of_equations(isa, part, "pose_left"),
+    "pose_spread": lambda isa, part: poses_of_equations(isa, part, "pose_spread"),
     "readings": lambda isa, part: actuators_as_instruments(isa, part, "readings"),
     "moved": lambda isa, part: actuators_as_instruments(isa, part, "moved"),
     "exp": by_rows(screws.exp, TWISTS),

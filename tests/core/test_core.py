@@ -91,7 +91,7 @@ def test_the_other_calls_give_the_same_bits_on_every_isa_and_in_every_tail(name:
             "error_twists": lambda part, r=robot: r.error_twists(at[part]),
             "closure": lambda part, m=machine, s=slots: m.closure(s, at[part], q[part]),
             "limbs": lambda part, m=machine, s=slots: m.limbs(s, at[part]),
-            "rates": lambda part, m=machine, s=slots: m.rates(s, motion[part]),
+            "rates": lambda part, m=machine, s=slots: m.rates(s, motion[part], q[part]),
             "motion": lambda part, m=machine, s=slots: m.motion(
                 s, at[part], q[part], speed[part], bend[part]
             ),

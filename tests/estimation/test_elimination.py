@@ -41,7 +41,7 @@ def test_poses_of_gross_readings_are_at_a_minimum() -> None:
     pose[:, :2] = at
     start = RowStates(pose, read, np.zeros(count, dtype=np.int32))
     blocks = Blocks(np.repeat(np.arange(count), 4), count, 2)
-    found: RowStates = blocks.best(Plane(), None, start, system)  # type: ignore[arg-type]
+    found, _ = blocks.best(Plane(), None, start, system)  # type: ignore[arg-type]
     residual, slopes = (each.reshape(count, 4, -1) for each in system(found))
     pull = np.linalg.norm((slopes * residual).sum(axis=1), axis=1)
     nearest = np.linalg.norm(found.pose[:, None, :2] - ANCHORS, axis=2).min(axis=1)

@@ -7,7 +7,9 @@ to ``fuzz-DOOR-SEED-K.bin`` in the current folder and the run goes on.
 from __future__ import annotations
 
 import argparse
+import os
 import resource
+import shutil
 import sys
 import tempfile
 import time
@@ -15,8 +17,8 @@ import traceback
 from pathlib import Path
 from random import Random
 
-from .damage import damaged
-from .doors import DOORS, emptied
+from .damage import Door, damaged
+from .doors import DOORS
 
 SLOW = 30.0  # s of processor time for one input; commands that draw take 6 on a busy machine
 MEMORY = Path("/dev/shm")  # files that no disk waits for, where there are such
@@ -35,20 +37,23 @@ def main() -> int:
 
 def run(name: str, seed: int, first: int, count: int, seconds: float) -> int:
     """Feed the inputs, and print what became of them; 1 if a law failed."""
-    door = DOORS[name]
+    door: Door = DOORS[name]
     entered = accepted = 0
     failed: dict[str, tuple[int, int]] = {}
     slowest = (0.0, -1)
-    began = time.monotonic()
+    began, worked = time.monotonic(), time.process_time()
     with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
         for k in range(first, first + count):
             if time.monotonic() - began > seconds:
                 break
-            content = damaged(door, Random(f"{seed} {k}"))
-            before = time.process_time()
+            before = time.monotonic()
+            content, chance = drawn(door, seed, k)
             entered += 1
             try:
-                accepted += door.enter(Path(folder), content)
+                accepted += door.enter(Path(folder), content, chance)
+                if time.monotonic() - before > SLOW:
+                    emptied(folder)
+                    _quick(door, Path(folder), seed, k)
             except KeyboardInterrupt:
                 raise
             except BaseException as error:
@@ -58,20 +63,42 @@ def run(name: str, seed: int, first: int, count: int, seconds: float) -> int:
                     Path(f"fuzz-{name}-{seed}-{k}.bin").write_bytes(content)
                     print(f"input {k}: {kind}: {str(error)[:300]!r}", flush=True)
                 failed[kind] = (failed.get(kind, (k, 0))[0], failed.get(kind, (k, 0))[1] + 1)
-            took = time.process_time() - before
-            if took > slowest[0]:
-                slowest = (took, k)
-            emptied(Path(folder))
+            slowest = max(slowest, (time.monotonic() - before, k))
+            emptied(folder)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(
         f"{name}, seed {seed}, numbers {first} to {first + entered - 1}: {entered} inputs,"
         f" {accepted} taken, {sum(n for _, n in failed.values())} failed in {len(failed)} ways;"
         f" slowest {slowest[0]:.2f} s (input {slowest[1]}), {memory:.0f} MB,"
-        f" {time.monotonic() - began:.0f} s"
+        f" {time.process_time() - worked:.0f} s of processor time"
     )
     for kind, (k, n) in failed.items():
         print(f"  {n} times, first input {k}: {kind}")
-    return int(bool(failed) or slowest[0] > SLOW)
+    return int(bool(failed))
+
+
+def drawn(door: Door, seed: int, k: int) -> tuple[bytes, Random]:
+    """Input k of a seed, and the chance by which the door chooses what to do with it."""
+    chance = Random(f"{seed} {k}")
+    return damaged(door, chance), chance
+
+
+def _quick(door: Door, folder: Path, seed: int, k: int) -> None:
+    """What took long by the clock, once more: the machine may have been busy."""
+    before = time.process_time()
+    door.enter(folder, *drawn(door, seed, k))
+    took = time.process_time() - before
+    assert took <= SLOW, f"{took:.0f} s of processor time"
+
+
+def emptied(folder: str) -> None:
+    """The folder as before: an input must not see what another one left."""
+    with os.scandir(folder) as found:
+        for each in found:
+            if each.is_dir(follow_symlinks=False):
+                shutil.rmtree(each.path)
+            else:
+                os.unlink(each.path)
 
 
 if __name__ == "__main__":

@@ -88,7 +88,7 @@ static void some_chains(chain_arrays *made, unsigned strange)
     pkm_chains *is = &made->is;
     memset(made, 0, sizeof *made);
     likely_chains(made);
-    for (int times = byte() < 150 ? 0 : 1 + (int)byte() % 3; times--;) spoil(made);
+    for (int times = byte() < 190 ? 0 : 1 + (int)byte() % 3; times--;) spoil(made);
     const int chains = within(is->chains, PKM_MAX_LIMBS), joints = within(is->joints, PKM_MAX_JOINTS);
     const int actuators = within(is->actuators, PKM_MAX_LIMBS);
     const int members = chains ? within(made->first[chains], PKM_MAX_LIMBS * PKM_MAX_CHAIN) : 0;
@@ -118,7 +118,7 @@ static void some_chains(chain_arrays *made, unsigned strange)
 static double *chain_geometry(const chain_arrays *made, ptrdiff_t rows, int count, unsigned strange)
 {
     double *geometry = numbers(rows * count, strange);
-    const int usual = byte() < 200;
+    const int usual = byte() < 220;
     for (ptrdiff_t i = 0; usual && i < rows * count; i++) geometry[i] = 0.0;
     for (ptrdiff_t i = 0; usual && i < rows; i++)
         for (int a = 0; a < made->is.actuators; a++)

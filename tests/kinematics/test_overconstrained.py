@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import pkmcal as pk
-
-from .. import generated
-from ..driven import with_laws
+from tests import generated, solved_again
+from tests.calibration.test_redundant_chains import eight_legs, four_cranks, four_planes
+from tests.chain_files import as_chains
+from tests.driven import with_laws
+from tests.kinematics.test_chains import loaded
+from tests.robots import made
 
 SEEDS = range(3)
 
@@ -69,3 +75,78 @@ def test_what_a_move_states_of_motion_are_derivatives_of_what_it_states_of_place
     slope = (after.pose - before.pose)[:, :3] / (2 * h)
     off = np.abs(slope - now.twist[:, 3:])[known]
     assert off.max() < 1e-3 * np.abs(now.twist[known]).max()
+
+
+def eight_rows() -> pk.Robot:
+    return pk.load(Path(__file__).parents[2] / "examples" / "2tpr2tps-eight-rows.toml")
+
+
+def eight_cables() -> pk.Robot:
+    """A wide body on four tackles, two pulleys and two cables."""
+    corners = np.array([[x, y, z] for z in (0, 2500) for x in (-2000, 2000) for y in (-1500, 1500)])
+    limbs = []
+    for i, corner in enumerate(corners.tolist()):
+        limb = {"kind": "cable", "base": corner}
+        limb["platform"] = (np.sign(corners[i] - [0, 0, 1000]) * [600, 450, 400]).tolist()
+        if i < 4:
+            over = [[corner[0], corner[1] + 90.0 + i, corner[2] + 10.0]]
+            limb |= {"kind": "tackle", "over": over, "parts": [1, 1 + i % 2]}
+        elif i < 6:
+            limb |= {"kind": "pulley", "radius": 40.0, "swivel": [0.0, 0.0, -1.0]}
+        limbs.append(limb)
+    return made("spatial", {"z": 1200.0}, limbs)
+
+
+OVER = (eight_rows, eight_legs, four_planes, four_cranks, eight_cables)
+
+
+def contradicting(robot: pk.Robot) -> tuple[pk.Robot, np.ndarray, np.ndarray]:
+    """The machine with errors, and poses and actuators at which its closures contradict."""
+    rng = np.random.default_rng(0)
+    sigma = {"mm": 0.3, "rad": 1e-3, "1": 1e-5}
+    wrong = [sigma[unit] * rng.normal() for unit in robot.geometry.units]
+    unit = np.where(np.array(robot.actuator_units) == "mm", 1.0, 5e-3)
+    q = robot.inverse(robot.home) + unit * rng.normal(0, 0.4, (5, robot.n_actuators))
+    robot = robot.replace(robot.geometry.values + wrong)
+    found = robot.forward(q)
+    assert found.ok.all() and found.residual.min() > 3e-3
+    return robot, robot.own_rows(found.pose)[0], q
+
+
+@pytest.mark.parametrize("made_of", OVER)
+def test_the_pose_moves_as_solving_again_says(made_of: Callable[[], pk.Robot]) -> None:
+    """With numbers and with actuators, also by what the closures miss times their curvature."""
+    robot, at, q = contradicting(made_of())
+    arcs = np.repeat([robot.length, 1.0], 3)[:, None]
+    columns = robot.geometry.slot_index.astype(np.int32)
+    found = robot.machine.error_jacobian(robot.slots, at, q, columns, twists=True)
+    solved = solved_again.by_numbers(robot, at, q, 1e-4)
+    assert np.abs((found - solved) * arcs).max() < 1e-9 * np.abs(solved * arcs).max()
+    found = robot.machine.forward_jacobian(robot.slots, at, q, twists=True)
+    solved = solved_again.by_actuators(robot, at, q, 1e-4)
+    assert np.abs((found - solved) * arcs).max() < 1e-9 * np.abs(solved * arcs).max()
+
+
+@pytest.mark.parametrize("made_of", [eight_legs, four_planes, four_cranks])
+def test_redundant_chains_move_as_solving_again_says(
+    made_of: Callable[[], pk.Robot], tmp_path: Path
+) -> None:
+    """In space and in the plane, with balls and with real joints."""
+    robot, at, q = contradicting(loaded(as_chains(made_of()), tmp_path))
+    arcs = np.repeat([robot.length, 1.0], 3)[:, None]
+    columns = robot.geometry.slot_index.astype(np.int32)
+    found = robot.machine.error_jacobian(robot.slots, at, q, columns, twists=True)
+    solved = solved_again.by_numbers(robot, at, q, 1e-4)
+    assert np.abs((found - solved) * arcs).max() < 1e-9 * np.abs(solved * arcs).max()
+
+
+@pytest.mark.parametrize("made_of", [eight_rows, eight_cables, lambda: pk.load("exechon")])
+def test_where_a_machine_does_not_close_nothing_is_said_of_how_it_moves(
+    made_of: Callable[[], pk.Robot],
+) -> None:
+    robot, at, q = contradicting(made_of())
+    machine = robot.machine.with_tolerance(1e-3)
+    assert (machine.forward(robot.slots, q, at, None)[1] == 5).all()
+    columns = robot.geometry.slot_index.astype(np.int32)
+    assert np.isnan(machine.error_jacobian(robot.slots, at, q, columns)).all()
+    assert np.isnan(machine.forward_jacobian(robot.slots, at, q)).all()

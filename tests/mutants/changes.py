@@ -1,24 +1,27 @@
-"""Mutants: one operator or number of the source exchanged for another.
+"""Mutants: an operator, a number or a word of the source is exchanged, or a statement dropped.
 
 By tokens, so that C and Python are treated alike: mutmut and cosmic-ray do Python only.
 """
 
 from __future__ import annotations
 
+import ast
 import io
 import re
 import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 _EXCHANGED = {
     "+": "-", "-": "+", "*": "/", "/": "*", "**": "*", "//": "/", "%": "*",
     "<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==",
-    "&&": "||", "||": "&&", "and": "or", "or": "and", "not": "",
+    "&&": "||", "||": "&&", "and": "or", "or": "and", "not": "", "is": "is not",
     "+=": "-=", "-=": "+=", "*=": "/=", "/=": "*=", "&": "|", "|=": "&=", "&=": "|=",
-    "True": "False", "False": "True", "break": "continue", "in": "not in",
+    "True": "False", "False": "True", "break": "continue", "continue": "break",
     "larger": "smaller", "fmax": "fmin", "fmin": "fmax", "min": "max", "max": "min",
+    "any": "all", "all": "any",
 }  # fmt: skip
 _C_TOKEN = re.compile(
     r"/\*.*?\*/|//[^\n]*|\"(?:\\.|[^\"\\])*\"|'(?:\\.|[^'\\])'|^[ \t]*#[ \t]*(?:include|if|ifdef"
@@ -28,11 +31,18 @@ _C_TOKEN = re.compile(
     re.DOTALL | re.MULTILINE,
 )
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
+# One line that sets what is there already, or calls something: no declaration, no head of a loop.
+_C_STATEMENT = re.compile(
+    r"^[ \t]*((?!(?:return|const|static|goto|else|typedef)\b)"
+    r"(?:[\w.\->*]+(?:\[[^;={}]*\])*(?<!\s)[ \t]*[-+*/&|]?=[ \t][^;={}]*|\w+\([^;={}]*\));)"
+    r"[ \t]*\\?$",
+    re.MULTILINE,
+)
 
 
 @dataclass(frozen=True)
 class Change:
-    """A token of a file, and what stands for it in the mutant."""
+    """A piece of a file, and what stands for it in the mutant."""
 
     file: str
     at: int
@@ -43,27 +53,40 @@ class Change:
         """The text of the mutant."""
         return text[: self.at] + self.new + text[self.at + len(self.old) :]
 
+    def line(self, text: str) -> int:
+        """Line of the file, from 1."""
+        return text.count("\n", 0, self.at) + 1
+
     def named(self, text: str) -> str:
         """File, line, and what changes there."""
-        line = text.count("\n", 0, self.at) + 1
         begin = text.rfind("\n", 0, self.at) + 1
         whole = text[begin : text.find("\n", self.at)].strip()
-        return f"{self.file}:{line}: {self.old!r} -> {self.new!r} in {whole}"
+        old = " ".join(self.old.split())
+        return f"{self.file}:{self.line(text)}: {old!r} -> {self.new!r} in {whole}"
 
 
 def changes(root: Path, file: str) -> list[Change]:
     """All mutants of a file, in their order."""
     text = (root / file).read_text(encoding="utf-8")
-    tokens = _python(text) if file.endswith(".py") else _c(text)
-    found = []
-    for at, token in tokens:
-        if token in _EXCHANGED and not (file.endswith(".py") and token == "|"):
+    of_python = file.endswith(".py")
+    found = [
+        Change(file, at, old, "pass" if of_python else ";")
+        for at, old in (_python_statements(text) if of_python else _c_statements(text))
+    ]
+    for at, token in _python(text) if of_python else _c(text):
+        if token in _EXCHANGED:
             found.append(Change(file, at, token, _EXCHANGED[token]))
         elif match := _NUMBER.match(token):
-            number = match[0]
-            more = str(int(number) + 1) if number.isdigit() else f"{2 * float(number) or 1.0!r}"
-            found.append(Change(file, at, token, more + token[len(number) :]))
-    return found
+            found.append(Change(file, at, token, _other(match[0]) + token[match.end() :]))
+    return sorted(found, key=lambda change: (change.at, len(change.old)))
+
+
+def _other(number: str) -> str:
+    """One more; twice as much where one more is next to nothing."""
+    if number.isdigit():
+        return str(int(number) + 1)
+    value = float(number)
+    return repr(value + 1.0 if value < 100.0 else 2.0 * value)
 
 
 def _c(text: str) -> Iterator[tuple[int, str]]:
@@ -71,10 +94,44 @@ def _c(text: str) -> Iterator[tuple[int, str]]:
         yield match.start(), match[0]
 
 
-def _python(text: str) -> Iterator[tuple[int, str]]:
+def _c_statements(text: str) -> Iterator[tuple[int, str]]:
+    for match in _C_STATEMENT.finditer(text):
+        yield match.start(1), match[1]
+
+
+def _starts(text: str) -> list[int]:
     starts = [0]
     for line in text.splitlines(keepends=True):
         starts.append(starts[-1] + len(line))
-    for token in tokenize.generate_tokens(io.StringIO(text).readline):
-        if token.type in (tokenize.OP, tokenize.NAME, tokenize.NUMBER):
-            yield starts[token.start[0] - 1] + token.start[1], token.string
+    return starts
+
+
+def _python(text: str) -> Iterator[tuple[int, str]]:
+    starts = _starts(text)
+    kept = (tokenize.OP, tokenize.NAME, tokenize.NUMBER)
+    tokens = list(tokenize.generate_tokens(io.StringIO(text).readline))
+    for before, token in pairwise(tokens):
+        unary = token.string in ("*", "**") and before.string in ("(", "[", "{", ",", "=", ":")
+        at = starts[token.start[0] - 1] + token.start[1]
+        of_is_not = text.startswith("is not", at)
+        if token.type in kept and not unary and not of_is_not:
+            yield at, token.string
+
+
+def _python_statements(text: str) -> Iterator[tuple[int, str]]:
+    """What calls, raises, or changes something that is there already."""
+    starts = _starts(text)
+    lines = text.splitlines(keepends=True)
+
+    def place(line: int, column: int) -> int:
+        return starts[line - 1] + len(lines[line - 1].encode()[:column].decode())
+
+    for node in ast.walk(ast.parse(text)):
+        sets = isinstance(node, ast.Assign) and not isinstance(
+            node.targets[0], ast.Name | ast.Tuple
+        )
+        calls = isinstance(node, ast.Expr) and not isinstance(node.value, ast.Constant)
+        if sets or calls or isinstance(node, ast.AugAssign | ast.Raise):
+            begin = place(node.lineno, node.col_offset)
+            assert node.end_lineno is not None and node.end_col_offset is not None
+            yield begin, text[begin : place(node.end_lineno, node.end_col_offset)]

@@ -1,0 +1,117 @@
+"""Equations of many poses, each with unknowns of its own: their steps, and what they leave.
+
+Own code in the core, for LAPACK through NumPy takes one pose after another and forms all of Q.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal._core import lib
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.core.library import ISA, call
+
+
+class PoseEquations:
+    """Which equations belong to which of K poses, each with u unknowns.
+
+    Parameters
+    ----------
+    order : ndarray of int (E,)
+        Places of the equations in arrays of all of them, pose by pose.
+    count : ndarray of int (K,)
+        How many each pose has.
+    unknowns : int
+        Of each pose.
+    isa : int, optional
+        Of the core.
+
+    Attributes
+    ----------
+    left_of : ndarray of int (K,)
+        How many equations are left of each pose.
+    place : ndarray of int (K,)
+        Where these begin in what is left of all.
+
+    Examples
+    --------
+    Three lengths read at each of two poses, one unknown: two equations each are left, in which it
+    has no part.
+
+    >>> import numpy as np
+    >>> poses = PoseEquations(np.arange(6), np.array([3, 3]), 1)
+    >>> slopes = np.array([1.0, 2, 2, 0, 3, 4])[:, None]
+    >>> left, _ = poses.left(slopes, np.column_stack([slopes, np.ones(6)]))
+    >>> left.shape, bool(np.allclose(left[:, 0], 0.0))
+    ((4, 2), True)
+    """
+
+    def __init__(self, order: IntArray, count: IntArray, unknowns: int, isa: int = ISA) -> None:
+        self.order, self.unknowns, self._isa = order.astype(np.int64, copy=False), unknowns, isa
+        self._first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
+        self._poses, self._most = len(count), int(count.max(initial=0))
+        self.left_of: IntArray = np.maximum(count - unknowns, 0)
+        self.place = (np.cumsum(self.left_of) - self.left_of).astype(np.int64)
+        self._left = int(self.left_of.sum())
+
+    def _work(self) -> FloatArray:
+        u = self.unknowns
+        return np.empty(lib.PKM_WIDEST * (self._most + u) * (u + 1))
+
+    def normals(
+        self, residual: FloatArray, by_unknown: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """JᵀJ (K, u, u), Jᵀr (K, u) and rᵀr (K,) of equations (E,) and J (E, u)."""
+        n, u = self._poses, self.unknowns
+        found = np.empty((n, u, u)), np.empty((n, u)), np.empty(n)
+        given = (
+            n,
+            u,
+            self._first,
+            self.order,
+            np.ascontiguousarray(residual),
+            np.ascontiguousarray(by_unknown),
+        )
+        call("pose_normals", *given, *found, self._work(), isa=self._isa)
+        return found
+
+    def steps(
+        self, matrix: FloatArray, pull: FloatArray, damping: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Steps (K, u) by damped normal equations, and what they should take off rᵀr (K,).
+
+        0 and NaN of poses with numbers that are not finite.
+        """
+        n, u = self._poses, self.unknowns
+        found = np.empty((n, u)), np.empty(n)
+        call("pose_steps", n, u, matrix, pull, damping, *found, self._work(), isa=self._isa)
+        return found
+
+    def left(self, by_unknown: FloatArray, part: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What is left (M, c) of columns (E, c) when the poses have taken theirs.
+
+        And how much the unknowns go against the columns for that (K, u, c); not finite where
+        equations do not determine them.
+        """
+        n, u, columns = self._poses, self.unknowns, part.shape[1]
+        left, following = np.empty((self._left, columns)), np.empty((n, u, columns))
+        equations = np.ascontiguousarray(by_unknown), columns, np.ascontiguousarray(part)
+        given = (n, u, self._first, self.order, *equations, self.place)
+        call("pose_left", *given, left, following, self._work(), isa=self._isa)
+        return left, following
+
+    def spread(self, by_unknown: FloatArray, left: FloatArray) -> FloatArray:
+        """Columns (E, c), pose by pose, of which so much is left (M, c), and no more."""
+        n, u, columns = self._poses, self.unknowns, left.shape[1]
+        part = np.empty((len(self.order), columns))
+        given = (
+            n,
+            u,
+            self._first,
+            self.order,
+            np.ascontiguousarray(by_unknown),
+            columns,
+            self.place,
+        )
+        call("pose_spread", *given, np.ascontiguousarray(left), part, self._work(), isa=self._isa)
+        return part

@@ -1,0 +1,82 @@
+"""Anchors of a point from lengths alone: distances between true anchors, in closed form."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import pdist
+
+import pkmcal as pk
+from tests.robots import made
+
+
+def machine(anchors: np.ndarray, **sections: Any) -> pk.Robot:
+    flat = not anchors[:, 2].any()
+    limbs = [{"kind": "cable", "base": a, "platform": [30.0, -20.0, 0.0]} for a in anchors]
+    home = {"x": 100.0, "y": 50.0} | ({} if flat else {"z": 20.0})
+    return made("xy" if flat else "translation", home, limbs, **sections)
+
+
+def case(m: int, count: int, rows: int, seed: int) -> tuple[pk.Robot, np.ndarray]:
+    """A machine with anchors anywhere, and places of its point."""
+    rng = np.random.default_rng(seed)
+    anchors, places = np.zeros((count, 3)), np.zeros((rows, 6))
+    anchors[:, :m] = rng.uniform(-2000, 2000, (count, m))
+    places[:, :m] = rng.uniform(-800, 800, (rows, m))
+    return machine(anchors), places
+
+
+def off(found: pk.Robot, true: pk.Robot) -> float:
+    """How far distances between anchors are off."""
+    return float(np.abs(pdist(found.slots[:, :3]) - pdist(true.slots[:, :3])).max())
+
+
+@pytest.mark.parametrize(("m", "count", "rows"), [(2, 3, 6), (2, 5, 12), (3, 4, 10), (3, 5, 30)])
+def test_exact_lengths_have_their_anchors_wherever_these_stand(
+    m: int, count: int, rows: int
+) -> None:
+    """Nearly in a plane as well: what is small beside the rest is no noise without noise."""
+    for seed in range(40):
+        true, places = case(m, count, rows, seed)
+        rng = np.random.default_rng(seed + 100)
+        stated = [n for n in true.geometry.match("base*") if m == 3 or not n.endswith("z")]
+        file = true.replace({n: true.geometry[n] + rng.normal(0, 150) for n in stated})
+        assert off(pk.locate_anchors(file, true.inverse(places)).robot, true) < 1e-3, seed
+
+
+@pytest.mark.parametrize("count", [4, 6])
+def test_misfit_says_before_any_fit_that_a_constant_is_missing(count: int) -> None:
+    """With one anchor more than dimensions too, where the pattern alone always fits."""
+    good, wrong = [], []
+    for seed in range(20):
+        true, places = case(3, count, 40, seed)
+        q = true.inverse(places) + np.random.default_rng(seed).normal(0, 0.3, (40, count))
+        good.append(pk.locate_anchors(true, q).misfit)
+        wrong.append(pk.locate_anchors(true, q + 150.0).misfit)
+    assert 0.0 < np.median(good) < 3e-3 and np.median(wrong) > 5e-3
+    assert (np.array(wrong) > 2 * np.array(good)).mean() > 0.75
+
+
+def test_as_few_rows_as_needed_say_nothing_of_the_misfit() -> None:
+    true, places = case(2, 3, 6, 0)
+    assert np.isnan(pk.locate_anchors(true, true.inverse(places)).misfit)
+
+
+def test_poses_are_in_the_frames_of_the_file() -> None:
+    anchors = np.array([[0.0, -1597, -120], [1550, 900, -120], [-1370, 790, -60], [0, 0, 2355]])
+    turned = machine(anchors, frames={"base": {"x": 100.0, "alpha": 0.4, "gamma": 0.7}})
+    own = np.zeros((20, 6))
+    own[:, :3] = np.random.default_rng(0).uniform(-500, 500, (20, 3))
+    poses = turned.frames.outward(own)
+    found = pk.locate_anchors(turned, turned.inverse(poses))
+    np.testing.assert_allclose(found.poses[:, :3], poses[:, :3], atol=1e-6)
+
+
+def test_rows_with_nothing_read_are_refused() -> None:
+    true, places = case(3, 5, 12, 1)
+    q = true.inverse(places)
+    q[3, 2] = np.nan
+    with pytest.raises(ValueError, match=r"actuators: must be finite, found .* in row 3"):
+        pk.locate_anchors(true, q)

@@ -1,0 +1,90 @@
+"""What the core does with equations of many poses is what dense linear algebra does with each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from pkmcal.core.elimination import PoseEquations
+
+COLUMNS = 5
+
+
+class Drawn:
+    """Poses with few, just enough and many equations, in any order."""
+
+    def __init__(self, unknowns: int) -> None:
+        draw = np.random.default_rng([51, unknowns])
+        self.count = draw.integers(0, unknowns + 6, 29)
+        total = int(self.count.sum())
+        self.order, self.unknowns = draw.permutation(total), unknowns
+        self.poses = PoseEquations(self.order, self.count, unknowns)
+        self.by_unknown = draw.normal(size=(total, unknowns))
+        self.residual, self.part = draw.normal(size=total), draw.normal(size=(total, COLUMNS))
+
+    def each(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
+        """Poses, the places of their equations, and of these in order."""
+        ends = np.cumsum(self.count)
+        for i, (end, count) in enumerate(zip(ends, self.count, strict=True)):
+            yield i, self.order[end - count : end], np.arange(end - count, end)
+
+
+@pytest.fixture(params=[1, 2, 3, 6, 9])
+def drawn(request: pytest.FixtureRequest) -> Drawn:
+    return Drawn(request.param)
+
+
+def test_steps_solve_the_damped_normal_equations(drawn: Drawn) -> None:
+    matrix, pull, cost = drawn.poses.normals(drawn.residual, drawn.by_unknown)
+    damping = np.linspace(1e-3, 1.0, len(cost))
+    step, gain = drawn.poses.steps(matrix, pull, damping)
+    for i, mine, _ in drawn.each():
+        slopes, residual = drawn.by_unknown[mine], drawn.residual[mine]
+        np.testing.assert_allclose(matrix[i], slopes.T @ slopes, atol=1e-12)
+        np.testing.assert_allclose(pull[i], slopes.T @ residual, atol=1e-12)
+        np.testing.assert_allclose(cost[i], residual @ residual, atol=1e-12)
+        if len(mine):
+            tall = np.vstack(
+                [slopes, np.sqrt(damping[i]) * np.diag(np.linalg.norm(slopes, axis=0))]
+            )
+            target = np.concatenate([-residual, np.zeros(drawn.unknowns)])
+            expected = np.linalg.lstsq(tall, target, rcond=None)[0]
+            np.testing.assert_allclose(step[i], expected, rtol=1e-6, atol=1e-8)
+            there = residual + slopes @ step[i]
+            np.testing.assert_allclose(gain[i], cost[i] - there @ there, rtol=1e-6, atol=1e-8)
+        else:
+            assert not step[i].any() and gain[i] == 0.0
+
+
+def test_what_is_left_is_the_part_across_the_unknowns(drawn: Drawn) -> None:
+    left, following = drawn.poses.left(drawn.by_unknown, drawn.part)
+    spread = drawn.poses.spread(drawn.by_unknown, left)
+    assert len(left) == drawn.poses.left_of.sum()
+    for i, mine, dense in drawn.each():
+        slopes, part = drawn.by_unknown[mine], drawn.part[mine]
+        place, count = drawn.poses.place[i], drawn.poses.left_of[i]
+        assert count == max(0, len(mine) - drawn.unknowns)
+        taken = slopes @ np.linalg.pinv(slopes) if len(mine) else np.zeros((0, 0))
+        across = part - taken @ part
+        own = left[place : place + count]
+        np.testing.assert_allclose(own.T @ own, across.T @ across, atol=1e-11)
+        np.testing.assert_allclose(spread[dense], across, atol=1e-11)
+        if count or len(mine) == drawn.unknowns:
+            expected = -np.linalg.lstsq(slopes, part, rcond=None)[0]
+            np.testing.assert_allclose(following[i], expected, rtol=1e-7, atol=1e-9)
+        else:
+            assert not np.isfinite(following[i]).any()
+
+
+def test_numbers_that_are_not_finite_stay_with_their_pose() -> None:
+    drawn = Drawn(3)
+    bad = int(np.flatnonzero(drawn.count > 3)[0])
+    whole = next(mine for i, mine, _ in drawn.each() if i == bad)
+    drawn.residual[whole[0]] = np.nan
+    matrix, pull, cost = drawn.poses.normals(drawn.residual, drawn.by_unknown)
+    step, gain = drawn.poses.steps(matrix, pull, np.zeros(len(cost)))
+    assert np.isnan(cost[bad]) and np.isnan(gain[bad]) and not step[bad].any()
+    others = np.arange(len(cost)) != bad
+    assert np.isfinite(gain[others]).all() and np.isfinite(step[others]).all()
