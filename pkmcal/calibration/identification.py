@@ -15,6 +15,7 @@ from pkmcal import arguments
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
+from pkmcal.calibration.displaced import displaced_target
 from pkmcal.calibration.drift import Drift, drift
 from pkmcal.calibration.law_tests import LawTest, law_tests
 from pkmcal.calibration.measuring_order import MeasuringOrder, measuring_order
@@ -54,7 +55,8 @@ class Identification(Parts, Result):
         looked for where held-out points contradict the fit.
         """
         robust = robust_check(self.fit) if self.loss == "linear" else None
-        return judge(self, robust, self.moved, self.drift, self.measuring_order)
+        displaced = displaced_target(self.fit)
+        return judge(self, robust, self.moved, self.drift, self.measuring_order, displaced)
 
     @cached_property
     def moved(self) -> tuple[Moved, ...]:

@@ -247,10 +247,14 @@ def identify(
     solution = solved(estimator, estimate)
     unlike = unlike_components(estimator, estimate, solution)
     if unlike is not None:
-        commanded = equations.reweighted(unlike[1])
-        estimator = Estimator(commanded, estimator.start, loss)
-        estimate = estimator.solve(estimate.evaluation)
-        solution = solved(estimator, estimate)
+        again = Estimator(equations.reweighted(unlike[1]), estimator.start, loss)
+        try:
+            estimate = again.solve(estimate.evaluation)
+        except ArgumentError:  # grossly off: what there is says more than an error
+            unlike = None
+        else:
+            estimator, commanded = again, again.equations
+            solution = solved(estimator, estimate)
     classes = None if unlike is None else unlike[0]
     sure = uncertainty(estimator, estimate, solution, covariance, classes)
     drawn = not isinstance(holdout, Measurements)

@@ -84,9 +84,9 @@ class MeasuringOrder:
         where = f" from {self.jump} on" if self.jump else " in the course of measuring"
         of = f" of {self.series}" if self.series else ""
         return (
-            f"residuals{of} shift by {value:.3g} {unit}{where}{along} ({chance_text(self.chance)}):"
-            " machine or instrument moved meanwhile, or the model is wrong where the machine was"
-            " then; measure some poses again at the end"
+            f"residuals{of} are as if readings had shifted by {value:.3g} {unit}{where}{along}"
+            f" ({chance_text(self.chance)}): machine or instrument moved meanwhile, or the model is"
+            " wrong where the machine was then; measure some poses again at the end"
         )
 
 

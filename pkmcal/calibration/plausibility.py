@@ -31,8 +31,9 @@ _SHRUNK = 0.02  # share of its size by which errors of manufacture do not shrink
 _REMOTE = 3.0  # times a machine's reach within which a point of its platform is
 _PULLED = 2.0  # times what is expected, from which a pull on a prior is worth a word
 _ALIKE = 1e-6  # share by which misfits, or pulls, differ that are not equal
+_REVERSED = "counts the other way"
 _FACTORS = {
-    "mm": (("metres", 1e3), ("inches", 25.4), ("micrometres", 1e-3)),
+    "mm": (("metres", 1e3), ("centimetres", 10.0), ("inches", 25.4), ("micrometres", 1e-3)),
     "rad": (
         ("degrees", np.pi / 180),
         ("milliradians", 1e-3),
@@ -115,6 +116,29 @@ def other_readings(
         values[:, [one, other]] = values[:, [other, one]]
         yield f"{names[one]} and {names[other]} are exchanged", replace(measured, values=values)
     yield from _other_turns(measured)
+    yield from _single_columns(measured, actuator_units)
+
+
+def _single_columns(
+    measured: Measurements, actuator_units: Sequence[str]
+) -> Iterator[tuple[str, Measurements]]:
+    """Read one column in another unit, or with the other sign."""
+    for i, unit in enumerate(actuator_units):
+        for words, factor in (*_FACTORS[unit], (_REVERSED, -1.0)):
+            q = measured.actuators.copy()
+            q[:, i] *= factor
+            yield _of_column(f"q{i + 1}", words), replace(measured, actuators=q)
+    rows = measured.values.reshape(len(measured), -1)
+    for k, (name, unit) in enumerate(zip(measured.components, measured.units, strict=True)):
+        for words, factor in (*_FACTORS[unit], (_REVERSED, -1.0)):
+            values = rows.copy()
+            values[:, k] *= factor
+            values = values.reshape(measured.values.shape)
+            yield _of_column(name, words), replace(measured, values=values)
+
+
+def _of_column(name: str, words: str) -> str:
+    return f"{name} {words}" if words == _REVERSED else f"{name} is in {words}"
 
 
 def _other_turns(measured: Measurements) -> Iterator[tuple[str, Measurements]]:

@@ -54,7 +54,8 @@ class RobustCheck:
 def robust_check(fit: Fit) -> RobustCheck | None:
     """Compare a least-squares fit with a robust one; None where they agree.
 
-    The linear model at the solution says whether the robust fit is worth its time.
+    The linear model at the solution says whether the robust fit is worth its time. That starts from
+    the nominal machine: from where gross rows have carried the least squares it can stay there.
     """
     equations, estimate = fit.uncertainty.equations, fit.estimate
     linear = fit.uncertainty.fit

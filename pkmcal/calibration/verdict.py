@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.arrays import FloatArray
+from pkmcal.calibration.displaced import DisplacedTarget
 from pkmcal.calibration.drift import Drift
 from pkmcal.calibration.linearity import Weak, beyond_linear
 from pkmcal.calibration.measuring_order import MeasuringOrder
@@ -67,6 +68,7 @@ def judge(
     moved: tuple[Moved, ...],
     drift: Drift | None = None,
     order: MeasuringOrder | None = None,
+    displaced: DisplacedTarget | None = None,
 ) -> Verdict:
     """Judge a calibration.
 
@@ -82,6 +84,8 @@ def judge(
         Whether repeated poses moved with time, where any were.
     order : MeasuringOrder or None
         Whether residuals follow the order of measuring, where enough are left to say.
+    displaced : DisplacedTarget or None
+        Which known target of several seems to be elsewhere.
     """
     grave = _grave(found, robust)
     doubts = [*_contradicted(found, moved), *_few(found)]
@@ -95,6 +99,9 @@ def judge(
     order = None if grave or (drift is not None and drift.found) else order
     if order is not None and order.large:
         doubts.append(str(order))
+    displaced = None if grave else displaced
+    if displaced is not None and displaced.large:
+        doubts.append(str(displaced))
     doubts += found.warnings
     weak = None if grave else beyond_linear(found.fit.estimate, found.fit.uncertainty)
     if weak is not None and not weak.assembled:
@@ -104,6 +111,8 @@ def judge(
     remarks = _remarks(found, robust, drift, weak)
     if order is not None and order.found and not order.large:
         remarks = (printable(str(order), _LONGEST), *remarks)
+    if displaced is not None and displaced.found and not displaced.large:
+        remarks = (printable(str(displaced), _LONGEST), *remarks)
     reasons = tuple(printable(text, _LONGEST) for text in grave + doubts)
     if grave:
         return Verdict("not calibrated", reasons, remarks)

@@ -55,8 +55,11 @@ class Balanced(Protocol):
     def closure(self, slots: FloatArray, pose: FloatArray, q: FloatArray) -> _Rows:
         """Rows and their derivatives."""
 
-    def moved(self, pose: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Poses moved by steps, and twists by them."""
+    def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
+        """Poses moved by steps."""
+
+    def step_twists(self, pose: FloatArray) -> FloatArray:
+        """Twists by steps."""
 
 
 def by_numbers(
@@ -155,11 +158,11 @@ def _answer(machine: Balanced, slots: FloatArray, pose: FloatArray, q: FloatArra
 
         def moved(share: float, j: int = j) -> FloatArray:
             to = np.tile(share * step * arcs * (np.arange(machine.m) == j), (len(pose), 1))
-            rows = machine.closure(slots, machine.moved(pose, to)[0], q).by_step
+            rows = machine.closure(slots, machine.moved(pose, to), q).by_step
             return (at.residual[:, None] @ rows)[:, 0]
 
         matrix[:, :, j] += _slope(moved) / step
-    twists = machine.moved(pose, np.zeros((len(pose), machine.m)))[1] * arcs
+    twists = machine.step_twists(pose) * arcs
     good = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(twists).all(axis=(1, 2))
     out = np.full(twists.shape, np.nan)
     out[good] = -twists[good] @ np.linalg.inv(matrix[good])

@@ -80,10 +80,13 @@ class Equations(Readings):
         for i, (measured, place) in enumerate(zip(self.sets, self.pose_of, strict=True)):
             elsewhere = self._framed[i] or self.columns_of(i, "tool") is not None
             if measured.kind in ("pose", "position") and not elsewhere:
-                read = np.isfinite(measured.values).all(axis=1)
-                guess[place[read], :3] = measured.values[read, :3]
-                if measured.kind == "pose":
-                    guess[place[read], 3:] = orientation.shortest(measured.values[read, 3:])
+                known = np.isfinite(measured.values)
+                ever = np.flatnonzero(known.any(axis=0))  # not across a plane, say
+                read = np.flatnonzero(known[:, ever].all(axis=1))
+                values = measured.values[np.ix_(read, ever)]
+                if 5 in ever:  # angles are read together
+                    values[:, -3:] = orientation.shortest(values[:, -3:])
+                guess[np.ix_(place[read], ever)] = values
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
         self._last: _Last | None = None

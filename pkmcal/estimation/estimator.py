@@ -187,12 +187,10 @@ class Estimator:
             u = self.search.best(u, state.noise, state.loss, pins)
             u = u - kept @ (kept.T @ u)
             estimate = self._estimate(u, state)
-            if not self.search.converged and self._worst > _LEAST_WORST * self.start.robot.length:
-                # what is hardly determined goes on for ever, far from any machine: less is fitted
-                self._worst *= _LESS
-                state = self._state(self._revised(estimate).noise, state.loss, None)
+            fewer = None if self.search.converged else self._fewer(estimate)
+            if fewer is not None:
+                state, u = fewer, np.zeros(len(self.scale))
                 self.equations.warm_start(self.start)
-                u = np.zeros(len(self.scale))
                 continue
             if self.equations.closures.unknowns and self._at_first is None:
                 self._at_first = estimate.freedom
@@ -303,6 +301,20 @@ class Estimator:
         if not self._priors:
             return data, data
         return data, decompose(np.vstack([jacobian, self.search.prior(evaluation.theta)]))
+
+    def _fewer(self, estimate: Estimate) -> IterationState | None:
+        """The state to begin again with after a search without an end; None where there is none.
+
+        It went along what is hardly determined, far from any machine: less of it is fitted.
+        """
+        before, noise = self._worst, self._revised(estimate).noise
+        while self._worst > _LEAST_WORST * self.start.robot.length:
+            self._worst *= _LESS
+            state = self._state(noise, estimate.state.loss, None)
+            if 0 < state.fitted.rank < estimate.state.fitted.rank:
+                return state
+        self._worst = before
+        return None
 
     def _revised(self, estimate: Estimate) -> IterationState:
         """Estimate unstated noise and limits of the loss, and split the directions anew."""

@@ -176,17 +176,27 @@ def _aligned(
             seen = [_seen(readings, evaluation, i, rows[i], parameters, theta) for i in kinds[kind]]
             whole = np.zeros((2, len(values), 6))
             whole[:, :, 6 - values.shape[1] :] = values, np.concatenate(seen)
-            read, predicted = whole[:, np.isfinite(values).all(axis=1)]
-            return of_poses(read, predicted)
+            whole[0, :, np.isnan(whole[0]).all(axis=0)] = 0.0  # never read, as across a plane
+            read, predicted = whole[:, np.isfinite(whole[0]).all(axis=1)]
+            return of_poses(read, predicted) if len(read) else np.zeros(6)
         parts = [_points(readings, evaluation, i, rows[i], theta) for i in kinds[kind]]
         return of_heights(values, np.concatenate([places for places, _ in parts]))
+    values = np.concatenate([readings.sets[i].values[rows[i]] for i in of_points_in])
     columns = np.concatenate([_sought(readings, i, rows[i], free) for i in of_points_in])
-    sought, target = np.unique(columns[:, 0], return_inverse=True)
     parts = [_points(readings, evaluation, i, rows[i], theta) for i in of_points_in]
+    places, turns = (np.concatenate(each) for each in zip(*parts, strict=True))
+    # rows of what was read at all: of a machine in a plane, say, not across it
+    never = np.isnan(values).all(axis=0)
+    read = np.isfinite(values[:, ~never]).all(axis=1)
+    if not read.any() or never[:2].all():
+        up = values[:, 2]
+        known = np.isfinite(up)
+        return of_heights(up[known], places[known]) if known.any() else np.zeros(6)
+    sought, target = np.unique(columns[read, 0], return_inverse=True)
     pairs = PointPairs(
-        values=np.concatenate([readings.sets[i].values[rows[i]] for i in of_points_in]),
-        point=np.concatenate([places for places, _ in parts]),
-        turn=np.concatenate([turn for _, turn in parts]),
+        values=np.where(never, 0.0, values)[read],
+        point=places[read],
+        turn=turns[read],
         target=target.reshape(-1) - int(sought[0] < 0),
     )
     frame, shifts = of_points(pairs)

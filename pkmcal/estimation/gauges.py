@@ -175,11 +175,11 @@ def _texts(free: FloatArray) -> list[str]:
     if len(alone) < free.shape[1]:  # turned about an anchor that is held, say
         rest = free.copy()
         rest[alone] = 0.0
-        held = free.shape[1] - len(alone)
+        held, more = free.shape[1] - len(alone), " more" if alone else ""
         what = "the anchors may be moved as one body"
         if np.linalg.norm(rest[_PLATFORM:]) > _MIXED:
             what = "the anchors and the platform's joints may be moved together"
-        texts.append(f"{what} in {held} more way{'s' * (held > 1)}")
+        texts.append(f"{what} in {held}{more} way{'s' * (held > 1)}")
     if _SCALE in alone:
         texts.append("the common scale: all lengths and gains may grow by the same factor")
     return texts

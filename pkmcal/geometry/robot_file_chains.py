@@ -119,6 +119,8 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
     copies = table.integer("copies", 1)
     if copies < 1:
         table.fail("copies", f"must be 1 or more, found {copies}")
+    if copies > MAX_LIMBS:  # before they are made
+        table.fail("copies", f"a robot has at most {MAX_LIMBS} limbs, found {copies} copies")
     group = table.text("group") if "group" in table else ""
     return Listed(table, tuple(joints), values, copies, group, _about(table))
 

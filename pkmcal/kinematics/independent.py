@@ -70,10 +70,11 @@ def _independent(columns: FloatArray) -> list[int]:
 
 
 def near_home(robot: Robot) -> FloatArray:
-    """Effects (N, 6, p) of every number at random coordinates near home, as twists (v, ω).
+    """Effects (N, 6, p) of every number at random poses near home, as twists (v, ω).
 
-    The coordinates are so near that the machine can be
-    solved at half of them, and so many that the poses do not limit what is independent.
+    Closures are met there, as far as the geometry lets them. The coordinates are so near that the
+    machine can be solved at half of them, and so many that the poses do not limit what is
+    independent.
     """
     home = robot.inverse(robot.home)
     way = np.array([SHARE * (robot.length if u == "mm" else 1.0) for u in robot.actuator_units])
@@ -85,7 +86,10 @@ def near_home(robot: Robot) -> FloatArray:
         solved = robot.forward(q)
         good = np.asarray(solved.ok)
         own, _ = robot.own_rows(solved.pose[good])
-        given = (robot.slots, own, np.ascontiguousarray(q[good]), columns, True)
+        met = q[good]
+        if robot.machine.rows > robot.machine.m:  # what actuators contradict each other by is none
+            met = robot.machine.inverse(robot.slots, own)
+        given = (robot.slots, own, np.ascontiguousarray(met), columns, True)
         effects = robot.machine.error_jacobian(*given)[:, [3, 4, 5, 0, 1, 2]]
         effects = effects[np.isfinite(effects).all(axis=(1, 2))]
         if len(effects) > len(found):

@@ -4,7 +4,8 @@
 columns                               meaning
 ====================================  =============================================================
 ``q1 [mm]`` … ``qn [mm]``             actuator coordinates, lengths or angles
-``x [mm], y [mm], z [mm]``            a position; with ``alpha``, ``beta``, ``gamma [deg]`` a pose
+``x [mm], y [mm], z [mm]``            a position; with ``alpha``, ``beta``, ``gamma [deg]`` a pose;
+                                      of a machine in a plane across z, ``z`` may be missing
 ``z [mm]`` alone                      a height
 ``x [mm], y [mm], probe [mm]``        where a printer's probe triggered; or ``q1`` … and ``probe``
 ``distance [mm]``                     from the fixed point ``target`` to the ``attachment``
@@ -77,6 +78,7 @@ from pkmcal.measurements.kind_columns import (
 )
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.orientation_columns import ANGLES, checked, names_in
+from pkmcal.measurements.plane_columns import fill_in
 from pkmcal.measurements.probe import (
     agreement,
     apart_from,
@@ -187,6 +189,7 @@ def read_measurements(
         return _read_probe(table, robot, probe_offset, times)
     actuators, actuator_units = read_actuators(table, robot)
     compare(table, actuator_units, robot)
+    fill_in(table, robot, several)
     kind = _kind(table, several)
     fields: dict[str, Any] = {"sigma": read_sigma(table, kind), "lines": np.array(table.lines)}
     fields["actuator_sigma"] = read_actuator_sigma(table, actuator_units)

@@ -37,12 +37,14 @@ def read_several(
         table.require(names)
         for axis, name in enumerate(names):
             values[:, t, axis] = table.numbers(name, "mm", blank=True, unseen=True)[0]
-        part = np.isnan(values[:, t]).any(axis=1) & ~np.isnan(values[:, t]).all(axis=1)
-        if part.any():
-            row = int(np.argmax(part))
-            name = names[int(np.argmax(np.isnan(values[row, t])))]
-            raise table.cell_error(name, row, "found an empty cell beside ones with numbers")
-    rows, index = np.nonzero(~np.isnan(values).any(axis=2))
+    missing = np.isnan(values)
+    read = ~missing.all(axis=(0, 1))  # an axis along which nothing was, as across a plane
+    part = missing[:, :, read].any(axis=2) & ~missing.all(axis=2)
+    if part.any():
+        t, row = np.argwhere(part.T)[0].tolist()
+        name = f"{targets[t]}.{_AXES[int(np.argmax(missing[row, t] & read))]}"
+        raise table.cell_error(name, row, "found an empty cell beside ones with numbers")
+    rows, index = np.nonzero(~np.isnan(values).all(axis=2))
     chosen = {name: None if value is None else value[rows] for name, value in fields.items()}
     chosen |= {"target_index": index, "target_names": targets}
     return actuators[rows], values[rows, index], chosen

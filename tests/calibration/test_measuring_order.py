@@ -130,7 +130,7 @@ def test_a_slightly_wrong_model_sorted_by_place_is_no_doubt(hexapod: pk.Robot) -
         order = found.measuring_order
         assert order is not None and not order.large
         assert not any("in the course of measuring" in text for text in found.verdict.reasons)
-        notes = [text for text in found.verdict.remarks if text.startswith("residuals shift")]
+        notes = [text for text in found.verdict.remarks if "readings had shifted" in text]
         said += len(notes)
         assert len(notes) == order.found and all("the model is wrong" in text for text in notes)
     assert said

@@ -98,6 +98,8 @@ def test_a_holdout_without_sigma_has_the_noise_of_the_fit(
     both = replace(first, sigma=0.02), replace(other, sigma=0.02)
     twice = fitted(hexapod, both[0], free="offset*", holdout=both[1])
     assert twice.holdout_expected == pytest.approx(stated.holdout_expected, rel=1e-6)
+    rough = fitted(hexapod, both[0], free="offset*", holdout=replace(other, sigma=0.06))
+    assert rough.holdout_expected == pytest.approx(3.0 * twice.holdout_expected, rel=0.03)
 
 
 def test_gross_rows_among_few_held_out_points_do_not_contradict_a_sound_fit(

@@ -10,6 +10,7 @@ import argparse
 import os
 import resource
 import shutil
+import signal
 import sys
 import tempfile
 import time
@@ -42,27 +43,30 @@ def run(name: str, seed: int, first: int, count: int, seconds: float) -> int:
     failed: dict[str, tuple[int, int]] = {}
     slowest = (0.0, -1)
     began, worked = time.monotonic(), time.process_time()
+    signal.signal(signal.SIGPROF, _stopped)
     with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
         for k in range(first, first + count):
             if time.monotonic() - began > seconds:
                 break
             before = time.monotonic()
-            content, chance = drawn(door, seed, k)
+            chance = Random(f"{seed} {k}")  # by which the door chooses, too
+            content = damaged(door, chance)
             entered += 1
             try:
+                signal.setitimer(signal.ITIMER_PROF, SLOW)
                 accepted += door.enter(Path(folder), content, chance)
-                if time.monotonic() - before > SLOW:
-                    emptied(folder)
-                    _quick(door, Path(folder), seed, k)
             except KeyboardInterrupt:
                 raise
             except BaseException as error:
-                where = traceback.extract_tb(error.__traceback__)[-1]
+                *_, within, where = traceback.extract_tb(error.__traceback__)
+                where = within if isinstance(error, TooLong) else where
                 kind = f"{type(error).__name__} {Path(where.filename).name}:{where.lineno}"
                 if kind not in failed:
                     Path(f"fuzz-{name}-{seed}-{k}.bin").write_bytes(content)
                     print(f"input {k}: {kind}: {str(error)[:300]!r}", flush=True)
                 failed[kind] = (failed.get(kind, (k, 0))[0], failed.get(kind, (k, 0))[1] + 1)
+            finally:
+                signal.setitimer(signal.ITIMER_PROF, 0.0)
             slowest = max(slowest, (time.monotonic() - before, k))
             emptied(folder)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -77,18 +81,12 @@ def run(name: str, seed: int, first: int, count: int, seconds: float) -> int:
     return int(bool(failed))
 
 
-def drawn(door: Door, seed: int, k: int) -> tuple[bytes, Random]:
-    """Input k of a seed, and the chance by which the door chooses what to do with it."""
-    chance = Random(f"{seed} {k}")
-    return damaged(door, chance), chance
+class TooLong(BaseException):
+    """An input has taken too much of the processor's time; nothing catches that by mistake."""
 
 
-def _quick(door: Door, folder: Path, seed: int, k: int) -> None:
-    """What took long by the clock, once more: the machine may have been busy."""
-    before = time.process_time()
-    door.enter(folder, *drawn(door, seed, k))
-    took = time.process_time() - before
-    assert took <= SLOW, f"{took:.0f} s of processor time"
+def _stopped(*_: object) -> None:
+    raise TooLong
 
 
 def emptied(folder: str) -> None:

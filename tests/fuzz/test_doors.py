@@ -13,6 +13,7 @@ from random import Random
 import pytest
 
 from .__main__ import emptied, run
+from .damage import Door
 from .doors import DOORS, ROOT
 
 INPUTS = {  # some five minutes of processor time together
@@ -59,3 +60,19 @@ def test_a_number_gives_its_input_again(tmp_path: Path) -> None:
         told.append(done.stdout.split(";")[0])
     assert told[0] == told[1]
     assert "numbers 3 to 22: 20 inputs" in told[0]
+
+
+def test_an_input_that_does_not_end_is_recorded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def endless(folder: Path, content: bytes, chance: Random) -> bool:
+        while True:
+            pass
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(DOORS, "csv", Door((b"x",), (b"y",), endless))
+    monkeypatch.setattr("tests.fuzz.__main__.SLOW", 0.1)
+    assert run("csv", seed=0, first=5, count=2, seconds=1e9) == 1
+    assert "2 failed in 1 ways" in (said := capsys.readouterr().out), said
+    assert "first input 5: TooLong test_doors.py" in said
+    assert (tmp_path / "fuzz-csv-0-5.bin").exists()

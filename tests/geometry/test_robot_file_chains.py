@@ -116,6 +116,7 @@ def test_parameters_of_places_are_values_and_no_numbers() -> None:
         ('kind = "P", axis = [0, 0, 1]', 'kind = "R"', "the key 'axis' is missing"),
         ("copies = 3", "copies = 0", "must be 1 or more"),
         ("copies = 3", "copies = 25", "at most 24 limbs"),
+        ("copies = 3", "copies = 2147483648", "copies: a robot has at most 24 limbs"),
         ("copies = 3", 'copies = 3\nerrors = { "joint9.dx" = 1 }', "'limb1.joint9.dx' is no error"),
         ("axis = [0, 0, 1],", "axis = [0, 0, 1], actuator = 1, home_value = 9.0,",
          "actuator 1 reads at home 0 in one limb and 9 in another"),

@@ -60,9 +60,10 @@ class Change:
     def named(self, text: str) -> str:
         """File, line, and what changes there."""
         begin = text.rfind("\n", 0, self.at) + 1
-        whole = text[begin : text.find("\n", self.at)].strip()
+        behind = text[self.at + len(self.old) :].partition("\n")[0].rstrip(" \\")
         old = " ".join(self.old.split())
-        return f"{self.file}:{self.line(text)}: {old!r} -> {self.new!r} in {whole}"
+        line = f"{text[begin : self.at].lstrip()}[{old} -> {self.new}]{behind}"
+        return f"{self.file}:{self.line(text)}: {line}"
 
 
 def changes(root: Path, file: str) -> list[Change]:
