@@ -289,8 +289,9 @@ def move(
     Raises
     ------
     ValueError
-        An end that the machine cannot take, a straight path that it cannot follow, no duration and
-        no limits, limits that are not positive.
+        An end that the machine cannot take, a straight path that it cannot follow, or on which it
+        would have to leave its assembly mode, no duration and no limits, limits that are not
+        positive.
 
     Notes
     -----
