@@ -19,7 +19,6 @@ INLINE void chain_prepare(const chain_geometry *of, ptrdiff_t first, const ptrdi
 
 #define AT_HOME 0.1  /* rad, of the length: passive joints so near those of home are of its posture */
 #define POSTURE 2e-4 /* of the size: actuators that are farther from those of a posture may be another's */
-#define NEARER 0.9   /* of the way to an answer: another one is taken that is not farther than this */
 #define LIKELY 0.2   /* of that way: what the other then misses at most */
 
 /* How far passive joints are from home, and drives from those asked for, mm. */
@@ -176,8 +175,7 @@ typedef struct {
     real iterations, residual;
 } chain_answer;
 
-/* From another state, and of both answers the one that is clearly nearer to the guess: with a joint
- * turned over, errors make another pose that is no farther. */
+/* From another state, and of both answers the one that is nearer to the guess. */
 SHARED void chain_solve_again(const pkm_chains *machine, const chain_numbers *numbers,
                               const chain_state *guess, const chain_state *other_start,
                               const real *from, const real *to, mask doubt, chain_answer *found)
@@ -189,7 +187,7 @@ SHARED void chain_solve_again(const pkm_chains *machine, const chain_numbers *nu
                 &other.iterations, &other.residual);
     const mask ok = fill_mask(PKM_OK);
     const mask nearer = states_apart(machine, other.at.state, guess->state)
-                        < NEARER * states_apart(machine, found->at.state, guess->state);
+                        < states_apart(machine, found->at.state, guess->state);
     const mask taken = doubt & (other.status == ok) & (nearer | (found->status != ok));
     for (int s = 0; s < MAX_STATE; s++)
         found->at.state[s] = select(taken, other.at.state[s], found->at.state[s]);

@@ -12,16 +12,17 @@
 /* The equations of LANES poses: of each as many as it has, behind them rows of zeros. */
 typedef struct {
     const int64_t *own[LANES];
-    ptrdiff_t count[LANES], most;
+    ptrdiff_t count[LANES], least, most;
 } pose_equations;
 
 INLINE pose_equations equations_of(const ptrdiff_t row[LANES], const int64_t *first,
                                    const int64_t *order)
 {
-    pose_equations of = {.most = 0};
+    pose_equations of = {.least = PTRDIFF_MAX, .most = 0};
     for (int l = 0; l < LANES; l++) {
         of.own[l] = order + first[row[l]];
         of.count[l] = first[row[l] + 1] - first[row[l]];
+        if (of.count[l] < of.least) of.least = of.count[l];
         if (of.count[l] > of.most) of.most = of.count[l];
     }
     return of;
@@ -34,6 +35,16 @@ INLINE real equation(const pose_equations *of, ptrdiff_t j, const double *column
     for (int l = 0; l < LANES; l++)
         if (j < of->count[l]) r[l] = column[stride * of->own[l][j]];
     return r;
+}
+
+/* A number for equation j of each pose that has so many: rows behind a pose's own stay zeros, also
+ * where its own numbers are not finite. */
+INLINE real owned(const pose_equations *of, ptrdiff_t j, real x)
+{
+    if (j >= of->least)
+        for (int l = 0; l < LANES; l++)
+            if (j >= of->count[l]) x[l] = 0.0;
+    return x;
 }
 
 /* Numbers in lanes, in memory that the caller lends. */
@@ -150,13 +161,15 @@ INLINE void mirrors(const pose_equations *of, ptrdiff_t u, const double *by_unkn
         put(-away, diagonal, a);
         put(top + away, vectors, a * u + a);
         for (ptrdiff_t j = a; j < of->most; j++)
-            put(scale * at(vectors, j * u + a), vectors, j * u + a);
+            put(owned(of, j, scale * at(vectors, j * u + a)), vectors, j * u + a);
         for (ptrdiff_t b = a + 1; b < u; b++) {
             real along = fill(0.0);
             for (ptrdiff_t j = a; j < of->most; j++)
                 along += at(vectors, j * u + a) * at(vectors, j * u + b);
-            for (ptrdiff_t j = a; j < of->most; j++)
-                put(at(vectors, j * u + b) - along * at(vectors, j * u + a), vectors, j * u + b);
+            for (ptrdiff_t j = a; j < of->most; j++) {
+                const real x = at(vectors, j * u + b) - along * at(vectors, j * u + a);
+                put(owned(of, j, x), vectors, j * u + b);
+            }
         }
     }
 }
@@ -168,7 +181,7 @@ INLINE void reflect(const pose_equations *of, ptrdiff_t u, ptrdiff_t a, const do
     real along = fill(0.0);
     for (ptrdiff_t j = a; j < of->most; j++) along += at(vectors, j * u + a) * at(column, j);
     for (ptrdiff_t j = a; j < of->most; j++)
-        put(at(column, j) - along * at(vectors, j * u + a), column, j);
+        put(owned(of, j, at(column, j) - along * at(vectors, j * u + a)), column, j);
 }
 
 int CALL(pose_left)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,

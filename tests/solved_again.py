@@ -24,7 +24,7 @@ def _slope(solved: Callable[[float], FloatArray], step: FloatArray) -> FloatArra
     return np.asarray(slope / np.reshape(step, (-1, 1)))
 
 
-def by_numbers(robot: Robot, pose: FloatArray, q: FloatArray, share: float = 3e-4) -> FloatArray:
+def by_numbers(robot: Robot, pose: FloatArray, q: FloatArray, share: float = 1e-4) -> FloatArray:
     """Twists of the platform in the machine's own frame by every number, (N, 6, p)."""
     steps = {"mm": share * robot.machine.struct.size, "rad": share, "1": share}
     columns, slots = robot.geometry.slot_index, robot.slots
@@ -40,7 +40,7 @@ def by_numbers(robot: Robot, pose: FloatArray, q: FloatArray, share: float = 3e-
     return out
 
 
-def by_actuators(robot: Robot, pose: FloatArray, q: FloatArray, share: float = 3e-4) -> FloatArray:
+def by_actuators(robot: Robot, pose: FloatArray, q: FloatArray, share: float = 1e-4) -> FloatArray:
     """The same by every actuator, (N, 6, n)."""
     out = np.empty((len(pose), 6, q.shape[1]))
     slopes = np.abs(robot.machine.slopes(robot.slots, q))

@@ -15,6 +15,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.calibration.fit import Fit
 from pkmcal.display import chance_text, displayed, printable
+from pkmcal.estimation.fit_data import Dependence
 from pkmcal.estimation.uncertainty import Uncertainty
 from pkmcal.statistics.score_test import Score, score_test
 
@@ -115,7 +116,7 @@ def _targets(fit: Fit) -> Iterator[tuple[str, list[BoolArray]]]:
     sets = fit.equations.datasets
     places: list[FloatArray | None] = []
     for data in sets:
-        given = [e.given for e in data.dependences() if e.argument == "target" and not e.sought]
+        given = [each.given for each in data.dependences() if _known_target(each)]
         shape = len(data.measured), 3
         places.append(np.broadcast_to(given[0], shape) if given else None)
     every = [place for place in places if place is not None]
@@ -127,6 +128,10 @@ def _targets(fit: Fit) -> Iterator[tuple[str, list[BoolArray]]]:
             for data, place in zip(sets, places, strict=True)
         ]
         yield _name(fit, each, rows), rows
+
+
+def _known_target(dependence: Dependence) -> bool:
+    return dependence.role == dependence.argument == "target" and not dependence.sought
 
 
 def _name(fit: Fit, place: FloatArray, rows: list[BoolArray]) -> str:

@@ -24,6 +24,7 @@ from pkmcal.controllers.loss import Loss, fitted, require_held
 from pkmcal.exceptions import ArgumentError, FileError
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.text_lines import text_in
+from pkmcal.files.toml_table import LARGEST
 from pkmcal.kinematics.robot import Robot, require_parallel
 
 CORNERS = ("tl", "tr", "bl", "br")  # in the order of the motors
@@ -124,6 +125,10 @@ def of_text(text: str, place: str) -> tuple[FloatArray, FloatArray]:
     values |= {found["name"]: float(found["value"]) for found in _ANCHOR.finditer(text)}
     if missing := [name for name in _NAMES if name not in values]:
         raise FileError(f"{place}: no number for {', '.join(missing)}: anchors of a Maslow")
+    if far := [name for name in _NAMES if not abs(values[name]) <= LARGEST]:
+        raise FileError(
+            f"{place}: {far[0]} must be at most {LARGEST:g} mm, found {values[far[0]]:g}"
+        )
     anchors = np.array([values[name] for name in _NAMES]).reshape(4, 2)
     start = text.rfind("CLBM:")  # each set repeats the places of those before
     rows = _ROW.findall(text, start) if start >= 0 else []

@@ -6,10 +6,9 @@ as this does:
     ∂pose = -(JᵀJ + Σ r ∂J)⁻¹ (Jᵀ ∂r + ∂Jᵀ r)
 
 The second terms are what rows that are missed add: at 0.3 mm some thousandths, enough to keep a
-calibration from converging. Derivatives of Jᵀ r are central differences of fourth order of it and
-not of poses, which would be solved for again: where the platform goes, those of J with r as it is;
-where a number or an actuator changes, of each row alone. As a row is of one limb, the same number
-of all limbs changes at once.
+calibration from converging. Derivatives of Jᵀ r are central differences of fourth order of it, and
+not of poses, which would be solved for again. As a row is of one limb, the same number of all limbs
+changes at once.
 """
 
 from __future__ import annotations
@@ -22,9 +21,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core.library import COORDINATE_UNITS, MAPS, SLOTS
 
-_STEP = (
-    3e-4  # of the size, or rad: what fifth derivatives and rounding add is 1e-12 of a derivative
-)
+_STEP = 1e-4  # of the size, or rad: fifth derivatives and rounding add 1e-11 of a derivative
 _OFFSET, _GAIN = SLOTS.index("offset"), SLOTS.index("gain")
 
 
@@ -148,20 +145,19 @@ def _slope(of: Callable[[float], FloatArray]) -> FloatArray:
 
 def _answer(machine: Balanced, slots: FloatArray, pose: FloatArray, q: FloatArray) -> FloatArray:
     """Twist of the platform by what is added to Jᵀ r, (N, 6, m)."""
-    at = machine.closure(slots, pose, q)
     free = MAPS[list(MAPS)[machine.struct.map]]
     turns = np.array([COORDINATE_UNITS[name] == "rad" for name in free])
     arcs = np.where(turns, 1.0 / machine.struct.length, 1.0)
-    matrix = at.by_step.swapaxes(1, 2) @ at.by_step
     step = _STEP * machine.struct.size
+    matrix = np.empty((len(pose), machine.m, machine.m))
     for j in range(machine.m):
 
         def moved(share: float, j: int = j) -> FloatArray:
             to = np.tile(share * step * arcs * (np.arange(machine.m) == j), (len(pose), 1))
-            rows = machine.closure(slots, machine.moved(pose, to), q).by_step
-            return (at.residual[:, None] @ rows)[:, 0]
+            found: FloatArray = _balance(machine, slots, machine.moved(pose, to), q).sum(axis=1)
+            return found
 
-        matrix[:, :, j] += _slope(moved) / step
+        matrix[:, :, j] = _slope(moved) / step
     twists = machine.step_twists(pose) * arcs
     good = np.isfinite(matrix).all(axis=(1, 2)) & np.isfinite(twists).all(axis=(1, 2))
     out = np.full(twists.shape, np.nan)

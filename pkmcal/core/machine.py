@@ -176,7 +176,7 @@ class Machine(CoreMachine):
     @property
     def turning(self) -> BoolArray:
         """Which drives are angles, (limbs,)."""
-        return np.array(self.struct.angle[0 : self.struct.limbs], dtype=bool)
+        return np.array(list(self.struct.angle[0 : self.struct.limbs]), dtype=bool)
 
     def drives_at(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """q̃ (N, limbs) that poses (N, 6) ask of each limb by itself; any turn."""

@@ -139,6 +139,7 @@ def test_offsets_and_gains_are_refused_or_projected(tmp_path: Path) -> None:
     ("text", "message"),
     [
         ("tlX: 1\n", r"no number for tlY, trX, trY, brX: anchors of a Maslow"),
+        (YAML.replace("-6.200000", "1e308"), r"tlX must be at most 1e\+15 mm, found 1e\+308"),
         (YAML.replace("tlX: ", "tlX: 1,5"), r"no number for tlX"),  # a decimal comma
         (LOG.replace("tl:1680.0", ""), r"place 2 of CLBM must have bl, br, tr and tl"),
         (LOG.replace("tl:1680.0", "tl:nan"), r"place 2 of CLBM must have"),

@@ -134,12 +134,13 @@ def actuators_as_instruments(isa: int, part: slice, call: str) -> list[np.ndarra
 
 
 def poses_of_equations(isa: int, part: slice, call: str) -> list[np.ndarray]:
-    """Some with fewer equations than unknowns; what is left of each in a row of its own."""
-    found = []
+    """Some with fewer equations than unknowns, some not finite; what is left in a row for each."""
+    found: list[np.ndarray] = []
     for unknowns in (2, 6):
         draw = np.random.default_rng([33, unknowns])
         count, most = draw.integers(0, unknowns + 5, ROWS), unknowns + 5
         slopes = draw.normal(size=(ROWS, most, unknowns))
+        slopes[2::5, 0, 0], slopes[::5, 0, -1], count[0] = np.nan, np.inf, 1
         columns = draw.normal(size=(ROWS, most, 3))
         order = np.flatnonzero(np.arange(most) < count[part, None])
         poses = PoseEquations(order, count[part], unknowns, isa)
@@ -151,10 +152,10 @@ def poses_of_equations(isa: int, part: slice, call: str) -> list[np.ndarray]:
         elif call == "pose_steps":
             found += [*poses.steps(matrix, pull, np.full(len(cost), 0.1))]
         elif call == "pose_left":
-            found += [np.nan_to_num(following), _rows(left, poses.left_of)]
+            found += [following, _rows(left, poses.left_of)]
         else:
             found.append(_rows(poses.spread(by_unknown, left), count[part]))
-    return found
+    return [np.where(np.isnan(each), np.nan, each) for each in found]
 
 
 def _rows(numbers: np.ndarray, count: np.ndarray) -> np.ndarray:

@@ -54,7 +54,7 @@ TESTS = {
     "pkmcal/planning": ("tests/planning",),
     "pkmcal/statistics": ("tests/statistics",),
     "pkmcal/estimation": ("tests/estimation", "tests/calibration"),
-    "pkmcal/calibration": ("tests/estimation", "tests/calibration"),
+    "pkmcal/calibration": ("tests/estimation", "tests/calibration", "tests/real"),
 }
 NOT_MEANT = {
     "csrc": ("core_v3.c", "core_v4.c", "build.py"),
@@ -126,6 +126,7 @@ class Folder:
         self.functions: list[tuple[str, int]] = []
         (copy / "pkmcal" / "derive").symlink_to(copy / "derive")
         (copy / "pkmcal" / "generated").symlink_to(copy / "generated")
+        (copy.parent / "shared").symlink_to(ROOT.parent / "shared")  # data of real machines, if any
         if name == "csrc":
             self._narrow()
         else:
