@@ -27,6 +27,8 @@ _ALIKE = 1e-6  # share by which entries of a direction differ that are not equal
 def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:
     """Numbers of any kind as an array; `last` axes are for the message of a ragged list.
 
+    What is masked is not there: NaN.
+
     Raises
     ------
     TypeError
@@ -42,6 +44,8 @@ def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:
         alone = not isinstance(array, np.ndarray | list | tuple)
         found = shown(array) if alone else f"dtype {given.dtype}"
         raise ArgumentTypeError(f"{name} must be an array of numbers, found {found}")
+    if isinstance(array, np.ma.MaskedArray) and np.ma.is_masked(array):
+        return np.asarray(array.astype(np.float64).filled(np.nan))  # not what lies under the mask
     return given
 
 

@@ -56,7 +56,7 @@ def exp(twist: ArrayLike, angle: ArrayLike = 1.0) -> FloatArray:
     >>> (screw.exp([0, 0, 1, 0, -100, 0], np.pi / 2).round(9) + 0.0).tolist()[0]
     [0.0, -1.0, 0.0, 100.0]
     """
-    _, shape = as_rows("twist", twist, 6)
+    given, shape = as_rows("twist", twist, 6)
     factor = as_numbers("angle", angle, "N")
     try:
         np.broadcast_shapes(shape, factor.shape)
@@ -64,9 +64,10 @@ def exp(twist: ArrayLike, angle: ArrayLike = 1.0) -> FloatArray:
         raise ArgumentError(
             f"angle has shape {factor.shape}, which does not go with twists {shape}"
         ) from None
-    given = np.asarray(twist, dtype=np.float64)  # before the product: small integers overflow
     with np.errstate(over="ignore", invalid="ignore"):  # such a row is NaN
-        rows, shape = as_rows("twist", given * factor[..., None].astype(np.float64), 6)
+        rows, shape = as_rows(
+            "twist", given.reshape(*shape, 6) * factor[..., None].astype(np.float64), 6
+        )
     return screws.exp(rows).reshape(*shape, 4, 4)
 
 

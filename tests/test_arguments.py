@@ -622,3 +622,27 @@ def test_a_move_may_be_sampled_at_no_time() -> None:
     end = robot.home + np.eye(6)[0]
     sampled = pk.trajectory.move(robot, robot.home, end, duration=1.0).sample([])
     assert sampled.pose.shape == (0, 6) and sampled.actuators.shape == (0, 6)
+
+
+def test_what_is_masked_is_not_there() -> None:
+    """Numbers under a mask are no numbers: their rows fail as rows with NaN do, or are refused."""
+    robot = pk.load("hexapod")
+    poses = np.ma.array(pk.sample_poses(robot, 3))
+    poses[1, 2] = np.ma.masked
+    given = poses.filled(np.nan)
+    for call in (
+        robot.inverse,
+        lambda each: robot.forward(each + 900.0).pose,
+        robot.violation,
+        lambda each: robot.feasible(each).ok,
+        lambda each: pk.screw.exp(each, 1.0),
+        lambda each: pk.dexterity(robot, each).conditioning,
+    ):
+        np.testing.assert_array_equal(call(poses), call(given))
+    whole = np.ma.array([[1, 2, 3, 4, 5, 6]], mask=[[1, 0, 0, 0, 0, 0]])
+    assert np.isnan(robot.inverse(whole)).all()
+    q = robot.inverse(pk.sample_poses(robot, 3))
+    measured = pk.Measurements(q, poses[:, :3], "position", sigma=0.01)
+    assert np.isnan(measured.values[1, 2]) and np.isfinite(measured.values).sum() == 8
+    with pytest.raises(pk.ArgumentError, match="actuators must be finite"):
+        pk.Measurements(np.ma.array(q, mask=q == q[0, 0]), given[:, :3], "position")

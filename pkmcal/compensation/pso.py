@@ -16,7 +16,7 @@ from pkmcal.arguments import checked_seed, function, number, whole
 from pkmcal.arrays import FloatArray, as_numbers
 from pkmcal.core.swarm import Swarm, SwarmSettings
 from pkmcal.display import Table
-from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.exceptions import ArgumentError
 from pkmcal.result import Result
 
 _WIDEST = 1e150  # of a bound, so that no step of the swarm overflows
@@ -168,9 +168,7 @@ def _bounds(lower: ArrayLike, upper: ArrayLike) -> tuple[FloatArray, FloatArray]
 
 def _values(objective: Objective, positions: FloatArray) -> FloatArray:
     count = len(positions)
-    values = np.asarray(objective(positions))
-    if values.dtype.kind not in "iuf":
-        raise ArgumentTypeError(f"objective must return numbers, found dtype {values.dtype}")
+    values = as_numbers("what objective returns", objective(positions), count)
     if values.shape != (count,):
         raise ArgumentError(
             f"objective must return one value for each of {count} particles, shape ({count},);"

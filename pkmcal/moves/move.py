@@ -22,6 +22,7 @@ from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.moves import derivatives
 from pkmcal.moves.events import Event, events
 from pkmcal.moves.jumps import Jump, jumps, said
+from pkmcal.moves.leaps import leap, same
 from pkmcal.moves.peaks import STEPS, largest, peaks
 from pkmcal.moves.time_laws import (
     CUBIC,
@@ -288,8 +289,9 @@ def move(
     Raises
     ------
     ValueError
-        An end that the machine cannot take, a straight path that it cannot follow, no duration and
-        no limits, limits that are not positive.
+        An end that the machine cannot take, a straight path that it cannot follow, or on which it
+        would have to leave its assembly mode, no duration and no limits, limits that are not
+        positive.
 
     Notes
     -----
@@ -402,7 +404,25 @@ def _followed(made: Move) -> Move:
                 f"{made.robot.name}: the path of {names} does not"
                 f" lead from start to end but to another assembly mode"
             )
+    if made.space != "pose":
+        _one_mode(made)
     return made
+
+
+def _one_mode(made: Move) -> None:
+    """Raise ValueError where poses that were found are not of one assembly mode."""
+    name, length = made.robot.name, made.robot.length
+    if not same(made.sample(made.duration).pose, made.end, length):
+        raise ArgumentError(
+            f"{name}: the move of the actuators does not lead from start to end but to another"
+            " assembly mode"
+        )
+    time = leap(made.sample, made.duration, length)
+    if time is not None:
+        raise ArgumentError(
+            f"{name} cannot follow the path: {time:.4g} s after the start its assembly mode ends,"
+            " and only poses of another one are found; poses nearer to each other may be joined"
+        )
 
 
 def _with_jumps(made: Move) -> Move:

@@ -266,6 +266,12 @@ def plan_poses(
     design, own_frame = design_of(parameters, blocks, sort, *aims, criterion)
     poses, q, inside = poses[safe], q[safe], inside[safe]
     everything = design.predicted(np.arange(len(blocks)))
+    if everything == 0.0 and (criterion == "prediction" or accuracy is not None):
+        raise ArgumentError(
+            f"{'criterion' if accuracy is None else 'accuracy'}: nothing that is free moves the"
+            " origin of the platform or tool, whose error would be predicted; state a count and"
+            " the criterion 'A' or 'D'"
+        )
     weight = _weight(travel_weight, accuracy, criterion)
     if accuracy is None:
         of = "kind" if isinstance(kind, Mapping) else "count"

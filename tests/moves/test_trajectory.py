@@ -578,3 +578,21 @@ def test_curves_are_those_of_the_move() -> None:
     t = np.asarray(line.get_xdata())[2:-2]
     np.testing.assert_allclose(line.get_ydata()[2:-2], move.sample(t).actuators[:, 2])
     assert len(move_figures.in_space(robot, move.sample([0.0, 1.0]).pose, "ab", "t").axes) == 2
+
+
+@pytest.mark.parametrize("other", ["the same actuators", "a gap that none crosses"])
+def test_a_move_of_actuators_stays_in_one_assembly_mode(other: str) -> None:
+    """No platform goes from one to another while its actuators go straight."""
+    robot = pk.load("2tpr2tps")
+    start = pk.sample_poses(robot, 1, seed=4)[0]
+    modes = robot.forward_all(robot.inverse(start)).poses
+    if other == "the same actuators":
+        ends_there = [pose for pose in modes if np.abs(pose - start).max() > 1.0]
+    else:
+        elsewhere = pk.sample_poses(robot, 1, seed=5)[0]
+        modes = robot.forward_all(robot.inverse(elsewhere)).poses
+        ends_there = [pose for pose in modes if np.abs(pose - elsewhere).max() > 1.0]
+    assert len(ends_there) == 7
+    for end in ends_there:
+        with pytest.raises(pk.ArgumentError, match="assembly mode"):
+            pk.trajectory.move(robot, start, end, duration=1.0, space="joint")

@@ -440,3 +440,18 @@ def test_poses_at_which_cables_would_have_to_push_are_not_proposed(
         "--actuator-noise", 0.5, "--count", 9, "--json",
     )  # fmt: skip
     assert json.loads(said.stdout)["unpulled"] == 3
+
+
+@pytest.mark.parametrize(
+    ("asked", "named"), [({"count": 6}, "criterion"), ({"accuracy": 0.1}, "accuracy")]
+)
+def test_an_error_that_is_always_nothing_chooses_no_poses(
+    asked: dict[str, float], named: str
+) -> None:
+    """The platform of a spherical machine turns about its origin, whatever the errors."""
+    robot = pk.load("agile-eye")
+    candidates = pk.sample_poses(robot, 12, seed=1)
+    with pytest.raises(pk.ArgumentError, match=f"{named}: nothing that is free moves the origin"):
+        pk.plan_poses(robot, candidates, kind="orientation", prior=0.3, **asked)
+    plan = pk.plan_poses(robot, candidates, 6, kind="orientation", prior=0.3, criterion="A")
+    assert len(plan) == 6
