@@ -170,7 +170,9 @@ class Identification(Parts, Result):
         Parameters
         ----------
         poses : array_like (..., 6), for a serial arm (..., n)
-            mm and rad; they need not have been measured. Of an arm its joint coordinates.
+            mm and rad; they need not have been measured. Of a pose that the machine cannot take,
+            the coordinates that its file declares are kept (`Robot.complete`). Of an arm its joint
+            coordinates.
         target : array_like (3,), optional
             A point of the platform, mm; its origin by default.
         session : str, optional
@@ -181,7 +183,7 @@ class Identification(Parts, Result):
         ndarray (...)
             √trace(J C Jᵀ) in mm, the standard deviation of the predicted point, from the
             covariance C of the numbers of the geometry. inf where the point moves along with an
-            unidentifiable combination.
+            unidentifiable combination, NaN where the machine has no such pose.
         """
         place = np.zeros(3) if target is None else as_rows("target", target, 3)[0][0]
         chosen = self.fit.parameters

@@ -13,9 +13,9 @@ from pkmcal.core.library import COORDINATE_UNITS, POSE, SLOTS
 from pkmcal.display import displayed
 from pkmcal.geometry.box import in_box
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.complete import completed
 from pkmcal.kinematics.dexterity import dexterity
 from pkmcal.kinematics.limits import kept, margin_of
-from pkmcal.kinematics.perturbed import completed
 from pkmcal.kinematics.robot import Robot
 
 _FULL_TURN = 2 * np.pi

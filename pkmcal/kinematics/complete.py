@@ -7,7 +7,7 @@ are too many: the closures, with the matched coordinates held, determine the res
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from pkmcal.screw import from_pose
 
 ITERATIONS = 30
 SETTLED = 1e-12  # of the machine's size
+ON_THE_MANIFOLD = 1e-6  # mm of closure error up to which a pose is taken as it is given
 KEPT = 1e-9  # of the size, or rad: a matched coordinate that is off by more was not kept
 OTHER_BRANCH = 1e-6  # of the size: so far apart, at a pose, are the drives of a limb's branches
 
@@ -48,6 +49,26 @@ def matched_coordinates(match: bool | str | Sequence[str], moved: Sequence[str])
     if len(set(names)) != len(names):
         raise ArgumentError(f"match: a coordinate is named twice in {', '.join(names)}")
     return [POSE.index(name) for name in names]
+
+
+class Completing(Protocol):
+    """What is asked of a robot."""
+
+    def violation(self, pose: FloatArray) -> FloatArray:
+        """How far poses are from those it can take, mm."""
+
+    def complete(self, pose: FloatArray) -> FloatArray:
+        """The poses that keep the coordinates which its file declares."""
+
+
+def completed(robot: Completing, poses: FloatArray) -> FloatArray:
+    """Poses (N, 6) with those completed that the closures do not allow; NaN where there is none."""
+    fits = robot.violation(poses) <= ON_THE_MANIFOLD
+    if fits.all():
+        return poses
+    poses = poses.copy()
+    poses[~fits] = robot.complete(poses[~fits])
+    return poses
 
 
 class Completed(NamedTuple):

@@ -15,8 +15,6 @@ from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.ties import Term, Tie
 from pkmcal.kinematics.robot import Robot
 
-ON_THE_MANIFOLD = 1e-6  # mm of closure error up to which a pose is taken as it is given
-
 
 class Ideal(NamedTuple):
     """Poses that a robot without errors takes, and the actuator coordinates that lead there.
@@ -55,19 +53,8 @@ def ideal(robot: Robot, poses: ArrayLike) -> Ideal:
     given, shape = as_rows("poses", poses, 6)
     if not len(given):
         raise ArgumentError("poses must be at least one, found none")
-    rows = completed(robot, given)
-    actuators = robot.inverse(rows)
-    return Ideal(robot.forward(actuators, guess=rows).pose, actuators, shape)
-
-
-def completed(robot: Robot, poses: FloatArray) -> FloatArray:
-    """Poses (N, 6) with those completed that the closures do not allow; NaN where there is none."""
-    fits = robot.violation(poses) <= ON_THE_MANIFOLD
-    if fits.all():
-        return poses
-    poses = poses.copy()
-    poses[~fits] = robot.complete(poses[~fits])
-    return poses
+    rows, actuators, _ = robot.commanded(given)
+    return Ideal(rows, actuators, shape)
 
 
 class Geometries:

@@ -28,6 +28,7 @@ from pkmcal.geometry import box, robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.model import Model
 from pkmcal.kinematics import chain_limits
+from pkmcal.kinematics.complete import completed
 from pkmcal.kinematics.kinematics import Kinematics, Match
 from pkmcal.kinematics.limits import Feasibility, feasibility
 from pkmcal.modes.assemblies import Assemblies
@@ -360,9 +361,11 @@ class Robot(Kinematics, Result):
         return self.frames.twists_outward(own, by_q).reshape(*shape, 6, self.n_actuators)
 
     def commanded(self, places: ArrayLike) -> tuple[FloatArray, FloatArray, tuple[int, ...]]:
-        """Pose, actuator coordinates and batch shape of poses (..., 6)."""
-        rows, _, q, shape = self._commanded(places, None)
-        return rows, q, shape
+        """Pose, actuator coordinates and batch shape of poses (..., 6), completed if need be."""
+        given, shape = as_rows("pose", places, 6)
+        rows = completed(self, given)
+        q = self.inverse(rows)
+        return self.forward(q, guess=rows).pose, q, shape
 
     visited = commanded
 

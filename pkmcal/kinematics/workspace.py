@@ -14,9 +14,9 @@ from pkmcal.core.library import POSE
 from pkmcal.display import Table, displayed
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.box import in_box
+from pkmcal.kinematics.complete import completed
 from pkmcal.kinematics.dexterity import BLOCK, Dexterity, dexterity
 from pkmcal.kinematics.limits import Feasibility
-from pkmcal.kinematics.perturbed import completed
 from pkmcal.kinematics.pulled import pulled
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result

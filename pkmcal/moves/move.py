@@ -15,9 +15,9 @@ from pkmcal.arrays import FloatArray, as_rows
 from pkmcal.core.library import POSE
 from pkmcal.display import POSE_HEADER, Table, displayed, long_table, pose_cells
 from pkmcal.exceptions import ArgumentError
-from pkmcal.kinematics.complete import Completed, complete, completed_rates
+from pkmcal.kinematics.complete import ON_THE_MANIFOLD, Completed, complete, completed_rates
 from pkmcal.kinematics.dexterity import dexterity
-from pkmcal.kinematics.perturbed import ON_THE_MANIFOLD, off
+from pkmcal.kinematics.perturbed import off
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.moves import derivatives
 from pkmcal.moves.events import Event, events

@@ -10,7 +10,7 @@ import numpy as np
 from pkmcal.arrays import FloatArray
 from pkmcal.core.library import POSE
 from pkmcal.exceptions import ArgumentError
-from pkmcal.kinematics.perturbed import completed
+from pkmcal.kinematics.complete import completed
 from pkmcal.kinematics.robot import Robot
 from pkmcal.kinematics.workspace import good_poses, reach
 

@@ -265,6 +265,22 @@ def test_predicted_accuracy_is_the_scatter_of_calibrations(paper: Robot) -> None
     )
 
 
+@pytest.mark.parametrize("name", ["tricept", "delta-parallelograms"])
+def test_accuracy_of_what_is_no_pose_is_that_where_the_machine_goes(name: str) -> None:
+    """Both tilt as they move; x y z alone say where they are."""
+    robot = pk.load(name)
+    rng = np.random.default_rng(24)
+    wrong = [{"mm": 0.3, "rad": 1e-3, "1": 0.0}[unit] for unit in robot.geometry.units]
+    true = robot.replace(robot.geometry.values + wrong * rng.normal(size=len(wrong)))
+    places = robot.home + np.array([80.0, 80.0, 80.0, 0.0, 0.0, 0.0]) * rng.uniform(-1, 1, (30, 6))
+    q = robot.inverse(places, match=True)
+    found = identify(robot, VirtualMachine(true, noise=0.02).measure(q, kind="pose"), prior=0.3)
+    there = found.robot.complete(places)
+    assert found.robot.violation(places).min() > 0.1
+    assert np.abs(there - places)[:, :3].max() < 1e-6
+    np.testing.assert_allclose(found.accuracy(places), found.accuracy(there), rtol=1e-6)
+
+
 def test_accuracy_is_infinite_where_nothing_tells() -> None:
     robot = pk.load("examples/linear-delta/robot.toml")
     poses = np.zeros((20, 6))
@@ -274,6 +290,7 @@ def test_accuracy_is_infinite_where_nothing_tells() -> None:
     turned = identify(robot, heights, free=[*robot.model.free, "angle3"])
     assert np.isfinite(told.accuracy(poses)).all()
     assert np.isinf(turned.accuracy(poses)).all()  # it may be turned about z
+    assert np.isnan(told.accuracy([1e4, 0.0, 0.0, 0.0, 0.0, 0.0]))  # out of reach
 
 
 def test_bounds_are_kept_and_named(paper: Robot) -> None:
