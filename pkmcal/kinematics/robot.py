@@ -293,8 +293,9 @@ class Robot(Kinematics, Result):
         ndarray (..., 6, p)
             In the order of ``geometry.names``. The column of a tied number says what that number
             alone would do; the column of a parameter what it does through all its ties.
-            NaN at a type-2 singularity. With more closures than free coordinates it is that of the
-            pose which misses them least.
+            NaN at a type-2 singularity, and where chains miss the pose by more than 1e-4 of the
+            machine's size: `complete` gives one that it takes. With more closures than free
+            coordinates it is that of the pose which misses them least.
         """
         given, own, q, shape = self._commanded(pose, actuators)
         columns = self.geometry.slot_index.astype(np.int32)

@@ -31,7 +31,8 @@ class Assemblies(Result):
     certified : ndarray of bool (k,)
         Proven to be near a solution, one each, and to be the only one near.
     error : ndarray (k,)
-        How far the solution is at most, mm; entries of R count times ``robot.length``. NaN where
+        How far the solution is at most, mm; entries of R count times ``robot.length``, and p is in
+        the machine's own frames: the origin of a tool frame is further off by its lever. NaN where
         nothing is proven.
     unique : ndarray (k,)
         No other solution is within this distance of the pose, in the same measure; of machines of

@@ -42,7 +42,8 @@ class Certificate(Result):
         There is a solution near, with R a rotation.
     error : ndarray (N,)
         How far it is at most, mm: for the entries of p, and those of R times the characteristic
-        length; NaN where nothing is proven.
+        length, of the platform in the machine's own frames: the origin of a tool frame is further
+        off by its lever. NaN where nothing is proven.
     unique : ndarray (N,)
         It is the only one within this distance, in the same measure; NaN likewise.
     """
