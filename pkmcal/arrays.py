@@ -45,7 +45,9 @@ def as_numbers(name: str, array: ArrayLike, last: str | int) -> NDArray[Any]:
         found = shown(array) if alone else f"dtype {given.dtype}"
         raise ArgumentTypeError(f"{name} must be an array of numbers, found {found}")
     if isinstance(array, np.ma.MaskedArray) and np.ma.is_masked(array):
-        return np.asarray(np.ma.filled(array.astype(np.float64), np.nan))  # not what lies below
+        return np.asarray(
+            np.ma.filled(array.astype(np.float64), np.nan)
+        )  # not what lies under the mask
     return given
 
 

@@ -59,7 +59,7 @@ class Fit:
 
         `Estimate.state` has them at the nominal machine; they turn with its errors.
         """
-        _, basis = decompose(np.vstack([self.estimate.jacobian, self.estimate.prior]))
+        _, basis = decompose(self.estimate.jacobian, self.estimate.prior)
         return basis[:, self.estimate.state.determined.rank :]
 
     def machine_combinations(self) -> int:

@@ -109,8 +109,8 @@ def parameter_table(
     along = rates @ estimate.state.determined.unidentifiable
     unknown = np.linalg.norm(along, axis=1) > _INVOLVED * chosen.scale
     unknown |= uncertainty.freedom <= 0  # nothing shows the deviation
-    after, rank = np.vstack([estimate.jacobian, estimate.prior]), estimate.state.determined.rank
-    held = rates @ held_errors(after, rank, chosen.robot.length)
+    rank, size = estimate.state.determined.rank, chosen.robot.length
+    held = rates @ held_errors(estimate.jacobian, estimate.prior, rank, size)
     shown = uncertainty.matrix + held @ held.T
     shown[unknown] = shown[:, unknown] = np.nan
     shown[unknown, unknown] = np.inf
@@ -247,6 +247,6 @@ def tested_prior(estimator: Estimator, estimate: Estimate) -> PriorTest | None:
             return None
         variance = squares / freedom
     columns = [estimate.jacobian @ known, estimate.jacobian @ rest, data]
-    factor = triangle(np.column_stack(columns))
+    factor = triangle(columns)
     k = len(rows)
     return prior_test(factor[:, :k], factor[:, k:-1], factor[:, -1], variance, freedom)

@@ -160,7 +160,7 @@ def _visits(fit: Fit, odd: Collection[int]) -> _Visits:
     mine = visit[labels.row] >= 0
     key = numbered(visit[labels.row][mine], labels.component[mine])
     whole = np.column_stack([sure.fit.design, sure.fit.residual, _by_component(fit)])
-    averaged = means(whole[mine], key)
+    averaged = means(whole if mine.all() else whole[mine], key)
     p = sure.fit.design.shape[1]
     return _Visits(
         names=names,

@@ -36,6 +36,9 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements import orientation
 from pkmcal.measurements.observation import by_difference, corrected, distance_per_point
 from pkmcal.result import failed_rows
+from pkmcal.statistics.linear_fit import lengths_squared
+
+_TOGETHER = 16384  # rows whose derivatives are multiplied at once
 
 # Whose, where, with which noise, and what `_system` says there; copies have another "whose".
 _Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, tuple[FloatArray, FloatArray]]
@@ -267,7 +270,7 @@ class Equations(Readings):
     def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Derivative (M, n) of what is predicted by the parameters; of what is left likewise."""
         if not self.closures.unknowns:
-            return self.whitened(self.jacobian(evaluation), noise)
+            return self.whiten(self.jacobian(evaluation), noise)
         p, (_, by_unknown) = self.parameters, self._at(evaluation, noise)
         of_closures = self.closures.by_numbers(
             evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
@@ -275,7 +278,7 @@ class Equations(Readings):
         of_closures /= noise[-1]
         by_all = self._counted(of_closures)
         if self.count.any():
-            readings = self.whitened(self.jacobian(evaluation), noise)
+            readings = self.whiten(self.jacobian(evaluation), noise)
             by_all = np.concatenate([by_all, readings])
         found, following = self._blocks.left(by_unknown, by_all)
         self._follow = evaluation, following
@@ -297,7 +300,8 @@ class Equations(Readings):
     ) -> tuple[FloatArray, FloatArray]:
         """Closures read less needed (K, equations), whitened, and their degrees of freedom.
 
-        None of those that do not count. Arguments are those of `by_groups`.
+        None of those that do not count. `weights` are those of `by_groups`, `taken` (M, r) what
+        Jacobian and directions give there.
         """
         off, by_unknown = self._at(evaluation, noise)
         own = int((~self._slack).sum())
@@ -417,18 +421,19 @@ class Equations(Readings):
         With the opposite sign that of the residuals.
         """
         p, numbers = self.parameters, self.spread.columns.shape[1]
-        by_geometry = self.closures.twists_by_numbers(
+        by_all = [np.zeros((*seen.values.shape, numbers)) for seen in evaluation.predicted]
+        for poses, twists in self.closures.twists_by_numbers(
             evaluation.machines, evaluation.states, p.places
-        )
+        ):
+            place = np.full(len(evaluation.pose), NONE)
+            place[poses] = np.arange(len(poses))
+            for i, seen in enumerate(evaluation.predicted):
+                _add_motion(by_all[i], seen.by_twist, twists, place[self.pose_of[i]])
+                if seen.by_other is not None:
+                    _add_motion(by_all[i], seen.by_other, twists, place[self.other_of[i]])
         parts = []
         for i, seen in enumerate(evaluation.predicted):
-            rows, k = seen.values.shape
-            part = np.zeros((rows, k, numbers))
-            if by_geometry is not None:
-                part[:, :, : len(p.places)] = seen.by_twist @ by_geometry[self.pose_of[i]]
-                if seen.by_other is not None:
-                    there = by_geometry[self.other_of[i]]
-                    part[:, :, : len(p.places)] += seen.by_other @ there
+            part = by_all[i]
             direct = self.by_numbers(i, evaluation.pose, evaluation.theta)
             if direct is not None:
                 part[:, :, : len(p.places)] += direct
@@ -447,7 +452,8 @@ class Equations(Readings):
         noise: FloatArray,
         weights: FloatArray,
         residual: FloatArray,
-        taken: FloatArray,
+        jacobian: FloatArray,
+        half: FloatArray,
     ) -> Shares:
         """Squares and degrees of freedom of each group.
 
@@ -461,21 +467,23 @@ class Equations(Readings):
             Of the units.
         residual : ndarray (M,)
             Whitened and weighted.
-        taken : ndarray (M, r)
-            Weighted Jacobian in directions in which the parameters' covariance is 1: the squares
-            of a row are the leverage of its equation.
+        jacobian : ndarray (M, n)
+            Weighted.
+        half : ndarray (n, r)
+            Directions in which the parameters' covariance is 1: in these the squares of a row of
+            the Jacobian are the leverage of its equation.
         """
         count = len(self.unstated)
         if not self.closures.unknowns:
             group = np.repeat(self._family_of_unit, self.components)
             every = np.repeat(weights, self.components)
-            left = every - (taken**2).sum(axis=1)
+            left = every - lengths_squared(jacobian, half)
             freedom = np.bincount(group, left, count).astype(np.float64)
             squares = np.bincount(group, residual**2, count).astype(np.float64)
             return Shares(squares, freedom, np.diag(freedom))
         _, by_unknown = self._at(evaluation, noise)
         group = self._group_of_equation
-        return self._blocks.by_groups(by_unknown, group, weights, residual, taken)
+        return self._blocks.by_groups(by_unknown, group, weights, residual, jacobian @ half)
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""
@@ -539,3 +547,15 @@ class Equations(Readings):
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""
         return failed_rows(self.status(evaluation), STATUS, self.rows, most=10)
+
+
+def _add_motion(
+    part: FloatArray, by_twist: FloatArray, twists: FloatArray, place: IntArray
+) -> None:
+    """Add how readings follow the twists (b, 6, g) to their derivatives (N, k, m), g ≤ m.
+
+    `by_twist` is (N, k, 6), `place` (N,) which of the twists moves each row; `NONE`: none of them.
+    """
+    moved = np.flatnonzero(place != NONE)
+    for rows in np.array_split(moved, 1 + len(moved) // _TOGETHER):
+        part[rows, :, : twists.shape[2]] += by_twist[rows] @ twists[place[rows]]

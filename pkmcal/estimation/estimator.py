@@ -20,7 +20,7 @@ from pkmcal.estimation.least_squares import Search
 from pkmcal.estimation.loss import Loss, LossName
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics import prior_test
-from pkmcal.statistics.linear_fit import column_basis, unit_basis
+from pkmcal.statistics.linear_fit import orthonormal, unit_basis
 from pkmcal.statistics.robust_scale import median_ratio
 
 _ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
@@ -239,10 +239,10 @@ class Estimator:
 
         None where too few equations are left to show it.
         """
-        basis = column_basis(jacobian)
-        left = residual - basis @ (basis.T @ residual)
+        half = orthonormal(jacobian)
+        left = residual - jacobian @ (half @ (half.T @ (jacobian.T @ residual)))
         every = np.ones(len(self.equations.components))
-        shares = self.equations.by_groups(evaluation, noise, every, left, basis)
+        shares = self.equations.by_groups(evaluation, noise, every, left, jacobian, half)
         few = (shares.freedom[self.unstated] < LEAST_FREEDOM).any()
         return None if few or shares.freedom.sum() < prior_test.LEAST_FREEDOM else shares
 
@@ -300,7 +300,7 @@ class Estimator:
         data = decompose(jacobian)
         if not self._priors:
             return data, data
-        return data, decompose(np.vstack([jacobian, self.search.prior(evaluation.theta)]))
+        return data, decompose(jacobian, self.search.prior(evaluation.theta))
 
     def _fewer(self, estimate: Estimate) -> IterationState | None:
         """The state to begin again with after a search without an end; None where there is none.
@@ -402,8 +402,12 @@ class Estimator:
             self.equations.jacobian(evaluation), self.equations.sets, strict=True
         ):
             arcs = mm_per_unit(measured.units, self.start.robot.length)
-            parts.append((part * arcs[:, None]).reshape(-1, part.shape[2]))
-        jacobian: FloatArray = np.concatenate(parts)[self.equations.present] * self.scale
+            part *= arcs[:, None]
+            parts.append(part.reshape(-1, part.shape[2]))
+        jacobian: FloatArray = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        if not self.equations.present.all():
+            jacobian = jacobian[self.equations.present]
+        jacobian *= self.scale
         return jacobian
 
     def _estimate(self, u: FloatArray, state: IterationState) -> Estimate:
@@ -412,9 +416,15 @@ class Estimator:
         residual = self.equations.residual(evaluation, state.noise)
         weights = state.loss.weights(residual)
         root = np.sqrt(np.repeat(weights, self.equations.components))
-        weighted = root[:, None] * jacobian
+        weighted = jacobian if self.loss == "linear" else root[:, None] * jacobian
         prior = self.search.prior(evaluation.theta)
         half = unit_basis(weighted, prior, state.determined.identifiable)
-        taken = weighted @ half[:, : state.fitted.rank]
-        shares = self.equations.by_groups(evaluation, state.noise, weights, root * residual, taken)
+        shares = self.equations.by_groups(
+            evaluation,
+            state.noise,
+            weights,
+            root * residual,
+            weighted,
+            half[:, : state.fitted.rank],
+        )
         return Estimate(evaluation, state, residual, jacobian, weights, prior, half, shares)

@@ -172,15 +172,16 @@ def _texts(free: FloatArray) -> list[str]:
         words += [f"turned about {_listed(turns)}"] if turns else []
         if words:
             texts.append(f"{moves} {' and '.join(words)}: {where}")
-    if len(alone) < free.shape[1]:  # turned about an anchor that is held, say
-        rest = free.copy()
-        rest[alone] = 0.0
-        held, more = free.shape[1] - len(alone), " more" if alone else ""
+    rest = free.copy()
+    rest[alone] = 0.0
+    grows = bool(np.linalg.norm(rest[_SCALE]) > _MIXED)  # about a place that was read, say
+    held, more = free.shape[1] - len(alone) - grows, " more" if alone else ""
+    if held:  # turned about an anchor that is held, say
         what = "the anchors may be moved as one body"
         if np.linalg.norm(rest[_PLATFORM:]) > _MIXED:
             what = "the anchors and the platform's joints may be moved together"
         texts.append(f"{what} in {held}{more} way{'s' * (held > 1)}")
-    if _SCALE in alone:
+    if grows or _SCALE in alone:
         texts.append("the common scale: all lengths and gains may grow by the same factor")
     return texts
 

@@ -59,11 +59,14 @@ class Directions:
 Decomposed = tuple[FloatArray, FloatArray]  # singular values (n,), directions (n, n)
 
 
-def decompose(jacobian: FloatArray) -> Decomposed:
-    """Singular values (n,), zeros where there are fewer rows, and all directions (n, n)."""
-    n = jacobian.shape[1]
+def decompose(*jacobian: FloatArray) -> Decomposed:
+    """Singular values (n,), zeros where there are fewer rows, and all directions (n, n).
+
+    The Jacobian may be in parts, below each other.
+    """
+    n = jacobian[0].shape[1]
     square = np.zeros((n, n))
-    factor = triangle(jacobian)
+    factor = triangle(*jacobian)
     square[: len(factor)] = factor
     _, singular, rows = np.linalg.svd(square)
     return singular, rows.T
@@ -98,7 +101,7 @@ def directions(
     return Directions(basis[:, :rank], basis[:, rank:], singular)
 
 
-def held_errors(jacobian: FloatArray, rank: int, size: float) -> FloatArray:
+def held_errors(jacobian: FloatArray, prior: FloatArray, rank: int, size: float) -> FloatArray:
     """What combinations may be off by that are held though errors of the machine show them.
 
     The machine as it was found determines a little what the nominal one does not. That is too
@@ -107,7 +110,9 @@ def held_errors(jacobian: FloatArray, rank: int, size: float) -> FloatArray:
     Parameters
     ----------
     jacobian : ndarray (M, n)
-        Scaled and whitened, after the fit, with the rows of a prior.
+        Scaled and whitened, after the fit.
+    prior : ndarray (p, n)
+        Rows of a prior.
     rank : int
         How many combinations were identifiable.
     size : float
@@ -120,7 +125,7 @@ def held_errors(jacobian: FloatArray, rank: int, size: float) -> FloatArray:
     """
     if rank == jacobian.shape[1]:
         return np.zeros((rank, 0))
-    singular, basis = decompose(jacobian)
+    singular, basis = decompose(jacobian, prior)
     shown = _count(singular, np.inf)
     errors: FloatArray = basis[:, rank:shown] * np.minimum(1.0 / singular[rank:shown], size)
     return errors

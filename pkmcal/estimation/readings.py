@@ -27,6 +27,7 @@ from pkmcal.measurements.observation import (
     read_angles,
 )
 
+_TOGETHER = 16384  # rows that are whitened at once by matrices
 ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
 
 
@@ -328,16 +329,22 @@ class Readings:
 
         `noise` (G,) multiplies what `Measurements.sigma` says. What was not read is left out.
         """
-        stacked = []
+        return self.whiten([np.array(part) for part in parts], noise)
+
+    def whiten(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
+        """The same as `whitened`, in the place of the parts: a Jacobian is large."""
         for part, white, factor in zip(parts, self._whiten, noise[: len(parts)], strict=True):
             if not self._whole:
-                part = np.nan_to_num(part, nan=0.0)
+                np.nan_to_num(part, copy=False, nan=0.0)
             if white.ndim == 3:
-                scaled = np.einsum("nij,nj...->ni...", white, part)
+                for first in range(0, len(part), _TOGETHER):
+                    rows = slice(first, first + _TOGETHER)
+                    part[rows] = np.einsum("nij,nj...->ni...", white[rows], part[rows])
             else:
-                scaled = white.reshape(*white.shape, *(1,) * (part.ndim - 2)) * part
-            stacked.append((scaled / factor).reshape(-1, *part.shape[2:]))
-        whole = np.concatenate(stacked)
+                part *= white.reshape(*white.shape, *(1,) * (part.ndim - 2))
+            part /= factor
+        flat = [part.reshape(-1, *part.shape[2:]) for part in parts]
+        whole = flat[0] if len(flat) == 1 else np.concatenate(flat)
         return whole if self._whole else whole[self.present]
 
     def unwhiten(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:

@@ -5,7 +5,7 @@ Where no number of the geometry is found anew in each session there is one machi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -21,6 +21,8 @@ from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
 
 AnyArray = TypeVar("AnyArray", FloatArray, Int32Array)
+
+_TOGETHER = 8192  # poses whose twists are held at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,17 +151,19 @@ class SessionClosures:
 
     def twists_by_numbers(
         self, machines: Machines, states: RowStates, places: IntArray
-    ) -> FloatArray | None:
-        """How the platform moves with numbers of its machine, unknowns held, (K, 6, g).
+    ) -> Iterator[tuple[IntArray, FloatArray]]:
+        """How the platform moves with numbers of its machine, unknowns held.
 
-        None: it does not.
+        Poses and their twists (b, 6, g), in lots where poses follow from the actuators: those of
+        all poses at once would be most of what a fit holds. Nothing where it does not move.
         """
-        found = [
-            part.twists_by_numbers(robot, own, places)
-            for part, robot, own in self._each(machines, states)
-        ]
-        held = [part for part in found if part is not None]
-        return _joined(held, self._rows) if held else None
+        for part, robot, rows in zip(self._parts, machines.robots, self._rows, strict=True):
+            most = len(rows) if self.unknowns else _TOGETHER
+            for own in (rows[first : first + most] for first in range(0, len(rows), most)):
+                driven = _driven(robot, machines.state.at(own))
+                found = part.twists_by_numbers(driven, _some(states, own), places)
+                if found is not None:
+                    yield own, found
 
     def _each(
         self, machines: Machines, states: RowStates

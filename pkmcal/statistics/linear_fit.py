@@ -7,6 +7,7 @@ spoil the others.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -137,7 +138,7 @@ def unit_basis(jacobian: FloatArray, prior: FloatArray, basis: FloatArray) -> Fl
 
     Arguments are those of `linear_fit`.
     """
-    whole = triangle(np.vstack([jacobian, prior])) @ basis
+    whole = triangle(jacobian, prior) @ basis
     _, singular, turned = np.linalg.svd(whole, full_matrices=False)
     back: FloatArray = basis @ (turned.T / singular)
     return back
@@ -166,22 +167,42 @@ def sums(rows: FloatArray, key: IntArray) -> FloatArray:
 
 def column_basis(matrix: FloatArray) -> FloatArray:
     """Orthonormal basis (M, r) of the columns."""
-    _, singular, rows = np.linalg.svd(triangle(matrix), full_matrices=False)
-    keep = singular > ROUNDING * singular[0]
-    basis: FloatArray = matrix @ (rows[keep].T / singular[keep])
+    basis: FloatArray = matrix @ orthonormal(matrix)
     return basis
 
 
-def triangle(matrix: FloatArray) -> FloatArray:
+def orthonormal(matrix: FloatArray) -> FloatArray:
+    """What the columns (M, n) are multiplied by, (n, r), to become a basis of theirs."""
+    _, singular, rows = np.linalg.svd(triangle(matrix), full_matrices=False)
+    keep = singular > ROUNDING * singular[0]
+    found: FloatArray = rows[keep].T / singular[keep]
+    return found
+
+
+def lengths_squared(matrix: FloatArray, directions: FloatArray) -> FloatArray:
+    """Squared lengths (M,) of the rows (M, n) in directions (n, r), without another matrix."""
+    found = np.empty(len(matrix))
+    for first in range(0, len(matrix), _IN_ONE_THREAD):
+        rows = slice(first, first + _IN_ONE_THREAD)
+        found[rows] = ((matrix[rows] @ directions) ** 2).sum(axis=1)
+    return found
+
+
+def triangle(*stacked: FloatArray | Sequence[FloatArray]) -> FloatArray:
     """Triangular factor R of a QR factorisation: RᵀR = AᵀA.
+
+    A consists of matrices below each other, each one matrix or several side by side.
 
     Rows enter in blocks so small that the linear algebra library does not spread them over
     threads, which on a busy computer takes a hundred times as long as the work itself.
     """
-    n = matrix.shape[1]
+    matrices = ([each] if isinstance(each, np.ndarray) else each for each in stacked)
+    below = [[p[:, None] if p.ndim == 1 else p for p in parts] for parts in matrices]
+    n = sum(part.shape[1] for part in below[0])
     block = max(n, _IN_ONE_THREAD // max(n, 1) - n)
     factor: FloatArray = np.zeros((0, n))
-    for start in range(0, len(matrix), block):
-        stacked = np.vstack([factor, matrix[start : start + block]])
-        factor = np.asarray(np.linalg.qr(stacked, mode="r"))
+    for beside in below:
+        for start in range(0, len(beside[0]), block):
+            rows = np.hstack([part[start : start + block] for part in beside])
+            factor = np.asarray(np.linalg.qr(np.vstack([factor, rows]), mode="r"))
     return factor

@@ -20,7 +20,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.statistics.distributions import f_tail
-from pkmcal.statistics.linear_fit import column_basis, sums
+from pkmcal.statistics.linear_fit import column_basis, sums, triangle
 
 WAVES = 3  # of each component
 LEAST = 5  # degrees of freedom beside them: below, nothing but a large jump would show
@@ -143,23 +143,26 @@ class Series:
         when = (np.arange(self.visits) + 0.5) / self.visits
         waves = np.cos(np.pi * when[:, None] * np.arange(1, WAVES + 1))
         columns = (self._own[:, :, None] * waves[self.visit][:, None]).reshape(len(self.visit), -1)
-        turn, sizes, back = np.linalg.svd(self._beside(columns), full_matrices=False)
-        new = sizes > _NEW * float(np.linalg.norm(columns, axis=0).max())
+        largest = float(np.einsum("ij,ij->j", columns, columns).max()) ** 0.5
+        columns = self._beside(columns)
+        _, sizes, back = np.linalg.svd(triangle(columns), full_matrices=False)
+        new = sizes > _NEW * largest
         taken = int(new.sum())
         freedom = len(self.residual) - self._known.shape[1] - taken
         if not taken or freedom < LEAST:
             return None
-        along = turn[:, new].T @ self.residual
+        onto = back[new].T / sizes[new]
+        along = onto.T @ (columns.T @ self.residual)
         explained = float(along @ along)
         whole = float(self._left @ self._left)
         variance = (whole - explained) / freedom
         if not variance > 0:
             return None
-        shares = (back[new].T @ (along / sizes[new])).reshape(k, WAVES)
+        shares = (onto @ along).reshape(k, WAVES)
         return Course(
             chance=f_tail(min(explained / taken / variance, 1e300), taken, freedom),
             explained=explained,
-            share=self._share(turn[:, new] @ along, freedom / len(self.residual)),
+            share=self._share(columns @ (onto @ along), freedom / len(self.residual)),
             values=waves @ shares.T * self._unit,
             scatter=np.sqrt(variance) * self._unit,
         )

@@ -66,7 +66,7 @@ def data_alone(jacobian: FloatArray, data: FloatArray) -> tuple[float, float]:
     data : ndarray (M,)
         Residuals at the expansion point.
     """
-    factor = triangle(np.column_stack([jacobian, data]))
+    factor = triangle([jacobian, data])
     n = jacobian.shape[1]
     basis, singular, _ = np.linalg.svd(factor[:, :n], full_matrices=False)
     basis = basis[:, singular > ROUNDING * singular[0]]

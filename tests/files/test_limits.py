@@ -123,6 +123,7 @@ def test_the_line_of_a_key_is_known_after_values_that_look_like_others(value: st
         ("x" + "a" * 100_000 + ",z [mm]\n1,2\n", "heading of column 1 has 100001 characters"),
         (",".join(f"x{i}" for i in range(100_000)) + "\n" + "," * 99_999, "100000 columns"),
     ],
+    ids=["unit far in", "unit far out", "long heading", "many columns"],
 )
 def test_a_table_beyond_the_limits_is_refused(content: str, message: str, tmp_path: Path) -> None:
     assert re.search(message, refused(Table, tmp_path / "m.csv", content))

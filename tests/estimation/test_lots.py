@@ -1,0 +1,50 @@
+"""Derivatives of many rows are made in lots, which change nothing but the memory they take."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.estimation import equations, readings, session_machines
+
+
+def fitted(robot: pk.Robot) -> pk.Identification:
+    """Poses with full covariances, and positions of repeats in any order."""
+    rng = np.random.default_rng(3)
+    q = robot.inverse(pk.sample_poses(robot, 30, seed=4))
+    true = robot.replace({"offset2": 0.2})
+    machine = pk.VirtualMachine(true, noise=0.01, seed=5)
+    spread = rng.normal(size=(30, 6, 6))
+    covariance = 1e-4 * (np.eye(6) + 0.1 * spread @ spread.transpose(0, 2, 1))
+    noise = np.einsum("nij,nj->ni", np.linalg.cholesky(covariance), rng.normal(size=(30, 6)))
+    sets = [
+        pk.Measurements(q, true.forward(q).pose + noise, "pose", sigma=covariance),
+        machine.measure(np.repeat(q[:12], 3, axis=0)[rng.permutation(36)], "position"),
+    ]
+    return pk.identify(robot, sets, free="offset*")
+
+
+def test_derivatives_in_lots_are_those_made_at_once(
+    hexapod: pk.Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = fitted(hexapod).fit
+    noise = np.ones(2)
+    at_once = fit.equations.by_parameters(fit.end, noise)
+    for module, together in ((session_machines, 7), (equations, 5), (readings, 4)):
+        monkeypatch.setattr(module, "_TOGETHER", together)
+    in_lots = fit.equations.by_parameters(fit.end, noise)
+    assert np.abs(at_once).max() > 1.0
+    np.testing.assert_allclose(in_lots, at_once, rtol=0, atol=1e-12 * np.abs(at_once).max())
+
+
+def test_derivatives_are_those_of_the_residuals(hexapod: pk.Robot) -> None:
+    fit = fitted(hexapod).fit
+    noise, step = np.ones(2), 1e-4
+    found = fit.equations.by_parameters(fit.end, noise)
+    for column in range(found.shape[1]):
+        by = step * np.eye(found.shape[1])[column]
+        after, before = (fit.equations.at(fit.end.theta + sign * by) for sign in (1, -1))
+        change = fit.equations.residual(before, noise) - fit.equations.residual(after, noise)
+        difference = change / (2 * step)
+        np.testing.assert_allclose(found[:, column], difference, atol=1e-5 * np.abs(found).max())
