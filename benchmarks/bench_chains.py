@@ -1,10 +1,11 @@
-"""Forward kinematics of machines of chains, one thread, beside the same machines of fast limbs.
+"""Forward kinematics of machines of chains beside the same machines of fast limbs.
 
 python -m benchmarks.bench_chains
 """
 
 from __future__ import annotations
 
+import os
 import tempfile
 import time
 from functools import partial
@@ -42,19 +43,24 @@ def with_axes(text: str) -> str:
 
 
 def main() -> None:
-    """Print microseconds a pose, cold from home."""
+    """Print microseconds a pose, cold from home: of one thread, and as it is called by itself."""
     with tempfile.TemporaryDirectory() as folder:
         robots = machines(Path(folder))
     random = np.random.default_rng(0)
-    cases, said = {}, {}
+    alone, together, said = {}, {}, {}
     for name, robot in robots.items():
         way = np.array([REACH[unit] for unit in robot.actuator_units])
         q = robot.inverse(robot.home) + random.uniform(-way, way, (ROWS, robot.n_actuators))
         found = robot.forward(q)
         said[name] = f"{found.iterations.mean():5.2f} steps, {100 * found.ok.mean():.2f} % ok"
-        cases[name] = partial(robot.forward, q, threads=1)
-    for name, seconds in medians(cases, rounds=7, clock=time.thread_time).items():
-        print(f"{name:32} {1e6 * seconds / ROWS:7.3f} µs a pose   {said[name]}")
+        alone[name] = partial(robot.forward, q, threads=1)
+        together[name] = partial(robot.forward, q)
+    by_one = medians(alone, rounds=7, clock=time.thread_time)
+    by_all = medians(together, rounds=7, clock=time.perf_counter)
+    print(f"µs a pose, one thread and all of {os.cpu_count()} processors")
+    for name in robots:
+        each = (1e6 * found[name] / ROWS for found in (by_one, by_all))
+        print(f"{name:32}" + "".join(f" {one:7.3f}" for one in each) + f"   {said[name]}")
 
 
 if __name__ == "__main__":

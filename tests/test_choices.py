@@ -335,6 +335,7 @@ def test_the_last_bit_does_not_move_a_pose_across_a_limit(name: str) -> None:
         assert tight.feasible(tight.forward(moved(q, seed), guess=at).pose).ok.all()
         modes = tight.forward_all(moved(q[seed], seed))
         assert modes.feasible[modes.nearest(at[seed])]
-    plans = [pk.plan_poses(tight, moved(at, seed), 4, kind="pose").indices.tolist()
+    by = "A" if robot.model.map == "spherical" else "prediction"  # its origin stays where it is
+    plans = [pk.plan_poses(tight, moved(at, seed), 4, kind="pose", criterion=by).indices.tolist()
              for seed in (0, *SEEDS)]  # fmt: skip
     assert all(plan == plans[0] for plan in plans)

@@ -79,9 +79,11 @@ def displaced_target(fit: Fit) -> DisplacedTarget | None:
     if sure.mixed or sure.rounded:
         return None
     targets = dict(_targets(fit))
+    if len(targets) < 2:
+        return None
     tested = {name: score_test(sure.fit, _columns(fit, rows)) for name, rows in targets.items()}
     known = {name: score for name, score in tested.items() if score is not None}
-    if len(targets) < 2 or not known:
+    if not known:
         return None
     name = max(known, key=lambda each: known[each].drop)
     best = known[name]

@@ -77,7 +77,7 @@ class Uncertainty:
         """Whether there is noise to state the uncertainty: stated, or shown by spare equations."""
         return not self.unknown.any()
 
-    @property
+    @cached_property
     def rounded(self) -> bool:
         """Whether the residuals are nothing but rounding errors."""
         limit = _ROUNDED * self.equations.rounding(self.factors)

@@ -21,6 +21,7 @@ import numpy as np
 from pkmcal import arguments
 from pkmcal.arguments import did_you_mean
 from pkmcal.arrays import FloatArray, Int64Array
+from pkmcal.display import printable
 from pkmcal.exceptions import FileError
 from pkmcal.files import reading, units
 from pkmcal.files.column_names import BESIDE, is_known
@@ -309,14 +310,16 @@ class Table:
         for row, cell in enumerate(column.cells):
             if unseen and cell.lower() in _UNSEEN:
                 values[row] = math.nan
-                self.note(f"cells with {cell!r} taken as not measured")
+                self.note(f"cells with {printable(cell)!r} taken as not measured")
                 continue
             values[row] = math.nan if blank and not cell else self._number(name, row, cell, signs)
         with np.errstate(over="ignore"):
             converted = values * times / over
         if (row := int(np.argmax(np.isinf(converted)))) or np.isinf(converted[0]):
             cell = column.cells[row]
-            raise self.cell_error(name, row, f"expected a smaller number, found {cell!r}")
+            raise self.cell_error(
+                name, row, f"expected a smaller number, found {printable(cell)!r}"
+            )
         return converted, quantity
 
     def stacked(self, names: Sequence[str], units: Sequence[str]) -> FloatArray:
@@ -381,10 +384,10 @@ class Table:
         try:
             value = float(plain(cell, signs, self.columns[name].decimal_comma))
         except ValueError:
-            found = f"found {cell!r}" if cell else "found an empty cell"
+            found = f"found {printable(cell)!r}" if cell else "found an empty cell"
             raise self.cell_error(name, row, f"expected a number, {found}") from None
         if not math.isfinite(value):
-            raise self.cell_error(name, row, f"expected a finite number, found {cell!r}")
+            raise self.cell_error(name, row, f"expected a finite number, found {printable(cell)!r}")
         return value
 
     def texts(self, name: str) -> tuple[str, ...]:
@@ -402,7 +405,9 @@ class Table:
         cells = self.texts(name)
         for row, cell in enumerate(cells):
             if not re.fullmatch(r"[+-]?[0-9]{1,18}", cell):
-                raise self.cell_error(name, row, f"expected a whole number, found {cell!r}")
+                raise self.cell_error(
+                    name, row, f"expected a whole number, found {printable(cell)!r}"
+                )
         return np.array([int(cell) for cell in cells], dtype=np.int64)
 
 

@@ -95,6 +95,8 @@ def _limb(table: Table, parameters: Parameters, map: str, known: dict[str, Joint
     values: dict[str, float] = {}
     for k, each in enumerate(listed):
         share = _share(each)
+        if share and any(joint.share == share for joint in joints):
+            each.fail("share", f"{share!r} is a joint of this limb already")
         if share in known and set(each.data) == {"share"}:
             joints.append(known[share])
             continue

@@ -271,7 +271,11 @@ BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"patience": 0}, ValueError, "patience"),
     ({"tolerance": -1.0}, ValueError, "tolerance"),
     ({"objective": lambda x: x}, ValueError, r"one value for each of 100 particles"),
-    ({"objective": lambda x: ["a"] * len(x)}, TypeError, "objective must return numbers"),
+    (
+        {"objective": lambda x: ["a"] * len(x)},
+        TypeError,
+        "what objective returns must be an array of numbers",
+    ),
 ]
 
 

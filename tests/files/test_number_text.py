@@ -59,3 +59,11 @@ def test_text_below_the_table_is_left_out(tmp_path: Path) -> None:
     path.write_text("q1 [mm],z [mm],A.b [mm]\n1,2,3\n1,2\n")
     with pytest.raises(pk.FileError, match="line 3: 2 cells under 3 column names"):
         pk.read_measurements(path)
+
+
+def test_a_cell_that_goes_on_is_quoted_by_its_beginning(tmp_path: Path) -> None:
+    path = tmp_path / "m.csv"
+    path.write_text(f"q1 [mm],z [mm]\n1,{'2.5' * 2000}\n", encoding="utf-8")
+    with pytest.raises(pk.FileError, match=r"line 2, column 'z'.*found '2\.52\.5") as caught:
+        pk.read_measurements(path)
+    assert len(str(caught.value)) < 300 + len(str(path))

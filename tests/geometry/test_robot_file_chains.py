@@ -129,6 +129,8 @@ def test_parameters_of_places_are_values_and_no_numbers() -> None:
          " actuator = 1, at = [0, 0, 9],", "actuator 1 turns one joint and slides another"),
         ('kind = "S"', 'actuator = 9, kind = "S"', "has several axes: list the actuated one"),
         ('kind = "S"', 'soft = 3, kind = "S"', "the ball that ends a limb is always 1"),
+        ("joints = [", 'joints = [ { kind = "R", share = "a", at = [0, 0, 9], axis = [0, 1, 0] },'
+         ' { share = "a" },', "'a' is a joint of this limb already"),
     ],
 )  # fmt: skip
 def test_mistakes_are_one_line_that_says_where(old: str, new: str, said: str) -> None:

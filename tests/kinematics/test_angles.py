@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -220,10 +221,15 @@ def test_moves_of_any_machine_are_continuous(kind: str, seed: int, space: str) -
     if space == "pose" and kind in generated.CONSTRAINED:
         pytest.skip("such machines do not follow straight lines")
     robot, rng = drawn(kind, seed)
-    at = reached(kind, robot, rng)[:2]
+    at = reached(kind, robot, rng)
     if kind == "planar":  # a straight way keeps to the plane
         assert robot.violation(at).max() < 1e-6
-    way = pk.trajectory.move(robot, at[0], at[1], duration=1.0, space=space)
+    for start, end in pairwise(at):
+        try:
+            way = pk.trajectory.move(robot, start, end, duration=1.0, space=space)
+            break
+        except pk.ArgumentError as refused:  # such actuators lead out of the mode on the way
+            assert space == "joint" and "assembly mode" in str(refused)
     times = np.linspace(0.0, 1.0, 1001)
     found = way.sample(times)
     known = np.isfinite(found.actuators).all(axis=1)
