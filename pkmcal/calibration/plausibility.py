@@ -48,7 +48,7 @@ def likely_unit_errors(
     """Suspect units or exchanged columns in measurements that are grossly off.
 
     Each set is read in other units and with columns exchanged; a reading that fits far better is
-    named.
+    named. Where some rows are out of reach as given, it has to fit better than the others do.
     """
     size = parameters.robot.length
     found = []
@@ -57,26 +57,28 @@ def likely_unit_errors(
         if not read.any():
             continue
         residual = np.where(read, evaluation.residuals[i], 0.0)
-        present = _misfit(residual, data.measured.units, size)
+        off = _misfits(residual, data.measured.units, size)
+        present = _together(off)
         if present <= GROSS * size:
             continue
         trials = {
-            words: _misfit(
+            words: _misfits(
                 np.where(read, _alone(replace(data, measured=other), parameters), 0.0),
                 other.units,
                 size,
             )
             for words, other in other_readings(data.measured, parameters.robot.actuator_units)
         }
+        misfit = {words: _together(trial) for words, trial in trials.items()}
         # exchanges that are equivalent on a symmetric machine misfit alike
-        least = min(trials.values())
-        words = next(text for text in trials if trials[text] <= least * (1.0 + _ALIKE))
-        if trials[words] < MISFIT_RATIO * present:
+        least = min(misfit.values())
+        words = next(text for text in trials if misfit[text] <= least * (1.0 + _ALIKE))
+        if misfit[words] < MISFIT_RATIO * present and _better_where_reached(trials[words], off):
             which = f"measurements {i + 1}: " if len(datasets) > 1 else ""
-            off = (
+            where = (
                 f"off by {present:.3g} mm" if np.isfinite(present) else "out of the machine's reach"
             )
-            found.append(f"{which}{off} as given, but by {trials[words]:.3g} mm if {words}")
+            found.append(f"{which}{where} as given, but by {misfit[words]:.3g} mm if {words}")
     return found
 
 
@@ -85,10 +87,26 @@ def _alone(data: FitData, parameters: Parameters) -> FloatArray:
     return residual
 
 
-def _misfit(residual: FloatArray, units: Sequence[str], size: float) -> float:
-    """Root mean square residual, mm; angles as their arc. inf if a row is not reached."""
-    off = np.linalg.norm(residual * mm_per_unit(units, size), axis=1)
+def _misfits(residual: FloatArray, units: Sequence[str], size: float) -> FloatArray:
+    """Residual of each row, mm; angles as their arc. NaN if the row is not reached."""
+    off: FloatArray = np.linalg.norm(residual * mm_per_unit(units, size), axis=1)
+    return off
+
+
+def _together(off: FloatArray) -> float:
+    """Root mean square of all rows; inf if one is not reached."""
     return rms(off) if np.isfinite(off).all() else float("inf")
+
+
+def _better_where_reached(trial: FloatArray, off: FloatArray) -> bool:
+    """Whether the rows that are reached as given speak for another reading, too.
+
+    Their medians, for some rows may be solved in another assembly mode.
+    """
+    reached = np.isfinite(off)
+    if reached.all() or not reached.any():
+        return True
+    return bool(np.median(trial[reached]) < MISFIT_RATIO * np.median(off[reached]))
 
 
 def other_readings(

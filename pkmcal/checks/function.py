@@ -41,7 +41,11 @@ _LENGTHS = {
 def wrong_unit(robot: Robot) -> Iterator[Finding]:
     """Angles beyond a full turn, and lengths out of all proportion to the others."""
     geometry = robot.geometry
-    for name, value, unit in zip(geometry.names, geometry.values, geometry.units, strict=True):
+    numbers = zip(geometry.names, geometry.values, geometry.units, strict=True)
+    home = zip(
+        [f"home {name}" for name in POSE], robot.own_home, COORDINATE_UNITS.values(), strict=True
+    )
+    for name, value, unit in (*numbers, *home):
         most = _STEEP if ".tilt" in name else _FULL_TURN
         if unit == "rad" and abs(value) > most:
             yield Finding(

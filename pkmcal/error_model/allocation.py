@@ -328,6 +328,11 @@ def _groups(robot: Robot, joints: str | Sequence[str] | None) -> dict[str, list[
             for name, unit, tied in zip(geometry.names, geometry.units, geometry.tied, strict=True)
             if unit == "mm" and not tied
         ]
+        if not lengths:
+            raise ArgumentError(
+                f"joints: by default they are those with lengths, and {robot.name} has none of its"
+                " own; name angles"
+            )
         joints = list(dict.fromkeys(_JOINT.sub(r"\1.*", name) for name in lengths))
     groups: dict[str, list[int]] = {}
     owner: dict[str, str] = {}
@@ -337,9 +342,10 @@ def _groups(robot: Robot, joints: str | Sequence[str] | None) -> dict[str, list[
     for joint in joints:
         names = geometry.match(joint, "joints")
         places = [geometry.names.index(name) for name in names]
-        if len({geometry.units[place] for place in places}) > 1:
+        covered = sorted({geometry.units[place] for place in places})
+        if len(covered) > 1:
             raise ArgumentError(
-                f"joints: {joint!r} covers lengths and other numbers; name them apart"
+                f"joints: {joint!r} covers numbers in {' and '.join(covered)}; name them apart"
             )
         for name in names:
             if name in owner:

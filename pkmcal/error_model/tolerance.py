@@ -315,7 +315,13 @@ def sigma_of(robot: Robot, sigma: Sigma) -> tuple[IntArray, FloatArray]:
                 )
             found[matched] = _deviations(f"sigma of {pattern}", given, ())
     elif as_numbers("sigma", sigma, len(geometry)).ndim == 0:
-        found[~geometry.tied & (units == "mm")] = _deviations("sigma", sigma, ())
+        lengths = ~geometry.tied & (units == "mm")
+        if not lengths.any():
+            raise ArgumentError(
+                f"sigma: one number is for lengths, and {robot.name} has none of its own; name"
+                " angles in a mapping, rad"
+            )
+        found[lengths] = _deviations("sigma", sigma, ())
     else:
         found[:] = _deviations("sigma", sigma, (len(geometry),))
         if found[geometry.tied].any():

@@ -332,3 +332,21 @@ def test_struts_exchanged_in_a_log_that_is_a_row_late_are_both_named(hexapod: pk
         except pk.ArgumentError as error:
             said = str(error)
     assert "if q3 and q4 are exchanged and each reading belongs to the row 1 before it" in said
+
+
+def test_rows_out_of_reach_do_not_make_another_reading_likely_that_fits_the_others_worse() -> None:
+    robot = pk.load("3rrr-planar")
+    poses = pk.sample_poses(robot, 200, seed=1, share=0.9)
+    q = robot.inverse(poses)
+    exchanged = q[:, [1, 0, 2]]
+    there, other_way = robot.forward(q).ok, robot.forward(exchanged).ok
+    good, bad = np.flatnonzero(there & other_way)[:20], np.flatnonzero(there & ~other_way)[:2]
+    values = np.vstack([robot.forward(q[good]).pose, poses[bad]])[:, :3]
+    mixed = pk.Measurements(np.vstack([q[good], exchanged[bad]]), values, sigma=0.02)
+    with pytest.raises(ValueError, match="rows 21") as told:
+        pk.identify(robot, mixed, "offset*")
+    assert "exchanged" not in str(told.value)  # by which twenty rows that fit would be 50 mm off
+    wrong = pk.Measurements(exchanged, poses[:, :3], sigma=0.02)
+    assert not robot.forward(exchanged).ok.all()
+    with pytest.raises(ValueError, match=r"but by .* mm if q1 and q2 are exchanged"):
+        pk.identify(robot, wrong.select(there), "offset*")

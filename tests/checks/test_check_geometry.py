@@ -233,6 +233,19 @@ def test_degrees_where_radians_are_meant_are_named() -> None:
     assert angle.what == "offset1 is 45 rad, 2578.31 deg"
 
 
+@pytest.mark.parametrize("degrees", [-30.0, 25.4, 180.0])
+def test_a_home_in_degrees_where_radians_are_meant_is_named(degrees: float) -> None:
+    robot = pk.load("3rrr-planar")
+    for turn, found in ((degrees, True), (np.radians(degrees), False)):
+        home = (*robot.model.home[:5], turn)
+        angles = [
+            f.what
+            for f in pk.check_geometry(with_model(robot, home=home)).findings
+            if f.kind == "angle"
+        ]
+        assert any(what.startswith("home gamma is") for what in angles) is found
+
+
 def test_stated_numbers_name_the_likely_unit(tmp_path: Path) -> None:
     text = (
         (Path(pk.__file__).parent / "builtin" / "machines")

@@ -194,7 +194,7 @@ def test_the_check_draws_other_machines_than_the_scaling() -> None:
         ({"allowed": {"x": "1"}}, TypeError, "allowed x must be a number"),
         ({"allowed": {"gamma": 0.1}}, ValueError, "has an effect on gamma"),
         ({"joints": ["base1.*", "base*.x"]}, ValueError, "base1.x is named by 'base1"),
-        ({"joints": ["*1"]}, ValueError, "covers lengths and other numbers"),
+        ({"joints": ["*1"]}, ValueError, "covers numbers in 1 and mm"),
         ({"joints": ["bse1.x"]}, ValueError, "did you mean 'base1.x'"),
         ({"cost": {"offset9": 1.0}}, ValueError, "cost: 'offset9' is none of the joints"),
         ({"cost": -1.0}, ValueError, "must be above 0"),
@@ -224,3 +224,14 @@ def test_joints_are_one_name_or_several_but_not_none() -> None:
     assert one.sigma == listed.sigma
     with pytest.raises(ValueError, match="joints: name at least one"):
         pk.allocate_tolerance(robot, robot.home, 0.5, joints=[])
+
+
+def test_a_machine_without_lengths_is_allocated_by_the_angles_that_are_named() -> None:
+    robot = pk.load("agile-eye")
+    allowed = {"alpha": 0.01}
+    with pytest.raises(ValueError, match=r"joints: by default .* agile eye has none"):
+        pk.allocate_tolerance(robot, robot.home, allowed)
+    with pytest.raises(ValueError, match="covers numbers in 1 and rad"):
+        pk.allocate_tolerance(robot, robot.home, allowed, joints="*1")
+    found = pk.allocate_tolerance(robot, robot.home, allowed, joints="offset*", samples=500)
+    assert found.sigma[0] > 0

@@ -432,6 +432,15 @@ def test_a_wrong_sigma_is_named(sigma: Any, error: type, words: str) -> None:
         pk.tolerance(robot, robot.home, sigma, samples=10)
 
 
+def test_one_sigma_is_refused_where_there_are_no_lengths() -> None:
+    robot = pk.load("agile-eye")
+    with pytest.raises(
+        ValueError, match="sigma: one number is for lengths, and agile eye has none"
+    ):
+        pk.tolerance(robot, robot.home, 0.01, samples=10)
+    assert pk.tolerance(robot, robot.home, {"offset*": 0.01}, samples=10).std[3:].all()
+
+
 def test_a_tied_number_has_no_sigma_of_its_own() -> None:
     robot = pk.load(DELTA)
     with pytest.raises(ValueError, match="driven by the parameter"):
