@@ -12,44 +12,11 @@
 #include "closure.h"
 #include "solve.h"
 
-enum { MAX_ITERATIONS = 60, MAX_HALVINGS = 20, STRAIGHT = 8 };
+enum { MAX_ITERATIONS = 60, MAX_HALVINGS = 20 };
 #define MAX_TURN 0.5      /* rad, the longest rotation of one step */
 #define CLOSED 2e-14      /* residual at which a closure holds, relative to the machine's size */
 #define SETTLED 5e-12     /* step after which the pose is known, relative likewise */
-#define BESIDE 1e-5      /* step of differences, relative likewise */
 #define LEAST_PIVOT 2e-5  /* relative pivot under which 1e-11 of the size is not assured */
-
-/* Step x where rows contradict each other, after STRAIGHT steps of Gauss and Newton: from the balance
- * b = J'r by the whole of its derivative, J'J + sum r dJ, in differences. With J'J alone steps fall by
- * what the rows miss times their curvature against it, and where that is much, not at all. A lane in
- * which the whole leads uphill keeps the x that it has, and its pivot. */
-SHARED void balanced_step(int map, const pkm_machine *machine, const FN(limb_sphere) *limb,
-                          const real *state, const real *b, real *x, real *pivot)
-{
-    const int m = map_m(map);
-    const real h = fill(BESIDE * machine->size);
-    real phi[PKM_MAX_ROWS], jacobian[PKM_MAX_ROWS * 6], A[36];
-    real other[6], other_pivot, down = fill(0.0);
-    for (int j = 0; j < m; j++) {
-        real side[2][6];
-        for (int way = 0; way < 2; way++) {
-            real step[6] = {0}, moved[MAX_STATE];
-            step[j] = way ? h : -h;
-            if (map_is_angle(map, j)) step[j] *= 1.0 / machine->length;
-            memcpy(moved, state, sizeof moved);
-            FN(map_retract)(map, state, step, moved);
-            const int rows = scaled_rows(map, machine, limb, moved, phi, jacobian);
-            normal_side(m, rows, jacobian, phi, side[way]);
-        }
-        for (int i = 0; i < m; i++) A[i * m + j] = (side[1][i] - side[0][i]) / (2.0 * h);
-    }
-    memcpy(other, b, sizeof(real) * m);
-    solve(m, 1, A, other, &other_pivot);
-    for (int j = 0; j < m; j++) down += other[j] * b[j];
-    const mask taken = (down > fill(0.0)) & finite(down);
-    for (int j = 0; j < m; j++) x[j] = select(taken, other[j], x[j]);
-    *pivot = select(taken, other_pivot, *pivot);
-}
 
 /* One block: status, iterations and residual of each lane; state holds the guess and the answer. */
 INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *limb, mask running,
@@ -78,13 +45,10 @@ INLINE void newton(int map, const pkm_machine *machine, const FN(limb_sphere) *l
         const mask better = (squares <= merit * (1.0 + 1e-9) + rounding) & running;
         const mask halved = running & ~better;
         share = select(halved, 0.5 * share, fill(1.0));
-        real fresh[6], balance[6], trial_pivot;
+        real fresh[6], trial_pivot;
         normal_matrix(m, rows, jacobian, A);
         normal_side(m, rows, jacobian, phi, fresh);
-        const int balanced = rows > m && k >= STRAIGHT;
-        if (balanced) memcpy(balance, fresh, sizeof(real) * m);
         solve(m, 1, A, fresh, &trial_pivot);
-        if (balanced) balanced_step(map, machine, limb, trial, balance, fresh, &trial_pivot);
         if (rows > m) trial_pivot = FN(root)(trial_pivot); /* the normal equations square it */
         real longest = zero, turn = zero;
         for (int j = 0; j < m; j++) {

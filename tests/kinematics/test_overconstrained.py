@@ -127,22 +127,6 @@ def test_the_pose_moves_as_solving_again_says(made_of: Callable[[], pk.Robot]) -
     assert np.abs((found - solved) * arcs).max() < 1e-9 * np.abs(solved * arcs).max()
 
 
-def test_rows_that_miss_each_other_by_much_settle_where_they_balance() -> None:
-    """Far from home, where some directions are held by little; steps of Gauss and Newton crawl."""
-    robot = eight_legs()
-    at = pk.sample_poses(robot, 300, share=0.7)
-    rng = np.random.default_rng(2)
-    q = robot.inverse(at) + rng.normal(0, 1.5, (len(at), robot.n_actuators))
-    found = robot.forward(q, guess=at)
-    assert found.ok.mean() > 0.98 and not (found.status == 1).any()
-    assert found.iterations.max() < 50
-    solved = found.ok
-    rows = robot.machine.closure(robot.slots, robot.own_rows(found.pose[solved])[0], q[solved])
-    balance = np.einsum("nri,nr->ni", rows.by_step, rows.residual)
-    assert np.abs(rows.residual).max(axis=1).min() > 0.1
-    assert np.abs(balance).max() < 1e-8
-
-
 @pytest.mark.parametrize("made_of", [eight_legs, four_planes, four_cranks])
 def test_redundant_chains_move_as_solving_again_says(
     made_of: Callable[[], pk.Robot], tmp_path: Path
