@@ -25,14 +25,6 @@ typedef struct {
     real taken[6][MAX_CHAIN_UNKNOWNS]; /* what the own joints' balance takes from the others' */
 } chain_balance;
 
-INLINE void cross(const real *a, const real *b, real *out)
-{
-    for (int i = 0; i < 3; i++) {
-        const int j = (i + 1) % 3, k = (i + 2) % 3;
-        out[i] = a[j] * b[k] - a[k] * b[j];
-    }
-}
-
 /* Rows that close in their places among all six; the reverse of chain_cut. */
 INLINE void chain_lift(const pkm_chains *machine, int l, const real *cut, real *out)
 {
@@ -145,15 +137,7 @@ SHARED void chain_rest(const pkm_chains *machine, int l, const chain_numbers *nu
     if (!machine->ball[l]) FN(chain_turned)(end->R, R, rest->by_end, rest->by_platform);
     chain_lift(machine, l, view.r, rest->r);
     chain_wrench(machine, l, rest, rest->r, rest->u);
-    for (int j = 0; j < m; j++) {
-        const real *t = twist + 6 * j;
-        for (int i = 0; i < 3; i++) {
-            const int h = (i + 1) % 3, k = (i + 2) % 3;
-            rest->step[j][i] = machine->ball[l] ? fill(0.0) : t[i] * machine->length;
-            rest->step[j][3 + i] = t[3 + i];
-            if (machine->ball[l]) rest->step[j][3 + i] += t[h] * rest->lever[k] - t[k] * rest->lever[h];
-        }
-    }
+    for (int j = 0; j < m; j++) chain_met(machine, l, rest->lever, twist + 6 * j, rest->step[j]);
     rest->passive = 0;
     for (int j = 0, own = 0; j < rest->joints; j++) {
         const int joint = machine->member[first + j], c = rest->passive;

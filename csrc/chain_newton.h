@@ -33,6 +33,25 @@ typedef struct {
     mask known; /* do the rows say where the platform is, and the platform where the joints are? */
 } chain_matrix;
 
+INLINE void cross(const real *a, const real *b, real *out)
+{
+    for (int i = 0; i < 3; i++) {
+        const int j = (i + 1) % 3, k = (i + 2) % 3;
+        out[i] = a[j] * b[k] - a[k] * b[j];
+    }
+}
+
+/* The platform's twist (ω, v) as a hybrid one, turns as arcs; where chain l ends in a ball, of that. */
+INLINE void chain_met(const pkm_chains *machine, int l, const real *lever, const real *twist, real *out)
+{
+    real moved[3];
+    cross(twist, lever, moved);
+    for (int i = 0; i < 3; i++) {
+        out[i] = twist[i] * machine->length;
+        out[3 + i] = machine->ball[l] ? twist[3 + i] + moved[i] : twist[3 + i];
+    }
+}
+
 /* A wrench's product with a twist's closing rows. */
 INLINE real wrench_on(int rows, const real *N, const real *x)
 {
@@ -79,11 +98,8 @@ INLINE void chain_rows(const pkm_chains *machine, int l, const chain_view *view,
         real omega[3] = {fill(0.0), fill(0.0), fill(0.0)}, v[3] = {fill(0.0), fill(0.0), fill(0.0)};
         real *row = jacobian + n * unknowns, phi;
         if (machine->ball[l]) {
-            for (int i = 0; i < 3; i++) {
-                const int j = (i + 1) % 3, k = (i + 2) % 3;
-                omega[i] = view->lever[j] * N[k] - view->lever[k] * N[j];
-                v[i] = N[i];
-            }
+            cross(view->lever, N, omega);
+            for (int i = 0; i < 3; i++) v[i] = N[i];
         } else {
             for (int i = 0; i < view->rows; i++)
                 if (which[i] < 3) omega[which[i]] = N[i] * machine->length;
@@ -164,12 +180,7 @@ INLINE void chain_follow(const pkm_chains *machine, int l, chain_view *view, con
 {
     const int first = machine->first[l];
     real x[6], all[6];
-    for (int i = 0; i < 3; i++) {
-        const int j = (i + 1) % 3, k = (i + 2) % 3;
-        all[i] = twist[i] * machine->length;
-        all[3 + i] = twist[3 + i];
-        if (machine->ball[l]) all[3 + i] += twist[j] * view->lever[k] - twist[k] * view->lever[j];
-    }
+    chain_met(machine, l, view->lever, twist, all);
     chain_cut(machine, l, all, x);
     for (int i = 0; i < view->rows; i++) {
         x[i] -= view->r[i];

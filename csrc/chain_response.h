@@ -261,7 +261,7 @@ SHARED mask chain_by_balance(chain_sink *sink, const chain_geometry *of, const c
     chain_answer_to(machine, at, twists, good, unknowns, X, answer);
     sink->answer = answer, sink->all = unknowns;
     for (int l = 0; l < machine->chains; l++) {
-        const chain_of own = {l, 0, NULL, &rest};
+        const chain_of own = {l, 0, NULL, &rest}; /* looked at again: all at once are too much for a stack */
         chain_rest(machine, l, numbers, at, drive, R, p, twist, &rest, all);
         chain_by_numbers(sink, &own, of, numbers, row, at, drive, lane_q);
     }

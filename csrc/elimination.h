@@ -141,6 +141,19 @@ int CALL(pose_steps)(ptrdiff_t n, int unknowns, const double *matrix, const doub
     return 0;
 }
 
+/* A column of `most` numbers, `stride` apart, in mirror a. */
+INLINE void reflect(const pose_equations *of, ptrdiff_t u, ptrdiff_t a, const double *vectors,
+                    double *column, ptrdiff_t stride)
+{
+    real along = fill(0.0);
+    for (ptrdiff_t j = a; j < of->most; j++)
+        along += at(vectors, j * u + a) * at(column, j * stride);
+    for (ptrdiff_t j = a; j < of->most; j++) {
+        const real x = at(column, j * stride) - along * at(vectors, j * u + a);
+        put(owned(of, j, x), column, j * stride);
+    }
+}
+
 /* Householder's mirrors, one a column and as many as unknowns, each normal to a vector of length √2
  * that stands in that column from its first row on: one after another they take the derivatives by
  * the unknowns (most x u) to a triangle. Above the vectors is what is above its diagonal. */
@@ -162,26 +175,8 @@ INLINE void mirrors(const pose_equations *of, ptrdiff_t u, const double *by_unkn
         put(top + away, vectors, a * u + a);
         for (ptrdiff_t j = a; j < of->most; j++)
             put(owned(of, j, scale * at(vectors, j * u + a)), vectors, j * u + a);
-        for (ptrdiff_t b = a + 1; b < u; b++) {
-            real along = fill(0.0);
-            for (ptrdiff_t j = a; j < of->most; j++)
-                along += at(vectors, j * u + a) * at(vectors, j * u + b);
-            for (ptrdiff_t j = a; j < of->most; j++) {
-                const real x = at(vectors, j * u + b) - along * at(vectors, j * u + a);
-                put(owned(of, j, x), vectors, j * u + b);
-            }
-        }
+        for (ptrdiff_t b = a + 1; b < u; b++) reflect(of, u, a, vectors, vectors + LANES * b, u);
     }
-}
-
-/* A column (most) in one of the mirrors. */
-INLINE void reflect(const pose_equations *of, ptrdiff_t u, ptrdiff_t a, const double *vectors,
-                    double *column)
-{
-    real along = fill(0.0);
-    for (ptrdiff_t j = a; j < of->most; j++) along += at(vectors, j * u + a) * at(column, j);
-    for (ptrdiff_t j = a; j < of->most; j++)
-        put(owned(of, j, at(column, j) - along * at(vectors, j * u + a)), column, j);
 }
 
 int CALL(pose_left)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,
@@ -199,7 +194,7 @@ int CALL(pose_left)(ptrdiff_t n, int unknowns, const int64_t *first, const int64
         for (ptrdiff_t c = 0; c < columns; c++) {
             for (ptrdiff_t j = 0; j < of.most; j++)
                 put(equation(&of, j, part + c, columns), column, j);
-            for (ptrdiff_t a = 0; a < u && a < of.most; a++) reflect(&of, u, a, vectors, column);
+            for (ptrdiff_t a = 0; a < u && a < of.most; a++) reflect(&of, u, a, vectors, column, 1);
             for (int l = 0; l < count; l++)
                 for (ptrdiff_t j = u; j < of.count[l]; j++)
                     left[(place[row[l]] + j - u) * columns + c] = at(column, j)[l];
@@ -239,7 +234,7 @@ int CALL(pose_spread)(ptrdiff_t n, int unknowns, const int64_t *first, const int
                 put(x, column, j);
             }
             for (ptrdiff_t a = (u < of.most ? u : of.most) - 1; a >= 0; a--)
-                reflect(&of, u, a, vectors, column);
+                reflect(&of, u, a, vectors, column, 1);
             for (int l = 0; l < count; l++)
                 for (ptrdiff_t j = 0; j < of.count[l]; j++)
                     part[(first[row[l]] + j) * columns + c] = at(column, j)[l];

@@ -41,6 +41,10 @@ class Balanced(Protocol):
     actuators: int
 
     @property
+    def turning(self) -> BoolArray:
+        """Which drives are angles."""
+
+    @property
     def reading_rows(self) -> IntArray:
         """Which row is the first of each limb."""
 
@@ -118,7 +122,7 @@ def by_actuators(
 def _is_angle(machine: Balanced, number: int) -> BoolArray:
     """Of each limb, whether this number of it is one."""
     if number == _OFFSET:
-        return np.array(list(machine.struct.angle[0 : machine.struct.limbs]), dtype=bool)
+        return machine.turning
     tilt = number < len(SLOTS) and "tilt" in SLOTS[number]
     return np.full(machine.struct.limbs, tilt)
 
