@@ -313,10 +313,12 @@ def _warnings(
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():
         names = [f"of measurements {i + 1}" for i in range(len(equations.sets))]
+        names += ["of the load cells"] if equations.closures.cells else []
         names = [n for n, u in zip([*names, "of the actuators"], unknown, strict=True) if u]
+        beside = ", actuator_sigma and tension_sigma" if equations.closures.cells else ""
         notes.append(
-            f"too little is left over to estimate the noise {' and '.join(names)}: state sigma and"
-            " actuator_sigma"
+            f"too little is left over to estimate the noise {' and '.join(names)}: state"
+            f" sigma{beside or ' and actuator_sigma'}"
         )
     kept = estimate.state.determined.rank - estimate.state.fitted.rank
     if kept:

@@ -31,6 +31,8 @@ class Evaluation:
         Of each set of measurements.
     residuals : tuple of ndarray (N, k)
         Measured less predicted of each set, mm and rad.
+    tension : ndarray (K, n) or None
+        Of what the actuators drive, N, where it is unknown and has been found.
     """
 
     theta: FloatArray
@@ -40,6 +42,7 @@ class Evaluation:
     status: Int32Array
     predicted: tuple[Predicted, ...]
     residuals: tuple[FloatArray, ...]
+    tension: FloatArray | None = None
 
     @property
     def ok(self) -> bool:
@@ -54,4 +57,4 @@ class Evaluation:
     @property
     def states(self) -> RowStates:
         """Where the machine is at each distinct row of actuators."""
-        return RowStates(self.pose, self.actuators, self.status)
+        return RowStates(self.pose, self.actuators, self.status, self.tension)
