@@ -34,11 +34,16 @@ from pkmcal.estimation.session_machines import (
 from pkmcal.estimation.sessions import NONE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements import orientation
-from pkmcal.measurements.observation import by_difference, corrected, distance_per_point
+from pkmcal.measurements.observation import (
+    Predicted,
+    by_difference,
+    corrected,
+    distance_per_point,
+)
 from pkmcal.result import failed_rows
 from pkmcal.statistics.linear_fit import lengths_squared
 
-_TOGETHER = 16384  # rows whose derivatives are multiplied at once
+_TOGETHER = 16384  # rows whose derivatives are multiplied at once, or kept
 
 # Whose, where, with which noise, and what `_system` says there; copies have another "whose".
 _Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, tuple[FloatArray, FloatArray]]
@@ -93,6 +98,7 @@ class Equations(Readings):
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
         self._last: _Last | None = None
+        self._seen: tuple[Evaluation, tuple[Predicted, ...]] | None = None
         self._from: Evaluation | None = None  # that the states are of
         self._follow: tuple[Evaluation, FloatArray] | None = None  # and how they follow theta
         self._no_sigma = np.array([
@@ -198,14 +204,26 @@ class Equations(Readings):
                 return self._system(machines, states, theta, factors)
 
             states, there = self._blocks.best(self.closures, machines, states, system)
-        predicted = self.predicted(states.pose, theta)
-        residuals = self.residuals(predicted)
+        seen = self.predicted(states.pose, theta)
         found = Evaluation(
-            theta, machines, states.pose, states.actuators, states.status, predicted, residuals
+            theta,
+            machines,
+            states.pose,
+            states.actuators,
+            states.status,
+            tuple(each.values for each in seen),
+            self.residuals(seen),
         )
+        self._seen = (found, seen) if len(self.rows) <= _TOGETHER else None
         if self.closures.unknowns and there is not None:
             self._last = weakref.ref(self), found, factors, there
         return found
+
+    def seen(self, evaluation: Evaluation) -> tuple[Predicted, ...]:
+        """Readings of each set at an evaluation, with derivatives; of few rows the last is kept."""
+        if self._seen is not None and self._seen[0] is evaluation:
+            return self._seen[1]
+        return self.predicted(evaluation.pose, evaluation.theta)
 
     def _states_ahead(self, machines: Machines, theta: FloatArray) -> RowStates:
         """Where to look for the states: as they follow the parameters from the last step taken."""
@@ -370,8 +388,8 @@ class Equations(Readings):
             errors = errors[own:]
         residuals = tuple(self.unwhiten(errors, noise[: len(self.sets)]))
         other.sets = tuple(
-            replace(m, values=corrected(m.kind, seen.values, residual).reshape(m.values.shape))
-            for m, seen, residual in zip(self.sets, at.predicted, residuals, strict=True)
+            replace(m, values=corrected(m.kind, values, residual).reshape(m.values.shape))
+            for m, values, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
         other.parameters = replace(self.parameters, start=prior_centre, drawn=drawn)
         other.warm_start(at)
@@ -422,18 +440,19 @@ class Equations(Readings):
         With the opposite sign that of the residuals.
         """
         p, numbers = self.parameters, self.spread.columns.shape[1]
-        by_all = [np.zeros((*seen.values.shape, numbers)) for seen in evaluation.predicted]
+        every = self.seen(evaluation)
+        by_all = [np.zeros((*seen.values.shape, numbers)) for seen in every]
         for poses, twists in self.closures.twists_by_numbers(
             evaluation.machines, evaluation.states, p.places
         ):
             place = np.full(len(evaluation.pose), NONE)
             place[poses] = np.arange(len(poses))
-            for i, seen in enumerate(evaluation.predicted):
+            for i, seen in enumerate(every):
                 _add_motion(by_all[i], seen.by_twist, twists, place[self.pose_of[i]])
                 if seen.by_other is not None:
                     _add_motion(by_all[i], seen.by_other, twists, place[self.other_of[i]])
         parts = []
-        for i, seen in enumerate(evaluation.predicted):
+        for i, seen in enumerate(every):
             part = by_all[i]
             direct = self.by_numbers(i, evaluation.pose, evaluation.theta)
             if direct is not None:
