@@ -221,11 +221,12 @@ def _points(
     like = rows.like
     by_actuators = after.machines.actuator_twists(after.states)
     variances, added = [], []
+    seen = equations.seen(after)
     for i, measured in enumerate(equations.sets):
         count, k = after.residuals[i].shape
         variances.append(np.repeat(_variances(measured, uncertainty, like[i]), k))
         sigma = _of_actuators(measured, after.robot, uncertainty)
-        moved = after.predicted[i].by_twist @ by_actuators[equations.pose_of[i]]
+        moved = seen[i].by_twist @ by_actuators[equations.pose_of[i]]
         part = (
             np.zeros((count, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
         )

@@ -216,6 +216,8 @@ def identify(
     word("datum", datum, DATUMS)
     word("slack", slack, SLACK)
     equations, commanded, start = begun(datasets, chosen, unread)
+    if held and equations.closures.cells:
+        raise ArgumentError("holdout: rows whose tensions are unknown are all fitted: leave it out")
     cells: tuple[Cell, ...] = ()
     held_numbers = NO_DATUM
     try:
@@ -367,6 +369,8 @@ def _result(
 ) -> Identification:
     chosen, search = estimator.equations.parameters, estimator.search
     end = estimate.evaluation
+    if commanded is not estimator.equations:
+        commanded = commanded.under(end.tension)
     robots = _robots(commanded, end)
     if commanded is not estimator.equations:
         commanded.warm_start(end)

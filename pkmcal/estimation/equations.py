@@ -34,11 +34,16 @@ from pkmcal.estimation.session_machines import (
 from pkmcal.estimation.sessions import NONE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements import orientation
-from pkmcal.measurements.observation import by_difference, corrected, distance_per_point
+from pkmcal.measurements.observation import (
+    Predicted,
+    by_difference,
+    corrected,
+    distance_per_point,
+)
 from pkmcal.result import failed_rows
 from pkmcal.statistics.linear_fit import lengths_squared
 
-_TOGETHER = 16384  # rows whose derivatives are multiplied at once
+_TOGETHER = 16384  # rows whose derivatives are multiplied at once, or kept
 
 # Whose, where, with which noise, and what `_system` says there; copies have another "whose".
 _Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, tuple[FloatArray, FloatArray]]
@@ -93,6 +98,7 @@ class Equations(Readings):
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
         self._last: _Last | None = None
+        self._seen: tuple[Evaluation, tuple[Predicted, ...]] | None = None
         self._from: Evaluation | None = None  # that the states are of
         self._follow: tuple[Evaluation, FloatArray] | None = None  # and how they follow theta
         self._no_sigma = np.array([
@@ -166,6 +172,14 @@ class Equations(Readings):
         other._take(commanded_closures(self._own, self._if_taut), estimated=False)
         return other
 
+    def under(self, tension: FloatArray | None) -> Equations:
+        """The same under other tensions (K, n) of what the actuators drive; None: as they are."""
+        if tension is None:
+            return self
+        other = copy.copy(self)
+        other.state = self.state._replace(tension=tension)
+        return other
+
     def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
         """Evaluate where the same with commanded poses has been started."""
         self.parameters, self._states, self._from = commanded.parameters, start.states, None
@@ -208,15 +222,27 @@ class Equations(Readings):
                 return self._system(machines, states, theta, factors)
 
             states, there = self._blocks.best(self.closures, machines, states, system)
-        predicted = self.predicted(states.pose, theta)
-        residuals = self.residuals(predicted)
+        seen = self.predicted(states.pose, theta)
         found = Evaluation(
-            theta, machines, states.pose, states.actuators, states.status, predicted, residuals,
+            theta,
+            machines,
+            states.pose,
+            states.actuators,
+            states.status,
+            tuple(each.values for each in seen),
+            self.residuals(seen),
             states.tension,
-        )  # fmt: skip
+        )
+        self._seen = (found, seen) if len(self.rows) <= _TOGETHER else None
         if self.closures.unknowns and there is not None:
             self._last = weakref.ref(self), found, factors, there
         return found
+
+    def seen(self, evaluation: Evaluation) -> tuple[Predicted, ...]:
+        """Readings of each set at an evaluation, with derivatives; of few rows the last is kept."""
+        if self._seen is not None and self._seen[0] is evaluation:
+            return self._seen[1]
+        return self.predicted(evaluation.pose, evaluation.theta)
 
     def _states_ahead(self, machines: Machines, theta: FloatArray) -> RowStates:
         """Where to look for the states: as they follow the parameters from the last step taken."""
@@ -224,7 +250,8 @@ class Equations(Readings):
             return self.closures.settled(machines, self._states)
         begin, following = self._follow
         step = following @ (theta - begin.theta)
-        step[~np.isfinite(step).all(axis=1)] = 0.0
+        if not np.isfinite(step).all():
+            step[~np.isfinite(step).all(axis=1)] = 0.0
         ahead = self.closures.moved(machines, self._states, step)
         if ahead.status.any():
             ahead = ahead.chosen(ahead.status == 0, self.closures.settled(machines, self._states))
@@ -239,7 +266,7 @@ class Equations(Readings):
         off /= factors
         by_unknown /= factors[:, None]
         equation, by_unknown = self._counted(off), self._counted(by_unknown)
-        if not self.count.any():
+        if not self.any_read:
             return equation, by_unknown
         twists = self.closures.twists(machines, states)
         predicted = self.predicted(states.pose, theta)
@@ -289,7 +316,7 @@ class Equations(Readings):
         )
         of_closures /= noise[self._groups][:, None]
         by_all = self._counted(of_closures)
-        if self.count.any():
+        if self.any_read:
             readings = self.whiten(self.jacobian(evaluation), noise)
             by_all = np.concatenate([by_all, readings])
         found, following = self._blocks.left(by_unknown, by_all)
@@ -382,8 +409,8 @@ class Equations(Readings):
             errors = errors[own:]
         residuals = tuple(self.unwhiten(errors, noise[: len(self.sets)]))
         other.sets = tuple(
-            replace(m, values=corrected(m.kind, seen.values, residual).reshape(m.values.shape))
-            for m, seen, residual in zip(self.sets, at.predicted, residuals, strict=True)
+            replace(m, values=corrected(m.kind, values, residual).reshape(m.values.shape))
+            for m, values, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
         other.parameters = replace(self.parameters, start=prior_centre, drawn=drawn)
         other.warm_start(at)
@@ -434,18 +461,19 @@ class Equations(Readings):
         With the opposite sign that of the residuals.
         """
         p, numbers = self.parameters, self.spread.columns.shape[1]
-        by_all = [np.zeros((*seen.values.shape, numbers)) for seen in evaluation.predicted]
+        every = self.seen(evaluation)
+        by_all = [np.zeros((*seen.values.shape, numbers)) for seen in every]
         for poses, twists in self.closures.twists_by_numbers(
             evaluation.machines, evaluation.states, p.places
         ):
             place = np.full(len(evaluation.pose), NONE)
             place[poses] = np.arange(len(poses))
-            for i, seen in enumerate(evaluation.predicted):
+            for i, seen in enumerate(every):
                 _add_motion(by_all[i], seen.by_twist, twists, place[self.pose_of[i]])
                 if seen.by_other is not None:
                     _add_motion(by_all[i], seen.by_other, twists, place[self.other_of[i]])
         parts = []
-        for i, seen in enumerate(evaluation.predicted):
+        for i, seen in enumerate(every):
             part = by_all[i]
             direct = self.by_numbers(i, evaluation.pose, evaluation.theta)
             if direct is not None:
@@ -500,7 +528,7 @@ class Equations(Readings):
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""
-        readings = super().rounding(noise) if self.count.any() else 0.0
+        readings = super().rounding(noise) if self.any_read else 0.0
         sigma = self.closures.sigma
         if sigma is None:
             return readings
@@ -522,12 +550,13 @@ class Equations(Readings):
 
     def progress(self, evaluation: Evaluation) -> float:
         """`rms`, or `closure_rms` where nothing but the actuators was read."""
-        return self.rms(evaluation) if self.count.any() else self.closure_rms(evaluation)
+        return self.rms(evaluation) if self.any_read else self.closure_rms(evaluation)
 
     def closure_rms(self, evaluation: Evaluation) -> float:
         """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
-        found = self.closures_off(evaluation)[evaluation.status == 0]
-        return rms(found[~self._slack[evaluation.status == 0, : found.shape[1]]])
+        off = self.closures_off(evaluation)
+        counted = ~self._slack[:, : off.shape[1]] & (evaluation.status == 0)[:, None]
+        return rms(off[counted])
 
     def worst_closures(self, evaluation: Evaluation) -> FloatArray:
         """The largest of them at each pose (K,); NaN where they hold."""

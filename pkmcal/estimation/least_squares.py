@@ -52,7 +52,8 @@ class Search:
         self._found: IntArray | slice = slice(None) if columns is None else columns
         self.equations, self.start = equations, start
         self.scale = parameters.scale[self._found]
-        self._stated = parameters.prior_rows(start.theta)[:, self._found].any(axis=1)
+        rows = parameters.prior_rows(start.theta)[:, self._found]
+        self._stated = np.flatnonzero(rows.any(axis=1))
         lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else None
@@ -76,9 +77,18 @@ class Search:
 
     def prior(self, theta: FloatArray) -> FloatArray:
         """A row (p, n) for each prior at all parameters `theta`, in units of its deviation."""
+        if not len(self._stated):
+            return np.empty((0, len(self.scale)))
         rows: FloatArray = self.equations.parameters.prior_rows(theta)[self._stated]
         found: FloatArray = rows[:, self._found]
         return found
+
+    def _pulled(self, theta: FloatArray) -> FloatArray:
+        """What each prior misses (p,) at all parameters."""
+        if not len(self._stated):
+            return np.empty(0)
+        pulled: FloatArray = self.equations.parameters.prior_left(theta)[self._stated]
+        return pulled
 
     def _theta(self, u: FloatArray) -> FloatArray:
         theta: FloatArray = self.start.theta.copy()
@@ -148,8 +158,7 @@ class Search:
     ) -> tuple[FloatArray, float]:
         """A minimum of the cost of the rows not set aside, and the cost."""
         equations = self.equations
-        parameters = equations.parameters
-        without = np.repeat(aside, equations.components)
+        without = np.flatnonzero(np.repeat(aside, equations.components))
 
         last: tuple[Evaluation, FloatArray] | None = None
 
@@ -165,18 +174,20 @@ class Search:
         floor = equations.rounding(noise) / np.sqrt(_FTOL)
         first = data(self.at(u, noise))
         worse = 10.0 * (1.0 + np.abs(first).max())
+        count = len(first) + len(self._stated) + len(pins) + 1
 
         def residual(u: FloatArray) -> FloatArray:
             evaluation = self.at(u, noise)
-            pulled = parameters.prior_left(evaluation.theta)[self._stated]
-            held = np.concatenate([-pulled, pins @ u])
-            missed = (evaluation.status[equations.pose_of_unit] != 0) & ~aside
-            if missed.any():  # worse than any step that is taken
-                self._refused |= missed
-                return np.full(len(first) + len(held) + 1, worse + floor)
-            return np.concatenate([-loss.residual(data(evaluation)), held, [floor]])
+            if not evaluation.ok:
+                missed = (evaluation.status[equations.pose_of_unit] != 0) & ~aside
+                if missed.any():  # worse than any step that is taken
+                    self._refused |= missed
+                    return np.full(count, worse + floor)
+            off = loss.residual(data(evaluation))
+            return np.concatenate([-off, -self._pulled(evaluation.theta), pins @ u, [floor]])
 
         taken: Evaluation | None = None
+        still = np.zeros((1, len(u)))  # the derivative of `floor`
 
         def take(evaluation: Evaluation) -> None:
             """A step goes on from here."""
@@ -190,10 +201,11 @@ class Search:
             evaluation = self.at(u, noise)
             take(evaluation)
             by_u = self._taken(evaluation, noise)
-            if aside.any():
-                by_u = np.where(without[:, None], 0.0, by_u)
+            if len(without):
+                by_u = by_u.copy()
+                by_u[without] = 0.0
             by_u = loss.jacobian(data(evaluation), _finite(by_u))
-            return np.vstack([by_u, self.prior(evaluation.theta), pins, np.zeros(len(u))])
+            return np.concatenate([by_u, self.prior(evaluation.theta), pins, still])
 
         found, cost, self.converged = self._searched(residual, jacobian, u)
         take(self.at(found, noise))

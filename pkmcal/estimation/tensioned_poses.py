@@ -89,6 +89,7 @@ class TensionedPoses(FreePoses):
         self._arcs = np.concatenate([self._arcs, np.full(count, _SHARE * largest)])
         self.unknowns = len(self._arcs) - len(self._held)
         self.equations += count
+        self._turning = np.append(self._turning, np.zeros(count, dtype=bool))
         self.actuators = (*self.actuators, *[-1] * count)
         of_cells = np.ones(cells.read.shape) if cells.sigma is None else cells.sigma
         self.sigma = np.hstack([np.asarray(self.sigma), of_cells])
@@ -99,12 +100,6 @@ class TensionedPoses(FreePoses):
         if states.tension is None:
             states = replace(states, tension=self._first)
         return super().settled(robot, states)
-
-    def lengths(self, robot: Calibratable) -> FloatArray:
-        """Of the actuators' units; none of load cells."""
-        found = super().lengths(robot)
-        found[-self.cells :] = np.nan
-        return found
 
     def _rows(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """As for `FreePoses`; kept for the last states, of which a step asks several times."""
