@@ -211,7 +211,7 @@ def test_what_forces_leave_open_is_named() -> None:
     found = pk.identify(four(), rows(data, 2.0), [*FREE, *FORCES, "load.cell*"])
     assert any(text.startswith("the scale of forces") for text in found.gauges)
     assert not found.unidentifiable and found.rank == len(found.free) - 1
-    upright = pk.identify(four(), rows(data, 2.0), ["base*", "gain*"])
+    upright = pk.identify(four(), rows(data, 2.0), ["base*", "gain*", "drive*"])
     assert "along x, y and z and turned about z:" in upright.gauges[0]
     assert "common scale" in upright.gauges[1] and not upright.unidentifiable
     tilted = pk.identify(four(), rows(data, 2.0), ["base*", "load.force.*"])
@@ -306,6 +306,8 @@ def test_what_cannot_be_is_refused_by_name() -> None:
         pk.identify(four(), rows(data, 2.0), ["base4.x"], holdout=0.25)
     with pytest.raises(ArgumentError, match=r"slack: .* tensions are unknown"):
         pk.identify(four(), rows(data, 2.0), ["base4.x"], slack="drop")
+    with pytest.raises(ArgumentError, match="plans know no load cells"):
+        pk.plan_poses(four(), np.hstack([data["at"], 0 * data["at"]]), 8, actuator_noise=0.2)
     with pytest.raises(ArgumentError, match="state tension_sigma of all sets"):
         pk.identify(four(), [rows(data, 2.0), rows(data, None)], ["base4.x"])
     with pytest.raises(ArgumentError, match="tension_sigma must be positive"):
