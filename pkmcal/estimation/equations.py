@@ -517,8 +517,10 @@ class Equations(Readings):
 
     def closure_rms(self, evaluation: Evaluation) -> float:
         """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
-        counted = ~self._slack & (evaluation.status == 0)[:, None]
-        return rms(self.closures_off(evaluation)[counted])
+        off = self.closures_off(evaluation)
+        if self._counting is not None or not evaluation.ok:
+            off = off[~self._slack & (evaluation.status == 0)[:, None]]
+        return rms(off)
 
     def worst_closures(self, evaluation: Evaluation) -> FloatArray:
         """The largest of them at each pose (K,); NaN where they hold."""
