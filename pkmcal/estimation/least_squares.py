@@ -11,6 +11,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.loss import Loss
 from pkmcal.exceptions import ArgumentError
+from pkmcal.statistics.linear_fit import triangle
 
 _FTOL = 1e-10  # of the cost: 1e-4 of a standard deviation; rounding moves it by less
 _TOLERANCES = {"ftol": _FTOL, "xtol": 1e-10, "gtol": 1e-15}
@@ -95,12 +96,20 @@ class Search:
         ValueError
             It does not exist, at a singularity of the machine.
         """
-        found = _finite(self._taken(evaluation, noise))
+        found = self.taken(evaluation, noise)
         self._last_jacobian = evaluation, noise, found
         return found
 
+    def taken(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """The same, which is the caller's: it is not kept."""
+        return _finite(self._taken(evaluation, noise))
+
+    def forget(self) -> None:
+        """A search has ended: what is kept for its next step takes memory."""
+        self._last_jacobian = None
+        self.equations.forget_following()
+
     def _taken(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
-        """The same, finite or not, and not kept: a search holds copies of its own."""
         last, self._last_jacobian = self._last_jacobian, None
         if last is not None and last[0] is evaluation and _same(last[1], noise):
             return last[2]
@@ -164,7 +173,8 @@ class Search:
         # a cost that nothing lowers: by less than rounding it need not fall
         floor = equations.rounding(noise) / np.sqrt(_FTOL)
         first = data(self.at(u, noise))
-        worse = 10.0 * (1.0 + np.abs(first).max())
+        worse = 10.0 * (1.0 + float(np.linalg.norm(first)))
+        rows = min(len(first), len(u) + 1)
 
         def residual(u: FloatArray) -> FloatArray:
             evaluation = self.at(u, noise)
@@ -173,8 +183,10 @@ class Search:
             missed = (evaluation.status[equations.pose_of_unit] != 0) & ~aside
             if missed.any():  # worse than any step that is taken
                 self._refused |= missed
-                return np.full(len(first) + len(held) + 1, worse + floor)
-            return np.concatenate([-loss.residual(data(evaluation)), held, [floor]])
+                return np.full(rows + len(held) + 1, worse + floor)
+            turned = np.zeros(rows)
+            turned[0] = np.linalg.norm(loss.residual(data(evaluation)))
+            return np.concatenate([turned, held, [floor]])
 
         taken: Evaluation | None = None
 
@@ -190,10 +202,11 @@ class Search:
             evaluation = self.at(u, noise)
             take(evaluation)
             by_u = self._taken(evaluation, noise)
-            if aside.any():
-                by_u = np.where(without[:, None], 0.0, by_u)
-            by_u = loss.jacobian(data(evaluation), _finite(by_u))
-            return np.vstack([by_u, self.prior(evaluation.theta), pins, np.zeros(len(u))])
+            by_u[without] = 0.0
+            whitened = data(evaluation)
+            by_u = loss.jacobian(whitened, _finite(by_u))
+            turned = _turned(-loss.residual(whitened), by_u)
+            return np.vstack([turned, self.prior(evaluation.theta), pins, np.zeros(len(u))])
 
         found, cost, self.converged = self._searched(residual, jacobian, u)
         take(self.at(found, noise))
@@ -233,6 +246,16 @@ class Search:
             max_nfev=_MOST,
         )
         return trf.x, float(trf.cost), bool(trf.status > 0)
+
+
+def _turned(residual: FloatArray, jacobian: FloatArray) -> FloatArray:
+    """Derivative (min(M, n + 1), n) of residuals (M,) turned so that the first has all of them.
+
+    Squares, gradient and Gauss-Newton matrix are those of all M rows, so are the steps of a search.
+    """
+    factor = triangle([residual, jacobian])
+    factor[0] *= np.copysign(1.0, factor[0, 0])
+    return factor[:, 1:]
 
 
 def _same(one: FloatArray, other: FloatArray) -> bool:
