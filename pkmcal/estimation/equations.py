@@ -41,7 +41,6 @@ from pkmcal.measurements.observation import (
     distance_per_point,
 )
 from pkmcal.result import failed_rows
-from pkmcal.statistics.linear_fit import lengths_squared
 
 _TOGETHER = 16384  # rows whose derivatives are multiplied at once, or kept
 
@@ -476,8 +475,7 @@ class Equations(Readings):
         noise: FloatArray,
         weights: FloatArray,
         residual: FloatArray,
-        jacobian: FloatArray,
-        half: FloatArray,
+        taken: FloatArray,
     ) -> Shares:
         """Squares and degrees of freedom of each group.
 
@@ -491,23 +489,21 @@ class Equations(Readings):
             Of the units.
         residual : ndarray (M,)
             Whitened and weighted.
-        jacobian : ndarray (M, n)
-            Weighted.
-        half : ndarray (n, r)
-            Directions in which the parameters' covariance is 1: in these the squares of a row of
-            the Jacobian are the leverage of its equation.
+        taken : ndarray (M, r)
+            Derivatives in directions in which the parameters' covariance is 1, weighted: the
+            squares of a row are the leverage of its equation.
         """
         count = len(self.unstated)
         if not self.closures.unknowns:
             group = np.repeat(self._family_of_unit, self.components)
             every = np.repeat(weights, self.components)
-            left = every - lengths_squared(jacobian, half)
+            left = every - np.einsum("ij,ij->i", taken, taken)
             freedom = np.bincount(group, left, count).astype(np.float64)
             squares = np.bincount(group, residual**2, count).astype(np.float64)
             return Shares(squares, freedom, np.diag(freedom))
         by_unknown = self._at(evaluation, noise).by_unknown
         group = self._group_of_equation
-        return self._blocks.by_groups(by_unknown, group, weights, residual, jacobian @ half)
+        return self._blocks.by_groups(by_unknown, group, weights, residual, taken)
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""
