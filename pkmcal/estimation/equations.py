@@ -34,11 +34,15 @@ from pkmcal.estimation.session_machines import (
 from pkmcal.estimation.sessions import NONE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements import orientation
-from pkmcal.measurements.observation import by_difference, corrected, distance_per_point
+from pkmcal.measurements.observation import (
+    Predicted,
+    by_difference,
+    corrected,
+    distance_per_point,
+)
 from pkmcal.result import failed_rows
-from pkmcal.statistics.linear_fit import lengths_squared
 
-_TOGETHER = 16384  # rows whose derivatives are multiplied at once
+_TOGETHER = 16384  # rows whose derivatives are multiplied at once, or kept
 
 # Whose, where, with which noise, and the equations there; copies have another "whose".
 _Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, System]
@@ -95,6 +99,7 @@ class Equations(Readings):
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
         self._last: _Last | None = None
+        self._seen: tuple[Evaluation, tuple[Predicted, ...]] | None = None
         self._from: Evaluation | None = None  # that the states are of
         self._follow: tuple[Evaluation, FloatArray] | None = None  # and how they follow theta
         self._no_sigma = np.array([
@@ -200,14 +205,26 @@ class Equations(Readings):
                 return self._system(machines, states, theta, factors)
 
             states, there = self._blocks.best(self.closures, machines, states, system)
-        predicted = self.predicted(states.pose, theta)
-        residuals = self.residuals(predicted)
+        seen = self.predicted(states.pose, theta)
         found = Evaluation(
-            theta, machines, states.pose, states.actuators, states.status, predicted, residuals
+            theta,
+            machines,
+            states.pose,
+            states.actuators,
+            states.status,
+            tuple(each.values for each in seen),
+            self.residuals(seen),
         )
+        self._seen = (found, seen) if len(self.rows) <= _TOGETHER else None
         if self.closures.unknowns:
             self._last = weakref.ref(self), found, factors, there
         return found
+
+    def seen(self, evaluation: Evaluation) -> tuple[Predicted, ...]:
+        """Readings of each set at an evaluation, with derivatives; of few rows the last is kept."""
+        if self._seen is not None and self._seen[0] is evaluation:
+            return self._seen[1]
+        return self.predicted(evaluation.pose, evaluation.theta)
 
     def _states_ahead(self, machines: Machines, theta: FloatArray) -> RowStates:
         """Where to look for the states: as they follow the parameters from the last step taken."""
@@ -374,8 +391,8 @@ class Equations(Readings):
             errors = errors[own:]
         residuals = tuple(self.unwhiten(errors, noise[: len(self.sets)]))
         other.sets = tuple(
-            replace(m, values=corrected(m.kind, seen.values, residual).reshape(m.values.shape))
-            for m, seen, residual in zip(self.sets, at.predicted, residuals, strict=True)
+            replace(m, values=corrected(m.kind, values, residual).reshape(m.values.shape))
+            for m, values, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
         other.parameters = replace(self.parameters, start=prior_centre, drawn=drawn)
         other.warm_start(at)
@@ -426,18 +443,19 @@ class Equations(Readings):
         With the opposite sign that of the residuals.
         """
         p, numbers = self.parameters, self.spread.columns.shape[1]
-        by_all = [np.zeros((*seen.values.shape, numbers)) for seen in evaluation.predicted]
+        every = self.seen(evaluation)
+        by_all = [np.zeros((*seen.values.shape, numbers)) for seen in every]
         for poses, twists in self.closures.twists_by_numbers(
             evaluation.machines, evaluation.states, p.places
         ):
             place = np.full(len(evaluation.pose), NONE)
             place[poses] = np.arange(len(poses))
-            for i, seen in enumerate(evaluation.predicted):
+            for i, seen in enumerate(every):
                 _add_motion(by_all[i], seen.by_twist, twists, place[self.pose_of[i]])
                 if seen.by_other is not None:
                     _add_motion(by_all[i], seen.by_other, twists, place[self.other_of[i]])
         parts = []
-        for i, seen in enumerate(evaluation.predicted):
+        for i, seen in enumerate(every):
             part = by_all[i]
             direct = self.by_numbers(i, evaluation.pose, evaluation.theta)
             if direct is not None:
@@ -457,8 +475,7 @@ class Equations(Readings):
         noise: FloatArray,
         weights: FloatArray,
         residual: FloatArray,
-        jacobian: FloatArray,
-        half: FloatArray,
+        taken: FloatArray,
     ) -> Shares:
         """Squares and degrees of freedom of each group.
 
@@ -472,23 +489,21 @@ class Equations(Readings):
             Of the units.
         residual : ndarray (M,)
             Whitened and weighted.
-        jacobian : ndarray (M, n)
-            Weighted.
-        half : ndarray (n, r)
-            Directions in which the parameters' covariance is 1: in these the squares of a row of
-            the Jacobian are the leverage of its equation.
+        taken : ndarray (M, r)
+            Derivatives in directions in which the parameters' covariance is 1, weighted: the
+            squares of a row are the leverage of its equation.
         """
         count = len(self.unstated)
         if not self.closures.unknowns:
             group = np.repeat(self._family_of_unit, self.components)
             every = np.repeat(weights, self.components)
-            left = every - lengths_squared(jacobian, half)
+            left = every - np.einsum("ij,ij->i", taken, taken)
             freedom = np.bincount(group, left, count).astype(np.float64)
             squares = np.bincount(group, residual**2, count).astype(np.float64)
             return Shares(squares, freedom, np.diag(freedom))
         by_unknown = self._at(evaluation, noise).by_unknown
         group = self._group_of_equation
-        return self._blocks.by_groups(by_unknown, group, weights, residual, jacobian @ half)
+        return self._blocks.by_groups(by_unknown, group, weights, residual, taken)
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""

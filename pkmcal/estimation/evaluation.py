@@ -8,7 +8,6 @@ from pkmcal.arrays import FloatArray, Int32Array
 from pkmcal.estimation.closures import RowStates
 from pkmcal.estimation.session_machines import Machines
 from pkmcal.measurements.calibratable import Calibratable
-from pkmcal.measurements.observation import Predicted
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,8 +26,8 @@ class Evaluation:
         Where the actuators are there; what they read unless their noise is stated.
     status : ndarray of int (K,)
         Of the forward kinematics.
-    predicted : tuple of Predicted
-        Of each set of measurements.
+    predicted : tuple of ndarray (N, k)
+        What the instruments show there, of each set of measurements.
     residuals : tuple of ndarray (N, k)
         Measured less predicted of each set, mm and rad.
     """
@@ -38,7 +37,7 @@ class Evaluation:
     pose: FloatArray
     actuators: FloatArray
     status: Int32Array
-    predicted: tuple[Predicted, ...]
+    predicted: tuple[FloatArray, ...]
     residuals: tuple[FloatArray, ...]
 
     @property

@@ -22,7 +22,7 @@ from pkmcal.measurements.calibratable import Calibratable
 
 AnyArray = TypeVar("AnyArray", FloatArray, Int32Array)
 
-_TOGETHER = 8192  # poses whose twists are held at once
+_TOGETHER = 8192  # poses whose derivatives are held at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +58,11 @@ class Machines:
         return _driven(robot, self.state.at(np.intp(k)))
 
     def joined(self, function: Callable[[Calibratable, IntArray], FloatArray]) -> FloatArray:
-        """What a function of a machine and its poses gives, pose by pose."""
-        parts = [function(r, own) for r, own in zip(self.driven, self.rows, strict=True)]
+        """What a function of a machine and its poses gives, pose by pose; in lots of poses."""
+        parts = []
+        for robot, rows in zip(self.robots, self.rows, strict=True):
+            found = [function(_driven(robot, self.state.at(own)), own) for own in _lots(rows)]
+            parts.append(found[0] if len(found) == 1 else np.concatenate(found))
         return _joined(parts, self.rows)
 
     def actuator_twists(self, states: RowStates) -> FloatArray:
@@ -160,8 +163,7 @@ class SessionClosures:
         all poses at once would be most of what a fit holds. Nothing where it does not move.
         """
         for part, robot, rows in zip(self._parts, machines.robots, self._rows, strict=True):
-            most = len(rows) if self.unknowns else _TOGETHER
-            for own in (rows[first : first + most] for first in range(0, len(rows), most)):
+            for own in [rows] if self.unknowns else _lots(rows):
                 driven = _driven(robot, machines.state.at(own))
                 found = part.twists_by_numbers(driven, _some(states, own), places)
                 if found is not None:
@@ -181,6 +183,10 @@ class SessionClosures:
             _joined([part.actuators for part in parts], self._rows),
             _joined([part.status for part in parts], self._rows),
         )
+
+
+def _lots(rows: IntArray) -> list[IntArray]:
+    return [rows[first : first + _TOGETHER] for first in range(0, len(rows) or 1, _TOGETHER)]
 
 
 def _driven(robot: Calibratable, state: DriveState) -> Calibratable:

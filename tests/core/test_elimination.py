@@ -61,6 +61,16 @@ def test_steps_solve_the_damped_normal_equations(drawn: Drawn) -> None:
             assert not step[i].any() and gain[i] == 0.0
 
 
+def test_units_of_a_poses_equations_change_no_step_of_any_pose(drawn: Drawn) -> None:
+    matrix, pull, _ = drawn.poses.normals(drawn.residual, drawn.by_unknown)
+    units = 10.0 ** np.random.default_rng(8).uniform(-12, 12, len(pull))
+    damping = np.full(len(pull), 1e-3)
+    expected = drawn.poses.steps(matrix, pull, damping)
+    found = drawn.poses.steps(matrix * units[:, None, None], pull * units[:, None], damping)
+    np.testing.assert_allclose(found[0], expected[0], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found[1] / units, expected[1], rtol=1e-9, atol=1e-12)
+
+
 def test_what_is_left_is_the_part_across_the_unknowns(drawn: Drawn) -> None:
     left, following = drawn.poses.left(drawn.by_unknown, drawn.part)
     spread = drawn.poses.spread(drawn.by_unknown, left)
