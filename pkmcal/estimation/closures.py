@@ -239,6 +239,8 @@ class FreePoses:
         self._held = np.concatenate([roles.held, roles.read[exact]])
         self._mixed = not np.array_equal(self._read, np.eye(robot.machine.rows))
         self._arcs = 1.0 / mm_per_unit(pose_steps.step_units(robot), robot.length)
+        units = [robot.actuator_units[a] if a >= 0 else "mm" for a in self.actuators]
+        self._turning = np.array([unit == "rad" for unit in units])
         self.unknowns = robot.machine.m - len(self._held)
         self.equations = len(rows)
         if self.unknowns < 1 or not sigma[:, np.setdiff1d(self.actuators, -1)].all():
@@ -287,9 +289,8 @@ class FreePoses:
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units; the other rows are in mm."""
-        units = robot.actuator_units
-        of_actuators = mm_per_unit(units, robot.length if "rad" in units else 1.0)
-        return np.array([of_actuators[a] if a >= 0 else 1.0 for a in self.actuators])
+        arc = robot.length if self._turning.any() else 1.0
+        return np.where(self._turning, arc, 1.0)
 
     def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
         """Twists by steps of the pose."""
@@ -352,10 +353,10 @@ class FreePoses:
                 if (short | np.isnan(step).any(axis=1)).all():
                     break
             pose = np.where(short[:, None], pose, np.nan)
-        known = np.isfinite(pose).all(axis=1)
         found = np.zeros(len(pose), dtype=np.int32)
-        if not known.all():
-            found[~known] = np.where(status == 0, 1, status)[~known]
+        if not np.isfinite(pose).all():
+            lost = ~np.isfinite(pose).all(axis=1)
+            found[lost] = np.where(status == 0, 1, status)[lost]
         return RowStates(pose, self.read, found)
 
 

@@ -214,7 +214,7 @@ class Blocks:
         Whitened or None
             What `system` says there; None where it was not asked there.
         """
-        damping, settled = np.zeros(self.poses), np.zeros(self.poses, dtype=bool)
+        damping, moving = np.zeros(self.poses), np.ones(self.poses, dtype=bool)
         there = system(states)
         matrix, pull, cost = self._all.normals(*there)
         equations: Whitened | None = there
@@ -228,19 +228,20 @@ class Blocks:
                     return self._all.normals(*system(closures.moved(machines, at, by)))[1]
 
                 damping[:] *= k > _STRAIGHT
-                bent = _bent(matrix, pull, np.where(settled, 0.0, cost), pulled)
+                bent = _bent(matrix, pull, np.where(moving, cost, 0.0), pulled)
                 step, gain = self._all.steps(bent, pull, damping)
             floor = rounded * (rounded + np.sqrt(cost))
-            settled = (gain <= _SETTLED * cost + floor) | ~np.isfinite(cost)
-            if settled.all():
+            moving = gain > _SETTLED * cost + floor  # none of those that are not finite
+            if not moving.any():
                 break
-            step[settled] = 0.0
+            step[~moving] = 0.0
             del there  # to bound memory
             equations, trial = None, closures.moved(machines, states, step)
             there = system(trial)
             normals = self._all.normals(*there)
-            better = ~settled & (normals[2] < cost)
-            if (better | settled).all():
+            better = moving & (normals[2] < cost)
+            worse = moving ^ better
+            if not worse.any():
                 states, equations, (matrix, pull, cost) = trial, there, normals
                 if damping.any():
                     damping *= 0.1 * (damping > 1e-5)
@@ -249,8 +250,8 @@ class Blocks:
             for mine, other in zip((matrix, pull, cost), normals, strict=True):
                 np.copyto(mine.T, other.T, where=better)
             damping = np.where(better, 0.1 * damping * (damping > 1e-5), damping)
-            damping = np.where(better | settled, damping, np.maximum(10.0 * damping, 1e-3))
-            if not better.any() and damping[~settled].min() > 1e8:
+            damping = np.where(worse, np.maximum(10.0 * damping, 1e-3), damping)
+            if not better.any() and damping[moving].min() > 1e8:
                 break
         else:
             damping[:] = 1.0  # the gain is that of states before
@@ -298,7 +299,5 @@ def _bent(
 
 def _size(states: RowStates) -> float:
     """The largest number of the poses and actuators."""
-    found = 1.0
-    for numbers in (states.pose, states.actuators):
-        found = float(np.max(np.abs(numbers), initial=found, where=np.isfinite(numbers)))
-    return found
+    numbers = np.abs(np.concatenate([states.pose.ravel(), states.actuators.ravel()]))
+    return float(np.max(numbers, initial=1.0, where=np.isfinite(numbers)))

@@ -230,7 +230,8 @@ class Equations(Readings):
             return self.closures.settled(machines, self._states)
         begin, following = self._follow
         step = following @ (theta - begin.theta)
-        step[~np.isfinite(step).all(axis=1)] = 0.0
+        if not np.isfinite(step).all():
+            step[~np.isfinite(step).all(axis=1)] = 0.0
         ahead = self.closures.moved(machines, self._states, step)
         if ahead.status.any():
             ahead = ahead.chosen(ahead.status == 0, self.closures.settled(machines, self._states))
@@ -244,7 +245,7 @@ class Equations(Readings):
         off /= noise[-1]
         by_unknown /= noise[-1]
         equation, by_unknown = self._counted(off), self._counted(by_unknown)
-        if not self.count.any():
+        if not self.any_read:
             return equation, by_unknown
         twists = self.closures.twists(machines, states)
         predicted = self.predicted(states.pose, theta)
@@ -294,7 +295,7 @@ class Equations(Readings):
         )
         of_closures /= noise[-1]
         by_all = self._counted(of_closures)
-        if self.count.any():
+        if self.any_read:
             readings = self.whiten(self.jacobian(evaluation), noise)
             by_all = np.concatenate([by_all, readings])
         found, following = self._blocks.left(by_unknown, by_all)
@@ -502,7 +503,7 @@ class Equations(Readings):
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""
-        readings = super().rounding(noise) if self.count.any() else 0.0
+        readings = super().rounding(noise) if self.any_read else 0.0
         sigma = self.closures.sigma
         if sigma is None:
             return readings
@@ -523,12 +524,12 @@ class Equations(Readings):
 
     def progress(self, evaluation: Evaluation) -> float:
         """`rms`, or `closure_rms` where nothing but the actuators was read."""
-        return self.rms(evaluation) if self.count.any() else self.closure_rms(evaluation)
+        return self.rms(evaluation) if self.any_read else self.closure_rms(evaluation)
 
     def closure_rms(self, evaluation: Evaluation) -> float:
         """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
-        found = self.closures_off(evaluation)[evaluation.status == 0]
-        return rms(found[~self._slack[evaluation.status == 0]])
+        counted = ~self._slack & (evaluation.status == 0)[:, None]
+        return rms(self.closures_off(evaluation)[counted])
 
     def worst_closures(self, evaluation: Evaluation) -> FloatArray:
         """The largest of them at each pose (K,); NaN where they hold."""

@@ -53,7 +53,8 @@ class Search:
         self._found: IntArray | slice = slice(None) if columns is None else columns
         self.equations, self.start = equations, start
         self.scale = parameters.scale[self._found]
-        self._stated = parameters.prior_rows(start.theta)[:, self._found].any(axis=1)
+        rows = parameters.prior_rows(start.theta)[:, self._found]
+        self._stated = np.flatnonzero(rows.any(axis=1))
         lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else None
@@ -77,9 +78,18 @@ class Search:
 
     def prior(self, theta: FloatArray) -> FloatArray:
         """A row (p, n) for each prior at all parameters `theta`, in units of its deviation."""
+        if not len(self._stated):
+            return np.empty((0, len(self.scale)))
         rows: FloatArray = self.equations.parameters.prior_rows(theta)[self._stated]
         found: FloatArray = rows[:, self._found]
         return found
+
+    def _pulled(self, theta: FloatArray) -> FloatArray:
+        """What each prior misses (p,) at all parameters."""
+        if not len(self._stated):
+            return np.empty(0)
+        pulled: FloatArray = self.equations.parameters.prior_left(theta)[self._stated]
+        return pulled
 
     def _theta(self, u: FloatArray) -> FloatArray:
         theta: FloatArray = self.start.theta.copy()
@@ -157,8 +167,7 @@ class Search:
     ) -> tuple[FloatArray, float]:
         """A minimum of the cost of the rows not set aside, and the cost."""
         equations = self.equations
-        parameters = equations.parameters
-        without = np.repeat(aside, equations.components)
+        without = np.flatnonzero(np.repeat(aside, equations.components))
 
         last: tuple[Evaluation, FloatArray] | None = None
 
@@ -175,20 +184,21 @@ class Search:
         first = data(self.at(u, noise))
         worse = 10.0 * (1.0 + float(np.linalg.norm(first)))
         rows = min(len(first), len(u) + 1)
+        count = rows + len(self._stated) + len(pins) + 1
 
         def residual(u: FloatArray) -> FloatArray:
             evaluation = self.at(u, noise)
-            pulled = parameters.prior_left(evaluation.theta)[self._stated]
-            held = np.concatenate([-pulled, pins @ u])
-            missed = (evaluation.status[equations.pose_of_unit] != 0) & ~aside
-            if missed.any():  # worse than any step that is taken
-                self._refused |= missed
-                return np.full(rows + len(held) + 1, worse + floor)
+            if not evaluation.ok:
+                missed = (evaluation.status[equations.pose_of_unit] != 0) & ~aside
+                if missed.any():  # worse than any step that is taken
+                    self._refused |= missed
+                    return np.full(count, worse + floor)
             turned = np.zeros(rows)
             turned[0] = np.linalg.norm(loss.residual(data(evaluation)))
-            return np.concatenate([turned, held, [floor]])
+            return np.concatenate([turned, -self._pulled(evaluation.theta), pins @ u, [floor]])
 
         taken: Evaluation | None = None
+        still = np.zeros((1, len(u)))  # the derivative of `floor`
 
         def take(evaluation: Evaluation) -> None:
             """A step goes on from here."""
@@ -206,7 +216,7 @@ class Search:
             whitened = data(evaluation)
             by_u = loss.jacobian(whitened, _finite(by_u))
             turned = _turned(-loss.residual(whitened), by_u)
-            return np.vstack([turned, self.prior(evaluation.theta), pins, np.zeros(len(u))])
+            return np.concatenate([turned, self.prior(evaluation.theta), pins, still])
 
         found, cost, self.converged = self._searched(residual, jacobian, u)
         take(self.at(found, noise))

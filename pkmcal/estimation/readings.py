@@ -67,6 +67,8 @@ class Readings:
         Which set each row is of.
     count : ndarray of int (N,)
         How many numbers were read in each row.
+    any_read : bool
+        Whether any number was read at all.
     present : ndarray of bool
         Which of all numbers of all sets were read, row by row.
     arcs : tuple of float
@@ -153,7 +155,7 @@ class Readings:
             np.isfinite(m.values).reshape(-1) for m in self.sets
         ])  # fmt: skip
         self.arcs = tuple(1.0 if "mm" in m.units else parameters.robot.length for m in self.sets)
-        self._whole = bool(self.present.all())
+        self._whole, self.any_read = bool(self.present.all()), bool(self.present.any())
         self.set_of = np.repeat(np.arange(len(self.sets)), count)
         self.count = np.concatenate([
             np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in self.sets

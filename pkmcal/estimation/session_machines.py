@@ -109,7 +109,7 @@ class SessionClosures:
 
     def moved(self, machines: Machines, states: RowStates, step: FloatArray) -> RowStates:
         """States after steps (K, unknowns) of the unknowns."""
-        steps = [step[rows] for rows in self._rows]
+        steps = _apart(step, self._rows)
         return self._states([
             part.moved(robot, own, mine)
             for (part, robot, own), mine in zip(self._each(machines, states), steps, strict=True)

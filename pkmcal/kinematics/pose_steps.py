@@ -123,14 +123,12 @@ def readings_by_numbers(
 ) -> FloatArray:
     """Derivative of `readings` by numbers of the geometry at `places` (k,), (N, rows, k)."""
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    chain = robot.geometry.chain[:, places]  # of the limbs' numbers, through their ties
-    moving = np.flatnonzero(chain.any(axis=1))
-    columns = robot.geometry.slot_index[moving].astype(np.int32)
+    columns, chain = robot.geometry.driven(places)
     by_number = robot.machine.readings(robot.slots, own, q, columns)[2]
     assert by_number is not None
-    if np.array_equal(chain[moving], np.eye(len(places))):
+    if chain is None:
         return by_number
-    by_places: FloatArray = by_number.reshape(-1, len(moving)) @ chain[moving]
+    by_places: FloatArray = by_number.reshape(-1, len(columns)) @ chain
     return by_places.reshape(*by_number.shape[:2], len(places))
 
 

@@ -48,7 +48,10 @@ def coordinates(arm: pk.SerialArm, count: int = 50, seed: int = 2) -> np.ndarray
     return rng.uniform(-1, 1, (count, arm.n_joints)) * scale
 
 
-ARMS = {"3r": pk.load("3r"), "six joints": mixed(), "seven": mixed(7, 3), "70": mixed(70, 4)}
+ARMS = {
+    "3r": pk.load("3r"),
+    **{"six joints": mixed(), "seven": mixed(7, 3), "70": mixed(70, 4), "one": mixed(1, 5)},
+}
 arms = pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS.keys())
 
 

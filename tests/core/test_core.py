@@ -230,6 +230,19 @@ def test_the_core_refuses_a_machine_whose_order_of_elimination_is_none(order: li
             refused()
 
 
+@every
+def test_rows_are_eliminated_by_their_largest_pivots_at_home(name: str) -> None:
+    machine = (robot := pk.load(name)).machine
+    home = robot.own_home[None]
+    by_step = machine.closure(robot.slots, home, machine.inverse(robot.slots, home)).by_step[0]
+    order = list(machine.struct.order[0 : machine.rows])
+    A = by_step[np.argsort(order)]
+    for c in range(machine.m):
+        factors = A[c + 1 :, c] / A[c, c]
+        assert np.abs(factors).max(initial=0.0) < 1.0 + 1e-9  # equal pivots: either may be first
+        A[c + 1 :] -= factors[:, None] * A[c]
+
+
 def test_the_core_takes_a_machine_with_as_many_rows_as_it_has_room_for() -> None:
     """More of them than an int has bits."""
     limb = {"kind": "UPS", "base": [300.0, 0.0, 0.0], "platform": [100.0, 0.0, -10.0]}

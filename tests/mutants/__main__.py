@@ -2,10 +2,11 @@
 
 Mutants are drawn by chance from all of a folder and made one at a time in a copy of the checkout.
 First its tests run without a mutant, and what each of them calls is noted (`calls.py`); then each
-mutant is shown to those that call its function, first to those of files named as its own, then to
-the quickest, until one fails or `--most` seconds of processor time are spent: in a process forked
-from this one, which has imported the libraries. Of ``csrc`` the 128-bit core alone is compiled,
-with little optimisation and no inlining, in seconds.
+mutant is shown to those that call its function, first to those that saw others, that are of files
+named as its own, and that are quick, until one fails or `--most` seconds of processor time are
+spent: in a process forked from one that has collected all tests (`collected.py`), or, where that
+would not do, from this one, which has imported the libraries. Of ``csrc`` the 128-bit core alone is
+compiled (`core.py`).
 
 Mutants that do not compile do not count, nor those of C that compile to the same; those of
 ``derive`` that no test saw are derived, and do not count where that gives what is checked in. The
@@ -22,12 +23,9 @@ import json
 import os
 import random
 import resource
-import shlex
 import shutil
 import signal
-import subprocess
 import sys
-import sysconfig
 import tempfile
 import time
 from collections import Counter
@@ -36,8 +34,9 @@ from pathlib import Path
 
 import pytest
 
-from . import calls
+from . import calls, collected
 from .changes import Change, changes
+from .core import Core
 
 ROOT = Path(__file__).resolve().parents[2]
 LEFT_OUT = shutil.ignore_patterns(
@@ -70,12 +69,8 @@ LIBRARIES = (
     *("tomli_w", "tomlkit", "openpyxl", "cffi"),
 )
 NO_TESTS, OWN_ERROR = int(pytest.ExitCode.NO_TESTS_COLLECTED), 99
+AT_IMPORT = ("abi.c", "pkmcal.h", "calls.h")  # what is called when Python imports the core
 MEMORY = 6 << 30  # bytes that a process with a mutant may have
-C_FLAGS = (
-    "-std=c11 -Og -w -fPIC -shared -fvisibility=hidden -fno-math-errno -fno-trapping-math"
-    " -ffp-contract=off -fcx-limited-range -Dalways_inline=unused"
-    " -Werror=implicit-function-declaration"
-)
 
 
 def main() -> int:
@@ -97,6 +92,8 @@ def main() -> int:
         shutil.copytree(ROOT, copy, ignore=LEFT_OUT)
         folder = Folder(chosen.folder, copy, chosen.tests or TESTS[chosen.folder], chosen.most)
         folder.record(chosen.recorded)
+        if chosen.count:
+            folder.collect()
         for k, change in enumerate(folder.drawn(chosen.seed)):
             if sum(ends.values()) - ends["not counted"] >= chosen.count:
                 break
@@ -108,6 +105,8 @@ def main() -> int:
             ends[end] += 1
             if end != "not counted":
                 print(f"{k} {end}{by}: {change.named(folder.text(change))}", flush=True)
+        if chosen.count:
+            folder.control()
     counted = sum(ends.values()) - ends["not counted"]
     print(
         f"{chosen.folder}, seed {chosen.seed}: {ends['killed']} of {counted} killed"
@@ -121,42 +120,17 @@ class Folder:
 
     def __init__(self, name: str, copy: Path, tests: tuple[str, ...], most: float) -> None:
         self.name, self.copy, self.tests, self.most = name, copy, tests, most
-        self.core = copy / "pkmcal" / "_core.abi3.so"
         self.known: dict[str, dict] = {}
+        self.killers = Counter[str]()
         self.functions: list[tuple[str, int]] = []
         (copy / "pkmcal" / "derive").symlink_to(copy / "derive")
         (copy / "pkmcal" / "generated").symlink_to(copy / "generated")
         (copy.parent / "shared").symlink_to(ROOT.parent / "shared")  # data of real machines, if any
         if name == "csrc":
-            self._narrow()
+            self.core = Core(copy)
         else:
             for core in (ROOT / "pkmcal").glob("_core*.so"):
                 shutil.copy2(core, copy / "pkmcal")
-
-    def _narrow(self) -> None:
-        """Leave the 128-bit core alone, and write what cffi makes of it."""
-        for path in (self.copy / "csrc").iterdir():
-            if path.suffix in (".c", ".h", ".py") and path.name != "lanes.h":
-                text = path.read_text(encoding="utf-8").replace("__x86_64__", "PKMCAL_ALL_ISAS")
-                path.write_text(text, encoding="utf-8")
-        source = "import csrc.build as b; b.ffibuilder().emit_c_code('_core.c')"
-        subprocess.run([sys.executable, "-c", source], cwd=self.copy, check=True)
-        self._compile("_core.c", "-DPy_LIMITED_API=0x030a0000")
-        for unit in ("core_base.c", "paths.c", "abi.c"):
-            self._compile(f"csrc/{unit}")
-        self._link()
-        self.whole = {path: path.read_bytes() for path in self.copy.glob("*.o")}
-
-    def _compile(self, unit: str, *more: str) -> bool:
-        command = [*shlex.split(os.environ.get("CC", "gcc") + " " + C_FLAGS), *more]
-        command += ["-Icsrc", "-Igenerated", "-I" + sysconfig.get_path("include")]
-        command += ["-c", unit, "-o", Path(unit).stem + ".o"]
-        return subprocess.run(command, cwd=self.copy, capture_output=True).returncode == 0
-
-    def _link(self, name: str = "pkmcal/_core.abi3.so", *more: str) -> None:
-        objects = sorted(str(path) for path in self.copy.glob("*.o"))
-        command = ["gcc", "-shared", "-Wl,-Bsymbolic", *objects, *more, "-lm", "-o", name]
-        subprocess.run(command, cwd=self.copy, check=True)
 
     def record(self, path: Path | None) -> None:
         """Note what each test calls, and leave out those that fail without a mutant."""
@@ -165,10 +139,10 @@ class Folder:
             self.known, self.functions = stored["tests"], stored["functions"]
         else:
             if self.name == "csrc":
-                self._instrument()
+                self.functions = self.core.instrumented()
             self.known = self._recorded()
             if self.name == "csrc":
-                self._link()
+                self.core.plain()
         for test, known in self.known.items():
             if known["failed"]:
                 print(f"fails without a mutant, left out: {test}", flush=True)
@@ -181,26 +155,12 @@ class Folder:
         seconds = sum(test["seconds"] for test in self.known.values())
         print(f"{len(self.known)} tests, {seconds:.0f} s", flush=True)
 
-    def _instrument(self) -> None:
-        (self.copy / "hook.c").write_text(calls.HOOK, encoding="utf-8")
-        more = ["-g", "-finstrument-functions"]
-        self._compile("hook.c", "-O2", "-g")
-        for unit in ("core_base.c", "paths.c", "abi.c"):
-            self._compile(f"csrc/{unit}", *more)
-        self._link()
-        self.functions = sorted(
-            {place for place, _ in calls.c_functions(self.copy, self.core).values()}
-        )
-        (self.copy / "hook.o").unlink()
-        for path, content in self.whole.items():  # the core itself stays instrumented
-            path.write_bytes(content)
-
     def _recorded(self) -> dict[str, dict]:
         found = self.copy / "recorded.json"
 
         def run() -> int:
             if self.name == "csrc":
-                drain = calls.c_calls(self.copy, self.core)
+                drain = calls.c_calls(self.copy, self.core.units)
             else:
                 drain = calls.python_calls(self.copy, self.name.split("/")[0])
             recorder = calls.Recorder(drain)
@@ -212,6 +172,38 @@ class Folder:
         if self._forked(run, 36000, bytecode=True) not in (0, 1):
             raise SystemExit((self.copy / "output.txt").read_text(encoding="utf-8"))
         return json.loads(found.read_text(encoding="utf-8"))
+
+    def collect(self) -> None:
+        """Collect all tests once, in a process that is asked for each mutant."""
+
+        def fork(run: Callable[[], int]) -> int:
+            return self._started(run, 36000)
+
+        options = [*self._options(), f"--basetemp={self.copy.parent / 'pytest'}", *self.tests]
+        self.requests, self.apart, self.called = collected.begin(
+            self.copy, self.name.split("/")[0], fork, options
+        )
+
+    def control(self) -> None:
+        """Do the tests that failed with mutants pass without one? And end the collecting."""
+        here = [k for k in self.killers if k.split("::")[0] not in self.apart]
+        file = next(path for path in sorted((self.copy / self.name).glob("*.[chp]*")))
+        if self.name == "csrc":
+            shutil.copy2(self.core.units, self.core.mutant)
+        while here:
+            code, test = self._asked(here, str(file.relative_to(self.copy)), "", "")
+            if not code:
+                break
+            print(f"fails without a mutant, too: {test}", flush=True)
+            here = here[here.index(test) + 1 :]
+        self.requests.send(None)
+
+    def _asked(self, tests: list[str], file: str, before: str, after: str) -> tuple[int, str]:
+        """How these end in a process forked from where they are collected, and the last of them."""
+        seconds = {k: self.known[k]["seconds"] for k in tests}
+        request = {"tests": tests, "file": file, "seconds": seconds}
+        self.requests.send(request | {"before": before, "after": after})
+        return self.requests.recv()
 
     def drawn(self, seed: int) -> list[Change]:
         """All mutants in an order of chance."""
@@ -234,46 +226,77 @@ class Folder:
         """What becomes of a mutant: killed, survived, or not counted; and by how many tests."""
         path, text = self.copy / change.file, self.text(change)
         times = path.stat()
-        path.write_text(change.applied(text), encoding="utf-8")
+        mutant = change.applied(text)
+        path.write_text(mutant, encoding="utf-8")
         try:
             if not self.compiles(path):
                 return "not counted", ""
-            tests = self.shown(change, text)
+            function = self.function(change, text)
+            tests = self.shown(change, function)
             began = time.monotonic()
-            for some in (tests[:12], tests[12:60], tests[60:]):  # collecting takes time
-                if some and not self.passes(some):
-                    return "killed", f" in {time.monotonic() - began:.1f} s"
+            if test := self.failing(change, text, function, tests):
+                self.killers[test] += 1
+                return "killed", f" in {time.monotonic() - began:.1f} s by {test}"
             if self.name == "derive" and self._derives_the_same():
                 return "not counted", ""
-            return "survived", f" {len(tests)} tests"
+            spent = sum(self.known[test]["seconds"] for test in tests)
+            return "survived", f" {len(tests)} tests of {spent:.0f} s"
         finally:
             path.write_text(text, encoding="utf-8")
             os.utime(path, ns=(times.st_atime_ns, times.st_mtime_ns))  # its bytecode holds again
 
-    def shown(self, change: Change, text: str) -> list[str]:
+    def function(self, change: Change, text: str) -> int | None:
+        """First line of the function of a change."""
+        if self.name != "csrc":
+            return calls.python_function(text, change.line(text))
+        starts = [line for file, line in self.functions if file == change.file]
+        return calls.c_function(text, change.at, starts)
+
+    def shown(self, change: Change, function: int | None) -> list[str]:
         """The tests that see it, up to the time there is: first of files named as its own.
 
         Where none calls anything of its file, some that import it.
         """
-        if self.name == "csrc":
-            starts = [line for file, line in self.functions if file == change.file]
-            first = calls.c_function(text, change.at, starts)
-        else:
-            first = calls.python_function(text, change.line(text))
-        inside = [k for k, test in self.known.items() if [change.file, first] in test["calls"]]
+        inside = [k for k, test in self.known.items() if [change.file, function] in test["calls"]]
         files = {k: {file for file, _ in test["calls"]} for k, test in self.known.items()}
         inside = inside or [k for k in self.known if change.file in files[k]]
-        stem, seconds = Path(change.file).stem, 0.0
+        stem, seconds = Path(change.file).stem.split("_")[0], 0.0
         if not inside:
             return sorted(self.known, key=lambda k: self.known[k]["seconds"])[:5]
-        tests = sorted(
-            inside, key=lambda k: (stem not in k.split("::")[0], self.known[k]["seconds"])
-        )
+
+        def promise(k: str) -> float:
+            likely = self.killers[k] + 0.1 + (stem in k.split("::")[0])
+            return likely / (self.known[k]["seconds"] + 0.02)
+
+        tests = sorted(inside, key=promise, reverse=True)
         for k, test in enumerate(tests):
             seconds += self.known[test]["seconds"]
             if seconds > self.most:
                 return tests[: k + 1]
         return tests
+
+    def failing(
+        self, change: Change, text: str, function: int | None, tests: list[str]
+    ) -> str | None:
+        """The test that fails, or None."""
+        lines = change.old.count("\n") - change.new.count("\n")
+        after = Change(change.file, change.at, change.old, change.new + "\n" * lines)
+        if self.name == "csrc":
+            here = [k for k in tests if k.split("::")[0] not in self.apart]
+            here = [] if Path(change.file).name in AT_IMPORT else here
+        else:
+            here = [] if function is None or (change.file, function) in self.called else tests
+        if here:
+            code, test = self._asked(here, change.file, text, after.applied(text))
+            if code and code != OWN_ERROR:
+                return test
+            here = [] if code else here
+        rest = [k for k in tests if k not in here]
+        for some in (rest[:12], rest[12:60], rest[60:]):  # collecting takes time
+            if some and not self.passes(some):
+                failed = self.copy / "failed.txt"
+                return failed.read_text(encoding="utf-8") if failed.exists() else some[0]
+        return None
 
     def compiles(self, changed: Path) -> bool:
         """Whether it compiles, and to something else."""
@@ -282,24 +305,21 @@ class Folder:
                 return bool(ast.parse(changed.read_text(encoding="utf-8")))
             except SyntaxError:
                 return False
-        units = [changed.name] if changed.suffix == ".c" else ["core_base.c", "paths.c", "abi.c"]
-        for path, content in self.whole.items():
-            path.write_bytes(content)
-        if not all(self._compile(f"csrc/{unit}") for unit in units):
-            return False
-        if all(path.read_bytes() == content for path, content in self.whole.items()):
-            return False
-        self.core.unlink(missing_ok=True)
-        self._link()
-        return True
+        return self.core.mutated(changed)
 
     def passes(self, tests: list[str]) -> bool:
         """Whether these tests pass."""
         files = list(dict.fromkeys(test.split("::")[0] for test in tests))
         limit = 60 + 10 * sum(self.known[test]["seconds"] for test in tests)
 
+        failed = self.copy / "failed.txt"
+        failed.unlink(missing_ok=True)
+
         def run() -> int:
-            return int(pytest.main([*self._options(), "-x", *files], plugins=[calls.Chosen(tests)]))
+            if self.name == "csrc":
+                os.environ["PKMCAL_UNITS"] = str(self.core.mutant)
+            chosen = calls.Chosen(tests, failed)
+            return int(pytest.main([*self._options(), "-x", *files], plugins=[chosen]))
 
         code = self._forked(run, limit)
         if code in (NO_TESTS, OWN_ERROR):
@@ -327,7 +347,15 @@ class Folder:
         return [*options, *LEFT_OUT_OF.get(self.name, ())]
 
     def _forked(self, run: Callable[[], int], limit: float, bytecode: bool = False) -> int:
-        """What this ends with in a process of its own, in the copy: below 0 if it is stopped.
+        """What this ends with in a process of its own, in the copy: below 0 if it is stopped."""
+        child = self._started(run, limit, bytecode)
+        _, status = os.waitpid(child, 0)
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(child, signal.SIGKILL)  # what it left behind
+        return os.waitstatus_to_exitcode(status)
+
+    def _started(self, run: Callable[[], int], limit: float, bytecode: bool = False) -> int:
+        """A process of its own that does this, in the copy.
 
         The limit is of processor time: other work may take all cores.
         """
@@ -352,10 +380,7 @@ class Folder:
             except BaseException as error:
                 os.write(2, repr(error).encode())
                 os._exit(OWN_ERROR)
-        _, status = os.waitpid(child, 0)
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(child, signal.SIGKILL)  # what it left behind
-        return os.waitstatus_to_exitcode(status)
+        return child
 
 
 if __name__ == "__main__":

@@ -90,10 +90,14 @@ class Recorder:
 
 
 class Chosen:
-    """A plugin of pytest that runs these tests alone, in their order."""
+    """A plugin of pytest that runs these tests alone, in their order, and notes which one fails."""
 
-    def __init__(self, tests: Iterable[str]) -> None:
-        self.place = {test: k for k, test in enumerate(tests)}
+    def __init__(self, tests: Iterable[str], failed: Path) -> None:
+        self.place, self.failed = {test: k for k, test in enumerate(tests)}, failed
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            self.failed.write_text(report.nodeid, encoding="utf-8")
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
@@ -122,6 +126,12 @@ def python_calls(copy: Path, folder: str) -> Callable[[], set[Function]]:
     sys.settrace(trace)
     threading.settrace(trace)
     return drain
+
+
+def untraced() -> None:
+    """End what `python_calls` began."""
+    sys.settrace(None)
+    threading.settrace(None)  # type: ignore[arg-type]
 
 
 def c_calls(copy: Path, core: Path) -> Callable[[], set[Function]]:
