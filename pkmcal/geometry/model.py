@@ -172,6 +172,10 @@ class Model:
     workspace: Box = field(default_factory=dict)
     load: Load | None = None
 
+    def __post_init__(self) -> None:
+        if self.load is not None:  # some of its numbers may be those of the geometry
+            object.__setattr__(self, "load", self.load.with_numbers(dict(self.geometry.items())))
+
     @property
     def n_actuators(self) -> int:
         """Number of actuators."""
