@@ -139,7 +139,8 @@ def furthest_axis(direction: FloatArray) -> int:
 
 def rms(values: FloatArray) -> float:
     """Root mean square; NaN without values."""
-    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float("nan")
+    count = np.size(values)
+    return float(np.sqrt(np.square(values).sum() / count)) if count else float("nan")
 
 
 def propagate(jacobian: FloatArray, covariance: FloatArray) -> FloatArray:

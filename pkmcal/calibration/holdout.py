@@ -14,7 +14,8 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.later import Later, OwnNumbers, compared, later
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM, Estimate, Estimator
+from pkmcal.estimation.estimate import Estimate
+from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM, Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.labels import Labels, labels

@@ -47,7 +47,8 @@ from pkmcal.calibration.slack import SLACK, Cell, Slack, said_slack, slack_cable
 from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.datasets import as_fit_data, as_fitted, by_set, informative
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimator import LEAST_FREEDOM, Estimate, Estimator
+from pkmcal.estimation.estimate import Estimate
+from pkmcal.estimation.estimator import LEAST_FREEDOM, Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.expansion import Coefficients, expansion_of
 from pkmcal.estimation.fit_data import FitData

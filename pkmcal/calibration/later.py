@@ -13,7 +13,7 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimator import Estimate
+from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters

@@ -256,7 +256,7 @@ class FreePoses:
         self._mixed = not np.array_equal(self._read, np.eye(robot.machine.rows))
         self._arcs = 1.0 / mm_per_unit(pose_steps.step_units(robot), robot.length)
         units = [robot.actuator_units[a] if a >= 0 else "mm" for a in self.actuators]
-        self._turning = np.array([unit == "rad" for unit in units])
+        self._turning = [unit == "rad" for unit in units]
         self.unknowns = robot.machine.m - len(self._held)
         self.equations = len(rows)
         if self.unknowns < 1 or not sigma[:, np.setdiff1d(self.actuators, -1)].all():
@@ -265,14 +265,21 @@ class FreePoses:
                 " be met without noise: actuator_sigma must be positive, or None; 0 at all rows for"
                 f" at most {robot.machine.m - len(roles.held) - 1} actuators that are never wrong"
             )
-        self.sigma: FloatArray | None = sigma
         if self.actuators != tuple(range(sigma.shape[1])):
             # passive rows that give way are as sure as the file weighs them against the actuators
             common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
             each = [sigma[:, a] if a >= 0 else common for a in self.actuators]
-            self.sigma = np.stack(each, axis=1)
-        self._white = 1.0 / self.sigma
-        self._shift: FloatArray | float = 0.0
+            sigma = np.stack(each, axis=1)
+        self._state(sigma)
+        self._shift: FloatArray | None = None
+
+    def _state(self, sigma: FloatArray) -> None:
+        """State the deviations (K, equations), and what they whiten with."""
+        self.sigma: FloatArray | None = sigma
+        self._white = 1.0 / sigma
+        alike = bool((sigma == sigma[:1]).all())
+        white = self._white[:1] if alike else self._white
+        self._white_steps = np.repeat(white[:, :, None], self.unknowns, axis=2)
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
         """Poses stay where they are, or where joints hold them, until they are fitted."""
@@ -292,20 +299,21 @@ class FreePoses:
         if len(self._held):
             by_step = by_step @ self._allowed(robot, states)[0]
         off *= self._white
-        off += self._shift
-        by_step *= self._white[:, :, None]
+        if self._shift is not None:
+            off += self._shift
+        by_step *= self._white_steps
         return off, by_step
 
     def shifted(self, by: FloatArray) -> FreePoses:
         """The same with larger equations."""
         other = copy.copy(self)
-        other._shift = self._shift + by
+        other._shift = by if self._shift is None else self._shift + by
         return other
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units; the other rows are in mm."""
-        arc = robot.length if self._turning.any() else 1.0
-        return np.where(self._turning, arc, 1.0)
+        arc = robot.length if any(self._turning) else 1.0
+        return np.array([arc if turning else 1.0 for turning in self._turning])
 
     def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
         """Twists by steps of the pose."""

@@ -19,7 +19,7 @@ from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
 from pkmcal.core.library import STATUS
 from pkmcal.estimation import joint_angles
 from pkmcal.estimation.closures import RowStates
-from pkmcal.estimation.elimination import Blocks, Shares
+from pkmcal.estimation.elimination import Blocks, Shares, System
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.first_frames import aligned
 from pkmcal.estimation.fit_data import FitData
@@ -41,12 +41,11 @@ from pkmcal.measurements.observation import (
     distance_per_point,
 )
 from pkmcal.result import failed_rows
-from pkmcal.statistics.linear_fit import lengths_squared
 
 _TOGETHER = 16384  # rows whose derivatives are multiplied at once, or kept
 
-# Whose, where, with which noise, and what `_system` says there; copies have another "whose".
-_Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, tuple[FloatArray, FloatArray]]
+# Whose, where, with which noise, and the equations there; copies have another "whose".
+_Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, System]
 
 
 class Equations(Readings):
@@ -95,6 +94,8 @@ class Equations(Readings):
                 if 5 in ever:  # angles are read together
                     values[:, -3:] = orientation.shortest(values[:, -3:])
                 guess[np.ix_(place[read], ever)] = values
+        length, *most = parameters.robot.length, np.abs(guess).max(), np.abs(self.actuators).max()
+        self._size = float(max(length, *most))
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
         self._last: _Last | None = None
@@ -155,7 +156,7 @@ class Equations(Readings):
             self._groups[closure],
             np.repeat(self.set_of, of_row),
         ])  # fmt: skip
-        self._blocks = Blocks(pose_of_equation, poses, closures.unknowns)
+        self._blocks = Blocks(pose_of_equation, poses, closures.unknowns, self._size)
         self.components, self.pose_of_unit = self._blocks.components, self._blocks.pose_of_unit
         unit_of_pose = np.full(poses, -1)
         unit_of_pose[self.pose_of_unit] = np.arange(len(self.pose_of_unit))
@@ -234,7 +235,7 @@ class Equations(Readings):
             states.tension,
         )
         self._seen = (found, seen) if len(self.rows) <= _TOGETHER else None
-        if self.closures.unknowns and there is not None:
+        if self.closures.unknowns:
             self._last = weakref.ref(self), found, factors, there
         return found
 
@@ -249,7 +250,9 @@ class Equations(Readings):
         if self._follow is None or self._follow[0] is not self._from:
             return self.closures.settled(machines, self._states)
         begin, following = self._follow
-        step = following @ (theta - begin.theta)
+        step = (following.reshape(-1, len(theta)) @ (theta - begin.theta)).reshape(
+            following.shape[:2]
+        )
         if not np.isfinite(step).all():
             step[~np.isfinite(step).all(axis=1)] = 0.0
         ahead = self.closures.moved(machines, self._states, step)
@@ -282,14 +285,15 @@ class Equations(Readings):
             np.concatenate([by_unknown, self.whitened(by_pose, noise)]),
         )
 
-    def _at(self, evaluation: Evaluation, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _at(self, evaluation: Evaluation, noise: FloatArray) -> System:
         """The system at an evaluation; the last one is kept, which a step asks for three times."""
         last = self._last
         mine = last is not None and last[0]() is self and last[1] is evaluation
         if last is not None and mine and (last[2] is noise or np.array_equal(last[2], noise)):
             return last[3]
         self._last = None
-        found = self._system(evaluation.machines, evaluation.states, evaluation.theta, noise)
+        there = self._system(evaluation.machines, evaluation.states, evaluation.theta, noise)
+        found = self._blocks.at(there)
         self._last = weakref.ref(self), evaluation, noise, found
         return found
 
@@ -297,8 +301,7 @@ class Equations(Readings):
         """Measured less predicted (M,), whitened: what is left when poses have taken their part."""
         if not self.closures.unknowns:
             return self.whitened(evaluation.residuals, noise)
-        off, by_unknown = self._at(evaluation, noise)
-        return -self._blocks.left(by_unknown, off[:, None])[0][:, 0]
+        return -self._at(evaluation, noise).left
 
     def squares(self, residual: FloatArray) -> FloatArray:
         """Squared length of the residuals (M,) of each unit, (U,)."""
@@ -310,7 +313,7 @@ class Equations(Readings):
         """Derivative (M, n) of what is predicted by the parameters; of what is left likewise."""
         if not self.closures.unknowns:
             return self.whiten(self.jacobian(evaluation), noise)
-        p, (_, by_unknown) = self.parameters, self._at(evaluation, noise)
+        p, by_unknown = self.parameters, self._at(evaluation, noise).by_unknown
         of_closures = self.closures.by_numbers(
             evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
         )
@@ -342,7 +345,7 @@ class Equations(Readings):
         None of those that do not count. `weights` are those of `by_groups`, `taken` (M, r) what
         Jacobian and directions give there.
         """
-        off, by_unknown = self._at(evaluation, noise)
+        off, by_unknown, _ = self._at(evaluation, noise)
         own = int(self._counts.sum())
         longer, freedom = np.zeros((2, *self._slack.shape))
         longer[self._counts] = -off[:own]
@@ -400,7 +403,7 @@ class Equations(Readings):
         """
         other, errors, unknowns = copy.copy(self), left, self.closures.unknowns
         if unknowns:
-            off, by_unknown = self._at(at, noise)
+            off, by_unknown, _ = self._at(at, noise)
             errors = self._blocks.spread(by_unknown, left)
             change, own = np.zeros(self._slack.shape), int(self._counts.sum())
             change[self._counts] = -(errors + off)[:own]
@@ -493,8 +496,7 @@ class Equations(Readings):
         noise: FloatArray,
         weights: FloatArray,
         residual: FloatArray,
-        jacobian: FloatArray,
-        half: FloatArray,
+        taken: FloatArray,
     ) -> Shares:
         """Squares and degrees of freedom of each group.
 
@@ -508,23 +510,21 @@ class Equations(Readings):
             Of the units.
         residual : ndarray (M,)
             Whitened and weighted.
-        jacobian : ndarray (M, n)
-            Weighted.
-        half : ndarray (n, r)
-            Directions in which the parameters' covariance is 1: in these the squares of a row of
-            the Jacobian are the leverage of its equation.
+        taken : ndarray (M, r)
+            Derivatives in directions in which the parameters' covariance is 1, weighted: the
+            squares of a row are the leverage of its equation.
         """
         count = len(self.unstated)
         if not self.closures.unknowns:
             group = np.repeat(self._family_of_unit, self.components)
             every = np.repeat(weights, self.components)
-            left = every - lengths_squared(jacobian, half)
+            left = every - np.einsum("ij,ij->i", taken, taken)
             freedom = np.bincount(group, left, count).astype(np.float64)
             squares = np.bincount(group, residual**2, count).astype(np.float64)
             return Shares(squares, freedom, np.diag(freedom))
-        _, by_unknown = self._at(evaluation, noise)
+        by_unknown = self._at(evaluation, noise).by_unknown
         group = self._group_of_equation
-        return self._blocks.by_groups(by_unknown, group, weights, residual, jacobian @ half)
+        return self._blocks.by_groups(by_unknown, group, weights, residual, taken)
 
     def rounding(self, noise: FloatArray) -> float:
         """Length of the whitened rounding errors of what is predicted."""
@@ -555,8 +555,9 @@ class Equations(Readings):
     def closure_rms(self, evaluation: Evaluation) -> float:
         """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
         off = self.closures_off(evaluation)
-        counted = ~self._slack[:, : off.shape[1]] & (evaluation.status == 0)[:, None]
-        return rms(off[counted])
+        if self._counting is not None or not evaluation.ok:
+            off = off[~self._slack[:, : off.shape[1]] & (evaluation.status == 0)[:, None]]
+        return rms(off)
 
     def worst_closures(self, evaluation: Evaluation) -> FloatArray:
         """The largest of them at each pose (K,); NaN where they hold."""
@@ -573,7 +574,8 @@ class Equations(Readings):
             and last[1] is evaluation
             and self._counting is None
         ):
-            off = last[3][0][: self._slack.size].reshape(self._slack.shape) * last[2][self._groups]
+            off = last[3].off[: self._slack.size].reshape(self._slack.shape)
+            off = off * last[2][self._groups]
         else:
             off, _ = self.closures.residual(evaluation.machines, evaluation.states)
         needed: FloatArray = off if self.closures.sigma is None else off * self.closures.sigma

@@ -161,6 +161,10 @@ class Readings:
         place = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
         self.pose_of, there = place[: len(count)], iter(place[len(count) :])
         self.other_of = [None if m.other is None else next(there) for m in self.sets]
+        self._nothing = [  # where actuators alone were read
+            None if m.components else Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6)))
+            for m in self.sets
+        ]
         self.deviations = tuple(np.ones(len(m.components)) for m in self.sets)
         self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
         self.present: BoolArray = np.concatenate([
@@ -221,8 +225,8 @@ class Readings:
     def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Readings of each set at poses (K, 6)."""
         return tuple(
-            self._grown(i, self._predicted_of(i, pose, theta), pose, theta)
-            for i in range(len(self.sets))
+            nothing or self._grown(i, self._predicted_of(i, pose, theta), pose, theta)
+            for i, nothing in enumerate(self._nothing)
         )
 
     def _grown(self, i: int, seen: Predicted, pose: FloatArray, theta: FloatArray) -> Predicted:

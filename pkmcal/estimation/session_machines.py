@@ -47,6 +47,8 @@ class Machines:
     @cached_property
     def driven(self) -> tuple[Calibratable, ...]:
         """The machines, each with its drives in the state of its poses."""
+        if all(each is None for each in self.state):
+            return self.robots
         return tuple(
             _driven(r, self.state.at(own)) for r, own in zip(self.robots, self.rows, strict=True)
         )
@@ -154,7 +156,7 @@ class SessionClosures:
         ]
         nowhere = [np.zeros(len(rows), dtype=np.intp) for rows in self._rows]
         wide = [
-            spread(part, columns[[s]], rows, size)
+            spread(part, columns[s : s + 1], rows, size)
             for s, (part, rows) in enumerate(zip(found, nowhere, strict=True))
         ]
         return _joined(wide, self._rows)

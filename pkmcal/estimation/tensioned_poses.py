@@ -89,11 +89,10 @@ class TensionedPoses(FreePoses):
         self._arcs = np.concatenate([self._arcs, np.full(count, _SHARE * largest)])
         self.unknowns = len(self._arcs) - len(self._held)
         self.equations += count
-        self._turning = np.append(self._turning, np.zeros(count, dtype=bool))
+        self._turning = [*self._turning, *[False] * count]
         self.actuators = (*self.actuators, *[-1] * count)
         of_cells = np.ones(cells.read.shape) if cells.sigma is None else cells.sigma
-        self.sigma = np.hstack([np.asarray(self.sigma), of_cells])
-        self._white = 1.0 / self.sigma
+        self._state(np.hstack([np.asarray(self.sigma), of_cells]))
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
         """Tensions begin where cells read them, those that were not read at the row's mean."""

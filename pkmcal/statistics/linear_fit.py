@@ -111,20 +111,20 @@ def linear_fit(
     True
     """
     back = unit_basis(jacobian, prior, basis)
-    return in_unit_basis(jacobian, residual, prior, back, cluster, component)
+    return in_unit_basis(jacobian @ back, residual, prior, back, cluster, component)
 
 
 def in_unit_basis(
-    jacobian: FloatArray,
+    design: FloatArray,
     residual: FloatArray,
     prior: FloatArray,
     back: FloatArray,
     cluster: IntArray,
     component: IntArray,
 ) -> LinearFit:
-    """`linear_fit` where its `unit_basis` is known, `back` (n, p)."""
+    """`linear_fit` where its `unit_basis` is known, `back` (n, p), and the design in it."""
     return LinearFit(
-        design=jacobian @ back,
+        design=design,
         residual=residual,
         prior=prior @ back,
         back=back,
@@ -171,21 +171,22 @@ def column_basis(matrix: FloatArray) -> FloatArray:
     return basis
 
 
-def orthonormal(matrix: FloatArray) -> FloatArray:
-    """What the columns (M, n) are multiplied by, (n, r), to become a basis of theirs."""
+def orthonormal(matrix: FloatArray | Sequence[FloatArray]) -> FloatArray:
+    """What the columns (M, n) are multiplied by, (n, r), to become a basis of theirs.
+
+    The matrix may be several side by side.
+    """
     _, singular, rows = np.linalg.svd(triangle(matrix), full_matrices=False)
     keep = singular > ROUNDING * singular[0]
     found: FloatArray = rows[keep].T / singular[keep]
     return found
 
 
-def lengths_squared(matrix: FloatArray, directions: FloatArray) -> FloatArray:
-    """Squared lengths (M,) of the rows (M, n) in directions (n, r), without another matrix."""
-    found = np.empty(len(matrix))
+def multiply_in_place(matrix: FloatArray, square: FloatArray) -> None:
+    """Multiply a matrix (M, n) by a square one (n, n) from the right, without another matrix."""
     for first in range(0, len(matrix), _IN_ONE_THREAD):
         rows = slice(first, first + _IN_ONE_THREAD)
-        found[rows] = ((matrix[rows] @ directions) ** 2).sum(axis=1)
-    return found
+        matrix[rows] = matrix[rows] @ square
 
 
 def triangle(*stacked: FloatArray | Sequence[FloatArray]) -> FloatArray:
