@@ -257,8 +257,8 @@ class FreePoses:
             self.sigma = np.stack(each, axis=1)
         self._white = 1.0 / self.sigma
         alike = bool((self.sigma == self.sigma[:1]).all())
-        rows = self._white[:1] if alike else self._white
-        self._white_steps = np.repeat(rows[:, :, None], self.unknowns, axis=2)
+        factors = self._white[:1] if alike else self._white
+        self._white_steps = np.repeat(factors[:, :, None], self.unknowns, axis=2)
         self._shift: FloatArray | None = None
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
