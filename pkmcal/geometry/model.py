@@ -172,6 +172,12 @@ class Model:
     workspace: Box = field(default_factory=dict)
     load: Load | None = None
 
+    def with_geometry(self, geometry: Geometry) -> Model:
+        """The same with other numbers: `replace` for the steps of a search, ten times as fast."""
+        other = object.__new__(Model)
+        other.__dict__.update(vars(self), geometry=geometry)
+        return other
+
     @property
     def n_actuators(self) -> int:
         """Number of actuators."""
