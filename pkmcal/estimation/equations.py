@@ -212,9 +212,7 @@ class Equations(Readings):
 
         `noise` (G,) multiplies the stated deviations of each group, as in `whitened`.
         """
-        p = self.parameters
-        robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
-        machines = Machines(tuple(robots), self._own, self.state)
+        machines = self._machines_at(theta)
         states, self._last = self._states_ahead(machines, theta), None
         if self.closures.unknowns:
             factors = np.ones(len(self.unstated)) if noise is None else noise
@@ -238,6 +236,17 @@ class Equations(Readings):
         if self.closures.unknowns:
             self._last = weakref.ref(self), found, factors, there
         return found
+
+    def squares_ahead(self, theta: FloatArray, noise: FloatArray) -> float:
+        """Sum of the squared equations at `theta` where poses are looked for, none fitted yet."""
+        machines = self._machines_at(theta)
+        off, _ = self._system(machines, self._states_ahead(machines, theta), theta, noise)
+        return float(off @ off)
+
+    def _machines_at(self, theta: FloatArray) -> Machines:
+        p = self.parameters
+        robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
+        return Machines(tuple(robots), self._own, self.state)
 
     def seen(self, evaluation: Evaluation) -> tuple[Predicted, ...]:
         """Readings of each set at an evaluation, with derivatives; of few rows the last is kept."""
