@@ -6,6 +6,7 @@ map in the machine's own frame, m numbers a row, mm and rad.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -129,7 +130,7 @@ def readings_by_numbers(
     assert by_number is not None
     if chain is None:
         return by_number
-    by_places: FloatArray = by_number.reshape(-1, len(columns)) @ chain
+    by_places: FloatArray = by_number.reshape(math.prod(by_number.shape[:2]), -1) @ chain
     return by_places.reshape(*by_number.shape[:2], len(places))
 
 

@@ -206,6 +206,14 @@ def test_as_many_cables_as_coordinates_hold_their_load() -> None:
     assert np.abs((found.values - [-1880.0, -190.0]) / found.stderr).max() < 4.5
 
 
+def test_the_load_alone_is_found() -> None:
+    """No number that cables or their ways depend on is free."""
+    data = simulated(12, 2.0, off=0.0)
+    for name, true in (("load.force.z", -WEIGHT), ("load.cell3", 1.0)):
+        found = pk.identify(four(), rows(data, 2.0), name)
+        assert abs(found.values[0] - true) < 4.5 * found.stderr[0] < 0.02 * abs(true)
+
+
 def test_what_forces_leave_open_is_named() -> None:
     data = simulated(7, 2.0)
     found = pk.identify(four(), rows(data, 2.0), [*FREE, *FORCES, "load.cell*"])
