@@ -105,10 +105,11 @@ def identify(
         Names of numbers to find, or wildcards (``"base*.x"``). None: the robot's own default set.
     prior : float or mapping of str to float or (float, float), optional
         Standard deviation around the present value. A number, in mm, holds for all free numbers
-        of the geometry (an angle as its arc at the machine's characteristic length); a mapping
-        gives it by name or wildcard in mm and rad, later entries before earlier ones. A key may
-        also be a function of numbers: a sum, ``"gain1 - gain2"``, or the length of a sum of points,
-        ``"|base1 - base2|"``; a pair is a value that was measured otherwise, and its deviation.
+        of the geometry (an angle as its arc at the machine's characteristic length) but those of a
+        balanced load; a mapping gives it by name or wildcard in mm, rad and N, later entries before
+        earlier ones. A key may also be a function of numbers: a sum, ``"gain1 - gain2"``, or the
+        length of a sum of points, ``"|base1 - base2|"``; a pair is a value that was measured
+        otherwise, and its deviation.
         None: no prior; unidentifiable combinations then move as little as possible.
     loss : {"linear", "huber", "cauchy"}
         Weight of rows with large residuals, by the length of the whole measured vector.

@@ -15,6 +15,7 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.library import POSE
 from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
+from pkmcal.geometry.load import is_of_load
 from pkmcal.kinematics.perturbed import ideal, off
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
@@ -197,9 +198,10 @@ def sensitivity(
 
 
 def own_names(robot: Robot) -> list[str]:
-    """List every number of the geometry that can be replaced, parameters too."""
+    """List every number that can be replaced and that poses follow, parameters too."""
     geometry = robot.geometry
-    return [name for name, tied in zip(geometry.names, geometry.tied, strict=True) if not tied]
+    names = zip(geometry.names, geometry.tied, strict=True)
+    return [name for name, tied in names if not tied and not is_of_load(name)]
 
 
 def study_cases(robot: Robot, study: Study) -> list[str]:

@@ -18,6 +18,7 @@ from pkmcal.estimation.parameters import Asked, Bounds, Parameters, Prior
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.geometry.load import is_of_load
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
@@ -244,6 +245,7 @@ def _prior(
             sigma[hits] = _positive(f"prior of {pattern}", value)
     else:
         sigma[:of_machine] = _positive("prior", prior) * scale[:of_machine]
+        sigma[[is_of_load(name) for name in names]] = np.inf  # forces are no lengths
     return sigma
 
 

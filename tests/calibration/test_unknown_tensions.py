@@ -214,6 +214,23 @@ def test_the_load_alone_is_found() -> None:
         assert abs(found.values[0] - true) < 4.5 * found.stderr[0] < 0.02 * abs(true)
 
 
+def test_one_length_for_all_says_nothing_of_forces() -> None:
+    """A prior of 1 mm is none of the mass or a gain; errors of 0.1 mm are none of the load."""
+    names = [*FREE, "load.force.z", "load.cell3"]
+    log = rows(simulated(13, 2.0), 2.0)
+    one = pk.identify(four(), log, names, prior=50.0)
+    other = pk.identify(four(), log, names, prior=dict.fromkeys(FREE, 50.0))
+    np.testing.assert_array_equal(one.values, other.values)
+    np.testing.assert_array_equal(one.stderr, other.stderr)
+    home = four().home
+    asked = [
+        pk.tolerance(four(), home, 0.1, samples=100).names,
+        pk.allocate_tolerance(four(), home, 0.1).joints,
+        pk.sensitivity(four(), home).cases,
+    ]
+    assert not [name for each in asked for name in each if name.startswith("load")]
+
+
 def test_what_forces_leave_open_is_named() -> None:
     data = simulated(7, 2.0)
     found = pk.identify(four(), rows(data, 2.0), [*FREE, *FORCES, "load.cell*"])
