@@ -189,7 +189,7 @@ class Replicate:
         """Whitened residuals (M,) with the deviation that the noise has."""
         estimate = self._estimate
         root = np.sqrt(np.repeat(estimate.weights, self._equations.components))
-        taken = root[:, None] * estimate.jacobian @ estimate.half
+        taken = root[:, None] * estimate.change(estimate.half)
         out = np.empty_like(estimate.residual)
         for pose in range(int(self._pose.max()) + 1):
             mine = np.flatnonzero(self._pose == pose)

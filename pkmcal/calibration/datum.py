@@ -17,7 +17,8 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, first_largest
-from pkmcal.estimation.estimator import Estimate, Estimator
+from pkmcal.estimation.estimate import Estimate
+from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import decompose, listed
 from pkmcal.estimation.parameters import Asked, Parameters

@@ -12,7 +12,8 @@ from pkmcal.arrays import BoolArray
 from pkmcal.calibration.outliers import outliers
 from pkmcal.estimation.begin import estimator_at
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimator import Estimate, Estimator
+from pkmcal.estimation.estimate import Estimate
+from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
@@ -73,13 +74,13 @@ def held_without(
 def outlying(estimator: Estimator, estimate: Estimate) -> BoolArray:
     """Which rows (N,) of the equations the others contradict."""
     equations = estimator.equations
-    fitted = estimate.half[:, : estimate.state.fitted.rank]
+    fitted = estimate.state.fitted.rank
     odd = outliers(
         estimate.residual,
-        estimate.jacobian @ fitted,
+        estimate.design[:, :fitted],
         equations.components,
         estimate.weights,
-        estimate.prior @ fitted,
+        estimate.prior @ estimate.half[:, :fitted],
     )
     return np.isin(equations.unit_of_row, odd)
 

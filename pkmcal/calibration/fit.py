@@ -8,7 +8,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimator import Estimate
+from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import decompose
 from pkmcal.estimation.parameters import Parameters
@@ -59,7 +59,7 @@ class Fit:
 
         `Estimate.state` has them at the nominal machine; they turn with its errors.
         """
-        _, basis = decompose(self.estimate.jacobian, self.estimate.prior)
+        _, basis = decompose(self.estimate.triangle, self.estimate.prior)
         return basis[:, self.estimate.state.determined.rank :]
 
     def machine_combinations(self) -> int:

@@ -9,7 +9,8 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit, rms
 from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.dropped import outlying
-from pkmcal.estimation.estimator import Estimate, Estimator
+from pkmcal.estimation.estimate import Estimate
+from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.gauges import Gauges, gauges
 from pkmcal.estimation.identifiability import (
@@ -65,6 +66,8 @@ class Misfit:
     closure_rms_before: float
     closures: FloatArray
     actuator_noise: float
+    tension_noise: float
+    tension_rms: float
     redundancy: tuple[float, ...]
     idle: int
     chi2_per_dof: float
@@ -110,7 +113,7 @@ def parameter_table(
     unknown = np.linalg.norm(along, axis=1) > _INVOLVED * chosen.scale
     unknown |= uncertainty.freedom <= 0  # nothing shows the deviation
     rank, size = estimate.state.determined.rank, chosen.robot.length
-    held = rates @ held_errors(estimate.jacobian, estimate.prior, rank, size)
+    held = rates @ held_errors(estimate.triangle, estimate.prior, rank, size)
     shown = uncertainty.matrix + held @ held.T
     shown[unknown] = shown[:, unknown] = np.nan
     shown[unknown, unknown] = np.inf
@@ -200,7 +203,9 @@ def misfit(
         closure_rms=equations.closure_rms(estimate.evaluation),
         closure_rms_before=equations.closure_rms(estimator.start),
         closures=equations.worst_closures(estimate.evaluation),
-        actuator_noise=float(np.append(shown, np.nan)[len(equations.sets)]),
+        actuator_noise=float(shown[-1]) if equations.closures.unknowns else float("nan"),
+        tension_noise=float(shown[-2]) if equations.closures.cells else float("nan"),
+        tension_rms=equations.cell_rms(estimate.evaluation),
         redundancy=tuple(estimate.freedom.tolist()),
         idle=equations.idle,
         chi2_per_dof=float((squares + prior @ prior) / dof) if stated else float("nan"),
@@ -235,18 +240,16 @@ def tested_prior(estimator: Estimator, estimate: Estimate) -> PriorTest | None:
     if not len(rows) or np.linalg.matrix_rank(rows) < len(rows) or estimator.loss != "linear":
         return None
     # parameters as what the prior says of them, in its deviations, and the rest
-    known = np.linalg.pinv(rows)
+    known = np.asarray(np.linalg.pinv(rows), dtype=np.float64)
     rest = np.linalg.svd(rows)[2][len(rows) :].T
-    data = estimate.residual - estimate.jacobian @ known @ chosen.prior_left(
-        estimate.evaluation.theta
-    )
+    data = estimate.residual - estimate.change(known @ chosen.prior_left(estimate.evaluation.theta))
     variance, freedom = 1.0, np.inf
     if estimator.unstated.any():
-        squares, freedom = data_alone(estimate.jacobian, data)
+        squares, freedom = data_alone(estimate.design, data)
         if freedom < LEAST_FREEDOM:
             return None
         variance = squares / freedom
-    columns = [estimate.jacobian @ known, estimate.jacobian @ rest, data]
+    columns = [estimate.change(known), estimate.change(rest), data]
     factor = triangle(columns)
     k = len(rows)
     return prior_test(factor[:, :k], factor[:, k:-1], factor[:, -1], variance, freedom)

@@ -14,7 +14,8 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
 from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.later import Later, OwnNumbers, compared, later
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM, Estimate, Estimator
+from pkmcal.estimation.estimate import Estimate
+from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM, Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.labels import Labels, labels
@@ -221,11 +222,12 @@ def _points(
     like = rows.like
     by_actuators = after.machines.actuator_twists(after.states)
     variances, added = [], []
+    seen = equations.seen(after)
     for i, measured in enumerate(equations.sets):
         count, k = after.residuals[i].shape
         variances.append(np.repeat(_variances(measured, uncertainty, like[i]), k))
         sigma = _of_actuators(measured, after.robot, uncertainty)
-        moved = after.predicted[i].by_twist @ by_actuators[equations.pose_of[i]]
+        moved = seen[i].by_twist @ by_actuators[equations.pose_of[i]]
         part = (
             np.zeros((count, k)) if sigma is None else ((moved * sigma[:, None]) ** 2).sum(axis=2)
         )

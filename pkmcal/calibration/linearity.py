@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.estimation.estimator import Estimate
+from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.identifiability import CLEAR, listed
 from pkmcal.estimation.uncertainty import Uncertainty
 
@@ -69,9 +69,10 @@ def beyond_linear(estimate: Estimate, uncertainty: Uncertainty) -> Weak | None:
         equations.warm_start(estimate.evaluation)
         there = equations.at(estimate.evaluation.theta + chosen.scale * step, state.noise)
         residual = equations.residual(there, state.noise)
-        linear = estimate.residual - estimate.jacobian @ step
+        change = estimate.change(step)
+        linear = estimate.residual - change
         beyond = weights @ residual**2 - weights @ linear**2
-        rises.append(beyond / (weights @ (estimate.jacobian @ step) ** 2))
+        rises.append(beyond / (weights @ change**2))
     equations.warm_start(estimate.evaluation)
     off = np.nan_to_num(np.abs(rises), nan=np.inf)
     if np.median(off) < _OFF:

@@ -159,17 +159,20 @@ def _visits(fit: Fit, odd: Collection[int]) -> _Visits:
     labels = sure.labels
     mine = visit[labels.row] >= 0
     key = numbered(visit[labels.row][mine], labels.component[mine])
-    whole = np.column_stack([sure.fit.design, sure.fit.residual, _by_component(fit)])
-    averaged = means(whole if mine.all() else whole[mine], key)
-    p = sure.fit.design.shape[1]
+    _, where = np.unique(key, return_index=True)
+    alone = np.array_equal(key, np.arange(len(mine)))  # there is nothing to average
+
+    def averaged(part: FloatArray) -> FloatArray:
+        return part if alone else means(part[mine], key)
+
     return _Visits(
         names=names,
         series=series[first],
         row=equations.rows[first],
-        visit=visit[labels.row][mine][np.unique(key, return_index=True)[1]],
-        design=averaged[:, :p],
-        residual=averaged[:, p],
-        by_component=averaged[:, p + 1 :],
+        visit=visit[labels.row][mine][where],
+        design=averaged(sure.fit.design),
+        residual=averaged(sure.fit.residual[:, None])[:, 0],
+        by_component=averaged(_by_component(fit)),
     )
 
 

@@ -163,7 +163,7 @@ def _first_session(fit: Fit) -> tuple[FloatArray, FloatArray, np.ndarray]:
     pulled = chosen.prior_left(fit.end.theta)
     own = np.arange(len(rows)) + sure.fit.clusters
     return (
-        np.vstack([fit.estimate.jacobian, rows]),
+        np.vstack([fit.estimate.change(np.eye(len(chosen))), rows]),
         np.concatenate([sure.fit.residual, pulled]),
         np.concatenate([sure.fit.cluster, own]),
     )

@@ -17,8 +17,10 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray, first_largest
 from pkmcal.display import first_rows
 from pkmcal.estimation.begin import estimator_at
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimator import Estimate, Estimator
+from pkmcal.estimation.estimate import Estimate
+from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
@@ -149,6 +151,10 @@ def taut(
     the way is taut after all.
     """
     cells: dict[tuple[int, int], Cell] = {}
+    if equations.closures.cells:
+        raise ArgumentError(
+            "slack: cables are not looked at for slack where their tensions are unknown"
+        )
     if not _pulling(equations).any():
         return equations, ()
     for k in range(_ROUNDS):
@@ -169,7 +175,7 @@ def taut(
 def _longer(equations: Equations, estimate: Estimate) -> tuple[FloatArray, FloatArray]:
     """By how much cables read longer than needed (K, equations), whitened, and redundancy."""
     root = np.sqrt(np.repeat(estimate.weights, equations.components))
-    taken = root[:, None] * estimate.jacobian @ estimate.half
+    taken = root[:, None] * estimate.change(estimate.half)
     every = np.ones(len(estimate.weights))  # what a robust loss sets aside is looked at as well
     off, redundancy = equations.closure_residuals(
         estimate.evaluation, estimate.state.noise, every, taken

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
 from pkmcal.estimation.elimination import Shares
 from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.estimate import Estimate, IterationState
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import (
     Decomposed,
-    Directions,
     decompose,
     directions,
 )
@@ -20,7 +18,12 @@ from pkmcal.estimation.least_squares import Search
 from pkmcal.estimation.loss import Loss, LossName
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics import prior_test
-from pkmcal.statistics.linear_fit import orthonormal, unit_basis
+from pkmcal.statistics.linear_fit import (
+    column_basis,
+    multiply_in_place,
+    triangle,
+    unit_basis,
+)
 from pkmcal.statistics.robust_scale import median_ratio
 
 _ROUNDS = 60  # of estimating noise and unidentifiable combinations anew
@@ -34,99 +37,6 @@ LEAST_REDUNDANCY = 2.0  # the same of one group of several that share poses
 
 
 _AtNoise = tuple[FloatArray, tuple[Decomposed, Decomposed]]  # noise; without and with the prior
-
-
-@dataclass(frozen=True, eq=False)
-class IterationState:
-    """What one least-squares solve takes as given, and what is revised before the next.
-
-    Attributes
-    ----------
-    noise : ndarray (G,)
-        Factor on the stated deviations of each group of equations (the sets, then the actuators
-        where poses have unknowns); where none is stated, the deviation in mm.
-    loss : Loss
-        How rows count.
-    measured : Directions
-        Identifiable from the measurements alone.
-    determined : Directions
-        Identifiable from measurements and prior.
-    fitted : Directions
-        Determined to `worst` or better; the rest is kept at its start.
-    worst : float
-        A standard deviation, mm: the machine's size, or less where searches did not end.
-    """
-
-    noise: FloatArray
-    loss: Loss
-    measured: Directions
-    determined: Directions
-    fitted: Directions
-    worst: float
-
-
-@dataclass(frozen=True, eq=False)
-class Estimate:
-    """The equations and their statistics at the solution.
-
-    All of it is of the M equations that are left when poses have taken their part: noise is 1 in
-    each, and those of different poses are independent. Nothing else of poses and closures is to be
-    known to judge a fit: `Equations.pose_of_unit` says which units are of one pose.
-
-    Attributes
-    ----------
-    evaluation : Evaluation
-        The equations there.
-    state : IterationState
-        Noise, loss and identifiable directions.
-    residual : ndarray (M,)
-        Measured less predicted, whitened.
-    jacobian : ndarray (M, n)
-        Scaled and whitened.
-    weights : ndarray (U,)
-        Of each unit (`Equations.components`); 1 unless the loss is robust.
-    prior : ndarray (p, n)
-        A row for each prior, scaled, in units of its deviation.
-    half : ndarray (n, r)
-        Scaled combinations whose covariance is 1, the best determined first.
-    shares : Shares
-        Of each group, the sum of squared residuals and what it says of the noise.
-    """
-
-    evaluation: Evaluation
-    state: IterationState
-    residual: FloatArray
-    jacobian: FloatArray
-    weights: FloatArray
-    prior: FloatArray
-    half: FloatArray
-    shares: Shares
-
-    @property
-    def covariance(self) -> FloatArray:
-        """Scaled (n, n); nothing along combinations that are not determined."""
-        matrix: FloatArray = self.half @ self.half.T
-        return matrix
-
-    @property
-    def freedom(self) -> FloatArray:
-        """Equations of each group less the poses and parameters they went into, (G,)."""
-        return self.shares.freedom
-
-    def with_noise(self, state: IterationState, factor: float) -> Estimate:
-        """The same of a linear loss where all noise is `factor` times what it was.
-
-        Of readings alone, unless `factor` is 1: neither prior nor closures go with it.
-        """
-        squares, freedom, information = self.shares
-        return replace(
-            self,
-            state=state,
-            residual=self.residual / factor,
-            jacobian=self.jacobian / factor,
-            half=self.half * factor,
-            shares=Shares(squares / factor**2, freedom, information),
-        )
 
 
 class Estimator:
@@ -151,6 +61,7 @@ class Estimator:
         self._worst = self.start.robot.length
         self._at_first: FloatArray | None = None
         self._first: _AtNoise | None = None
+        self._estimated: Estimate | None = None
 
     @property
     def least_freedom(self) -> float:
@@ -206,7 +117,8 @@ class Estimator:
                 break
         factor = self._common_factor(estimate.state, state)
         found = self._estimate(u, state) if factor is None else estimate.with_noise(state, factor)
-        self.equations.forget_following()
+        self.search.forget()
+        self._estimated = None
         return found
 
     # between the least squares ------------------------------------------------------------------
@@ -239,10 +151,10 @@ class Estimator:
 
         None where too few equations are left to show it.
         """
-        half = orthonormal(jacobian)
-        left = residual - jacobian @ (half @ (half.T @ (jacobian.T @ residual)))
+        taken = column_basis(jacobian)
+        left = residual - taken @ (taken.T @ residual)
         every = np.ones(len(self.equations.components))
-        shares = self.equations.by_groups(evaluation, noise, every, left, jacobian, half)
+        shares = self.equations.by_groups(evaluation, noise, every, left, taken)
         few = (shares.freedom[self.unstated] < LEAST_FREEDOM).any()
         return None if few or shares.freedom.sum() < prior_test.LEAST_FREEDOM else shares
 
@@ -296,11 +208,21 @@ class Estimator:
             if not self._priors and (factors == factors[0]).all():
                 singular, basis = known[1][0]
                 return ((singular / factors[0], basis),) * 2
-        jacobian = self.search.jacobian(evaluation, noise)
-        data = decompose(jacobian)
+        factor = self._triangle(evaluation, noise)
+        data = decompose(factor)
         if not self._priors:
             return data, data
-        return data, decompose(jacobian, self.search.prior(evaluation.theta))
+        return data, decompose(factor, self.search.prior(evaluation.theta))
+
+    def _triangle(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """R of the Jacobian, made of that of the last estimate where all noise has grown alike."""
+        last = self._estimated
+        if last is not None and last.evaluation is evaluation:
+            factors = noise / last.state.noise
+            if (factors == factors[0]).all():
+                grown: FloatArray = last.triangle / factors[0]
+                return grown
+        return triangle(self.search.jacobian(evaluation, noise))
 
     def _fewer(self, estimate: Estimate) -> IterationState | None:
         """The state to begin again with after a search without an end; None where there is none.
@@ -334,7 +256,7 @@ class Estimator:
         alone = None
         if self._priors:
             alone = self._alone(
-                estimate.evaluation, estimate.state.noise, estimate.jacobian, estimate.residual
+                estimate.evaluation, estimate.state.noise, estimate.design, estimate.residual
             )
         return self._scored(estimate.shares if alone is None else alone)
 
@@ -412,19 +334,26 @@ class Estimator:
 
     def _estimate(self, u: FloatArray, state: IterationState) -> Estimate:
         evaluation = self.search.at(u, state.noise)
-        jacobian = self.search.jacobian(evaluation, state.noise)
+        self._estimated = None
+        design = self.search.taken(evaluation, state.noise)
         residual = self.equations.residual(evaluation, state.noise)
         weights = state.loss.weights(residual)
         root = np.sqrt(np.repeat(weights, self.equations.components))
-        weighted = jacobian if self.loss == "linear" else root[:, None] * jacobian
+        linear = self.loss == "linear"
+        factor = triangle(design)
+        weighted = factor if linear else triangle(root[:, None] * design)
         prior = self.search.prior(evaluation.theta)
         half = unit_basis(weighted, prior, state.determined.identifiable)
+        basis = np.hstack([half, state.determined.unidentifiable])
+        multiply_in_place(design, basis)
+        taken = design[:, : state.fitted.rank]
         shares = self.equations.by_groups(
             evaluation,
             state.noise,
             weights,
             root * residual,
-            weighted,
-            half[:, : state.fitted.rank],
+            taken if linear else root[:, None] * taken,
         )
-        return Estimate(evaluation, state, residual, jacobian, weights, prior, half, shares)
+        found = Estimate(evaluation, state, residual, design, factor, weights, prior, basis, shares)
+        self._estimated = found
+        return found

@@ -8,7 +8,6 @@ from pkmcal.arrays import FloatArray, Int32Array
 from pkmcal.estimation.closures import RowStates
 from pkmcal.estimation.session_machines import Machines
 from pkmcal.measurements.calibratable import Calibratable
-from pkmcal.measurements.observation import Predicted
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +26,12 @@ class Evaluation:
         Where the actuators are there; what they read unless their noise is stated.
     status : ndarray of int (K,)
         Of the forward kinematics.
-    predicted : tuple of Predicted
-        Of each set of measurements.
+    predicted : tuple of ndarray (N, k)
+        What the instruments show there, of each set of measurements.
     residuals : tuple of ndarray (N, k)
         Measured less predicted of each set, mm and rad.
+    tension : ndarray (K, n) or None
+        Of what the actuators drive, N, where it is unknown and has been found.
     """
 
     theta: FloatArray
@@ -38,8 +39,9 @@ class Evaluation:
     pose: FloatArray
     actuators: FloatArray
     status: Int32Array
-    predicted: tuple[Predicted, ...]
+    predicted: tuple[FloatArray, ...]
     residuals: tuple[FloatArray, ...]
+    tension: FloatArray | None = None
 
     @property
     def ok(self) -> bool:
@@ -54,4 +56,4 @@ class Evaluation:
     @property
     def states(self) -> RowStates:
         """Where the machine is at each distinct row of actuators."""
-        return RowStates(self.pose, self.actuators, self.status)
+        return RowStates(self.pose, self.actuators, self.status, self.tension)

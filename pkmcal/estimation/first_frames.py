@@ -144,7 +144,7 @@ def _seen(
     """What rows of set `i` read in the base frame, (N, k), tools where they are laid."""
     columns = readings.columns_of(i, "tool")
     if columns is None:
-        return evaluation.predicted[i].values[rows]
+        return evaluation.predicted[i][rows]
     pose = evaluation.pose[readings.pose_of[i][rows]]
     for first in np.unique(columns[rows, 0]).tolist():
         mine = columns[rows, 0] == first

@@ -11,6 +11,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.loss import Loss
 from pkmcal.exceptions import ArgumentError
+from pkmcal.statistics.linear_fit import triangle
 
 _FTOL = 1e-10  # of the cost: 1e-4 of a standard deviation; rounding moves it by less
 _TOLERANCES = {"ftol": _FTOL, "xtol": 1e-10, "gtol": 1e-15}
@@ -52,7 +53,8 @@ class Search:
         self._found: IntArray | slice = slice(None) if columns is None else columns
         self.equations, self.start = equations, start
         self.scale = parameters.scale[self._found]
-        self._stated = parameters.prior_rows(start.theta)[:, self._found].any(axis=1)
+        rows = parameters.prior_rows(start.theta)[:, self._found]
+        self._stated = np.flatnonzero(rows.any(axis=1))
         lower, upper = ((end - start.theta)[self._found] / self.scale for end in parameters.bounds)
         bounded = bool(np.isfinite([lower, upper]).any())
         self._bounds = (lower, upper) if bounded else None
@@ -76,9 +78,18 @@ class Search:
 
     def prior(self, theta: FloatArray) -> FloatArray:
         """A row (p, n) for each prior at all parameters `theta`, in units of its deviation."""
+        if not len(self._stated):
+            return np.empty((0, len(self.scale)))
         rows: FloatArray = self.equations.parameters.prior_rows(theta)[self._stated]
         found: FloatArray = rows[:, self._found]
         return found
+
+    def _pulled(self, theta: FloatArray) -> FloatArray:
+        """What each prior misses (p,) at all parameters."""
+        if not len(self._stated):
+            return np.empty(0)
+        pulled: FloatArray = self.equations.parameters.prior_left(theta)[self._stated]
+        return pulled
 
     def _theta(self, u: FloatArray) -> FloatArray:
         theta: FloatArray = self.start.theta.copy()
@@ -95,12 +106,20 @@ class Search:
         ValueError
             It does not exist, at a singularity of the machine.
         """
-        found = _finite(self._taken(evaluation, noise))
+        found = self.taken(evaluation, noise)
         self._last_jacobian = evaluation, noise, found
         return found
 
+    def taken(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """The same, which is the caller's: it is not kept."""
+        return _finite(self._taken(evaluation, noise))
+
+    def forget(self) -> None:
+        """A search has ended: what is kept for its next step takes memory."""
+        self._last_jacobian = None
+        self.equations.forget_following()
+
     def _taken(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
-        """The same, finite or not, and not kept: a search holds copies of its own."""
         last, self._last_jacobian = self._last_jacobian, None
         if last is not None and last[0] is evaluation and _same(last[1], noise):
             return last[2]
@@ -148,8 +167,7 @@ class Search:
     ) -> tuple[FloatArray, float]:
         """A minimum of the cost of the rows not set aside, and the cost."""
         equations = self.equations
-        parameters = equations.parameters
-        without = np.repeat(aside, equations.components)
+        without = np.flatnonzero(np.repeat(aside, equations.components))
 
         last: tuple[Evaluation, FloatArray] | None = None
 
@@ -164,19 +182,23 @@ class Search:
         # a cost that nothing lowers: by less than rounding it need not fall
         floor = equations.rounding(noise) / np.sqrt(_FTOL)
         first = data(self.at(u, noise))
-        worse = 10.0 * (1.0 + np.abs(first).max())
+        worse = 10.0 * (1.0 + float(np.linalg.norm(first)))
+        rows = min(len(first), len(u) + 1)
+        count = rows + len(self._stated) + len(pins) + 1
 
         def residual(u: FloatArray) -> FloatArray:
             evaluation = self.at(u, noise)
-            pulled = parameters.prior_left(evaluation.theta)[self._stated]
-            held = np.concatenate([-pulled, pins @ u])
-            missed = (evaluation.status[equations.pose_of_unit] != 0) & ~aside
-            if missed.any():  # worse than any step that is taken
-                self._refused |= missed
-                return np.full(len(first) + len(held) + 1, worse + floor)
-            return np.concatenate([-loss.residual(data(evaluation)), held, [floor]])
+            if not evaluation.ok:
+                missed = (evaluation.status[equations.pose_of_unit] != 0) & ~aside
+                if missed.any():  # worse than any step that is taken
+                    self._refused |= missed
+                    return np.full(count, worse + floor)
+            turned = np.zeros(rows)
+            turned[0] = np.linalg.norm(loss.residual(data(evaluation)))
+            return np.concatenate([turned, -self._pulled(evaluation.theta), pins @ u, [floor]])
 
         taken: Evaluation | None = None
+        still = np.zeros((1, len(u)))  # the derivative of `floor`
 
         def take(evaluation: Evaluation) -> None:
             """A step goes on from here."""
@@ -190,10 +212,11 @@ class Search:
             evaluation = self.at(u, noise)
             take(evaluation)
             by_u = self._taken(evaluation, noise)
-            if aside.any():
-                by_u = np.where(without[:, None], 0.0, by_u)
-            by_u = loss.jacobian(data(evaluation), _finite(by_u))
-            return np.vstack([by_u, self.prior(evaluation.theta), pins, np.zeros(len(u))])
+            by_u[without] = 0.0
+            whitened = data(evaluation)
+            by_u = loss.jacobian(whitened, _finite(by_u))
+            turned = _turned(-loss.residual(whitened), by_u)
+            return np.concatenate([turned, self.prior(evaluation.theta), pins, still])
 
         found, cost, self.converged = self._searched(residual, jacobian, u)
         take(self.at(found, noise))
@@ -210,7 +233,7 @@ class Search:
             twice = [jacobian(u)] * 2  # which `leastsq` asks for as often
 
             def once(at: FloatArray) -> FloatArray:
-                return twice.pop() if twice and np.array_equal(at, u) else jacobian(at)
+                return twice.pop() if twice and _same(at, u) else jacobian(at)
 
             found, _, said, _, end = leastsq(
                 residual,
@@ -235,8 +258,18 @@ class Search:
         return trf.x, float(trf.cost), bool(trf.status > 0)
 
 
+def _turned(residual: FloatArray, jacobian: FloatArray) -> FloatArray:
+    """Derivative (min(M, n + 1), n) of residuals (M,) turned so that the first has all of them.
+
+    Squares, gradient and Gauss-Newton matrix are those of all M rows, so are the steps of a search.
+    """
+    factor = triangle([residual, jacobian])
+    factor[0] *= np.copysign(1.0, factor[0, 0])
+    return factor[:, 1:]
+
+
 def _same(one: FloatArray, other: FloatArray) -> bool:
-    return one is other or np.array_equal(one, other)
+    return one is other or one.tobytes() == other.tobytes()
 
 
 def _finite(jacobian: FloatArray) -> FloatArray:

@@ -9,7 +9,8 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.estimation.equations import Equations
-from pkmcal.estimation.estimator import FEW, Estimate, Estimator
+from pkmcal.estimation.estimate import Estimate
+from pkmcal.estimation.estimator import FEW, Estimator
 from pkmcal.estimation.labels import Labels, labels, poses_of_rows
 from pkmcal.estimation.set_noise import slipped
 from pkmcal.measurements.measurements import Measurements
@@ -263,12 +264,11 @@ def solved(estimator: Estimator, estimate: Estimate) -> Solution:
             state.loss.decline(estimate.residual),
             state.determined.rank,
         )
-    back = estimate.half
+    back, design = estimate.half, estimate.design[:, : state.determined.rank]
     if estimator.loss != "linear":  # equations count alike, their residuals are other ones
-        back = unit_basis(estimate.jacobian, estimate.prior, state.determined.identifiable)
-    fit = in_unit_basis(
-        estimate.jacobian, pseudo.residual, estimate.prior, back, named.pose, named.component
-    )
+        back = unit_basis(estimate.triangle, estimate.prior, state.determined.identifiable)
+        design = estimate.change(back)
+    fit = in_unit_basis(design, pseudo.residual, estimate.prior, back, named.pose, named.component)
     return Solution(named, fit, pseudo)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pkmcal.arguments import did_you_mean, number, words
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, Unit, as_numbers
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, Unit, as_numbers
 from pkmcal.core.library import SLOTS
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.ties import LimbNumber, Term, Tie
@@ -56,6 +56,7 @@ class _Layout:
             for n in self.numbers
         ]
         self.slot_index = _frozen(np.array(places, dtype=np.intp))
+        self.driven: dict[bytes, tuple[Int32Array, FloatArray | None]] = {}  # without ties
         if len(self.index) != len(self.names):
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise ArgumentError(f"the name {twice!r} stands for two numbers of the geometry")
@@ -134,7 +135,7 @@ class Geometry:
         self._slots = _frozen(slots)
 
     @classmethod
-    def _make(cls, layout: _Layout, values: FloatArray) -> Geometry:
+    def _make(cls, layout: _Layout, values: NDArray[np.generic]) -> Geometry:
         geometry = cls.__new__(cls)
         geometry._set(layout, np.array(values, dtype=np.float64))
         return geometry
@@ -195,6 +196,23 @@ class Geometry:
             for name, slope in tie.derivatives(parameters):
                 chain[i, layout.index[name]] += slope
         return _frozen(chain)
+
+    def driven(self, places: IntArray) -> tuple[Int32Array, FloatArray | None]:
+        """What numbers at `places` (k,) drive: places in `slots`, c of them, and how (c, k).
+
+        None: each drives one, in the same order.
+        """
+        layout, key = self._layout, places.tobytes()
+        if key not in layout.driven:
+            part = self.chain[:, places]
+            moving = np.flatnonzero(part.any(axis=1))
+            alone = np.array_equal(part[moving], np.eye(len(places)))
+            columns = layout.slot_index[moving].astype(np.int32)
+            found = columns, None if alone else part[moving]
+            if layout.ties:  # they may bend
+                return found
+            layout.driven[key] = found
+        return layout.driven[key]
 
     def __getitem__(self, name: str) -> float:
         try:
@@ -263,10 +281,11 @@ class Geometry:
         if not np.isfinite(values).all():
             name = self.names[int(np.flatnonzero(~np.isfinite(values))[0])]
             raise ArgumentError(f"changes: {name} must be finite, found {values[self._at(name)]}")
-        changed = Geometry._make(self._layout, values.astype(np.float64))
-        wrong = self.tied & (values != self._values) & (values != changed._values)
-        if wrong.any():
-            self.require_own(self.names[int(np.flatnonzero(wrong)[0])])
+        changed = Geometry._make(self._layout, values)
+        if self._layout.ties:
+            wrong = self.tied & (values != self._values) & (values != changed._values)
+            if wrong.any():
+                self.require_own(self.names[int(np.flatnonzero(wrong)[0])])
         return changed
 
     def _at(self, name: str) -> int:

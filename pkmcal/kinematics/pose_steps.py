@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, Unit, mm_per_unit
+from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
@@ -123,15 +124,22 @@ def readings_by_numbers(
 ) -> FloatArray:
     """Derivative of `readings` by numbers of the geometry at `places` (k,), (N, rows, k)."""
     own = np.ascontiguousarray(robot.frames.inward(pose))
-    chain = robot.geometry.chain[:, places]  # of the limbs' numbers, through their ties
-    moving = np.flatnonzero(chain.any(axis=1))
-    columns = robot.geometry.slot_index[moving].astype(np.int32)
+    columns, chain = robot.geometry.driven(places)
     by_number = robot.machine.readings(robot.slots, own, q, columns)[2]
     assert by_number is not None
-    if np.array_equal(chain[moving], np.eye(len(places))):
+    if chain is None:
         return by_number
-    by_places: FloatArray = by_number.reshape(-1, len(moving)) @ chain[moving]
+    by_places: FloatArray = by_number.reshape(-1, len(columns)) @ chain
     return by_places.reshape(*by_number.shape[:2], len(places))
+
+
+def readings_by_tension(robot: Robot, pose: FloatArray) -> FloatArray:
+    """Derivative of limbs' `readings` by what they pull with, a limb an actuator, (N, limbs)."""
+    machine = robot.machine
+    if not isinstance(machine, DrivenMachine):
+        return np.zeros((len(pose), machine.rows))
+    own = np.ascontiguousarray(robot.frames.inward(pose))
+    return machine.by_tension(robot.slots, own)
 
 
 def sphere_actuators(robot: Robot) -> list[int]:

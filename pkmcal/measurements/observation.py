@@ -17,6 +17,7 @@ _ORIGIN = np.zeros(3)
 _NOWHERE = np.zeros(6)
 _ZERO = np.zeros(1)
 _UP = np.array([0.0, 0.0, 1.0])
+_TOGETHER = 16384  # rows whose derivatives are multiplied at once
 
 
 @dataclass(frozen=True)
@@ -323,12 +324,14 @@ def corrected(kind: Kind, predicted: FloatArray, residual: FloatArray) -> FloatA
 
 
 def by_difference(kind: Kind, derivative: FloatArray, residual: FloatArray) -> FloatArray:
-    """How `difference` shrinks, (N, k, n), from a derivative of `Predicted`."""
+    """How `difference` shrinks, (N, k, n), in the place of a derivative of `Predicted`."""
     first = KINDS[kind].turning
-    if first is None:
-        return derivative
-    turning = orientation.by_turning(residual[:, first:]) @ derivative[:, first:]
-    return np.concatenate([derivative[:, :first], turning], axis=1)
+    if first is not None:
+        for start in range(0, len(residual), _TOGETHER):
+            rows = slice(start, start + _TOGETHER)
+            by_turning = orientation.by_turning(residual[rows, first:])
+            derivative[rows, first:] = by_turning @ derivative[rows, first:]
+    return derivative
 
 
 def distance_per_point(residual: FloatArray, units: Sequence[str], length: float) -> FloatArray:

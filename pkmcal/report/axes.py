@@ -8,7 +8,6 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, rms
 from pkmcal.calibration.identification import Identification
-from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.measurements.iso230 import axis_performance
 from pkmcal.measurements.repeats import targets
 from pkmcal.statistics.linear_fit import numbered
@@ -25,7 +24,8 @@ def axes(found: Identification) -> list[dict[str, Any]]:
     E, A and R are ISO 230-2's; mean, the mean size of the deviation of a pose, and spread, three
     standard deviations, are ISO 9283's of an angle (7.2.1, 7.2.2).
     """
-    equations = found.fit.equations
+    equations, ends = found.fit.equations, (found.fit.start, found.fit.end)
+    by_twists = [[seen.by_twist for seen in equations.seen(at)] for at in ends]
     before, after = list[FloatArray](), list[FloatArray]()
     poses = list[IntArray]()
     for i, measured in enumerate(equations.sets):
@@ -37,8 +37,10 @@ def axes(found: Identification) -> list[dict[str, Any]]:
         run[~good] = -1
         if not good.any():  # partly read rows alone
             continue
-        first = _deviations(found.fit.start, i, run, measured.kind)
-        last = _deviations(found.fit.end, i, run, measured.kind)
+        first, last = (
+            _deviations(at.residuals[i], by_twist[i], run, measured.kind)
+            for at, by_twist in zip(ends, by_twists, strict=True)
+        )
         before.append(first)
         after.append(last)
         kept = np.array([np.flatnonzero(run == k)[0] for k in np.unique(run[run >= 0])])
@@ -80,9 +82,8 @@ def _runs(pose: IntArray, target: IntArray) -> IntArray:
     return numbered(pose, order)
 
 
-def _deviations(evaluation: Evaluation, i: int, run: IntArray, kind: str) -> FloatArray:
+def _deviations(residual: FloatArray, by_twist: FloatArray, run: IntArray, kind: str) -> FloatArray:
     """Shift and turning (R, 6) in base axes of each run, mm and rad; NaN where not seen."""
-    residual, by_twist = evaluation.residuals[i], evaluation.predicted[i].by_twist
     found = []
     for k in np.unique(run[run >= 0]):
         rows = np.flatnonzero(run == k)

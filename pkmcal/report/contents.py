@@ -201,7 +201,7 @@ def iso9283(found: Identification) -> list[dict[str, Any]]:
             continue
         group = np.unique(groups(measured)[read], return_inverse=True)[1]
         values = measured.values[read, :3]
-        first = performance(values, found.fit.start.predicted[i].values[read, :3], group)
+        first = performance(values, found.fit.start.predicted[i][read, :3], group)
         last = performance(values, values - found.residuals[i][read, :3], group)
         scores.append({
             "set": i + 1,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, propagate
+from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.display import displayed, printable
 from pkmcal.report.drawing import BLUE, GREEN, ORANGE, PINK, empty_figure, in_context, sample
 from pkmcal.report.residual_vectors import measured_places, residual_vectors
@@ -176,11 +176,9 @@ def _quantiles(panel: Axes, found: Identification) -> None:
     from scipy.special import ndtri
 
     estimate = found.fit.estimate
-    weighted = (
-        estimate.jacobian
-        * np.sqrt(np.repeat(estimate.weights, estimate.state.loss.components))[:, None]
-    )
-    redundancy = 1.0 - propagate(weighted[:, None], estimate.covariance)
+    weights = np.repeat(estimate.weights, estimate.state.loss.components)
+    taken = estimate.change(estimate.half)
+    redundancy = 1.0 - weights * np.einsum("ij,ij->i", taken, taken)
     checked = redundancy > 1e-6  # the others are fitted exactly, whatever was measured
     scaled = np.sort(estimate.residual[checked] / np.sqrt(redundancy[checked]))
     normal = ndtri((np.arange(len(scaled)) + 0.5) / max(len(scaled), 1))

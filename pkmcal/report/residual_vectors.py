@@ -18,10 +18,11 @@ def residual_vectors(found: Identification, at: Evaluation) -> FloatArray:
     the twist: unit vectors of the instrument's axes, of a height's axis or along a distance.
     """
     parts = []
-    sets = found.fit.equations.sets
-    for measured, residual, predicted in zip(sets, at.residuals, at.predicted, strict=True):
+    equations = found.fit.equations
+    every = zip(equations.sets, at.residuals, equations.seen(at), strict=True)
+    for measured, residual, seen in every:
         lengths = [k for k, unit in enumerate(measured.units) if unit == "mm"]
-        along, off = predicted.by_twist[:, lengths, 3:], residual[:, lengths]
+        along, off = seen.by_twist[:, lengths, 3:], residual[:, lengths]
         vectors = np.einsum("nk,nki->ni", np.nan_to_num(off), along)
         vectors[~np.isfinite(off).any(axis=1)] = np.nan
         parts.append(vectors)

@@ -18,6 +18,7 @@ from pkmcal.arrays import FloatArray, IntArray
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 _WHOLE = 9  # decimals from which degrees of freedom are whole: limits on them are
 _IN_ONE_THREAD = 8192  # numbers
+_COLUMNS_AT_ONCE = 32  # of a factorisation
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,20 +112,20 @@ def linear_fit(
     True
     """
     back = unit_basis(jacobian, prior, basis)
-    return in_unit_basis(jacobian, residual, prior, back, cluster, component)
+    return in_unit_basis(jacobian @ back, residual, prior, back, cluster, component)
 
 
 def in_unit_basis(
-    jacobian: FloatArray,
+    design: FloatArray,
     residual: FloatArray,
     prior: FloatArray,
     back: FloatArray,
     cluster: IntArray,
     component: IntArray,
 ) -> LinearFit:
-    """`linear_fit` where its `unit_basis` is known, `back` (n, p)."""
+    """`linear_fit` where its `unit_basis` is known, `back` (n, p), and the design in it."""
     return LinearFit(
-        design=jacobian @ back,
+        design=design,
         residual=residual,
         prior=prior @ back,
         back=back,
@@ -171,21 +172,22 @@ def column_basis(matrix: FloatArray) -> FloatArray:
     return basis
 
 
-def orthonormal(matrix: FloatArray) -> FloatArray:
-    """What the columns (M, n) are multiplied by, (n, r), to become a basis of theirs."""
+def orthonormal(matrix: FloatArray | Sequence[FloatArray]) -> FloatArray:
+    """What the columns (M, n) are multiplied by, (n, r), to become a basis of theirs.
+
+    The matrix may be several side by side.
+    """
     _, singular, rows = np.linalg.svd(triangle(matrix), full_matrices=False)
     keep = singular > ROUNDING * singular[0]
     found: FloatArray = rows[keep].T / singular[keep]
     return found
 
 
-def lengths_squared(matrix: FloatArray, directions: FloatArray) -> FloatArray:
-    """Squared lengths (M,) of the rows (M, n) in directions (n, r), without another matrix."""
-    found = np.empty(len(matrix))
+def multiply_in_place(matrix: FloatArray, square: FloatArray) -> None:
+    """Multiply a matrix (M, n) by a square one (n, n) from the right, without another matrix."""
     for first in range(0, len(matrix), _IN_ONE_THREAD):
         rows = slice(first, first + _IN_ONE_THREAD)
-        found[rows] = ((matrix[rows] @ directions) ** 2).sum(axis=1)
-    return found
+        matrix[rows] = matrix[rows] @ square
 
 
 def triangle(*stacked: FloatArray | Sequence[FloatArray]) -> FloatArray:
@@ -194,8 +196,11 @@ def triangle(*stacked: FloatArray | Sequence[FloatArray]) -> FloatArray:
     A consists of matrices below each other, each one matrix or several side by side.
 
     Rows enter in blocks so small that the linear algebra library does not spread them over
-    threads, which on a busy computer takes a hundred times as long as the work itself.
+    threads, which on a busy computer takes a hundred times as long as the work itself. LAPACK is
+    called directly: around small blocks NumPy takes five times as long.
     """
+    from scipy.linalg.lapack import dgeqrf
+
     matrices = ([each] if isinstance(each, np.ndarray) else each for each in stacked)
     below = [[p[:, None] if p.ndim == 1 else p for p in parts] for parts in matrices]
     n = sum(part.shape[1] for part in below[0])
@@ -203,6 +208,8 @@ def triangle(*stacked: FloatArray | Sequence[FloatArray]) -> FloatArray:
     factor: FloatArray = np.zeros((0, n))
     for beside in below:
         for start in range(0, len(beside[0]), block):
-            rows = np.hstack([part[start : start + block] for part in beside])
-            factor = np.asarray(np.linalg.qr(np.vstack([factor, rows]), mode="r"))
+            rows = [part[start : start + block] for part in beside]
+            whole = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
+            whole = np.concatenate([factor, whole]) if len(factor) else whole
+            factor = np.triu(dgeqrf(whole, lwork=_COLUMNS_AT_ONCE * n or 1)[0][:n])
     return factor

@@ -20,12 +20,14 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.statistics.distributions import f_tail
-from pkmcal.statistics.linear_fit import column_basis, sums, triangle
+from pkmcal.statistics.linear_fit import orthonormal, sums, triangle
 
 WAVES = 3  # of each component
 LEAST = 5  # degrees of freedom beside them: below, nothing but a large jump would show
 _NEW = 0.05  # share of a course that must be left beside the parameters
 _BOTH = 2  # visits on either side of a jump, at least
+_TOGETHER = 16384  # equations whose courses are there at once, to bound memory
+_VISITS = 1024  # visits of which jumps are looked for at once, likewise
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,65 +106,80 @@ class Series:
         return int(self.visit.max()) + 1
 
     @cached_property
-    def _mine(self) -> FloatArray:
-        """`by_component` of this series."""
-        mine: FloatArray = np.where(self.visit[:, None] >= 0, self.by_component, 0.0)
-        return mine
-
-    @cached_property
     def _unit(self) -> FloatArray:
         """How much of each component (k,) changes an equation by 1; 0 of what was not read."""
-        squares, count = (self._mine**2).sum(axis=0), (self._mine != 0).sum(axis=0)
+        mine = self.by_component[self.visit >= 0]
+        squares, count = np.einsum("ij,ij->j", mine, mine), np.count_nonzero(mine, axis=0)
         unit: FloatArray = np.sqrt(count / np.where(count, squares, 1.0))
         return unit
 
     @cached_property
     def _own(self) -> FloatArray:
-        """The same in these units."""
-        own: FloatArray = self._mine * self._unit
+        """`by_component` of this series, in these units."""
+        own: FloatArray = self.by_component * self._unit
+        own[self.visit < 0] = 0.0
         return own
 
     @cached_property
-    def _known(self) -> FloatArray:
-        """Basis of what parameters and a constant of each component explain."""
-        return column_basis(np.hstack([self.design, self._own]))
+    def _factor(self) -> FloatArray:
+        """What `_both` is multiplied by, (p + k, r), to become a basis."""
+        return orthonormal([self.design, self._own])
+
+    def _both(self, steps: FloatArray, rows: slice | IntArray = slice(None)) -> FloatArray:
+        """Rows of what parameters and a constant of each component explain by (p + k, ...)."""
+        p = self.design.shape[1]
+        both: FloatArray = self.design[rows] @ steps[:p] + self._own[rows] @ steps[p:]
+        return both
 
     @cached_property
     def _left(self) -> FloatArray:
         """The residuals beside that."""
-        return self._beside(self.residual)
-
-    def _beside(self, columns: FloatArray) -> FloatArray:
-        """What of columns (E, ...) parameters and constants do not explain."""
-        beside: FloatArray = columns - self._known @ (self._known.T @ columns)
-        return beside
+        along = np.concatenate([self.design.T @ self.residual, self._own.T @ self.residual])
+        left: FloatArray = self.residual - self._both(self._factor @ (self._factor.T @ along))
+        return left
 
     def course(self) -> Course | None:
         """Test the series; None where too little is left to say."""
         k = self.by_component.shape[1]
         when = (np.arange(self.visits) + 0.5) / self.visits
         waves = np.cos(np.pi * when[:, None] * np.arange(1, WAVES + 1))
-        columns = (self._own[:, :, None] * waves[self.visit][:, None]).reshape(len(self.visit), -1)
-        largest = float(np.einsum("ij,ij->j", columns, columns).max()) ** 0.5
-        columns = self._beside(columns)
-        _, sizes, back = np.linalg.svd(triangle(columns), full_matrices=False)
-        new = sizes > _NEW * largest
+        lots = [slice(i, i + _TOGETHER) for i in range(0, len(self.visit), _TOGETHER)]
+
+        def columns(rows: slice) -> FloatArray:
+            courses = self._own[rows, :, None] * waves[self.visit[rows]][:, None]
+            return courses.reshape(len(courses), k * WAVES)
+
+        squares, pulls = np.zeros((2, k * WAVES))
+        inner = np.zeros((len(self._factor), k * WAVES))
+        for rows in lots:
+            some = columns(rows)
+            squares += np.einsum("ij,ij->j", some, some)
+            pulls += some.T @ self._left[rows]
+            inner += np.concatenate([self.design[rows].T @ some, self._own[rows].T @ some])
+        known = self._factor @ (self._factor.T @ inner)
+        factor = np.zeros((0, k * WAVES))
+        for rows in lots:
+            factor = triangle(factor, columns(rows) - self._both(known, rows))
+        _, sizes, back = np.linalg.svd(factor, full_matrices=False)
+        new = sizes > _NEW * float(squares.max()) ** 0.5
         taken = int(new.sum())
-        freedom = len(self.residual) - self._known.shape[1] - taken
+        freedom = len(self.residual) - self._factor.shape[1] - taken
         if not taken or freedom < LEAST:
             return None
         onto = back[new].T / sizes[new]
-        along = onto.T @ (columns.T @ self.residual)
+        along = onto.T @ pulls
         explained = float(along @ along)
         whole = float(self._left @ self._left)
         variance = (whole - explained) / freedom
         if not variance > 0:
             return None
         shares = (onto @ along).reshape(k, WAVES)
+        course = np.einsum("ij,ij->i", self._own, (waves @ shares.T)[self.visit])
+        course -= self._both(known @ (onto @ along))
         return Course(
             chance=f_tail(min(explained / taken / variance, 1e300), taken, freedom),
             explained=explained,
-            share=self._share(columns @ (onto @ along), freedom / len(self.residual)),
+            share=self._share(course, freedom / len(self.residual)),
             values=waves @ shares.T * self._unit,
             scatter=np.sqrt(variance) * self._unit,
         )
@@ -188,24 +205,35 @@ class Series:
         """The course as one jump, where that explains at least as much."""
         order = np.argsort(self.visit, kind="stable")
         rows = order[self.visit[order] >= 0]
-        own, visit = self._own[rows], self.visit[rows]
-        parts = np.concatenate([self._known[rows], self._left[rows, None], own], axis=1)
-        of_visit = sums(own[:, :, None] * parts[:, None], visit)
-        # of all visits from each on: the jump by what is known, what is left, and itself
-        behind = np.cumsum(of_visit[::-1], axis=0)[::-1][_BOTH : self.visits - _BOTH + 1]
-        if not len(behind):
+        visit, rank = self.visit[rows], self._factor.shape[1]
+        best, at, jump = course.explained, None, np.zeros(0)
+        every = np.zeros(1)  # of all visits behind
+        for first in reversed(range(0, self.visits, _VISITS)):
+            some = slice(*np.searchsorted(visit, [first, first + _VISITS]))
+            mine = rows[some]
+            own = self._own[mine]
+            known = self._both(self._factor, mine)
+            parts = np.concatenate([known, self._left[mine, None], own], axis=1)
+            of_visit = sums(own[:, :, None] * parts[:, None], visit[some])
+            # of all visits from each on: the jump by what is known, what is left, and itself
+            behind = np.cumsum(of_visit[::-1], axis=0)[::-1] + every
+            every = behind[0]
+            begin = max(_BOTH - first, 0)
+            behind = behind[begin : max(self.visits - _BOTH + 1 - first, begin)]
+            if not len(behind):
+                continue
+            within, pull, size = behind[:, :, :rank], behind[:, :, rank], behind[:, :, rank + 1 :]
+            beside = size - within @ within.transpose(0, 2, 1)
+            values, ways = np.linalg.eigh(beside)
+            new = values > _NEW**2 * size.max(axis=(1, 2))[:, None]
+            along = (ways.transpose(0, 2, 1) @ pull[:, :, None])[:, :, 0]
+            along = np.where(new, along / np.where(new, values, 1.0), 0.0)
+            jumps = (ways @ along[:, :, None])[:, :, 0]
+            explained = (jumps * pull).sum(axis=1)
+            largest = int(np.argmax(explained))
+            if explained[largest] >= best:
+                best, at, jump = float(explained[largest]), first + begin + largest, jumps[largest]
+        if at is None:
             return course
-        rank = self._known.shape[1]
-        within, pull, size = behind[:, :, :rank], behind[:, :, rank], behind[:, :, rank + 1 :]
-        beside = size - within @ within.transpose(0, 2, 1)
-        values, ways = np.linalg.eigh(beside)
-        new = values > _NEW**2 * size.max(axis=(1, 2))[:, None]
-        along = (ways.transpose(0, 2, 1) @ pull[:, :, None])[:, :, 0]
-        along = np.where(new, along / np.where(new, values, 1.0), 0.0)
-        jump = (ways @ along[:, :, None])[:, :, 0]
-        explained = (jump * pull).sum(axis=1)
-        best = int(np.argmax(explained))
-        if explained[best] < course.explained:
-            return course
-        after = np.arange(self.visits)[:, None] >= best + _BOTH
-        return replace(course, values=after * jump[best] * self._unit, jump=best + _BOTH)
+        after = np.arange(self.visits)[:, None] >= at
+        return replace(course, values=after * jump * self._unit, jump=at)

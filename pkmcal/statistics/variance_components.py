@@ -27,6 +27,7 @@ _NO_SLOPE = 0.3  # of a score test, above which the likelihoods of both are too 
 _ROUNDS, _SETTLED, _STEP, _HALVINGS = 50, 1e-6, 1.0, 12  # of the logarithms of the variances
 _SPENT = 1e-6  # share of the equations of a class that must be left
 _TINY = 1e-18  # of the mean variance: a class that the fit meets exactly
+_TOGETHER = 16384  # equations that are looked at at once, to bound memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +124,15 @@ class _Model:
     def __init__(self, fit: LinearFit, classes: IntArray, prior_residual: FloatArray) -> None:
         self.classes = classes
         self.count = np.bincount(classes).astype(np.float64)
-        rows = [classes == c for c in range(len(self.count))]
-        self._inner = np.array([fit.design[mine].T @ fit.design[mine] for mine in rows])
-        self._pulls = np.array([fit.design[mine].T @ fit.residual[mine] for mine in rows])
+        p = fit.design.shape[1]
+        self._inner, self._pulls = np.zeros((len(self.count), p, p)), np.zeros((len(self.count), p))
+        for first in range(0, len(classes), _TOGETHER):
+            some = slice(first, first + _TOGETHER)
+            design, residual, of = fit.design[some], fit.residual[some], classes[some]
+            for c in range(len(self.count)):
+                part = design[of == c]
+                self._inner[c] += part.T @ part
+                self._pulls[c] += part.T @ residual[of == c]
         self._prior, self._missed = fit.prior, prior_residual
         self._known, self._drawn = fit.prior.T @ fit.prior, fit.prior.T @ prior_residual
         self.square = np.bincount(classes, fit.residual**2)

@@ -126,7 +126,7 @@ def test_deviations_are_those_of_the_s_transformation(name: str) -> None:
         pytest.skip("some numbers of this machine stay unidentifiable")
     chosen, names = plain.fit.parameters, list(plain.free)
     rank = plain.rank
-    _, basis = decompose(plain.fit.estimate.jacobian)
+    _, basis = decompose(plain.fit.estimate.triangle)
     null = basis[:, rank:]
     pinned = [names.index(each) for each in held.datum.names]
     kept = [names.index(each) for each in held.free]

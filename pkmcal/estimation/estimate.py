@@ -1,0 +1,120 @@
+"""An estimate: what one solve took as given, and the equations with their statistics there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from pkmcal.arrays import FloatArray
+from pkmcal.estimation.elimination import Shares
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.identifiability import Directions
+from pkmcal.estimation.loss import Loss
+
+
+@dataclass(frozen=True, eq=False)
+class IterationState:
+    """What one least-squares solve takes as given, and what is revised before the next.
+
+    Attributes
+    ----------
+    noise : ndarray (G,)
+        Factor on the stated deviations of each group of equations (the sets, then the actuators
+        where poses have unknowns); where none is stated, the deviation in mm.
+    loss : Loss
+        How rows count.
+    measured : Directions
+        Identifiable from the measurements alone.
+    determined : Directions
+        Identifiable from measurements and prior.
+    fitted : Directions
+        Determined to `worst` or better; the rest is kept at its start.
+    worst : float
+        A standard deviation, mm: the machine's size, or less where searches did not end.
+    """
+
+    noise: FloatArray
+    loss: Loss
+    measured: Directions
+    determined: Directions
+    fitted: Directions
+    worst: float
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """The equations and their statistics at the solution.
+
+    All of it is of the M equations that are left when poses have taken their part: noise is 1 in
+    each, and those of different poses are independent. Nothing else of poses and closures is to be
+    known to judge a fit: `Equations.pose_of_unit` says which units are of one pose.
+
+    Attributes
+    ----------
+    evaluation : Evaluation
+        The equations there.
+    state : IterationState
+        Noise, loss and identifiable directions.
+    residual : ndarray (M,)
+        Measured less predicted, whitened.
+    design : ndarray (M, n)
+        Derivative of the predicted values, whitened, by the combinations of `basis`. It is the
+        Jacobian, which is not kept beside it: `change` is what that says.
+    triangle : ndarray (k, n)
+        R of a QR factorisation of the scaled, whitened Jacobian, k = min(M, n).
+    weights : ndarray (U,)
+        Of each unit (`Equations.components`); 1 unless the loss is robust.
+    prior : ndarray (p, n)
+        A row for each prior, scaled, in units of its deviation.
+    basis : ndarray (n, n)
+        Scaled combinations at right angles to each other: those of `half`, and those that are not
+        determined.
+    shares : Shares
+        Of each group, the sum of squared residuals and what it says of the noise.
+    """
+
+    evaluation: Evaluation
+    state: IterationState
+    residual: FloatArray
+    design: FloatArray
+    triangle: FloatArray
+    weights: FloatArray
+    prior: FloatArray
+    basis: FloatArray
+    shares: Shares
+
+    @property
+    def half(self) -> FloatArray:
+        """Scaled combinations (n, r) whose covariance is 1, the best determined first."""
+        return self.basis[:, : self.state.determined.rank]
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Scaled (n, n); nothing along combinations that are not determined."""
+        matrix: FloatArray = self.half @ self.half.T
+        return matrix
+
+    def change(self, steps: FloatArray) -> FloatArray:
+        """How the whitened predicted values (M, ...) change by scaled parameters (n, ...)."""
+        inverse = (self.basis / (self.basis**2).sum(axis=0)).T
+        found: FloatArray = self.design @ (inverse @ steps)
+        return found
+
+    @property
+    def freedom(self) -> FloatArray:
+        """Equations of each group less the poses and parameters they went into, (G,)."""
+        return self.shares.freedom
+
+    def with_noise(self, state: IterationState, factor: float) -> Estimate:
+        """The same of a linear loss where all noise is `factor` times what it was.
+
+        Of readings alone, unless `factor` is 1: neither prior nor closures go with it.
+        """
+        squares, freedom, information = self.shares
+        return replace(
+            self,
+            state=state,
+            residual=self.residual / factor,
+            triangle=self.triangle / factor,
+            basis=self.basis * factor,
+            shares=Shares(squares / factor**2, freedom, information),
+        )
