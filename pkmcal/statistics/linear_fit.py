@@ -138,7 +138,7 @@ def unit_basis(jacobian: FloatArray, prior: FloatArray, basis: FloatArray) -> Fl
 
     Arguments are those of `linear_fit`.
     """
-    whole = triangle(jacobian, prior) @ basis
+    whole = few_rows(jacobian, prior) @ basis
     _, singular, turned = np.linalg.svd(whole, full_matrices=False)
     back: FloatArray = basis @ (turned.T / singular)
     return back
@@ -189,6 +189,15 @@ def multiply_in_place(matrix: FloatArray, square: FloatArray) -> None:
         matrix[rows] = matrix[rows] @ square
 
 
+def few_rows(*stacked: FloatArray) -> FloatArray:
+    """A matrix with the same AᵀA as all of these below each other, and at most 2 n rows.
+
+    The factor of `triangle` unless they have no more as they are.
+    """
+    few = sum(map(len, stacked)) <= 2 * stacked[0].shape[1]
+    return np.concatenate(stacked) if few else triangle(*stacked)
+
+
 def triangle(*stacked: FloatArray | Sequence[FloatArray]) -> FloatArray:
     """Triangular factor R of a QR factorisation: RᵀR = AᵀA.
 
@@ -204,6 +213,8 @@ def triangle(*stacked: FloatArray | Sequence[FloatArray]) -> FloatArray:
     factor: FloatArray = np.zeros((0, n))
     for beside in below:
         for start in range(0, len(beside[0]), block):
-            rows = np.hstack([part[start : start + block] for part in beside])
-            factor = np.asarray(np.linalg.qr(np.vstack([factor, rows]), mode="r"))
+            parts = [part[start : start + block] for part in beside]
+            rows = parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1)
+            rows = np.concatenate([factor, rows]) if len(factor) else rows
+            factor = np.asarray(np.linalg.qr(rows, mode="r"))
     return factor
