@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 _WHOLE = 9  # decimals from which degrees of freedom are whole: limits on them are
@@ -211,5 +211,12 @@ def triangle(*stacked: FloatArray | Sequence[FloatArray]) -> FloatArray:
             rows = [part[start : start + block] for part in beside]
             whole = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
             whole = np.concatenate([factor, whole]) if len(factor) else whole
-            factor = np.triu(dgeqrf(whole, lwork=_COLUMNS_AT_ONCE * n or 1)[0][:n])
+            factor = dgeqrf(whole, lwork=_COLUMNS_AT_ONCE * n or 1)[0][:n]
+            factor[_below(*factor.shape)] = 0.0
     return factor
+
+
+@cache
+def _below(rows: int, columns: int) -> BoolArray:
+    """The places below the diagonal."""
+    return np.tri(rows, columns, -1, dtype=bool)
