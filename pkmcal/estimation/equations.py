@@ -75,7 +75,7 @@ class Equations(Readings):
         How many rows or poses say nothing: unread, or all that was read determines their pose.
     unstated : ndarray of bool (G,)
         Whose deviation is not known, of each group of equations with a noise of its own: the sets,
-        then the actuators where they have equations.
+        then load cells and actuators where they have equations.
     """
 
     def __init__(
@@ -108,7 +108,9 @@ class Equations(Readings):
         sigma = self.actuator_sigma
         machines = range(len(self.machine_columns))
         self._own = tuple(np.flatnonzero(self.machine_of_pose == s) for s in machines)
-        closures = closures_of_sessions(parameters.robot, self._own, self.actuators, sigma)
+        cells = self.cells
+        self._no_cell_sigma = cells is not None and cells.sigma is None
+        closures = closures_of_sessions(parameters.robot, self._own, self.actuators, sigma, cells)
         self._slack = np.zeros((len(guess), closures.equations), dtype=bool)
         self._if_taut = self.actuators
         self._take(closures, sigma is None)
@@ -116,7 +118,10 @@ class Equations(Readings):
     def _take(self, closures: SessionClosures, estimated: bool) -> None:
         """Build the units for these closures; `estimated`: their deviations are not known."""
         self.closures = closures
-        self._counting = np.flatnonzero(~self._slack) if self._slack.any() else None
+        self._counts = ~self._slack
+        if closures.unread is not None:
+            self._counts &= ~closures.unread
+        self._counting = None if self._counts.all() else np.flatnonzero(self._counts)
         if closures.unknowns:
             if any(growth is not None for growth in self._growth):
                 raise ArgumentError(
@@ -139,12 +144,16 @@ class Equations(Readings):
             self._family_of_unit = self.set_of[of_row > 0]
             self.idle = self._unread + int((of_row == 0).sum())
             return
-        self.unstated = np.append(self._no_sigma, estimated)
+        of_cells = [self._no_cell_sigma] if closures.cells else []
+        self.unstated = np.concatenate([self._no_sigma, of_cells, [estimated]]).astype(bool)
+        last, count = len(self.unstated) - 1, closures.equations
+        self._groups = np.full(count, last)  # of the closures: load cells are one before
+        self._groups[count - closures.cells :] -= 1
         poses = len(self.actuators)
-        own = np.nonzero(~self._slack)[0]
+        own, closure = np.nonzero(self._counts)
         pose_of_equation = np.concatenate([own, np.repeat(pose_of_row, of_row)])
         self._group_of_equation = np.concatenate([
-            np.full(len(own), len(self.sets)),
+            self._groups[closure],
             np.repeat(self.set_of, of_row),
         ])  # fmt: skip
         self._blocks = Blocks(pose_of_equation, poses, closures.unknowns, self._size)
@@ -164,6 +173,14 @@ class Equations(Readings):
         other._take(commanded_closures(self._own, self._if_taut), estimated=False)
         return other
 
+    def under(self, tension: FloatArray | None) -> Equations:
+        """The same under other tensions (K, n) of what the actuators drive; None: as they are."""
+        if tension is None:
+            return self
+        other = copy.copy(self)
+        other.state = self.state._replace(tension=tension)
+        return other
+
     def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
         """Evaluate where the same with commanded poses has been started."""
         self.parameters, self._states, self._from = commanded.parameters, start.states, None
@@ -175,8 +192,9 @@ class Equations(Readings):
     def sigma_stated(self) -> bool:
         """Whether any noise is stated, of what was read or of the actuators."""
         of_actuators = self.closures.unknowns and not self.unstated[-1]
+        of_cells = self.cells is not None and not self._no_cell_sigma
         of_read = [m.sigma is not None and bool(np.isfinite(m.values).any()) for m in self.sets]
-        return bool(of_actuators) or any(of_read)
+        return bool(of_actuators) or of_cells or any(of_read)
 
     @property
     def family_of_unit(self) -> IntArray:
@@ -212,6 +230,7 @@ class Equations(Readings):
             states.status,
             tuple(each.values for each in seen),
             self.residuals(seen),
+            states.tension,
         )
         self._seen = (found, seen) if len(self.rows) <= _TOGETHER else None
         if self.closures.unknowns:
@@ -255,8 +274,9 @@ class Equations(Readings):
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
         off, by_unknown = self.closures.residual(machines, states)
-        off /= noise[-1]
-        by_unknown /= noise[-1]
+        factors = noise[self._groups]
+        off /= factors
+        by_unknown /= factors[:, None]
         equation, by_unknown = self._counted(off), self._counted(by_unknown)
         if not self.any_read:
             return equation, by_unknown
@@ -306,7 +326,7 @@ class Equations(Readings):
         of_closures = self.closures.by_numbers(
             evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
         )
-        of_closures /= noise[-1]
+        of_closures /= noise[self._groups][:, None]
         by_all = self._counted(of_closures)
         if self.any_read:
             readings = self.whiten(self.jacobian(evaluation), noise)
@@ -335,10 +355,10 @@ class Equations(Readings):
         Jacobian and directions give there.
         """
         off, by_unknown, _ = self._at(evaluation, noise)
-        own = int((~self._slack).sum())
+        own = int(self._counts.sum())
         longer, freedom = np.zeros((2, *self._slack.shape))
-        longer[~self._slack] = -off[:own]
-        freedom[~self._slack] = self._blocks.redundancy(by_unknown, weights, taken)[:own]
+        longer[self._counts] = -off[:own]
+        freedom[self._counts] = self._blocks.redundancy(by_unknown, weights, taken)[:own]
         if self._slack.any():
             whole, _ = self.closures.residual(evaluation.machines, evaluation.states)
             longer[self._slack] = -whole[self._slack] / noise[-1]
@@ -394,8 +414,9 @@ class Equations(Readings):
         if unknowns:
             off, by_unknown, _ = self._at(at, noise)
             errors = self._blocks.spread(by_unknown, left)
-            change, own = np.zeros(self._slack.shape), int((~self._slack).sum())
-            change[~self._slack] = -noise[-1] * (errors + off)[:own]
+            change, own = np.zeros(self._slack.shape), int(self._counts.sum())
+            change[self._counts] = -(errors + off)[:own]
+            change *= noise[self._groups]
             other.closures = self.closures.shifted(change)
             errors = errors[own:]
         residuals = tuple(self.unwhiten(errors, noise[: len(self.sets)]))
@@ -521,7 +542,8 @@ class Equations(Readings):
         if sigma is None:
             return readings
         size = ROUNDING * float(np.abs(self.actuators).max())
-        return float(np.hypot(readings, size / noise[-1] * np.linalg.norm(1.0 / sigma)))
+        whitened = size / (noise[self._groups] * sigma)
+        return float(np.hypot(readings, np.linalg.norm(whitened)))
 
     def distances(self, evaluation: Evaluation) -> FloatArray:
         """How far off each measured point is, mm, in the order of the sets."""
@@ -543,13 +565,13 @@ class Equations(Readings):
         """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
         off = self.closures_off(evaluation)
         if self._counting is not None or not evaluation.ok:
-            off = off[~self._slack & (evaluation.status == 0)[:, None]]
+            off = off[~self._slack[:, : off.shape[1]] & (evaluation.status == 0)[:, None]]
         return rms(off)
 
     def worst_closures(self, evaluation: Evaluation) -> FloatArray:
         """The largest of them at each pose (K,); NaN where they hold."""
         off = np.abs(self.closures_off(evaluation))
-        off[self._slack] = 0.0
+        off[self._slack[:, : off.shape[1]]] = 0.0
         return off.max(axis=1) if off.shape[1] else np.full(len(off), np.nan)
 
     def readings_off(self, evaluation: Evaluation) -> FloatArray:
@@ -561,7 +583,8 @@ class Equations(Readings):
             and last[1] is evaluation
             and self._counting is None
         ):
-            off = last[3].off[: self._slack.size].reshape(self._slack.shape) * last[2][-1]
+            off = last[3].off[: self._slack.size].reshape(self._slack.shape)
+            off = off * last[2][self._groups]
         else:
             off, _ = self.closures.residual(evaluation.machines, evaluation.states)
         needed: FloatArray = off if self.closures.sigma is None else off * self.closures.sigma
@@ -569,7 +592,16 @@ class Equations(Readings):
 
     def closures_off(self, evaluation: Evaluation) -> FloatArray:
         """The same in mm."""
-        return self.readings_off(evaluation) * self.closures.lengths(evaluation.machines)
+        lengths = self.closures.lengths(evaluation.machines)
+        of_actuators = slice(self.closures.equations - self.closures.cells)
+        return (self.readings_off(evaluation) * lengths)[:, of_actuators]
+
+    def cell_rms(self, evaluation: Evaluation) -> float:
+        """How far tensions are off what load cells read, N; NaN where they are no unknowns."""
+        cells = self.closures.cells
+        if not cells:
+            return float("nan")
+        return rms(self.readings_off(evaluation)[:, -cells:][self._counts[:, -cells:]])
 
     def status(self, evaluation: Evaluation) -> Int32Array:
         """Of the forward kinematics, for each row."""

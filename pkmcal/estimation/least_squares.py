@@ -212,9 +212,7 @@ class Search:
             evaluation = self.at(u, noise)
             take(evaluation)
             by_u = self._taken(evaluation, noise)
-            if len(without):
-                by_u = by_u.copy()
-                by_u[without] = 0.0
+            by_u[without] = 0.0
             whitened = data(evaluation)
             by_u = loss.jacobian(whitened, _finite(by_u))
             turned = _turned(-loss.residual(whitened), by_u)

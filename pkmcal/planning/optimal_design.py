@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, first_largest
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, first_largest
 from pkmcal.estimation.identifiability import decompose
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics.linear_fit import ROUNDING
@@ -26,6 +26,7 @@ Criterion = Literal["prediction", "D", "A"]
 CRITERIA: tuple[Criterion, ...] = ("prediction", "D", "A")
 
 _SHORTLIST = 1000  # candidates that help most, which exchanges are first sought among
+_RENEWED = 5  # members that grow on one shortlist
 _TRIED = 12  # members that matter least, one of which must want to be exchanged
 _TOGETHER = 512  # candidates that are looked at at once, as many as caches hold
 _ALIKE = 1e-6  # share by which an exchange must gain; rounding moves gains by up to 1e-7
@@ -86,6 +87,8 @@ class Design:
         aimed = (aims @ unit).reshape(-1, rank)
         self._errors = aimed.T @ aimed / len(aims)
         self._cost = metric if criterion == "A" else self._errors
+        self._coarse = self._blocks.reshape(-1, rank).astype(np.float32)
+        self._lengths = np.sqrt(np.einsum("nij,nij->n", self._blocks, self._blocks))
 
     def predicted(self, chosen: IntArray) -> float:
         """Root mean square error (mm) at the aims if these candidates are measured."""
@@ -164,14 +167,15 @@ class Design:
 
         At most `counts` of each sort.
         """
-        ridge, chosen = self._ridge + self._worth(worth), list[int]()
+        ridge, chosen, among = self._ridge + self._worth(worth), list[int](), self._all
         most = sum(counts) if counts else len(self._blocks)
         while len(chosen) < most:
-            gains = self._gains(chosen, ridge, self._all)
+            among = self._shortlist(chosen, ridge) if len(chosen) % _RENEWED == 0 else among
+            gains = self._gains(chosen, ridge, among)
             if counts:
                 entered = np.bincount(self._sort[chosen], minlength=len(counts))
-                gains[(entered >= counts)[self._sort]] = -np.inf
-            chosen.append(first_largest(gains, _ALIKE * gains.max()))
+                gains[(entered >= counts)[self._sort[among]]] = -np.inf
+            chosen.append(int(among[first_largest(gains, _ALIKE * gains.max())]))
             yield chosen[-1]
 
     def _reduced(self, chosen: list[int], error: float) -> IntArray:
@@ -208,11 +212,11 @@ class Design:
         sizes = np.bincount(self._sort)
         if len(self._all) <= _SHORTLIST * len(sizes):
             return self._all
-        gains, short = self._gains(chosen, ridge, self._all), np.zeros(len(self._all), dtype=bool)
+        short = np.zeros(len(self._all), dtype=bool)
         for sort, size in enumerate(sizes):
-            own = self._sort == sort
-            least = np.partition(gains[own], -min(_SHORTLIST, size))[-min(_SHORTLIST, size)]
-            short |= own & (gains >= least - _ALIKE * abs(least))  # all that are equal
+            gains = self._largest(chosen, ridge, self._sort == sort, min(_SHORTLIST, size))
+            least = np.partition(gains, -min(_SHORTLIST, size))[-min(_SHORTLIST, size)]
+            short |= gains >= least - _ALIKE * abs(least)  # all that are equal
         short[chosen] = True
         return np.flatnonzero(short)
 
@@ -222,9 +226,12 @@ class Design:
         """One member exchanged for the best among these candidates, if one wants to be."""
         for i in self._least(chosen, ridge):
             others = [j for j in chosen if j != i]
-            gains = self._gains(others, ridge, among)
-            own = gains[np.searchsorted(among, i)]
-            gains[self._sort[among] != self._sort[i]] = -np.inf
+            if len(among) == len(self._all):
+                gains = self._largest(others, ridge, self._sort == self._sort[i], 1)
+            else:
+                gains = self._gains(others, ridge, among)
+                gains[self._sort[among] != self._sort[i]] = -np.inf
+            own = self._gains(others, ridge, np.array([i]))[0]
             best = first_largest(gains, _ALIKE * gains.max())
             if gains[best] > (1.0 + _ALIKE) * own:
                 return [*others, int(among[best])], True
@@ -253,6 +260,53 @@ class Design:
         gains = self._changes(self._blocks if every else self._blocks[among], at, 1.0, ridge)
         gains[np.isin(among, at)] = -np.inf
         return gains
+
+    def _largest(
+        self, chosen: list[int], ridge: FloatArray, allowed: BoolArray, count: int
+    ) -> FloatArray:
+        """`_gains` among all, as far as they may be of the `count` largest; -inf of the others.
+
+        A gain takes several times as long as a bound of it, for which single precision will do.
+        """
+        first = max(4 * count, _SHORTLIST)
+        if len(self._all) <= first:
+            gains = self._gains(chosen, ridge, self._all)
+            gains[~allowed] = -np.inf
+            return gains
+        gains = np.full(len(self._all), -np.inf)
+        bounds = self._bounds(np.sort(np.array(chosen, dtype=np.intp)), ridge)
+        bounds[~allowed] = -np.inf
+        bounds[chosen] = -np.inf
+        some = np.sort(np.argpartition(-bounds, first - 1)[:first])
+        gains[some] = self._gains(chosen, ridge, some)
+        gains[~allowed] = -np.inf
+        least = np.partition(gains, -count)[-count]
+        rest = np.flatnonzero(
+            (bounds >= least - 2.0 * _ALIKE * abs(least)) & np.isinf(gains) & allowed
+        )
+        if len(rest):
+            gains[rest] = self._gains(chosen, ridge, rest)
+        return gains
+
+    def _bounds(self, chosen: IntArray, ridge: FloatArray) -> FloatArray:
+        """What the gain of no candidate (N,) exceeds.
+
+        With G = B C Bᵀ of a block, ln det(1 + G) ≤ k ln(1 + tr G / k), and what it takes off the
+        cost, tr((1 + G)⁻¹ S), is at most tr S. Single precision is allowed for.
+        """
+        covariance = np.asarray(np.linalg.inv(self._information(chosen) + ridge), np.float64)
+        square = covariance if self._determinant else covariance @ self._cost @ covariance
+        sizes, axes = np.linalg.eigh(0.5 * (square + square.T))
+        root = (axes * np.sqrt(np.maximum(sizes, 0.0))).astype(np.float32)
+        k, found = self._blocks.shape[1], np.empty(len(self._all))
+        for at in range(0, len(found), _TOGETHER):
+            through = self._coarse[at * k : (at + _TOGETHER) * k] @ root
+            found[at : at + _TOGETHER] = (
+                np.einsum("ij,ij->i", through, through).reshape(-1, k).sum(1)
+            )
+        rounding = len(root) * np.finfo(np.float32).eps * float(np.linalg.norm(root))
+        traces: FloatArray = (np.sqrt(found) + 2.0 * rounding * self._lengths) ** 2
+        return k * np.log1p(traces / k) if self._determinant else traces
 
     def _log_cost(self, chosen: IntArray, ridge: FloatArray) -> float:
         """Logarithm of what the criterion makes least."""

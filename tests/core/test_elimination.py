@@ -62,13 +62,15 @@ def test_steps_solve_the_damped_normal_equations(drawn: Drawn) -> None:
 
 
 def test_units_of_a_poses_equations_change_no_step_of_any_pose(drawn: Drawn) -> None:
-    matrix, pull, _ = drawn.poses.normals(drawn.residual, drawn.by_unknown)
-    units = 10.0 ** np.random.default_rng(8).uniform(-12, 12, len(pull))
-    damping = np.full(len(pull), 1e-3)
-    expected = drawn.poses.steps(matrix, pull, damping)
-    found = drawn.poses.steps(matrix * units[:, None, None], pull * units[:, None], damping)
-    np.testing.assert_allclose(found[0], expected[0], rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(found[1] / units, expected[1], rtol=1e-9, atol=1e-12)
+    poses = len(drawn.count)
+    units, damping = 10.0 ** np.random.default_rng(8).uniform(-6, 6, poses), np.full(poses, 1e-3)
+    each = np.empty(len(drawn.residual))
+    for i, mine, _ in drawn.each():
+        each[mine] = units[i]
+    expected = drawn.poses.fit(drawn.residual, drawn.by_unknown, damping)
+    found = drawn.poses.fit(drawn.residual * each, drawn.by_unknown * each[:, None], damping)
+    np.testing.assert_allclose(found.step, expected.step, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.gain / units**2, expected.gain, rtol=1e-9, atol=1e-12)
 
 
 def test_what_is_left_is_the_part_across_the_unknowns(drawn: Drawn) -> None:
