@@ -6,22 +6,24 @@ import multiprocessing
 import resource
 import time
 import tracemalloc
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 from scipy.optimize import least_squares
 
 import pkmcal as pk
-from benchmarks.timing import Report, medians, times
+from benchmarks.timing import Report, medians, medians_of_made, times
 from pkmcal.estimation.begin import estimator_at
 from pkmcal.estimation.estimator import Estimator
+from pkmcal.estimation.loss import Loss
 from tests.simulated import hexapod_poses, tilted_poses, with_errors
 
 POSES, SIGMA, NOISE = 30, 0.5, 0.02
 WANTED = 50.0
 REPLICATES = 1000
 CANDIDATES, CHOSEN = 500, 20
-BELTS = 100_000
+BELTS, BELT_NOISE = 100_000, 0.5
 
 
 class Plain:
@@ -158,35 +160,67 @@ def bench_others(report: Report) -> None:
     report.table(["job", "ms"], [[name, f"{1e3 * s:.1f}"] for name, s in took.items()])
 
 
-def belts(rows: int) -> tuple[pk.Robot, pk.Measurements]:
-    """Four belts, 5 numbers free, whose lengths alone were read."""
+def belts(rows: int, error: float = 10.0) -> tuple[pk.Robot, pk.Measurements]:
+    """Four belts, 5 numbers free and off by `error` mm, whose lengths alone were read."""
     robot = pk.load("examples/belts/robot.toml")
     rng = np.random.default_rng(0)
-    off = dict(zip(robot.model.free, rng.normal(0, 10, len(robot.model.free)), strict=True))
+    off = dict(zip(robot.model.free, rng.normal(0, error, len(robot.model.free)), strict=True))
     true = robot.replace({name: robot.geometry[name] + error for name, error in off.items()})
     at = np.zeros((rows, 6))
     at[:, :2] = rng.uniform([400, 300], [2600, 1700], (rows, 2))
-    q = true.inverse(at) + rng.normal(0, 0.5, (rows, 4))
-    return robot, pk.Measurements(q, None, "closure", actuator_sigma=0.5)
+    q = true.inverse(at) + rng.normal(0, BELT_NOISE, (rows, 4))
+    return robot, pk.Measurements(q, None, "closure", actuator_sigma=BELT_NOISE)
+
+
+class PlainBelts:
+    """Anchors of belts and the places of all rows, in NumPy, from the same start."""
+
+    def __init__(self, robot: pk.Robot, log: pk.Measurements, start: np.ndarray) -> None:
+        self.q, geometry = log.actuators, robot.geometry
+        self.anchors = np.array([[geometry[f"base{i}.{a}"] for a in "xy"] for i in range(1, 5)])
+        names = [f"base{i}.{a}" for i in range(1, 5) for a in "xy"]
+        self.free = [names.index(name) for name in robot.model.free]
+        self.start = np.concatenate([self.anchors.flat[self.free], start[:, :2].ravel()])
+
+    def arms(self, unknowns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Vectors from the anchors to the places, and their lengths."""
+        anchors, own = self.anchors.copy(), len(self.free)
+        anchors.flat[self.free] = unknowns[:own]
+        arms = unknowns[own:].reshape(-1, 1, 2) - anchors
+        return arms, np.linalg.norm(arms, axis=2)
+
+    def residual(self, unknowns: np.ndarray) -> np.ndarray:
+        """In standard deviations."""
+        return ((self.arms(unknowns)[1] - self.q) / BELT_NOISE).ravel()
+
+    def slopes(self, unknowns: np.ndarray) -> np.ndarray:
+        """Its derivative, dense."""
+        arms, lengths = self.arms(unknowns)
+        unit = arms / lengths[:, :, None] / BELT_NOISE
+        rows = np.arange(len(unit))
+        by_anchors = np.zeros((len(unit), 4, 4, 2))
+        by_anchors[:, range(4), range(4)] = -unit
+        by_places = np.zeros((len(unit), 4, len(unit), 2))
+        by_places[rows, :, rows] = unit
+        parts = by_anchors.reshape(4 * len(unit), 8)[:, self.free], by_places
+        return np.hstack([part.reshape(4 * len(unit), -1) for part in parts])
+
+    def fit(self) -> np.ndarray:
+        """As SciPy does it if it is told nothing else."""
+        return least_squares(self.residual, self.start).x
+
+    def fit_with_slopes(self) -> np.ndarray:
+        """With derivatives in closed form, by MINPACK."""
+        return least_squares(self.residual, self.start, self.slopes, method="lm").x
 
 
 def bench_belts(report: Report) -> None:
     """A machine that calibrates itself, a pose of its own for every row; processor time."""
-    robot, log = belts(100)
-    fit = pk.identify(robot, log).fit
-
-    def begin() -> Estimator:
-        return estimator_at(fit.uncertainty.equations, fit.equations, fit.start, "linear")
-
-    jobs = {
-        "100 rows, the solve alone": lambda: begin().solve(),
-        "of that, poses at the nominal machine": begin,
-        "100 rows": lambda: pk.identify(robot, log),
-    }
-    took = medians(jobs, 25, time.thread_time)
+    for error in 10.0, 100.0:
+        bench_100_belts(report, error)
     robot, many = belts(BELTS)
     jobs = {f"{BELTS} rows": lambda: pk.identify(robot, many)}
-    took |= medians(jobs, 3, time.thread_time)
+    took = medians(jobs, 3, time.thread_time)
     tracemalloc.start()
     pk.identify(robot, many)
     peak = tracemalloc.get_traced_memory()[1] / BELTS
@@ -219,6 +253,42 @@ def bench_many(report: Report) -> None:
         numbers = "6" if free else "42"
         rows.append([f"{count} positions, {numbers} numbers", f"{took:.1f}", f"{held:.2f}"])
     report.table(["hexapod, with its verdict", "processor s", "GB at most"], rows)
+
+
+def bench_100_belts(report: Report, error: float) -> None:
+    """100 rows of them, anchors off by `error` mm."""
+    robot, log = belts(100, error)
+    found = pk.identify(robot, log)
+    fit = found.fit
+
+    def begin() -> Estimator:
+        return estimator_at(fit.uncertainty.equations, fit.equations, fit.start, "linear")
+
+    def alone() -> Callable[[], object]:
+        """The least squares from there to the minimum."""
+        made = begin()
+        units, n = len(made.equations.components), len(made.scale)
+        loss = Loss("linear", made.equations.components, np.ones(units))
+        given = np.zeros(n), np.ones(len(made.unstated)), loss, np.empty((0, n))
+        return lambda: made.search.best(*given)
+
+    plain = PlainBelts(robot, log, begin().start.pose)
+    for far in plain.fit(), plain.fit_with_slopes():
+        off = np.abs((far[: len(found.values)] - found.values) / found.stderr).max()
+        if off > 1e-3:
+            raise RuntimeError(f"the fits differ by {off} standard deviations")
+    jobs: dict[str, Callable[[], Callable[[], object]]] = {
+        "the solve alone": alone,
+        "with its start, rank and noise": lambda: lambda: begin().solve(),
+        "identify": lambda: lambda: pk.identify(robot, log),
+        "NumPy and least_squares": lambda: plain.fit,
+        "NumPy and least_squares, derivatives given": lambda: plain.fit_with_slopes,
+    }
+    took = medians_of_made(jobs, 25, time.thread_time)
+    report.table(
+        [f"four belts, 100 rows, anchors off by {error:.0f} mm", "ms", "the solve alone is"],
+        [[name, f"{1e3 * s:.2f}", times(s / took["the solve alone"])] for name, s in took.items()],
+    )
 
 
 def main() -> None:

@@ -37,6 +37,23 @@ def medians(
     return {name: statistics.median(times) for name, times in found.items()}
 
 
+def medians_of_made(
+    cases: Mapping[str, Callable[[], Callable[[], object]]],
+    rounds: int,
+    clock: Callable[[], float],
+) -> dict[str, float]:
+    """The same of what each case makes anew, untimed, in every round."""
+    found: dict[str, list[float]] = {name: [] for name in cases}
+    for turn in range(rounds + 1):
+        for name, make in cases.items():
+            run = make()
+            start = clock()
+            run()
+            if turn:  # the first warms up
+                found[name].append(clock() - start)
+    return {name: statistics.median(each) for name, each in found.items()}
+
+
 def processor() -> str:
     """Model name of the processor, and how many of it."""
     info = Path("/proc/cpuinfo")

@@ -61,8 +61,8 @@ int CALL(moved)(int map, ptrdiff_t n, const double *pose, const double *step, do
                 double *twist);
 
 /* Equations of n poses with as many unknowns each: those of pose i are order[first[i]] to order[first[i
- * + 1] - 1], places in arrays of all equations. `work` is PKM_WIDEST (k + unknowns) (unknowns + 1)
- * numbers, k the most equations of a pose.
+ * + 1] - 1], places in arrays of all equations. `work` is PKM_WIDEST (k + unknowns + 1) (unknowns
+ * + 1) numbers, k the most equations of a pose.
  *
  * residual, by_unknown (equations, unknowns) -> JᵀJ (n, unknowns, unknowns), Jᵀr (n, unknowns) and rᵀr
  * (n). */
@@ -70,10 +70,14 @@ int CALL(pose_normals)(ptrdiff_t n, int unknowns, const int64_t *first, const in
                        const double *residual, const double *by_unknown, double *matrix,
                        double *pull, double *cost, double *work);
 
-/* These, and damping (n) of each pose -> the step (n, unknowns), and what it should take off rᵀr (n): of
- * a pose with numbers that are not finite 0 and NaN. */
-int CALL(pose_steps)(ptrdiff_t n, int unknowns, const double *matrix, const double *pull,
-                     const double *damping, double *step, double *gain, double *work);
+/* These, and damping (n) of each pose -> the step (n, unknowns), what it should take off rᵀr (n), rᵀr
+ * itself (n), and what is left of the residual as of a column of `part` below. A step that gains less
+ * than `least` of rᵀr, or no more than errors `rounding` of the unknowns make of it, is 0 and gains 0;
+ * of a pose with numbers that are not finite it is 0 and gains NaN. */
+int CALL(pose_fit)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,
+                   const double *residual, const double *by_unknown, const double *damping,
+                   double least, double rounding, const int64_t *place, double *step, double *gain,
+                   double *cost, double *left, double *work);
 
 /* part (equations, columns) -> what is left of it when by_unknown is a triangle: of pose i the rows from
  * place[i] on; and -R⁻¹ times what is not left (n, unknowns, columns), not finite where R is singular. */

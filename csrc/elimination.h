@@ -1,4 +1,4 @@
-/* Poses are nuisance parameters (pkmcal/estimation/elimination.py): their normal equations and steps,
+/* Poses are nuisance parameters (pkmcal/estimation/elimination.py): their steps and normal equations,
  * and what is left of other columns of their equations when each pose has taken its own part. */
 #ifndef ELIMINATION_H
 #define ELIMINATION_H
@@ -104,43 +104,6 @@ INLINE void solve_positive(ptrdiff_t u, double *A, double *b)
     }
 }
 
-int CALL(pose_steps)(ptrdiff_t n, int unknowns, const double *matrix, const double *pull,
-                     const double *damping, double *step, double *gain, double *work)
-{
-    const ptrdiff_t u = unknowns;
-    double *A = work, *x = work + LANES * u * u;
-    for (ptrdiff_t start = 0; start < n; start += LANES) {
-        ptrdiff_t row[LANES];
-        const int count = block_rows(start, n, row);
-        const real damp = gather(damping, 1, row);
-        real trace = fill(0.0), gained = fill(0.0);
-        mask known = fill_mask(-1);
-        for (ptrdiff_t a = 0; a < u; a++) trace += gather(matrix + a * (u + 1), u * u, row);
-        const real ridge = RIDGE * trace + DBL_MIN;
-        for (ptrdiff_t a = 0; a < u; a++) {
-            const real size = gather(matrix + a * (u + 1), u * u, row), b = gather(pull + a, u, row);
-            for (ptrdiff_t k = 0; k < a; k++) {
-                const real beside = gather(matrix + a * u + k, u * u, row);
-                known &= finite(beside);
-                put(beside, A, a * u + k);
-            }
-            const real damped = size + (damp * size + ridge);
-            known &= finite(damped) & finite(b);
-            put(damped, A, a * u + a);
-            put(-b, x, a);
-        }
-        solve_positive(u, A, x);
-        for (ptrdiff_t a = 0; a < u; a++) {
-            real bent = 2.0 * gather(pull + a, u, row);
-            for (ptrdiff_t k = 0; k < u; k++) bent += gather(matrix + a * u + k, u * u, row) * at(x, k);
-            gained -= at(x, a) * bent;
-            scatter(select(known, at(x, a), fill(0.0)), step + a, u, row, count);
-        }
-        scatter(select(known, gained, fill(NAN)), gain, 1, row, count);
-    }
-    return 0;
-}
-
 /* A column of `most` numbers, `stride` apart, in mirror a. */
 INLINE void reflect(const pose_equations *of, ptrdiff_t u, ptrdiff_t a, const double *vectors,
                     double *column, ptrdiff_t stride)
@@ -177,6 +140,75 @@ INLINE void mirrors(const pose_equations *of, ptrdiff_t u, const double *by_unkn
             put(owned(of, j, scale * at(vectors, j * u + a)), vectors, j * u + a);
         for (ptrdiff_t b = a + 1; b < u; b++) reflect(of, u, a, vectors, vectors + LANES * b, u);
     }
+}
+
+/* The triangle that mirrors leave: its number in row a and column b, a <= b. */
+INLINE real triangle(ptrdiff_t u, const double *vectors, const double *diagonal, ptrdiff_t a,
+                     ptrdiff_t b)
+{
+    return a == b ? at(diagonal, a) : at(vectors, a * u + b);
+}
+
+int CALL(pose_fit)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,
+                   const double *residual, const double *by_unknown, const double *damping,
+                   double least, double rounding, const int64_t *place, double *step, double *gain,
+                   double *cost, double *left, double *work)
+{
+    const ptrdiff_t u = unknowns;
+    double *diagonal = work, *A = diagonal + LANES * u, *x = A + LANES * u * u;
+    double *vectors = x + LANES * u;
+    for (ptrdiff_t start = 0; start < n; start += LANES) {
+        ptrdiff_t row[LANES];
+        const int count = block_rows(start, n, row);
+        const pose_equations of = equations_of(row, first, order);
+        const ptrdiff_t rank = u < of.most ? u : of.most;
+        const real damp = gather(damping, 1, row);
+        double *column = vectors + LANES * of.most * u;
+        real squares = fill(0.0), trace = fill(0.0), gained = fill(0.0);
+        mask known = fill_mask(-1);
+        mirrors(&of, u, by_unknown, vectors, diagonal);
+        for (ptrdiff_t j = 0; j < of.most; j++) {
+            const real r = equation(&of, j, residual, 1);
+            squares += r * r;
+            put(r, column, j);
+        }
+        for (ptrdiff_t a = 0; a < rank; a++) reflect(&of, u, a, vectors, column, 1);
+        for (int l = 0; l < count; l++)
+            for (ptrdiff_t j = u; j < of.count[l]; j++) left[place[row[l]] + j - u] = at(column, j)[l];
+        for (ptrdiff_t a = 0; a < u; a++) {
+            real pull = fill(0.0);
+            for (ptrdiff_t b = 0; b <= a; b++) {
+                real sum = fill(0.0);
+                for (ptrdiff_t k = 0; k <= b && k < rank; k++)
+                    sum += triangle(u, vectors, diagonal, k, a) * triangle(u, vectors, diagonal, k, b);
+                known &= finite(sum);
+                put(sum, A, a * u + b);
+            }
+            for (ptrdiff_t k = 0; k <= a && k < rank; k++)
+                pull += triangle(u, vectors, diagonal, k, a) * at(column, k);
+            known &= finite(pull);
+            trace += at(A, a * (u + 1));
+            put(-pull, x, a);
+        }
+        for (ptrdiff_t a = 0; a < u; a++) {
+            const real size = at(A, a * (u + 1));
+            put(size + (damp * size + (RIDGE * trace + DBL_MIN)), A, a * (u + 1));
+        }
+        solve_positive(u, A, x);
+        for (ptrdiff_t k = 0; k < rank; k++) {
+            real along = fill(0.0);
+            for (ptrdiff_t b = k; b < u; b++) along += triangle(u, vectors, diagonal, k, b) * at(x, b);
+            gained -= along * (2.0 * at(column, k) + along);
+        }
+        const real rounded = rounding * FN(root)(trace);
+        const real floor = rounded * (rounded + FN(root)(squares));
+        const mask gains = known & (gained > least * squares + floor);
+        for (ptrdiff_t a = 0; a < u; a++)
+            scatter(select(gains, at(x, a), fill(0.0)), step + a, u, row, count);
+        scatter(select(known, select(gains, gained, fill(0.0)), fill(NAN)), gain, 1, row, count);
+        scatter(squares, cost, 1, row, count);
+    }
+    return 0;
 }
 
 int CALL(pose_left)(ptrdiff_t n, int unknowns, const int64_t *first, const int64_t *order,

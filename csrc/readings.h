@@ -12,13 +12,14 @@ typedef struct {
 } readings_out;
 
 /* The sphere row of limb i, solved for the actuator coordinate: zero where the pose needs `read`. Where
- * the limb does not reach, the closure at `read` over its slope by the actuator. */
+ * the limb does not reach, the closure at `read` over its slope by the actuator. `by_g` is that of the
+ * closure, whose slope by the actuator is `by_q`. */
 INLINE real actuator_row(int map, const pkm_machine *machine, int i, const limb_numbers *limb,
                          const real *state, const real *R, const real *p, real read, real *by_step,
-                         real *by_g)
+                         real *by_q, real *by_g)
 {
     FN(limb_sphere) sphere;
-    real phi, omega[3], v[3], by_q, about;
+    real phi, omega[3], v[3], about;
     mask reachable = fill_mask(-1);
     FN(limb_drive)(read, limb->g, &about);
     const real own = limb_inverse(machine, i, limb, R, p, about);
@@ -28,10 +29,9 @@ INLINE real actuator_row(int map, const pkm_machine *machine, int i, const limb_
     sphere_at(machine->driver[i], limb, at, &sphere, &reachable);
     FN(sphere_row)(R, p, limb->g + PLATFORM_X, sphere.c, sphere.rho * sphere.rho, &phi, omega, v);
     FN(map_pull)(map, state, omega, v, by_step);
-    sphere_derivatives_called(machine, i, limb, R, p, at, &by_q, by_g);
-    for (int j = 0; j < map_m(map); j++) by_step[j] /= -by_q;
-    for (int s = 0; s < SLOTS; s++) by_g[s] /= -by_q;
-    return select(reaches, own - read, -phi / by_q);
+    sphere_derivatives_called(machine, i, limb, R, p, at, by_q, by_g);
+    for (int j = 0; j < map_m(map); j++) by_step[j] /= -*by_q;
+    return select(reaches, own - read, -phi / *by_q);
 }
 
 INLINE void readings_map(int map, const pkm_machine *machine, ptrdiff_t n, const double *geometry,
@@ -60,7 +60,9 @@ INLINE void readings_map(int map, const pkm_machine *machine, ptrdiff_t n, const
                 real residual, by_step[6], by_q, by_g[SLOTS];
                 if (kind && !(machine->rows[i] & kind)) continue;
                 if (!kind) {
-                    residual = actuator_row(map, machine, i, &limb[i], state, R, p, own_q, by_step, by_g);
+                    residual = actuator_row(map, machine, i, &limb[i], state, R, p, own_q, by_step,
+                                            &by_q, by_g);
+                    for (int k = c; k < end; k++) by_g[column[k] % SLOTS] /= -by_q;
                 } else {
                     real omega[3], v[3];
                     const double weight = machine->weight[r];

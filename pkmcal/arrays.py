@@ -19,7 +19,7 @@ Int32Array = NDArray[np.int32]  # what the core writes
 Int64Array = NDArray[np.int64]
 TextArray = NDArray[np.str_]
 
-Unit = Literal["mm", "rad", "1", "1/mm", "1/rad", "1/mm2", "1/N"]
+Unit = Literal["mm", "rad", "1", "1/mm", "1/rad", "1/mm2", "1/N", "N"]
 
 _ALIKE = 1e-6  # share by which entries of a direction differ that are not equal
 
@@ -139,7 +139,8 @@ def furthest_axis(direction: FloatArray) -> int:
 
 def rms(values: FloatArray) -> float:
     """Root mean square; NaN without values."""
-    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else float("nan")
+    count = np.size(values)
+    return float(np.sqrt(np.square(values).sum() / count)) if count else float("nan")
 
 
 def propagate(jacobian: FloatArray, covariance: FloatArray) -> FloatArray:

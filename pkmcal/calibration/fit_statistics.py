@@ -66,6 +66,8 @@ class Misfit:
     closure_rms_before: float
     closures: FloatArray
     actuator_noise: float
+    tension_noise: float
+    tension_rms: float
     redundancy: tuple[float, ...]
     idle: int
     chi2_per_dof: float
@@ -201,7 +203,9 @@ def misfit(
         closure_rms=equations.closure_rms(estimate.evaluation),
         closure_rms_before=equations.closure_rms(estimator.start),
         closures=equations.worst_closures(estimate.evaluation),
-        actuator_noise=float(np.append(shown, np.nan)[len(equations.sets)]),
+        actuator_noise=float(shown[-1]) if equations.closures.unknowns else float("nan"),
+        tension_noise=float(shown[-2]) if equations.closures.cells else float("nan"),
+        tension_rms=equations.cell_rms(estimate.evaluation),
         redundancy=tuple(estimate.freedom.tolist()),
         idle=equations.idle,
         chi2_per_dof=float((squares + prior @ prior) / dof) if stated else float("nan"),

@@ -217,6 +217,8 @@ def identify(
     word("datum", datum, DATUMS)
     word("slack", slack, SLACK)
     equations, commanded, start = begun(datasets, chosen, unread)
+    if held and equations.closures.cells:
+        raise ArgumentError("holdout: rows whose tensions are unknown are all fitted: leave it out")
     cells: tuple[Cell, ...] = ()
     held_numbers = NO_DATUM
     try:
@@ -314,10 +316,12 @@ def _warnings(
     unknown = fit.uncertainty.unknown
     if fit.uncertainty.mixed and unknown.any():
         names = [f"of measurements {i + 1}" for i in range(len(equations.sets))]
+        names += ["of the load cells"] if equations.closures.cells else []
         names = [n for n, u in zip([*names, "of the actuators"], unknown, strict=True) if u]
+        beside = ", actuator_sigma and tension_sigma" if equations.closures.cells else ""
         notes.append(
-            f"too little is left over to estimate the noise {' and '.join(names)}: state sigma and"
-            " actuator_sigma"
+            f"too little is left over to estimate the noise {' and '.join(names)}: state"
+            f" sigma{beside or ' and actuator_sigma'}"
         )
     kept = estimate.state.determined.rank - estimate.state.fitted.rank
     if kept:
@@ -366,6 +370,8 @@ def _result(
 ) -> Identification:
     chosen, search = estimator.equations.parameters, estimator.search
     end = estimate.evaluation
+    if commanded is not estimator.equations:
+        commanded = commanded.under(end.tension)
     robots = _robots(commanded, end)
     if commanded is not estimator.equations:
         commanded.warm_start(end)

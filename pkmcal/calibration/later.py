@@ -102,7 +102,11 @@ def noise_factors(rows: Later, equations: Equations, sure: Uncertainty) -> Float
             factors.append(1.0 if stated else float(np.sqrt(sure.noises[i].total)))
     if len(equations.unstated) > len(rows.data):  # the actuators: stated or estimated alike
         of_fit = sure.factors[len(sure.equations.sets) :]
-        factors += [float(of_fit[0])] if equations.unstated[-1] and len(of_fit) else [1.0]
+        alike = len(of_fit) == len(equations.unstated) - len(rows.data)
+        factors += [
+            float(of_fit[j - len(rows.data)]) if unstated and alike else 1.0
+            for j, unstated in enumerate(equations.unstated) if j >= len(rows.data)
+        ]  # fmt: skip
     return np.array(factors)
 
 

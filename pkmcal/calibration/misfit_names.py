@@ -86,8 +86,18 @@ class MisfitNames:
         return self.misfit.actuator_noise
 
     @property
+    def tension_noise(self) -> float:
+        """Estimated deviation of what load cells read, N; NaN where it was stated."""
+        return self.misfit.tension_noise
+
+    @property
+    def tension_rms(self) -> float:
+        """How far tensions are off what load cells read, N; NaN where they are no unknowns."""
+        return self.misfit.tension_rms
+
+    @property
     def redundancy(self) -> tuple[float, ...]:
-        """Degrees of freedom left in each set, then in the closures where those are fitted.
+        """Degrees of freedom left in each set, then in load cells and closures if fitted.
 
         Equations less what poses and parameters took of them; a deviation estimated from r of them
         is itself good to 1/√(2 r) of it.

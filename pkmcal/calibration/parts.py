@@ -61,6 +61,8 @@ _NAMES = (  # of `to_dict`, in the order in which they are written
     "reading_noise",
     "pose_noise",
     "actuator_noise",
+    "tension_noise",
+    "tension_rms",
     "redundancy",
     "idle",
     "repeatability",

@@ -17,6 +17,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.identifiability import listed
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.geometry.load import is_of_load
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements
@@ -245,6 +246,7 @@ def _out_of_stroke(robot: Robot, drive: FloatArray) -> BoolArray:
 def implausible_changes(start: Evaluation, end: Evaluation, parameters: Parameters) -> list[str]:
     """Find numbers of the geometry that moved further than errors of manufacture explain."""
     moved = np.abs((end.theta - start.theta) / parameters.scale)[parameters.geometry]
+    moved[[is_of_load(name) for name in parameters.names[parameters.geometry]]] = 0.0
     far = np.flatnonzero(moved > FAR * parameters.robot.length)
     if not len(far):
         return []

@@ -20,6 +20,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
@@ -150,6 +151,10 @@ def taut(
     the way is taut after all.
     """
     cells: dict[tuple[int, int], Cell] = {}
+    if equations.closures.cells:
+        raise ArgumentError(
+            "slack: cables are not looked at for slack where their tensions are unknown"
+        )
     if not _pulling(equations).any():
         return equations, ()
     for k in range(_ROUNDS):

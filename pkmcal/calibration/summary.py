@@ -111,6 +111,10 @@ def _noise(misfit: Misfit) -> Iterator[str]:
     elif estimated:
         how = f"estimated from the residuals (dof {_count(misfit.dof)})"
         yield f"noise {', '.join(estimated)} mm, {how}"
+    if np.isfinite(misfit.tension_noise):
+        yield f"noise of the load cells {_short(misfit.tension_noise)} N, estimated likewise"
+    elif np.isfinite(misfit.tension_rms):
+        yield f"load cells off by {_short(misfit.tension_rms)} N rms"
     if not misfit.told_apart:
         return
     for names, deviations in zip(misfit.components, misfit.component_noise, strict=True):

@@ -347,6 +347,23 @@ class DrivenMachine(CoreMachine):
             out[:, spheres[d], of_laws[i]] = -by_number[:, i] / slope[:, d]
         return residual, by_step, out
 
+    def ways_at(
+        self, slots: FloatArray, pose: FloatArray, columns: Int32Array
+    ) -> tuple[FloatArray, FloatArray]:
+        """How ways follow poses (N, 6), as `pkmcal.core.machine.Machine.ways_at`."""
+        own, _, _ = self._sorted(columns)
+        within = np.array([self._within(int(columns[i])) for i in own], dtype=np.int32)
+        by_step, by_own = self._of_limbs.ways_at(self._bare(slots), pose, within)
+        by_number = np.zeros((*by_own.shape[:2], len(columns)))
+        by_number[:, :, own] = by_own
+        return by_step, by_number
+
+    def by_tension(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
+        """By how much less limbs read at poses (N, 6) per N of their tension, (N, drives)."""
+        way, state = self._of_limbs.inverse(self._bare(slots), pose), self._state(len(pose))
+        slope = self.laws.ways(slots, self.laws.readings(slots, way, *state), *state).slope
+        return -self.laws.by_tension(slots, way, state[1]) / slope
+
     def moved(self, pose: FloatArray, step: FloatArray) -> FloatArray:
         """Poses moved, as `pkmcal.core.machine.Machine.moved`."""
         return self.inner.moved(pose, step)

@@ -5,11 +5,34 @@ Own code in the core, for LAPACK through NumPy takes one pose after another and 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pkmcal._core import lib
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.library import ISA, call
+
+
+class Fit(NamedTuple):
+    """Steps of K poses with u unknowns each.
+
+    Attributes
+    ----------
+    step : ndarray (K, u)
+        0 of poses with numbers that are not finite.
+    gain : ndarray (K,)
+        What it should take off the squares; NaN of those poses.
+    cost : ndarray (K,)
+        The sum of the squares.
+    left : ndarray (M,)
+        What is left of the equations, as of a column in `PoseEquations.left`.
+    """
+
+    step: FloatArray
+    gain: FloatArray
+    cost: FloatArray
+    left: FloatArray
 
 
 class PoseEquations:
@@ -56,7 +79,7 @@ class PoseEquations:
 
     def _work(self) -> FloatArray:
         u = self.unknowns
-        return np.empty(lib.PKM_WIDEST * (self._most + u) * (u + 1))
+        return np.empty(lib.PKM_WIDEST * (self._most + u + 1) * (u + 1))
 
     def normals(
         self, residual: FloatArray, by_unknown: FloatArray
@@ -75,16 +98,24 @@ class PoseEquations:
         call("pose_normals", *given, *found, self._work(), isa=self._isa)
         return found
 
-    def steps(
-        self, matrix: FloatArray, pull: FloatArray, damping: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Steps (K, u) by damped normal equations, and what they should take off rᵀr (K,).
+    def fit(
+        self,
+        residual: FloatArray,
+        by_unknown: FloatArray,
+        damping: FloatArray,
+        least: float = 0.0,
+        rounding: float = 0.0,
+    ) -> Fit:
+        """Damped steps (K,) that take the squares of equations (E,) with slopes J (E, u) down.
 
-        0 and NaN of poses with numbers that are not finite.
+        One that gains less than `least` of the squares, or no more than errors `rounding` of the
+        unknowns make of it, is 0, and so is its gain.
         """
         n, u = self._poses, self.unknowns
-        found = np.empty((n, u)), np.empty(n)
-        call("pose_steps", n, u, matrix, pull, damping, *found, self._work(), isa=self._isa)
+        found = Fit(np.empty((n, u)), np.empty(n), np.empty(n), np.empty(self._left))
+        given = np.ascontiguousarray(residual), np.ascontiguousarray(by_unknown), damping
+        order = self._first, self.order, *given, least, rounding, self.place
+        call("pose_fit", n, u, *order, *found, self._work(), isa=self._isa)
         return found
 
     def left(self, by_unknown: FloatArray, part: FloatArray) -> tuple[FloatArray, FloatArray]:

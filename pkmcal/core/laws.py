@@ -225,6 +225,14 @@ class Laws:
                 out[:, i] *= self._longer(numbers, tension)[:, d]
         return out
 
+    def by_tension(
+        self, slots: FloatArray, way: FloatArray, tension: FloatArray | None
+    ) -> FloatArray:
+        """Derivative of ways (N, drives) by their tensions, (N, drives)."""
+        numbers = self._numbers(slots)
+        unpulled = way if tension is None else way / self._longer(numbers, tension)
+        return np.asarray(unpulled * numbers[:, self._stretch])
+
     def _longer(self, numbers: FloatArray, tension: FloatArray) -> FloatArray:
         """How many times as long the ways are under a tension."""
         longer: FloatArray = 1.0 + tension * numbers[:, self._stretch]

@@ -334,6 +334,21 @@ class Machine(CoreMachine):
         call("readings", self.struct, *given, isa=self.isa)
         return residual, by_step, by_number
 
+    def ways_at(
+        self, slots: FloatArray, pose: FloatArray, columns: Int32Array
+    ) -> tuple[FloatArray, FloatArray]:
+        """How the ways of limbs follow poses (N, 6): by the map's step (N, limbs, m), mm and rad.
+
+        And by the numbers at `columns` of the flattened slots (N, limbs, columns).
+        """
+        bare, width = slots.copy(), slots.shape[-1]
+        bare[:, _GAIN], bare[:, _OFFSET] = 1.0, 0.0
+        nowhere = np.full((len(pose), self.actuators), self.struct.size)
+        _, by_step, by_number = self.readings(bare, pose, nowhere, columns)
+        assert by_number is not None
+        by_number[:, :, np.isin(columns % width, (_GAIN, _OFFSET))] = 0.0
+        return by_step[:, self.reading_rows], by_number[:, self.reading_rows]
+
     @property
     def reading_rows(self) -> IntArray:
         """Which row of `readings` is that of each limb's coordinate."""

@@ -28,6 +28,7 @@ PER_STEP = {
     "1/rad": 1e-3,
     "1/mm2": 1e-9,
     "1/N": 1e-6,
+    "N": 1.0,
 }
 Study = Literal["limb1", "offsets", "all-limbs"]
 STUDIES: tuple[Study, ...] = get_args(Study)

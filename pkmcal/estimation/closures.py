@@ -46,11 +46,14 @@ class RowStates:
         Where the actuators are.
     status : ndarray of int (K,)
         Of the forward kinematics.
+    tension : ndarray (K, n) or None
+        Of what actuators drive, N, where it is unknown and has been found.
     """
 
     pose: FloatArray
     actuators: FloatArray
     status: Int32Array
+    tension: FloatArray | None = None
 
     def chosen(self, rows: BoolArray, others: RowStates) -> RowStates:
         """These where `rows` (K,), else the others."""
@@ -59,10 +62,14 @@ class RowStates:
         actuators = self.actuators
         if actuators is not others.actuators:
             actuators = np.where(rows[:, None], actuators, others.actuators)
+        tension = self.tension
+        if tension is not None and others.tension is not None:
+            tension = np.where(rows[:, None], tension, others.tension)
         return RowStates(
             np.where(rows[:, None], self.pose, others.pose),
             actuators,
             np.where(rows, self.status, others.status),
+            tension,
         )
 
 
@@ -77,6 +84,8 @@ class Closures(Protocol):
     equations: int
     actuators: tuple[int, ...]
     sigma: FloatArray | None
+    unread: BoolArray | None  # equations (K, equations) of load cells that were not read
+    cells: int  # how many of the equations are of load cells: the last ones
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
         """The states of a robot with other numbers, near those given."""
@@ -108,8 +117,9 @@ class Closures(Protocol):
 class Commanded:
     """Poses that follow from what the actuators read."""
 
-    unknowns = equations = 0
+    unknowns = equations = cells = 0
     actuators: tuple[int, ...] = ()
+    unread: BoolArray | None = None
 
     def __init__(self, read: FloatArray) -> None:
         self.read = read
@@ -161,6 +171,9 @@ class NoisyActuators:
     sigma : ndarray (K, n)
         Its standard deviation, mm or rad; an actuator whose deviations are 0 has no unknown.
     """
+
+    cells = 0
+    unread: BoolArray | None = None
 
     def __init__(self, read: FloatArray, sigma: FloatArray) -> None:
         self.read = read
@@ -229,6 +242,9 @@ class FreePoses:
         Its standard deviation, mm or rad; an actuator whose deviations are 0 is never wrong.
     """
 
+    cells = 0
+    unread: BoolArray | None = None
+
     def __init__(self, robot: Robot, read: FloatArray, sigma: FloatArray) -> None:
         self.read = read
         roles = pose_steps.row_roles(robot)
@@ -240,7 +256,7 @@ class FreePoses:
         self._mixed = not np.array_equal(self._read, np.eye(robot.machine.rows))
         self._arcs = 1.0 / mm_per_unit(pose_steps.step_units(robot), robot.length)
         units = [robot.actuator_units[a] if a >= 0 else "mm" for a in self.actuators]
-        self._turning = np.array([unit == "rad" for unit in units])
+        self._turning = [unit == "rad" for unit in units]
         self.unknowns = robot.machine.m - len(self._held)
         self.equations = len(rows)
         if self.unknowns < 1 or not sigma[:, np.setdiff1d(self.actuators, -1)].all():
@@ -249,61 +265,67 @@ class FreePoses:
                 " be met without noise: actuator_sigma must be positive, or None; 0 at all rows for"
                 f" at most {robot.machine.m - len(roles.held) - 1} actuators that are never wrong"
             )
-        self.sigma: FloatArray | None = sigma
         if self.actuators != tuple(range(sigma.shape[1])):
             # passive rows that give way are as sure as the file weighs them against the actuators
             common = np.mean(sigma * mm_per_unit(robot.actuator_units, robot.length), axis=1)
             each = [sigma[:, a] if a >= 0 else common for a in self.actuators]
-            self.sigma = np.stack(each, axis=1)
-        self._white = 1.0 / self.sigma
-        self._shift: FloatArray | float = 0.0
+            sigma = np.stack(each, axis=1)
+        self._state(sigma)
+        self._shift: FloatArray | None = None
+
+    def _state(self, sigma: FloatArray) -> None:
+        """State the deviations (K, equations), and what they whiten with."""
+        self.sigma: FloatArray | None = sigma
+        self._white = 1.0 / sigma
+        alike = bool((sigma == sigma[:1]).all())
+        white = self._white[:1] if alike else self._white
+        self._white_steps = np.repeat(white[:, :, None], self.unknowns, axis=2)
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
         """Poses stay where they are, or where joints hold them, until they are fitted."""
-        return self._kept(robot, states.pose, states.status)
+        return self._kept(robot, states)
 
     def moved(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
         """Move the poses."""
         if len(self._held):
             step = (self._allowed(robot, states)[0] @ step[:, :, None])[:, :, 0]
-        pose = pose_steps.moved(_machine(robot), states.pose, step)
-        return self._kept(robot, pose, states.status)
+        return self._kept(robot, self._stepped(robot, states, step))
 
     def residual(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """What the limbs would read at the poses less what they read."""
-        off, by_step = pose_steps.readings(_machine(robot), states.pose, self.read)
+        off, by_step = self._rows(robot, states)
         if self._mixed:
             off, by_step = off @ self._read.T, self._read @ by_step
         if len(self._held):
             by_step = by_step @ self._allowed(robot, states)[0]
         off *= self._white
-        off += self._shift
-        by_step *= self._white[:, :, None]
+        if self._shift is not None:
+            off += self._shift
+        by_step *= self._white_steps
         return off, by_step
 
     def shifted(self, by: FloatArray) -> FreePoses:
         """The same with larger equations."""
         other = copy.copy(self)
-        other._shift = self._shift + by
+        other._shift = by if self._shift is None else self._shift + by
         return other
 
     def lengths(self, robot: Calibratable) -> FloatArray:
         """Of the actuators' units; the other rows are in mm."""
-        arc = robot.length if self._turning.any() else 1.0
-        return np.where(self._turning, arc, 1.0)
+        arc = robot.length if any(self._turning) else 1.0
+        return np.array([arc if turning else 1.0 for turning in self._turning])
 
     def twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
         """Twists by steps of the pose."""
-        twists = pose_steps.step_twists(_machine(robot), states.pose)
+        twists = self._step_twists(robot, states)
         return twists @ self._allowed(robot, states)[0] if len(self._held) else twists
 
     def by_numbers(self, robot: Calibratable, states: RowStates, places: IntArray) -> FloatArray:
         """What the limbs would read, unknowns held."""
-        machine = _machine(robot)
-        by_free = pose_steps.readings_by_numbers(machine, states.pose, self.read, places)
+        by_free = self._rows_by_numbers(robot, states, places)
         found = self._read @ by_free if self._mixed else by_free
         if len(self._held):
-            by_step = pose_steps.readings(machine, states.pose, self.read)[1]
+            by_step = self._rows(robot, states)[1]
             found += self._read @ by_step @ self._following(robot, states, by_free)
         found *= self._white[:, :, None]
         return found
@@ -314,10 +336,31 @@ class FreePoses:
         """Poses are held, or go with the joints that hold them."""
         if not len(self._held):
             return None
-        machine = _machine(robot)
-        by_free = pose_steps.readings_by_numbers(machine, states.pose, self.read, places)
-        steps = self._following(robot, states, by_free)
-        return pose_steps.step_twists(machine, states.pose) @ steps
+        steps = self._following(robot, states, self._rows_by_numbers(robot, states, places))
+        return self._step_twists(robot, states) @ steps
+
+    # rows of read and held equations by steps of the unknowns, before any is held -----------------
+
+    def _rows(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
+        """What they miss (K, rows), and their derivative by the steps (K, rows, s)."""
+        return pose_steps.readings(machine_of(robot), states.pose, self.read)
+
+    def _rows_by_numbers(
+        self, robot: Calibratable, states: RowStates, places: IntArray
+    ) -> FloatArray:
+        """Their derivative by numbers of the geometry, (K, rows, p)."""
+        return pose_steps.readings_by_numbers(machine_of(robot), states.pose, self.read, places)
+
+    def _stepped(self, robot: Calibratable, states: RowStates, step: FloatArray) -> RowStates:
+        """The states after steps (K, s)."""
+        pose = pose_steps.moved(machine_of(robot), states.pose, step)
+        return RowStates(pose, self.read, states.status)
+
+    def _step_twists(self, robot: Calibratable, states: RowStates) -> FloatArray:
+        """Twists by the steps, (K, 6, s)."""
+        return pose_steps.step_twists(machine_of(robot), states.pose)
+
+    # what is held ---------------------------------------------------------------------------------
 
     def _following(self, robot: Calibratable, states: RowStates, by_free: FloatArray) -> FloatArray:
         """Steps of the pose by numbers that keep what is held, (K, m, p)."""
@@ -325,8 +368,7 @@ class FreePoses:
 
     def _allowed(self, robot: Calibratable, states: RowStates) -> tuple[FloatArray, FloatArray]:
         """Steps that keep the held rows (K, m, unknowns), and those that undo them (K, m, h)."""
-        by_step = pose_steps.readings(_machine(robot), states.pose, self.read)[1]
-        return self._split(by_step)
+        return self._split(self._rows(robot, states)[1])
 
     def _split(self, by_step: FloatArray) -> tuple[FloatArray, FloatArray]:
         across = (self._held @ by_step * self._arcs).transpose(0, 2, 1)
@@ -339,30 +381,40 @@ class FreePoses:
         arcs = self._arcs[:, None]
         return arcs * q[:, :, len(self._held) :], arcs * undo
 
-    def _kept(self, robot: Calibratable, pose: FloatArray, status: Int32Array) -> RowStates:
-        """Poses (K, 6) moved back to where joints hold them; NaN where they do not get there."""
-        machine = _machine(robot)
+    def _kept(self, robot: Calibratable, states: RowStates) -> RowStates:
+        """States moved back to where joints hold them; poses of NaN where they do not get there."""
+        pose = states.pose
         if len(self._held):
-            limit = _HELD * machine.machine.struct.size
+            limit = _HELD * machine_of(robot).machine.struct.size
             for _ in range(_STEPS):
-                off, by_step = pose_steps.readings(machine, pose, self.read)
+                off, by_step = self._rows(robot, states)
                 missed = off @ self._held.T
                 step = -(self._split(by_step)[1] @ missed[:, :, None])[:, :, 0]
-                pose = pose_steps.moved(machine, pose, step)
+                states = self._stepped(robot, states, step)
                 short = np.abs(step / self._arcs).max(axis=1) <= limit
                 if (short | np.isnan(step).any(axis=1)).all():
                     break
-            pose = np.where(short[:, None], pose, np.nan)
+            pose = np.where(short[:, None], states.pose, np.nan)
+        return self._said(states, pose)
+
+    def _said(self, states: RowStates, pose: FloatArray) -> RowStates:
+        """The states at poses (K, 6), with a status where there is none."""
         found = np.zeros(len(pose), dtype=np.int32)
         if not np.isfinite(pose).all():
             lost = ~np.isfinite(pose).all(axis=1)
-            found[lost] = np.where(status == 0, 1, status)[lost]
-        return RowStates(pose, self.read, found)
+            found[lost] = np.where(states.status == 0, 1, states.status)[lost]
+        return RowStates(pose, self.read, found, states.tension)
 
 
-def _machine(robot: Calibratable) -> Robot:
+def machine_of(robot: Calibratable) -> Robot:
+    """The parallel machine that rows with poses of their own are of."""
     assert isinstance(robot, Robot)  # arms have no surplus closures
     return robot
+
+
+def one_mm(robot: Robot, read: FloatArray) -> FloatArray:
+    """Deviations (K, n) of what actuators read, where none is known: to be estimated."""
+    return np.tile(1.0 / mm_per_unit(robot.actuator_units, robot.length), (len(read), 1))
 
 
 def has_equations(robot: Calibratable, sigmas: Sequence[FloatArray | None]) -> bool:
@@ -387,9 +439,7 @@ def closures_of(
         actuators are as many as the ways to move, and 1 mm, to be estimated, where they are more.
     """
     if isinstance(robot, Robot) and pose_steps.surplus(robot) > 0:
-        if sigma is None:
-            sigma = np.tile(1.0 / mm_per_unit(robot.actuator_units, robot.length), (len(read), 1))
-        return FreePoses(robot, read, sigma)
+        return FreePoses(robot, read, one_mm(robot, read) if sigma is None else sigma)
     if sigma is None or not has_equations(robot, [sigma]):
         return Commanded(read)
     return NoisyActuators(read, sigma)

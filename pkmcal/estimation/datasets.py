@@ -15,6 +15,7 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import KNOWN, Known
 from pkmcal.estimation.sessions import in_sessions, set_names
 from pkmcal.estimation.starts import with_starts
+from pkmcal.estimation.tensioned_poses import unknown_tensions
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.components import KINDS
@@ -77,7 +78,10 @@ def informative(machine: Calibratable, datasets: list[FitData]) -> tuple[list[Fi
 
     And count them.
     """
-    if has_equations(machine, [data.measured.actuator_sigma for data in datasets]):
+    sets = [data.measured for data in datasets]
+    if unknown_tensions(machine, sets):
+        return datasets, 0
+    if has_equations(machine, [measured.actuator_sigma for measured in sets]):
         return datasets, 0
     kept, unread = [], 0
     for data in datasets:
@@ -116,6 +120,9 @@ def as_fitted(
     of_actuators = datasets[i].measured.actuator_sigma
     if holdout.actuator_sigma is None and of_actuators is not None:
         holdout = replace(holdout, actuator_sigma=np.sqrt(np.mean(of_actuators**2, axis=0)))
+    of_cells = datasets[i].measured.tension_sigma
+    if holdout.tension_sigma is None and of_cells is not None and holdout.tension is not None:
+        holdout = replace(holdout, tension_sigma=np.sqrt(np.mean(of_cells**2, axis=0)))
     data = replace(datasets[i], measured=holdout, rows=np.arange(len(holdout)))
     return with_starts(robot, [data])[0], i
 

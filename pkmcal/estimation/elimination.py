@@ -17,12 +17,13 @@ core (`core.elimination`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.core.elimination import PoseEquations
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.core.elimination import Fit, PoseEquations
 from pkmcal.estimation.closures import RowStates
 from pkmcal.estimation.session_machines import Machines, SessionClosures
 
@@ -31,11 +32,30 @@ _STRAIGHT = 12  # of these, as if equations were straight; then as they bend
 _NEAR = 1e-4  # share of the way on which equations are as large as what is left, to see them bend
 _SETTLED = 1e-12  # share of a pose's cost that a further step would gain
 _CLOSE = 1e-6  # the same where steps have become too short to gain anything
-_ROUNDING = 1e-15  # of a whitened equation, of the largest number it was made of
+_ROUNDING = 1e-15  # of the largest number that equations are made of
+_RIDGE = 1e-13  # of a normal matrix, for unknowns that no equation has
 _TOGETHER = 4096  # poses whose bases are there at once, to bound memory
 
 Whitened = tuple[FloatArray, FloatArray]  # whitened (E,), and their derivative by unknowns (E, u)
-System = Callable[[RowStates], Whitened]
+Equate = Callable[[RowStates], Whitened]
+
+
+class System(NamedTuple):
+    """Equations at some states.
+
+    Attributes
+    ----------
+    off : ndarray (E,)
+        Predicted less measured, whitened.
+    by_unknown : ndarray (E, u)
+        Their derivative by the unknowns.
+    left : ndarray (M,)
+        What is left of them when poses have taken their part.
+    """
+
+    off: FloatArray
+    by_unknown: FloatArray
+    left: FloatArray
 
 
 class _Alike(NamedTuple):
@@ -78,6 +98,8 @@ class Blocks:
         How many there are.
     unknowns : int
         Of each pose.
+    size : float
+        The largest number that the equations are made of.
 
     Attributes
     ----------
@@ -89,8 +111,9 @@ class Blocks:
         How many poses have none left: whatever was read there, they say nothing.
     """
 
-    def __init__(self, pose_of: IntArray, poses: int, unknowns: int) -> None:
+    def __init__(self, pose_of: IntArray, poses: int, unknowns: int, size: float) -> None:
         self.pose_of, self.poses, self.unknowns = pose_of, poses, unknowns
+        self._rounding = _ROUNDING * size
         self._order = np.argsort(pose_of, kind="stable")
         self._count = np.bincount(pose_of, minlength=poses)
         self._all = PoseEquations(self._order, self._count, unknowns)
@@ -187,8 +210,8 @@ class Blocks:
         return Shares(squares, freedom, information)
 
     def best(
-        self, closures: SessionClosures, machines: Machines, states: RowStates, system: System
-    ) -> tuple[RowStates, Whitened | None]:
+        self, closures: SessionClosures, machines: Machines, states: RowStates, system: Equate
+    ) -> tuple[RowStates, System]:
         """The states of least squares, each pose by itself.
 
         Levenberg's and Marquardt's steps for all poses at once, each with a damping of its own.
@@ -211,57 +234,81 @@ class Blocks:
         -------
         RowStates
             Poses that no step improves, though their gradient is not zero, have status 1.
-        Whitened or None
-            What `system` says there; None where it was not asked there.
+        System
+            The equations there.
         """
-        damping, moving = np.zeros(self.poses), np.ones(self.poses, dtype=bool)
+        damping = np.zeros(self.poses)
+        moving = np.ones(self.poses, dtype=bool)
         there = system(states)
-        matrix, pull, cost = self._all.normals(*there)
-        equations: Whitened | None = there
-        rounded = _ROUNDING * _size(states) * np.sqrt(np.einsum("kii->k", matrix))
+        fit = self._fit(there, damping)
         for k in range(_STEPS):
-            if k < _STRAIGHT:
-                step, gain = self._all.steps(matrix, pull, damping)
-            else:
+            if k >= _STRAIGHT:
 
                 def pulled(by: FloatArray, at: RowStates = states) -> FloatArray:
                     return self._all.normals(*system(closures.moved(machines, at, by)))[1]
 
                 damping[:] *= k > _STRAIGHT
-                bent = _bent(matrix, pull, np.where(moving, cost, 0.0), pulled)
-                step, gain = self._all.steps(bent, pull, damping)
-            floor = rounded * (rounded + np.sqrt(cost))
-            moving = gain > _SETTLED * cost + floor  # none of those that are not finite
+                fit = self._newton(fit, there, damping, moving, pulled)
+            moving = fit.gain > 0.0
             if not moving.any():
                 break
-            step[~moving] = 0.0
-            del there  # to bound memory
-            equations, trial = None, closures.moved(machines, states, step)
-            there = system(trial)
-            normals = self._all.normals(*there)
-            better = moving & (normals[2] < cost)
-            worse = moving ^ better
-            if not worse.any():
-                states, equations, (matrix, pull, cost) = trial, there, normals
-                if damping.any():
-                    damping *= 0.1 * (damping > 1e-5)
-                continue
-            states = trial.chosen(better, states)
-            for mine, other in zip((matrix, pull, cost), normals, strict=True):
-                np.copyto(mine.T, other.T, where=better)
-            damping = np.where(better, 0.1 * damping * (damping > 1e-5), damping)
-            damping = np.where(worse, np.maximum(10.0 * damping, 1e-3), damping)
-            if not better.any() and damping[moving].min() > 1e8:
-                break
-        else:
-            damping[:] = 1.0  # the gain is that of states before
-        if damping.any():
-            _, gain = self._all.steps(matrix, pull, np.zeros(self.poses))
-        unsolved = ~(gain <= _CLOSE * cost + floor) & (states.status == 0)
+            trial = closures.moved(machines, states, fit.step)
+            beyond = system(trial)
+            after = self._fit(beyond, damping)
+            worse = moving & ~(after.cost < fit.cost)
+            if worse.any():
+                states = trial.chosen(~worse, states)
+                stay = worse[self.pose_of]
+                there = (
+                    np.where(stay, there[0], beyond[0]),
+                    np.where(stay[:, None], there[1], beyond[1]),
+                )
+            else:
+                states, there, fit = trial, beyond, after
+            if worse.any() or damping.any():
+                eased = 0.1 * damping * (damping > 1e-5)
+                damping = np.where(worse, np.maximum(10.0 * damping, 1e-3), eased)
+                fit = self._fit(there, damping)
+                if (damping[moving] > 1e8).all():
+                    break
+        if moving.any() or damping.any():  # short of steps, or they have become too short
+            fit = self._fit(there, np.zeros(self.poses), _CLOSE)
+        unsolved = (fit.gain != 0.0) & (states.status == 0)
         if unsolved.any():
             status = np.where(unsolved, 1, states.status).astype(np.int32)
-            states = RowStates(states.pose, states.actuators, status)
-        return states, equations
+            states = replace(states, status=status)
+        return states, System(*there, fit.left)
+
+    def at(self, there: Whitened) -> System:
+        """The equations where poses are not moved."""
+        return System(*there, self._fit(there, np.zeros(self.poses)).left)
+
+    def _fit(self, there: Whitened, damping: FloatArray, least: float = _SETTLED) -> Fit:
+        return self._all.fit(*there, damping, least, self._rounding)
+
+    def _newton(
+        self,
+        straight: Fit,
+        there: Whitened,
+        damping: FloatArray,
+        moving: BoolArray,
+        pulled: Callable[[FloatArray], FloatArray],
+    ) -> Fit:
+        """Newton's steps of poses that move, equations bent as `_bent` finds them by `pulled`."""
+        matrix, pull, cost = self._all.normals(*there)
+        rounded = self._rounding * np.sqrt(np.einsum("kii->k", matrix))
+        matrix = _bent(matrix, pull, np.where(moving, cost, 0.0), pulled)
+        size = np.einsum("kii->ki", matrix)
+        ridge = _RIDGE * size.sum(axis=1) + np.finfo(np.float64).tiny
+        unit = np.eye(self.unknowns)
+        damped = matrix + unit * (damping[:, None] * size + ridge[:, None])[:, None]
+        known = np.isfinite(damped).all(axis=(1, 2)) & np.isfinite(pull).all(axis=1)
+        damped[~known] = unit
+        step = -np.linalg.solve(damped, pull[:, :, None])
+        gain = -(step[:, :, 0] * (2.0 * pull + (matrix @ step)[:, :, 0])).sum(axis=1)
+        gain[gain <= _SETTLED * cost + rounded * (rounded + np.sqrt(cost))] = 0.0
+        gain[~known] = np.nan
+        return straight._replace(step=np.where(gain[:, None] > 0.0, step[:, :, 0], 0.0), gain=gain)
 
 
 def _sums(numbers: FloatArray, group: IntArray, count: int) -> FloatArray:
@@ -295,9 +342,3 @@ def _bent(
     found: FloatArray = matrix.copy()
     found[mine] = (axes * np.abs(curved)[:, None]) @ axes.transpose(0, 2, 1)
     return found
-
-
-def _size(states: RowStates) -> float:
-    """The largest number of the poses and actuators."""
-    numbers = np.abs(np.concatenate([states.pose.ravel(), states.actuators.ravel()]))
-    return float(np.max(numbers, initial=1.0, where=np.isfinite(numbers)))

@@ -19,7 +19,7 @@ from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
 from pkmcal.core.library import STATUS
 from pkmcal.estimation import joint_angles
 from pkmcal.estimation.closures import RowStates
-from pkmcal.estimation.elimination import Blocks, Shares
+from pkmcal.estimation.elimination import Blocks, Shares, System
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.first_frames import aligned
 from pkmcal.estimation.fit_data import FitData
@@ -44,8 +44,8 @@ from pkmcal.result import failed_rows
 
 _TOGETHER = 16384  # rows whose derivatives are multiplied at once, or kept
 
-# Whose, where, with which noise, and what `_system` says there; copies have another "whose".
-_Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, tuple[FloatArray, FloatArray]]
+# Whose, where, with which noise, and the equations there; copies have another "whose".
+_Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, System]
 
 
 class Equations(Readings):
@@ -75,7 +75,7 @@ class Equations(Readings):
         How many rows or poses say nothing: unread, or all that was read determines their pose.
     unstated : ndarray of bool (G,)
         Whose deviation is not known, of each group of equations with a noise of its own: the sets,
-        then the actuators where they have equations.
+        then load cells and actuators where they have equations.
     """
 
     def __init__(
@@ -94,6 +94,8 @@ class Equations(Readings):
                 if 5 in ever:  # angles are read together
                     values[:, -3:] = orientation.shortest(values[:, -3:])
                 guess[np.ix_(place[read], ever)] = values
+        length, *most = parameters.robot.length, np.abs(guess).max(), np.abs(self.actuators).max()
+        self._size = float(max(length, *most))
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
         self._last: _Last | None = None
@@ -106,7 +108,9 @@ class Equations(Readings):
         sigma = self.actuator_sigma
         machines = range(len(self.machine_columns))
         self._own = tuple(np.flatnonzero(self.machine_of_pose == s) for s in machines)
-        closures = closures_of_sessions(parameters.robot, self._own, self.actuators, sigma)
+        cells = self.cells
+        self._no_cell_sigma = cells is not None and cells.sigma is None
+        closures = closures_of_sessions(parameters.robot, self._own, self.actuators, sigma, cells)
         self._slack = np.zeros((len(guess), closures.equations), dtype=bool)
         self._if_taut = self.actuators
         self._take(closures, sigma is None)
@@ -114,7 +118,10 @@ class Equations(Readings):
     def _take(self, closures: SessionClosures, estimated: bool) -> None:
         """Build the units for these closures; `estimated`: their deviations are not known."""
         self.closures = closures
-        self._counting = np.flatnonzero(~self._slack) if self._slack.any() else None
+        self._counts = ~self._slack
+        if closures.unread is not None:
+            self._counts &= ~closures.unread
+        self._counting = None if self._counts.all() else np.flatnonzero(self._counts)
         if closures.unknowns:
             if any(growth is not None for growth in self._growth):
                 raise ArgumentError(
@@ -137,15 +144,19 @@ class Equations(Readings):
             self._family_of_unit = self.set_of[of_row > 0]
             self.idle = self._unread + int((of_row == 0).sum())
             return
-        self.unstated = np.append(self._no_sigma, estimated)
+        of_cells = [self._no_cell_sigma] if closures.cells else []
+        self.unstated = np.concatenate([self._no_sigma, of_cells, [estimated]]).astype(bool)
+        last, count = len(self.unstated) - 1, closures.equations
+        self._groups = np.full(count, last)  # of the closures: load cells are one before
+        self._groups[count - closures.cells :] -= 1
         poses = len(self.actuators)
-        own = np.nonzero(~self._slack)[0]
+        own, closure = np.nonzero(self._counts)
         pose_of_equation = np.concatenate([own, np.repeat(pose_of_row, of_row)])
         self._group_of_equation = np.concatenate([
-            np.full(len(own), len(self.sets)),
+            self._groups[closure],
             np.repeat(self.set_of, of_row),
         ])  # fmt: skip
-        self._blocks = Blocks(pose_of_equation, poses, closures.unknowns)
+        self._blocks = Blocks(pose_of_equation, poses, closures.unknowns, self._size)
         self.components, self.pose_of_unit = self._blocks.components, self._blocks.pose_of_unit
         unit_of_pose = np.full(poses, -1)
         unit_of_pose[self.pose_of_unit] = np.arange(len(self.pose_of_unit))
@@ -162,6 +173,14 @@ class Equations(Readings):
         other._take(commanded_closures(self._own, self._if_taut), estimated=False)
         return other
 
+    def under(self, tension: FloatArray | None) -> Equations:
+        """The same under other tensions (K, n) of what the actuators drive; None: as they are."""
+        if tension is None:
+            return self
+        other = copy.copy(self)
+        other.state = self.state._replace(tension=tension)
+        return other
+
     def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
         """Evaluate where the same with commanded poses has been started."""
         self.parameters, self._states, self._from = commanded.parameters, start.states, None
@@ -173,8 +192,9 @@ class Equations(Readings):
     def sigma_stated(self) -> bool:
         """Whether any noise is stated, of what was read or of the actuators."""
         of_actuators = self.closures.unknowns and not self.unstated[-1]
+        of_cells = self.cells is not None and not self._no_cell_sigma
         of_read = [m.sigma is not None and bool(np.isfinite(m.values).any()) for m in self.sets]
-        return bool(of_actuators) or any(of_read)
+        return bool(of_actuators) or of_cells or any(of_read)
 
     @property
     def family_of_unit(self) -> IntArray:
@@ -192,9 +212,7 @@ class Equations(Readings):
 
         `noise` (G,) multiplies the stated deviations of each group, as in `whitened`.
         """
-        p = self.parameters
-        robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
-        machines = Machines(tuple(robots), self._own, self.state)
+        machines = self._machines_at(theta)
         states, self._last = self._states_ahead(machines, theta), None
         if self.closures.unknowns:
             factors = np.ones(len(self.unstated)) if noise is None else noise
@@ -212,11 +230,23 @@ class Equations(Readings):
             states.status,
             tuple(each.values for each in seen),
             self.residuals(seen),
+            states.tension,
         )
         self._seen = (found, seen) if len(self.rows) <= _TOGETHER else None
-        if self.closures.unknowns and there is not None:
+        if self.closures.unknowns:
             self._last = weakref.ref(self), found, factors, there
         return found
+
+    def squares_ahead(self, theta: FloatArray, noise: FloatArray) -> float:
+        """Sum of the squared equations at `theta` where poses are looked for, none fitted yet."""
+        machines = self._machines_at(theta)
+        off, _ = self._system(machines, self._states_ahead(machines, theta), theta, noise)
+        return float(off @ off)
+
+    def _machines_at(self, theta: FloatArray) -> Machines:
+        p = self.parameters
+        robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
+        return Machines(tuple(robots), self._own, self.state)
 
     def seen(self, evaluation: Evaluation) -> tuple[Predicted, ...]:
         """Readings of each set at an evaluation, with derivatives; of few rows the last is kept."""
@@ -229,7 +259,9 @@ class Equations(Readings):
         if self._follow is None or self._follow[0] is not self._from:
             return self.closures.settled(machines, self._states)
         begin, following = self._follow
-        step = following @ (theta - begin.theta)
+        step = (following.reshape(-1, len(theta)) @ (theta - begin.theta)).reshape(
+            following.shape[:2]
+        )
         if not np.isfinite(step).all():
             step[~np.isfinite(step).all(axis=1)] = 0.0
         ahead = self.closures.moved(machines, self._states, step)
@@ -242,8 +274,9 @@ class Equations(Readings):
     ) -> tuple[FloatArray, FloatArray]:
         """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
         off, by_unknown = self.closures.residual(machines, states)
-        off /= noise[-1]
-        by_unknown /= noise[-1]
+        factors = noise[self._groups]
+        off /= factors
+        by_unknown /= factors[:, None]
         equation, by_unknown = self._counted(off), self._counted(by_unknown)
         if not self.any_read:
             return equation, by_unknown
@@ -261,14 +294,15 @@ class Equations(Readings):
             np.concatenate([by_unknown, self.whitened(by_pose, noise)]),
         )
 
-    def _at(self, evaluation: Evaluation, noise: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _at(self, evaluation: Evaluation, noise: FloatArray) -> System:
         """The system at an evaluation; the last one is kept, which a step asks for three times."""
         last = self._last
         mine = last is not None and last[0]() is self and last[1] is evaluation
         if last is not None and mine and (last[2] is noise or np.array_equal(last[2], noise)):
             return last[3]
         self._last = None
-        found = self._system(evaluation.machines, evaluation.states, evaluation.theta, noise)
+        there = self._system(evaluation.machines, evaluation.states, evaluation.theta, noise)
+        found = self._blocks.at(there)
         self._last = weakref.ref(self), evaluation, noise, found
         return found
 
@@ -276,8 +310,7 @@ class Equations(Readings):
         """Measured less predicted (M,), whitened: what is left when poses have taken their part."""
         if not self.closures.unknowns:
             return self.whitened(evaluation.residuals, noise)
-        off, by_unknown = self._at(evaluation, noise)
-        return -self._blocks.left(by_unknown, off[:, None])[0][:, 0]
+        return -self._at(evaluation, noise).left
 
     def squares(self, residual: FloatArray) -> FloatArray:
         """Squared length of the residuals (M,) of each unit, (U,)."""
@@ -289,11 +322,11 @@ class Equations(Readings):
         """Derivative (M, n) of what is predicted by the parameters; of what is left likewise."""
         if not self.closures.unknowns:
             return self.whiten(self.jacobian(evaluation), noise)
-        p, (_, by_unknown) = self.parameters, self._at(evaluation, noise)
+        p, by_unknown = self.parameters, self._at(evaluation, noise).by_unknown
         of_closures = self.closures.by_numbers(
             evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
         )
-        of_closures /= noise[-1]
+        of_closures /= noise[self._groups][:, None]
         by_all = self._counted(of_closures)
         if self.any_read:
             readings = self.whiten(self.jacobian(evaluation), noise)
@@ -321,11 +354,11 @@ class Equations(Readings):
         None of those that do not count. `weights` are those of `by_groups`, `taken` (M, r) what
         Jacobian and directions give there.
         """
-        off, by_unknown = self._at(evaluation, noise)
-        own = int((~self._slack).sum())
+        off, by_unknown, _ = self._at(evaluation, noise)
+        own = int(self._counts.sum())
         longer, freedom = np.zeros((2, *self._slack.shape))
-        longer[~self._slack] = -off[:own]
-        freedom[~self._slack] = self._blocks.redundancy(by_unknown, weights, taken)[:own]
+        longer[self._counts] = -off[:own]
+        freedom[self._counts] = self._blocks.redundancy(by_unknown, weights, taken)[:own]
         if self._slack.any():
             whole, _ = self.closures.residual(evaluation.machines, evaluation.states)
             longer[self._slack] = -whole[self._slack] / noise[-1]
@@ -379,10 +412,11 @@ class Equations(Readings):
         """
         other, errors, unknowns = copy.copy(self), left, self.closures.unknowns
         if unknowns:
-            off, by_unknown = self._at(at, noise)
+            off, by_unknown, _ = self._at(at, noise)
             errors = self._blocks.spread(by_unknown, left)
-            change, own = np.zeros(self._slack.shape), int((~self._slack).sum())
-            change[~self._slack] = -noise[-1] * (errors + off)[:own]
+            change, own = np.zeros(self._slack.shape), int(self._counts.sum())
+            change[self._counts] = -(errors + off)[:own]
+            change *= noise[self._groups]
             other.closures = self.closures.shifted(change)
             errors = errors[own:]
         residuals = tuple(self.unwhiten(errors, noise[: len(self.sets)]))
@@ -497,7 +531,7 @@ class Equations(Readings):
             freedom = np.bincount(group, left, count).astype(np.float64)
             squares = np.bincount(group, residual**2, count).astype(np.float64)
             return Shares(squares, freedom, np.diag(freedom))
-        _, by_unknown = self._at(evaluation, noise)
+        by_unknown = self._at(evaluation, noise).by_unknown
         group = self._group_of_equation
         return self._blocks.by_groups(by_unknown, group, weights, residual, taken)
 
@@ -508,7 +542,8 @@ class Equations(Readings):
         if sigma is None:
             return readings
         size = ROUNDING * float(np.abs(self.actuators).max())
-        return float(np.hypot(readings, size / noise[-1] * np.linalg.norm(1.0 / sigma)))
+        whitened = size / (noise[self._groups] * sigma)
+        return float(np.hypot(readings, np.linalg.norm(whitened)))
 
     def distances(self, evaluation: Evaluation) -> FloatArray:
         """How far off each measured point is, mm, in the order of the sets."""
@@ -528,13 +563,15 @@ class Equations(Readings):
 
     def closure_rms(self, evaluation: Evaluation) -> float:
         """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
-        counted = ~self._slack & (evaluation.status == 0)[:, None]
-        return rms(self.closures_off(evaluation)[counted])
+        off = self.closures_off(evaluation)
+        if self._counting is not None or not evaluation.ok:
+            off = off[~self._slack[:, : off.shape[1]] & (evaluation.status == 0)[:, None]]
+        return rms(off)
 
     def worst_closures(self, evaluation: Evaluation) -> FloatArray:
         """The largest of them at each pose (K,); NaN where they hold."""
         off = np.abs(self.closures_off(evaluation))
-        off[self._slack] = 0.0
+        off[self._slack[:, : off.shape[1]]] = 0.0
         return off.max(axis=1) if off.shape[1] else np.full(len(off), np.nan)
 
     def readings_off(self, evaluation: Evaluation) -> FloatArray:
@@ -546,7 +583,8 @@ class Equations(Readings):
             and last[1] is evaluation
             and self._counting is None
         ):
-            off = last[3][0][: self._slack.size].reshape(self._slack.shape) * last[2][-1]
+            off = last[3].off[: self._slack.size].reshape(self._slack.shape)
+            off = off * last[2][self._groups]
         else:
             off, _ = self.closures.residual(evaluation.machines, evaluation.states)
         needed: FloatArray = off if self.closures.sigma is None else off * self.closures.sigma
@@ -554,7 +592,16 @@ class Equations(Readings):
 
     def closures_off(self, evaluation: Evaluation) -> FloatArray:
         """The same in mm."""
-        return self.readings_off(evaluation) * self.closures.lengths(evaluation.machines)
+        lengths = self.closures.lengths(evaluation.machines)
+        of_actuators = slice(self.closures.equations - self.closures.cells)
+        return (self.readings_off(evaluation) * lengths)[:, of_actuators]
+
+    def cell_rms(self, evaluation: Evaluation) -> float:
+        """How far tensions are off what load cells read, N; NaN where they are no unknowns."""
+        cells = self.closures.cells
+        if not cells:
+            return float("nan")
+        return rms(self.readings_off(evaluation)[:, -cells:][self._counts[:, -cells:]])
 
     def status(self, evaluation: Evaluation) -> Int32Array:
         """Of the forward kinematics, for each row."""

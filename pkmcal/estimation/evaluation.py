@@ -30,6 +30,8 @@ class Evaluation:
         What the instruments show there, of each set of measurements.
     residuals : tuple of ndarray (N, k)
         Measured less predicted of each set, mm and rad.
+    tension : ndarray (K, n) or None
+        Of what the actuators drive, N, where it is unknown and has been found.
     """
 
     theta: FloatArray
@@ -39,6 +41,7 @@ class Evaluation:
     status: Int32Array
     predicted: tuple[FloatArray, ...]
     residuals: tuple[FloatArray, ...]
+    tension: FloatArray | None = None
 
     @property
     def ok(self) -> bool:
@@ -53,4 +56,4 @@ class Evaluation:
     @property
     def states(self) -> RowStates:
         """Where the machine is at each distinct row of actuators."""
-        return RowStates(self.pose, self.actuators, self.status)
+        return RowStates(self.pose, self.actuators, self.status, self.tension)

@@ -18,6 +18,7 @@ from pkmcal.estimation.parameters import Asked, Bounds, Parameters, Prior
 from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 
@@ -60,7 +61,8 @@ def parameters(
     of_unit = {"mm": 1.0, "rad": 1.0 / robot.length, "1": 1.0 / travel}
     of_unit |= {"1/mm": 1.0 / travel**2, "1/rad": robot.length / travel**2}
     of_unit["1/mm2"] = of_unit["1/mm"] / robot.length
-    of_unit["1/N"] = 1.0 / travel / max(_pull(data.measured) for data in datasets)
+    pull = max(_pull(robot, data.measured) for data in datasets)
+    of_unit |= {"1/N": 1.0 / travel / pull, "N": pull / robot.length}
     scale = np.array([of_unit[unit] for unit in units])
     if like is not None:
         known = dict(zip(like.names, like.scale.tolist(), strict=True))
@@ -208,9 +210,13 @@ def _travel(robot: Calibratable, measured: Measurements) -> float:
     return max(1.0, float(np.abs(arcs).max()))
 
 
-def _pull(measured: Measurements) -> float:
-    """Largest tension, N."""
-    return 1.0 if measured.tension is None else max(1.0, float(np.abs(measured.tension).max()))
+def _pull(robot: Calibratable, measured: Measurements) -> float:
+    """Largest force that is known, N: of tensions, and of a load that they balance."""
+    load = robot.model.load if isinstance(robot, Robot) else None
+    forces = [1.0, *load.force] if load is not None and load.balance else [1.0]
+    if measured.tension is not None:
+        forces.append(float(np.nanmax(np.abs(measured.tension), initial=0.0)))
+    return float(np.abs(forces).max())
 
 
 def _matching(argument: str, pattern: object, names: Sequence[str], strict: bool) -> list[int]:

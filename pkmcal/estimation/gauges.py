@@ -2,6 +2,7 @@
 
 Closures do not change when all that stands on the base moves as one body, axes included, nor when
 all that is on the platform does, nor when every length and every gain grows by the same factor.
+Where tensions balance a load, nor when all forces grow by the same factor and stretch falls by it.
 Such combinations of parameters are named by what they are, not by their numbers.
 """
 
@@ -22,7 +23,8 @@ from pkmcal.screw import from_pose
 _OUTSIDE = 1e-6  # share of a motion outside what may move that does not count
 _AXES = ("x", "y", "z")
 _BASE, _SCALE, _PLATFORM = 0, 6, 7  # first columns of the motions: shifts, turns; the common scale
-_MOTIONS = 13
+_FORCES = 13  # the scale of forces
+_MOTIONS = 14
 _MIXED = 1e-3  # of a motion: what is none of its own
 _OFFSET = SLOTS.index("offset")
 _SCALED = [SLOTS.index(name) for name in SLOTS if "tilt" not in name]  # gains too
@@ -60,10 +62,10 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
     if robot.model.chains is not None:  # whose numbers are errors of joints, not places of points
         found, free = frame_motions(parameters, robot, unidentifiable)
         rest = np.linalg.svd(found, full_matrices=True)[0][:, found.shape[1] :]
-        of_all = np.insert(free, _SCALE, 0.0, axis=0)
+        of_all = np.pad(np.insert(free, _SCALE, 0.0, axis=0), ((0, 1), (0, 0)))
         return Gauges(tuple(_texts(of_all)), unidentifiable @ rest)
     moves = _motions(robot)
-    beside = _swivel_zeros(parameters)
+    beside = _swivel_zeros(parameters) | _of_load(parameters)
     numbers = moves.reshape(-1, moves.shape[2])[robot.geometry.slot_index]
     chain = robot.geometry.chain[:, parameters.places]
     change = np.linalg.pinv(chain) @ numbers  # of the free numbers, as far as they can follow
@@ -91,11 +93,13 @@ def gauges(parameters: Parameters, unidentifiable: FloatArray) -> Gauges:
 
 
 def _motions(robot: Robot) -> FloatArray:
-    """Changes of all numbers (*slots, 13): shifts and turns of the base, the scale, the platform's.
+    """Changes of all numbers (*slots, 14): shifts and turns of the base, the scale, the platform's.
 
-    Turns are about the mean of the base's points, and of the platform's.
+    And the scale of forces, where tensions balance a load. Turns are about the mean of the base's
+    points, and of the platform's.
     """
-    slots, limbs = robot.slots, robot.model.limbs
+    slots, limbs, load = robot.slots, robot.model.limbs, robot.model.load
+    balanced = load is not None and load.balance
     change = np.zeros((*slots.shape, _MOTIONS))
     over = range(len(SLOTS), robot.model.own_width, 3)
     of_base = [0, *over]  # the first of the three numbers of each point
@@ -121,6 +125,9 @@ def _motions(robot: Robot) -> FloatArray:
             if key != number.slot or key == "gain":
                 grows = not (turns and key in ("gain", "quadratic"))
                 change.reshape(-1, _MOTIONS)[place, _SCALE] = slots.flat[place] * grows
+            if key == "stretch":  # of no length
+                change.reshape(-1, _MOTIONS)[place, _SCALE] = 0.0
+                change.reshape(-1, _MOTIONS)[place, _FORCES] = -slots.flat[place] * balanced
     return change
 
 
@@ -158,8 +165,34 @@ def _swivel_zeros(parameters: Parameters) -> dict[int, FloatArray]:
     return found
 
 
+def _of_load(parameters: Parameters) -> dict[int, FloatArray]:
+    """How numbers of a load that tensions balance follow the motions, by parameter."""
+    robot = parameters.robot
+    assert isinstance(robot, Robot)
+    load, middle = robot.model.load, robot.slots[:, 3:6].mean(axis=0)
+    if load is None or not load.balance:
+        return {}
+    frames = [robot.model.base_frame, robot.model.tool_frame]
+    base, tool = (np.eye(4) if frame is None else from_pose(frame) for frame in frames)
+    by = {name: np.zeros(_MOTIONS) for name in load.units}
+    force = np.array(load.force) @ base[:3, :3]  # in the machine's own frame
+    turned = base[:3, :3] @ np.cross(np.eye(3), force).T
+    # the tool is where the platform's frame is, seen from the user's
+    at = np.array(load.at) @ tool[:3, :3].T + tool[:3, 3]
+    moved = np.zeros((6, _MOTIONS))
+    _move(moved, np.concatenate([np.zeros(3), at]), 3, _PLATFORM, middle)
+    moved[3:, _SCALE] = at
+    for k, axis in enumerate("xyz"):
+        by[f"load.force.{axis}"][3:6] = turned[k]
+        by[f"load.force.{axis}"][_FORCES] = load.force[k]
+        by[f"load.at.{axis}"][:] = tool[:3, k] @ moved[3:]
+    for j, gain in enumerate(load.cells):
+        by[f"load.cell{j + 1}"][_FORCES] = -gain
+    return {k: by[own] for k, own in enumerate(parameters.names) if own in by}
+
+
 def _texts(free: FloatArray) -> list[str]:
-    """Motions (13, d) in words."""
+    """Motions (14, d) in words."""
     alone = [k for k in range(_MOTIONS) if np.linalg.norm(free[k]) > 1.0 - _MIXED]
     texts = []
     for first, moves, where in (
@@ -183,6 +216,11 @@ def _texts(free: FloatArray) -> list[str]:
         texts.append(f"{what} in {held}{more} way{'s' * (held > 1)}")
     if grows or _SCALE in alone:
         texts.append("the common scale: all lengths and gains may grow by the same factor")
+    if _FORCES in alone:
+        texts.append(
+            "the scale of forces: the load and all tensions may grow by the same factor, stretch"
+            " and gains of load cells falling by it"
+        )
     return texts
 
 

@@ -20,6 +20,7 @@ from pkmcal.screw import from_pose, to_pose
 
 MIRROR = "its mirror image fits as well: which of the two it is, the robot file says alone"
 _ALIKE = 1e-6  # share by which costs differ that are the same
+_FAR = 1e4  # times the cost, at mirrored poses: no image, which would have the same there
 _FLAT = 1e-9  # of the machine's size: points in one plane
 _DIMENSIONS = {"translation": 3, "xy": 2, "spatial": 3, "planar": 2}
 _NO_TURN = ("translation", "xy")  # maps of platforms that do not turn: T turns as S does
@@ -51,7 +52,10 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
             continue  # another pose of the same machine
         pose = robot.frames.outward(to_pose(on_base @ motions @ on_platform))
         image = copy.copy(equations)
+        image.warm_start(evaluation)
         image.start_from(np.arange(len(pose)), pose)
+        if image.squares_ahead(theta, noise) > _FAR * (cost + equations.rounding(noise) ** 2):
+            continue
         there = image.at(theta, noise)
         if there.ok and _cost(image, there, noise) <= (1.0 + _ALIKE) * cost:
             return True

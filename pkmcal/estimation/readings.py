@@ -13,10 +13,12 @@ from pkmcal.estimation import joint_angles
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.sessions import NONE
+from pkmcal.estimation.tensioned_poses import Cells, cells_of, check_cells
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements import orientation
 from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.components import KINDS
+from pkmcal.measurements.fields import filled_tension
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import (
     Predicted,
@@ -53,6 +55,8 @@ class Readings:
         Its stated deviations.
     state : DriveState
         From where the actuators came, and the tension of what they drive, (K, n) each.
+    cells : Cells or None
+        What load cells read, where tensions are unknown.
     pose_of : list of ndarray of int
         Which pose each row of each set is at.
     other_of : list of ndarray of int or None
@@ -118,11 +122,13 @@ class Readings:
             _of_all(each, [m.actuators for m in sources])
             for each in zip(*(m.drive_state for m in sources), strict=True)
         )
+        cells = cells_of(parameters.robot, sources)
         given = {
             "actuators": actuators,
             "sigma": np.concatenate(noises) if noises else None,
             "approach": approach,
-            "tension": tension,
+            "tension": tension if cells is None else _blank(cells.read),
+            "tension sigma": None if cells is None else cells.sigma,
         }
         known = {name: part for name, part in given.items() if part is not None}
         commands = np.hstack([*known.values()])
@@ -138,6 +144,12 @@ class Readings:
         self.actuators = of_pose["actuators"]
         self.actuator_sigma = of_pose.get("sigma")
         self.state = DriveState(of_pose.get("approach"), of_pose.get("tension"))
+        self.cells: Cells | None = None
+        if cells is not None:
+            self.cells = Cells(_blank(of_pose["tension"]), of_pose.get("tension sigma"))
+            of_rows = np.concatenate([self.rows, *(datasets[i].rows for i in double)])
+            check_cells(parameters.robot, self.cells, of_rows[first])
+            self.state = DriveState(of_pose.get("approach"), filled_tension(self.cells.read))
         self.machine_of_pose: IntArray = machine[first]
         self.command_of_pose: IntArray = (
             np.unique(distinct[:, :width], axis=0, return_inverse=True)[1].reshape(-1)
@@ -149,6 +161,10 @@ class Readings:
         place = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
         self.pose_of, there = place[: len(count)], iter(place[len(count) :])
         self.other_of = [None if m.other is None else next(there) for m in self.sets]
+        self._nothing = [  # where actuators alone were read
+            None if m.components else Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6)))
+            for m in self.sets
+        ]
         self.deviations = tuple(np.ones(len(m.components)) for m in self.sets)
         self._whiten = [_whitening(m, parameters.robot.length) for m in self.sets]
         self.present: BoolArray = np.concatenate([
@@ -209,8 +225,8 @@ class Readings:
     def predicted(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
         """Readings of each set at poses (K, 6)."""
         return tuple(
-            self._grown(i, self._predicted_of(i, pose, theta), pose, theta)
-            for i in range(len(self.sets))
+            nothing or self._grown(i, self._predicted_of(i, pose, theta), pose, theta)
+            for i, nothing in enumerate(self._nothing)
         )
 
     def _grown(self, i: int, seen: Predicted, pose: FloatArray, theta: FloatArray) -> Predicted:
@@ -379,6 +395,12 @@ class Readings:
         """Length of the whitened rounding errors of what is predicted."""
         parts = [_rounded(m, self.parameters.robot.length) for m in self.sets]
         return float(np.linalg.norm(self.whitened(parts, noise)))
+
+
+def _blank(tension: FloatArray) -> FloatArray:
+    """Tensions that were not read as infinite in place of NaN, or back: equal to one another."""
+    there = np.isfinite(tension)
+    return np.where(there, tension, np.where(np.isnan(tension), np.inf, np.nan))
 
 
 def _rounded(measured: Measurements, length: float) -> FloatArray:

@@ -12,15 +12,16 @@ from typing import TypeVar
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, Int32Array, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.estimation.closures import Closures, Commanded, RowStates, closures_of
 from pkmcal.estimation.sessions import spread
+from pkmcal.estimation.tensioned_poses import Cells, tensioned_poses
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
 
-AnyArray = TypeVar("AnyArray", FloatArray, Int32Array)
+AnyArray = TypeVar("AnyArray", FloatArray, Int32Array, BoolArray)
 
 _TOGETHER = 8192  # poses whose derivatives are held at once
 
@@ -46,6 +47,8 @@ class Machines:
     @cached_property
     def driven(self) -> tuple[Calibratable, ...]:
         """The machines, each with its drives in the state of its poses."""
+        if all(each is None for each in self.state):
+            return self.robots
         return tuple(
             _driven(r, self.state.at(own)) for r, own in zip(self.robots, self.rows, strict=True)
         )
@@ -88,6 +91,10 @@ class SessionClosures:
         Whose reading each equation is of; -1 of none.
     sigma : ndarray (K, equations) or None
         Standard deviations of the equations.
+    unread : ndarray of bool (K, equations) or None
+        Those of load cells that were not read.
+    cells : int
+        How many of the equations are of load cells: the last ones.
     """
 
     def __init__(self, parts: Sequence[Closures], rows: Sequence[IntArray]) -> None:
@@ -97,7 +104,9 @@ class SessionClosures:
             raise ArgumentError(
                 "measurements: state actuator_sigma of the same actuators in all sessions"
             )
-        self.actuators = parts[0].actuators
+        self.actuators, self.cells = parts[0].actuators, parts[0].cells
+        unread = [part.unread for part in parts if part.unread is not None]
+        self.unread = _joined(unread, self._rows) if unread else None
         stated = [part.sigma for part in parts if part.sigma is not None]
         self.sigma = _joined(stated, self._rows) if stated else None
 
@@ -147,7 +156,7 @@ class SessionClosures:
         ]
         nowhere = [np.zeros(len(rows), dtype=np.intp) for rows in self._rows]
         wide = [
-            spread(part, columns[[s]], rows, size)
+            spread(part, columns[s : s + 1], rows, size)
             for s, (part, rows) in enumerate(zip(found, nowhere, strict=True))
         ]
         return _joined(wide, self._rows)
@@ -176,10 +185,12 @@ class SessionClosures:
     def _states(self, parts: Sequence[RowStates]) -> RowStates:
         if len(parts) == 1:
             return parts[0]
+        tensions = [part.tension for part in parts if part.tension is not None]
         return RowStates(
             _joined([part.pose for part in parts], self._rows),
             _joined([part.actuators for part in parts], self._rows),
             _joined([part.status for part in parts], self._rows),
+            None if not tensions else _joined(tensions, self._rows),
         )
 
 
@@ -197,12 +208,24 @@ def commanded_closures(rows: Sequence[IntArray], read: FloatArray) -> SessionClo
 
 
 def closures_of_sessions(
-    robot: Calibratable, rows: Sequence[IntArray], read: FloatArray, sigma: FloatArray | None
+    robot: Calibratable,
+    rows: Sequence[IntArray],
+    read: FloatArray,
+    sigma: FloatArray | None,
+    cells: Cells | None = None,
 ) -> SessionClosures:
-    """What the closures say of poses at what the actuators read (K, n); see `closures_of`."""
+    """What the closures say of poses at what the actuators read (K, n); see `closures_of`.
+
+    `cells` are what load cells read there, where tensions are unknown.
+    """
     sigmas = [None] * len(rows) if sigma is None else _apart(sigma, rows)
     pairs = zip(_apart(read, rows), sigmas, strict=True)
-    return SessionClosures([closures_of(robot, *pair) for pair in pairs], rows)
+    if cells is None:
+        return SessionClosures([closures_of(robot, *pair) for pair in pairs], rows)
+    parts = [
+        tensioned_poses(robot, *pair, cells.of(own)) for pair, own in zip(pairs, rows, strict=True)
+    ]
+    return SessionClosures(parts, rows)
 
 
 def _apart(whole: FloatArray, rows: Sequence[IntArray]) -> list[FloatArray]:
@@ -211,7 +234,8 @@ def _apart(whole: FloatArray, rows: Sequence[IntArray]) -> list[FloatArray]:
 
 
 def _some(states: RowStates, rows: IntArray) -> RowStates:
-    return RowStates(states.pose[rows], states.actuators[rows], states.status[rows])
+    tension = None if states.tension is None else states.tension[rows]
+    return RowStates(states.pose[rows], states.actuators[rows], states.status[rows], tension)
 
 
 def _joined(parts: Sequence[AnyArray], rows: Sequence[IntArray]) -> AnyArray:

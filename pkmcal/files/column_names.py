@@ -21,6 +21,7 @@ RESERVED = (
     "actuator_sigma",
     "approach",
     "tension",
+    "tension_sigma",
     "to",
     "touch",
     "temperature",

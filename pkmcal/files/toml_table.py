@@ -36,6 +36,7 @@ class Units:
             "1/rad": 1.0 / self.angle,
             "1/mm2": 1.0 / self.length**2,
             "1/N": 1.0,
+            "N": 1.0,
         }[unit]
 
 

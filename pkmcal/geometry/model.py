@@ -172,6 +172,17 @@ class Model:
     workspace: Box = field(default_factory=dict)
     load: Load | None = None
 
+    def __post_init__(self) -> None:
+        if self.load is not None:  # some of its numbers may be those of the geometry
+            object.__setattr__(self, "load", self.load.with_numbers(dict(self.geometry.items())))
+
+    def with_geometry(self, geometry: Geometry) -> Model:
+        """The same with other numbers: `replace` for the steps of a search, ten times as fast."""
+        other = object.__new__(Model)
+        other.__dict__.update(vars(self), geometry=geometry)
+        other.__post_init__()
+        return other
+
     @property
     def n_actuators(self) -> int:
         """Number of actuators."""

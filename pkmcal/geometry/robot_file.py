@@ -160,6 +160,9 @@ def parse(source: Source, file: str | None) -> Model:
         _check_rows(pose, pose_map, limbs.limbs)
     values = parameters.finish([number.name for number in limbs.numbers])
     units = parameters.ordered_units()
+    load = _read_load(top, limbs.limbs)
+    if load is not None:
+        units, values = units | load.units, values | load.numbers
     geometry = Geometry(limbs.numbers, units, limbs.values | values, limbs.blank)
     frames = _section(top, "frames")
     frames.only(("base", "tool"))
@@ -177,7 +180,7 @@ def parse(source: Source, file: str | None) -> Model:
         tool_frame=_read_pose(frames, "tool", POSE) if "tool" in frames else None,
         closure_tolerance=_read_tolerance(top),
         workspace=read_box(_section(top, "workspace")),
-        load=_read_load(top, limbs.limbs),
+        load=load,
         file=file,
     )
     refuse_turning(model, described)
@@ -198,7 +201,7 @@ def _read_load(top: Table, limbs: tuple[Limb, ...]) -> Load | None:
         return None
     if not any(limb.kind in KINDS and KINDS[limb.kind].cable for limb in limbs):
         top.fail("load", "is what cables have to hold, and the robot has none")
-    return read_load(top.table("load"))
+    return read_load(top.table("load"), 1 + max(limb.actuator for limb in limbs))
 
 
 def _section(top: Table, key: str) -> Table:

@@ -21,6 +21,7 @@ from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.laws import LawNumber
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.load import is_of_load
 from pkmcal.geometry.model import Limb, Model
 from pkmcal.geometry.ties import LimbNumber
 
@@ -64,6 +65,8 @@ def text_like(
     edit = _Edit(robot_file.read_units(top), before.geometry, model.geometry, deviations or {})
     if "parameters" in document:
         edit.parameters(document["parameters"])
+    if "load" in document:
+        edit.load(document["load"])
     for i, (table, limb) in enumerate(zip(document["limb"], model.limbs, strict=True)):
         edit.limb(table, limb, i)
     text = comment + tomlkit.dumps(document)
@@ -85,8 +88,22 @@ class _Edit:
     def parameters(self, table: Any) -> None:
         """The section of named parameters."""
         for name in self._new.parameters:
-            if self._concerns(name):
+            if self._concerns(name) and not is_of_load(name):
                 self._put(table, name, self._written(name), [name])
+
+    def load(self, table: Any) -> None:
+        """The load, where its numbers are some of the geometry."""
+        names = [name for name in self._new.parameters if is_of_load(name)]
+        for key, lead in (("force", "load.force."), ("at", "load.at."), ("cells", "load.cell")):
+            mine = [name for name in names if name.startswith(lead)]
+            if not any(map(self._concerns, mine)):
+                continue
+            if key not in table:
+                table[key] = [self._old[name] for name in mine]
+            for k, name in enumerate(mine):
+                if self._changed(name):
+                    table[key][k] = self._written(name)
+            self._comment(table[key], mine)
 
     def limb(self, table: Any, limb: Limb, i: int) -> None:
         """One limb, key by key."""

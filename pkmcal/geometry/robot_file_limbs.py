@@ -30,6 +30,7 @@ UNIT_WORDS: dict[Unit, str] = {
     "1/rad": "per angle",
     "1/mm2": "per square of length",
     "1/N": "per force",
+    "N": "a force",
 }
 
 

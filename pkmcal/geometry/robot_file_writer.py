@@ -9,7 +9,7 @@ from pkmcal.arrays import FloatArray
 from pkmcal.core.library import AXES, MAPS, POSE
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.load import load_table
+from pkmcal.geometry.load import is_of_load, load_table
 from pkmcal.geometry.model import Cone, Limb, Model
 from pkmcal.geometry.robot_file_chain_writer import chain_tables, tail_tables
 from pkmcal.geometry.robot_file_laws import law_table
@@ -72,7 +72,9 @@ def _sections(model: Model) -> dict[str, Mapping[str, Any]]:
         "frames": {k: _pose(v, POSE) for k, v in frames.items() if v is not None},
         "workspace": {name: list(ends) for name, ends in model.workspace.items()},
         "load": {} if model.load is None else load_table(model.load),
-        "parameters": {name: geometry[name] for name in geometry.parameters},
+        "parameters": {
+            name: geometry[name] for name in geometry.parameters if not is_of_load(name)
+        },
         "calibration": {"free": list(model.free)} if model.free else {},
         "stated": model.stated,
     }

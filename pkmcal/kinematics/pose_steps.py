@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray, Unit, mm_per_unit
+from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
@@ -130,6 +131,15 @@ def readings_by_numbers(
         return by_number
     by_places: FloatArray = by_number.reshape(-1, len(columns)) @ chain
     return by_places.reshape(*by_number.shape[:2], len(places))
+
+
+def readings_by_tension(robot: Robot, pose: FloatArray) -> FloatArray:
+    """Derivative of limbs' `readings` by what they pull with, a limb an actuator, (N, limbs)."""
+    machine = robot.machine
+    if not isinstance(machine, DrivenMachine):
+        return np.zeros((len(pose), machine.rows))
+    own = np.ascontiguousarray(robot.frames.inward(pose))
+    return machine.by_tension(robot.slots, own)
 
 
 def sphere_actuators(robot: Robot) -> list[int]:

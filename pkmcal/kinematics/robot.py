@@ -492,7 +492,7 @@ class Robot(Kinematics, Result):
         """
         changed = copy(self)
         changed.machine = self._of_any_misfit
-        changed.model = replace(self.model, geometry=self.geometry.replace(values))
+        changed.model = self.model.with_geometry(self.geometry.replace(values))
         changed.slots = np.ascontiguousarray(changed.model.geometry.slots)
         return changed
 

@@ -16,9 +16,9 @@ from pkmcal.display import Table
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import Load, Vector
+from pkmcal.kinematics.equilibrium import generalised, pulls_of_load
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import RowResult
-from pkmcal.screw import from_pose
 
 _HELD, _SLACK, _TORN, _NOWHERE = range(4)
 _OPTIMAL, _INFEASIBLE = 0, 2  # of linprog
@@ -194,27 +194,14 @@ def _balance(robot: Robot, poses: FloatArray, load: Load) -> _Balance:
     force, at = np.array(load.force), np.array(load.at)
     machine, slots = robot.limb_machine, robot.slots
     own = robot.on_map(robot.frames.inward(poses))
-    twists = machine.step_twists(own)
-    arcs = np.array([1.0 if name in "xyz" else robot.length for name in robot.coordinates])
-
-    def generalised(pull: FloatArray, point: FloatArray) -> FloatArray:
-        """Of forces (N, 3) at points (N, 3), (N, m)."""
-        wrench = np.concatenate([np.cross(point - own[:, :3], pull), pull], axis=1)
-        forces: FloatArray = (twists.transpose(0, 2, 1) @ wrench[:, :, None])[:, :, 0] / arcs
-        return forces
-
     directions = machine.pulls(slots, own)
     slopes = machine.closure(slots, own, machine.inverse(slots, own)).by_step.transpose(0, 2, 1)
     kinds = [1 + int(row).bit_count() for row in machine.struct.rows[0 : machine.struct.limbs]]
     first = np.concatenate([[0], np.cumsum(kinds)[:-1]]).astype(np.intp)
     for i, row in enumerate(first):  # closures are in mm to some 1e-7, forces to rounding
         joint = instruments.points(own, np.ascontiguousarray(slots[i, 3:6]))[0]
-        slopes[:, :, row] = generalised(directions[:, i], joint)
-    points = instruments.points(poses, at)[0]
-    if robot.model.base_frame is not None:
-        base = from_pose(robot.model.base_frame)
-        points, force = (points - base[:3, 3]) @ base[:3, :3], force @ base[:3, :3]
-    return _Balance(slopes, generalised(np.tile(force, (len(own), 1)), points), first)
+        slopes[:, :, row] = generalised(robot, own, directions[:, i], joint)
+    return _Balance(slopes, pulls_of_load(robot, own, force, at), first)
 
 
 def _held(balance: _Balance, cables: IntArray, least: float, most: float) -> BoolArray:

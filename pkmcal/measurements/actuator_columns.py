@@ -30,7 +30,7 @@ def actuators_in(table: Table) -> list[str]:
 
 def columns_of_actuators(table: Table, what: str, count: int) -> list[str]:
     """The columns that state something of the actuators: one for all, or one of each; or none."""
-    given = [name for name in table.columns if name.startswith(what)]
+    given = [name for name in table.columns if name == what or name.startswith(f"{what}.")]
     if not given or given == [what]:
         return given
     each = [f"{what}.q{i + 1}" for i in range(count)]

@@ -270,13 +270,47 @@ def approach_array(given: ArrayLike | None, actuators: FloatArray) -> FloatArray
 
 
 def tension_array(given: ArrayLike | None, shape: tuple[int, ...]) -> FloatArray | None:
-    """Tension of what each actuator drives (N, n), N."""
-    return None if given is None else _of_actuators("tension", given, shape)
+    """Tension of what each actuator drives (N, n), N; NaN where it was not read."""
+    return None if given is None else _of_actuators("tension", given, shape, blank=True)
 
 
-def _of_actuators(name: str, given: ArrayLike, shape: tuple[int, ...]) -> FloatArray:
+def tension_sigma_array(
+    given: ArrayLike | None, tension: ArrayLike | None, shape: tuple[int, ...]
+) -> FloatArray | None:
+    """Standard deviations of tensions (N, n), N."""
+    if given is None:
+        return None
+    if tension is None:
+        raise ArgumentError("tension_sigma: no tension was read that it could be of")
+    found = _of_actuators("tension_sigma", given, shape)
+    if not (found > 0.0).all():
+        raise ArgumentError(
+            f"tension_sigma must be positive, found {found.min():g}; without it tensions are exact"
+        )
+    return found
+
+
+def filled_tension(tension: FloatArray) -> FloatArray:
+    """Tensions (N, n), those that were not read (NaN) at the mean of their row, else at 0.
+
+    Examples
+    --------
+    >>> filled_tension(np.array([[10.0, np.nan, 30.0]]))
+    array([[10., 20., 30.]])
+    """
+    read = np.isfinite(tension)
+    if read.all():
+        return tension
+    count = np.maximum(read.sum(axis=1, keepdims=True), 1)
+    mean = np.nansum(tension, axis=1, keepdims=True) / count
+    return np.where(read, tension, mean)
+
+
+def _of_actuators(
+    name: str, given: ArrayLike, shape: tuple[int, ...], blank: bool = False
+) -> FloatArray:
     """Numbers of each actuator (N, n), given for all, for each or for each row."""
-    found = numbers(name, given)
+    found = numbers(name, given, blank)
     if found.shape not in ((), shape[1:], shape):
         raise ArgumentError(
             f"{name} must be one number or have shape {shape[1:]} or {shape}; found {found.shape}"

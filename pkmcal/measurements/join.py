@@ -24,7 +24,13 @@ _LATE = re.compile(r"row([+-][1-9][0-9]{0,5})")
 _ENOUGH = 0.5  # of the points have to be found by a key for it to be one
 _NUMBER = re.compile(r"([0-9]+)\D*$")
 _LISTED = 3
-_BESIDE = ("session", "approach", "tension", "temperature")  # of the log, beside its actuators
+_BESIDE = (
+    "session",
+    "approach",
+    "tension",
+    "tension_sigma",
+    "temperature",
+)  # of the log, beside its actuators
 _EPOCH = 1e8  # s: seconds since 1970 are more
 
 Rows = list[int | None]  # of the log, for each row of the instrument

@@ -92,7 +92,7 @@ def title(m: Listed) -> str:
     if m.approach is not None:
         parts.append("approach stated")
     if m.tension is not None:
-        parts.append("tension stated")
+        parts.append("tension stated" if m.tension_sigma is None else "tension read")
     if m.sessions:
         many = "s" if len(m.sessions) > 1 else ""
         parts.append(f"session{many} {', '.join(map(display.printable, m.sessions))}")

@@ -25,6 +25,7 @@ columns                               meaning
                                       ``.q1`` …, of what that actuator drives
 ``approach.q1`` …                     1 or -1: the reading had grown or fallen; 0: not known
 ``tension.q1`` …                      of what the actuator drives, N, or one ``tension`` for all
+``tension_sigma.q1`` …                standard deviation of what load cells read, N, or one for all
 ``target``                            name of the target that the row measured
 ``target.x [mm]`` ``.y`` ``.z``       its place on the platform (the fixed point of a distance)
 ``attachment.x [mm]`` ``.y`` ``.z``   where on the platform a distance ends; its origin by default
@@ -201,6 +202,7 @@ def read_measurements(
     fields["temperature"] = read_temperature(table, len(actuator_units))
     fields["approach"] = _read_approach(table, len(actuator_units))
     fields["tension"] = _read_tension(table, len(actuator_units))
+    fields["tension_sigma"] = _read_tension_sigma(table, len(actuator_units))
     values: FloatArray | None
     if several:
         actuators, values, fields = read_several(table, several, actuators, fields)
@@ -304,6 +306,7 @@ def _probed(
         temperature=read_temperature(table, measured.actuators.shape[1]),
         approach=_read_approach(table, measured.actuators.shape[1]),
         tension=_read_tension(table, measured.actuators.shape[1]),
+        tension_sigma=_read_tension_sigma(table, measured.actuators.shape[1]),
     )
 
 
@@ -350,8 +353,8 @@ def _known(table: Table, several: tuple[str, ...]) -> set[str]:
         "probe",
         "contact",
     }
-    names |= {"actuator_sigma", "approach", "tension", *parts_of(0), WHOLE}
-    whats = ("actuator_sigma", "approach", "tension", WHOLE)
+    names |= {"actuator_sigma", "approach", "tension", "tension_sigma", *parts_of(0), WHOLE}
+    whats = ("actuator_sigma", "approach", "tension", "tension_sigma", WHOLE)
     names |= {f"{what}.{q}" for what in whats for q in actuators}
     names |= {f"{point}.{axis}" for point in ("target", "attachment") for axis in _AXES}
     names |= {f"{target}.{axis}" for target in several for axis in _AXES}
@@ -426,7 +429,16 @@ def _read_approach(table: Table, count: int) -> FloatArray | None:
 
 def _read_tension(table: Table, count: int) -> FloatArray | None:
     """Tension of what each actuator drives (rows, n), N."""
-    return read_of_actuators(table, "tension", count, lambda name: table.numbers(name, "N")[0])
+    return read_of_actuators(
+        table, "tension", count, lambda name: table.numbers(name, "N", blank=True)[0]
+    )
+
+
+def _read_tension_sigma(table: Table, count: int) -> FloatArray | None:
+    """Standard deviation of that (rows, n), N."""
+    return read_of_actuators(
+        table, "tension_sigma", count, lambda name: table.numbers(name, "N")[0]
+    )
 
 
 def _read_session(table: Table) -> TextArray | None:

@@ -79,6 +79,10 @@ class Writable(OfAKind, Protocol):
         """Of what each actuator drives, N."""
 
     @property
+    def tension_sigma(self) -> FloatArray | None:
+        """Deviations (N, n) of that, N."""
+
+    @property
     def session(self) -> TextArray | None:
         """When each row was measured."""
 
@@ -156,6 +160,9 @@ def _columns(m: Writable, units: Sequence[str]) -> Iterator[tuple[str, Sequence[
     if m.tension is not None:
         for i, each in enumerate(m.tension.T):
             yield f"tension.q{i + 1} [N]", _exact(each)
+    if m.tension_sigma is not None:
+        for i, each in enumerate(m.tension_sigma.T):
+            yield f"tension_sigma.q{i + 1} [N]", _exact(each)
 
 
 def _actuator_sigma(m: Writable, units: Sequence[str]) -> Iterator[tuple[str, Sequence[str]]]:

@@ -21,6 +21,7 @@ from pkmcal.measurements.fields import (
     actuator_sigma_array,
     approach_array,
     attachment_array,
+    filled_tension,
     integers,
     names_of_targets,
     number_of_row,
@@ -31,6 +32,7 @@ from pkmcal.measurements.fields import (
     target_array,
     temperature_array,
     tension_array,
+    tension_sigma_array,
     units_of_actuators,
     value_of_row,
     values_array,
@@ -49,7 +51,7 @@ from pkmcal.result import Result
 
 _PER_ROW = (
     "actuators", "values", "sigma", "group", "target_index", "actuator_sigma", "lines", "session",
-    "approach", "tension", "other", "run", "touched", "temperature", "time",
+    "approach", "tension", "tension_sigma", "other", "run", "touched", "temperature", "time",
 )  # fmt: skip
 
 
@@ -125,7 +127,11 @@ class Measurements(Result):
         row as they stand. Kept as (N, n).
     tension : scalar, (n,) or (N, n) array, optional
         Of what each actuator drives, N: what load cells read, or `pkmcal.tensions` says. A drive
-        law with `stretch` is longer by it.
+        law with `stretch` is longer by it. NaN: not read there; see `tension_sigma`.
+    tension_sigma : scalar, (n,) or (N, n) array, optional
+        Standard deviation of `tension`, N: it is then a reading, and the true tensions of a row are
+        unknown. None: it is exact, or, of a robot whose file says that tensions balance its load,
+        estimated from the rows. Kept as (N, n).
     temperature : scalar, (N,) or (N, 2 + n) array, optional
         °C, of the whole machine, or of base, platform and what each actuator drives; NaN: not read.
         `identify` refers numbers to 20 °C where it is told how the machine expands. Kept as
@@ -173,6 +179,7 @@ class Measurements(Result):
     session: TextArray | None = None
     approach: FloatArray | None = None
     tension: FloatArray | None = None
+    tension_sigma: FloatArray | None = None
     temperature: FloatArray | None = None
     time: FloatArray | None = None
     lines: Int64Array | None = None
@@ -203,6 +210,7 @@ class Measurements(Result):
         session: str | Sequence[str] | TextArray | None = None,
         approach: ArrayLike | None = None,
         tension: ArrayLike | None = None,
+        tension_sigma: ArrayLike | None = None,
         temperature: ArrayLike | None = None,
         time: ArrayLike | None = None,
         lines: ArrayLike | None = None,
@@ -249,6 +257,7 @@ class Measurements(Result):
             "session": sessions_array(session, len(q)),
             "approach": approach_array(approach, q),
             "tension": tension_array(tension, q.shape),
+            "tension_sigma": tension_sigma_array(tension_sigma, tension, q.shape),
             "temperature": temperature_array(temperature, q.shape),
             "time": None if time is None else row_numbers("time", time, len(q)),
             "lines": None if lines is None else integers("lines", lines, len(q)),
@@ -314,8 +323,9 @@ class Measurements(Result):
 
     @property
     def drive_state(self) -> DriveState:
-        """From where actuators came, and the tension of what they drive."""
-        return DriveState(self.approach, self.tension)
+        """From where actuators came, and the tension of what they drive, as far as it was read."""
+        tension = None if self.tension is None else filled_tension(self.tension)
+        return DriveState(self.approach, tension)
 
     @property
     def sessions(self) -> tuple[str, ...]:
@@ -424,6 +434,9 @@ class Measurements(Result):
             columns |= {f"approach.q{i + 1}": each for i, each in enumerate(self.approach.T)}
         if self.tension is not None:
             columns |= {f"tension.q{i + 1}": each for i, each in enumerate(self.tension.T)}
+        if self.tension_sigma is not None:
+            pairs = enumerate(self.tension_sigma.T, 1)
+            columns |= {f"tension_sigma.q{i}": each for i, each in pairs}
         return columns
 
     def _parts(self) -> Iterator[str | Table]:

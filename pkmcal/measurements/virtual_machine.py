@@ -142,6 +142,8 @@ class VirtualMachine:
         if actuators.ndim != 2 or actuators.shape[1] != n or not actuators.size:
             raise ArgumentError(f"q must have shape (N, {n}) or ({n},); found {np.shape(q)}")
         word("kind", kind, KINDS)
+        if tension is not None:
+            numbers("tension", tension)  # of what is driven it is known
         touching = kind == "touch"
         width = len(components(kind, artefact if touching else None))
         blank = Measurements(

@@ -42,6 +42,12 @@ def planned(
     actuator_noise: ArrayLike | None,
 ) -> Measurements:
     """What would be measured, the rows of a pose one after another; `several` are targets."""
+    load = robot.model.load if isinstance(robot, Robot) else None
+    if load is not None and load.balance:
+        raise ArgumentError(
+            f"robot: plans know no load cells, and tensions of {robot.name} are to balance its load"
+            " ([load] balance)"
+        )
     surplus = isinstance(robot, Robot) and pose_steps.surplus(robot) > 0
     if surplus and actuator_noise is None:
         raise ArgumentError(

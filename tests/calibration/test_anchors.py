@@ -80,3 +80,11 @@ def test_rows_with_nothing_read_are_refused() -> None:
     q[3, 2] = np.nan
     with pytest.raises(ValueError, match=r"actuators: must be finite, found .* in row 3"):
         pk.locate_anchors(true, q)
+
+
+def test_lengths_that_fall_where_they_should_grow_are_no_anchors() -> None:
+    """c² less the squared distance: as regular as distances, and of no point."""
+    true, places = case(3, 5, 12, 1)
+    squares = true.inverse(places) ** 2
+    with pytest.raises(ValueError, match="lengths that no anchors have; check offsets"):
+        pk.locate_anchors(true, np.sqrt(2.0 * squares.max() - squares))

@@ -149,8 +149,10 @@ def poses_of_equations(isa: int, part: slice, call: str) -> list[np.ndarray]:
         left, following = poses.left(by_unknown, columns)
         if call == "pose_normals":
             found += [matrix, pull, cost]
-        elif call == "pose_steps":
-            found += [*poses.steps(matrix, pull, np.full(len(cost), 0.1))]
+        elif call == "pose_fit":
+            residual = np.ascontiguousarray(columns[:, 0])
+            *of_poses, rest = poses.fit(residual, by_unknown, np.full(len(cost), 0.1), 0.01, 1e-3)
+            found += [*of_poses, _rows(rest[:, None], poses.left_of)]
         elif call == "pose_left":
             found += [following, _rows(left, poses.left_of)]
         else:
@@ -221,7 +223,7 @@ CASES: dict[str, Case] = {
     "closure_cost": closure_cost,
     "spheres": spheres,
     "pose_normals": lambda isa, part: poses_of_equations(isa, part, "pose_normals"),
-    "pose_steps": lambda isa, part: poses_of_equations(isa, part, "pose_steps"),
+    "pose_fit": lambda isa, part: poses_of_equations(isa, part, "pose_fit"),
     "pose_left": lambda isa, part: poses_of_equations(isa, part, "pose_left"),
     "pose_spread": lambda isa, part: poses_of_equations(isa, part, "pose_spread"),
     "readings": lambda isa, part: actuators_as_instruments(isa, part, "readings"),

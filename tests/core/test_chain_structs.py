@@ -99,6 +99,7 @@ def test_a_number_has_one_column_of_chains() -> None:
         numbers = np.array(columns, dtype=np.int32)
         return lambda: robot.machine.error_jacobian(robot.slots, pose, q, numbers)
 
+    assert errors()().shape == (1, 6, 0)
     both = errors(4, 1)()
     np.testing.assert_array_equal(both[..., 0], errors(4)()[..., 0])
     np.testing.assert_array_equal(both[..., 1], errors(1)()[..., 0])

@@ -16,7 +16,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.arrays import as_rows
-from pkmcal.core import library
+from pkmcal.core import library, machine
 from pkmcal.core import poses as core_poses
 from pkmcal.core.library import ISAS, MOST_THREADS, SLOTS, ffi, in_threads, lib
 
@@ -194,6 +194,16 @@ def test_the_core_refuses_an_isa_a_machine_and_columns_it_does_not_have() -> Non
     machine.isa = 3
     with pytest.raises(ValueError, match="has no ISA"):
         machine.forward(robot.slots, q, robot.home, None)
+
+
+def test_errors_go_to_their_places_and_nowhere_else() -> None:
+    ideal, slots = np.arange(5.0), np.tile(np.arange(5.0), (2, 1))
+    errors = np.array([[0.5, -0.25], [1.0, 2.0]])
+    machine.with_errors(errors, np.array([4, 0], dtype=np.int32), ideal, slots)
+    np.testing.assert_array_equal(slots, [[-0.25, 1, 2, 3, 4.5], [2, 1, 2, 3, 5]])
+    for place in (-1, 5):
+        with pytest.raises(ValueError, match="refused"):
+            machine.with_errors(errors, np.array([0, place], dtype=np.int32), ideal, slots)
 
 
 def test_threads_are_limited_whatever_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

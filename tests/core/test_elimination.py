@@ -37,9 +37,12 @@ def drawn(request: pytest.FixtureRequest) -> Drawn:
 
 
 def test_steps_solve_the_damped_normal_equations(drawn: Drawn) -> None:
-    matrix, pull, cost = drawn.poses.normals(drawn.residual, drawn.by_unknown)
-    damping = np.linspace(1e-3, 1.0, len(cost))
-    step, gain = drawn.poses.steps(matrix, pull, damping)
+    matrix, pull, squares = drawn.poses.normals(drawn.residual, drawn.by_unknown)
+    damping = np.linspace(1e-3, 1.0, len(squares))
+    step, gain, cost, left = drawn.poses.fit(drawn.residual, drawn.by_unknown, damping)
+    np.testing.assert_array_equal(cost, squares)
+    column = drawn.residual[:, None]
+    np.testing.assert_array_equal(left, drawn.poses.left(drawn.by_unknown, column)[0][:, 0])
     for i, mine, _ in drawn.each():
         slopes, residual = drawn.by_unknown[mine], drawn.residual[mine]
         np.testing.assert_allclose(matrix[i], slopes.T @ slopes, atol=1e-12)
@@ -56,6 +59,18 @@ def test_steps_solve_the_damped_normal_equations(drawn: Drawn) -> None:
             np.testing.assert_allclose(gain[i], cost[i] - there @ there, rtol=1e-6, atol=1e-8)
         else:
             assert not step[i].any() and gain[i] == 0.0
+
+
+def test_units_of_a_poses_equations_change_no_step_of_any_pose(drawn: Drawn) -> None:
+    poses = len(drawn.count)
+    units, damping = 10.0 ** np.random.default_rng(8).uniform(-6, 6, poses), np.full(poses, 1e-3)
+    each = np.empty(len(drawn.residual))
+    for i, mine, _ in drawn.each():
+        each[mine] = units[i]
+    expected = drawn.poses.fit(drawn.residual, drawn.by_unknown, damping)
+    found = drawn.poses.fit(drawn.residual * each, drawn.by_unknown * each[:, None], damping)
+    np.testing.assert_allclose(found.step, expected.step, rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(found.gain / units**2, expected.gain, rtol=1e-9, atol=1e-12)
 
 
 def test_what_is_left_is_the_part_across_the_unknowns(drawn: Drawn) -> None:
@@ -83,8 +98,29 @@ def test_numbers_that_are_not_finite_stay_with_their_pose() -> None:
     bad = int(np.flatnonzero(drawn.count > 3)[0])
     whole = next(mine for i, mine, _ in drawn.each() if i == bad)
     drawn.residual[whole[0]] = np.nan
-    matrix, pull, cost = drawn.poses.normals(drawn.residual, drawn.by_unknown)
-    step, gain = drawn.poses.steps(matrix, pull, np.zeros(len(cost)))
+    undamped = np.zeros(len(drawn.count))
+    step, gain, cost, left = drawn.poses.fit(drawn.residual, drawn.by_unknown, undamped)
     assert np.isnan(cost[bad]) and np.isnan(gain[bad]) and not step[bad].any()
     others = np.arange(len(cost)) != bad
     assert np.isfinite(gain[others]).all() and np.isfinite(step[others]).all()
+    place, count = drawn.poses.place[bad], drawn.poses.left_of[bad]
+    assert np.isfinite(np.delete(left, np.arange(place, place + count))).all()
+
+
+def test_steps_that_gain_little_are_none(drawn: Drawn) -> None:
+    undamped = np.zeros(len(drawn.count))
+    whole = drawn.poses.fit(drawn.residual, drawn.by_unknown, undamped)
+    share = np.divide(whole.gain, whole.cost, out=undamped.copy(), where=whole.cost > 0.0)
+    least = 0.999 * float(np.median(share[share > 0.0]))
+    some = drawn.poses.fit(drawn.residual, drawn.by_unknown, undamped, least)
+    np.testing.assert_array_equal(some.gain, np.where(share > least, whole.gain, 0.0))
+    np.testing.assert_array_equal(some.step, np.where(share[:, None] > least, whole.step, 0.0))
+    slopes = drawn.poses.normals(drawn.residual, drawn.by_unknown)[0]
+    length = np.sqrt(np.einsum("kii->k", slopes))
+    some = drawn.count > 0
+    rounding = 0.8 * float(np.median(whole.gain[some] / length[some] / np.sqrt(whole.cost[some])))
+    made = rounding * length  # of the equations' length
+    gains = whole.gain > made * (made + np.sqrt(whole.cost))
+    assert gains.any() and not gains[some].all()
+    rounded = drawn.poses.fit(drawn.residual, drawn.by_unknown, undamped, 0.0, rounding)
+    np.testing.assert_array_equal(rounded.gain, np.where(gains, whole.gain, 0.0))

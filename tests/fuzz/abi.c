@@ -343,12 +343,13 @@ static void of_poses(ptrdiff_t n, unsigned strange, int isas)
     for (int64_t e = 0; e < total; e++) order[e] = (int64_t)(bits() % (uint64_t)total);
     const double *slopes = numbers(total * u, strange), *residual = numbers(total, strange);
     const double *part = numbers(total * columns, strange), *rest = numbers(left * columns, strange);
-    const double *matrix = numbers(n * u * u, strange), *damping = numbers(n, strange);
-    double *work = fresh(sizeof *work * PKM_WIDEST * (MOST + (size_t)u) * ((size_t)u + 1));
+    const double *damping = numbers(n, strange);
+    double *work = fresh(sizeof *work * PKM_WIDEST * (MOST + (size_t)u + 1) * ((size_t)u + 1));
     one_of(4);
     EACH_ISA(pose_normals, n, u, first, order, residual, slopes, D(0, n * u * u), D(1, n * u), D(2, n),
              work);
-    EACH_ISA(pose_steps, n, u, matrix, matrix, damping, D(0, n * u), D(1, n), work);
+    EACH_ISA(pose_fit, n, u, first, order, residual, slopes, damping, 1e-12, 1e-12, place, D(0, n * u),
+             D(1, n), D(2, n), D(3, left), work);
     EACH_ISA(pose_left, n, u, first, order, slopes, columns, part, place, D(0, left * columns),
              D(1, n * u * columns), work);
     EACH_ISA(pose_spread, n, u, first, order, slopes, columns, place, rest, D(0, total * columns), work);

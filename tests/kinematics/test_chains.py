@@ -12,7 +12,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.core.chains import ChainMachine
-from pkmcal.core.library import ISAS
+from pkmcal.core.library import ISAS, POSE
 from pkmcal.geometry import robot_file
 from pkmcal.screw import from_pose
 from tests import solved_again
@@ -220,6 +220,19 @@ def test_every_isa_gives_the_same_bits(name: str) -> None:
     for other in found[1:]:
         for a, b in zip(found[0], other, strict=True):
             assert np.array_equal(a, b)
+
+
+@pytest.mark.parametrize("name", (*SQUARE, *OVER))
+def test_closures_of_chains_are_known_as_a_whole_or_not_at_all(name: str) -> None:
+    robot = pk.load(name)
+    poses = np.tile(robot.own_home, (6, 1))
+    q = robot.machine.inverse(robot.slots, poses)
+    q[[1, 4], 0] = np.nan, np.inf
+    poses[2, POSE.index(robot.coordinates[0])] = np.nan
+    found = robot.machine.closure(robot.slots, poses, q)
+    for each in (found.residual, found.by_step, found.by_free, found.by_q):
+        assert np.isnan(each[[1, 2, 4]]).all() and np.isfinite(each[[0, 3, 5]]).all()
+        np.testing.assert_array_equal(each[[3, 5]], each[[0, 0]])
 
 
 def test_rows_fail_alone_and_say_why() -> None:

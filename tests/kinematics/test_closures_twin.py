@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -56,3 +58,26 @@ def test_closures_and_all_their_derivatives_are_those_of_the_twin(name: str) -> 
         at = twin.complex_step(lambda u: twin.pose_of_free(model, u), u)
         np.testing.assert_allclose(found.pose[i], twin.pose_of_free(model, u), rtol=0, atol=1e-9)
         np.testing.assert_allclose(found.pose_by_free[i], at, rtol=0, atol=1e-9)
+
+
+def test_of_a_limb_that_does_not_reach_a_reading_misses_its_closure_over_its_slope() -> None:
+    robot = pk.load("linear-delta")
+    pose = robot.home + 200.0 * np.eye(6)[0]
+    reaches = np.isfinite([twin.limb_inverse(limb, n, pose) for limb, n in numbered(robot)])
+    assert 0 < reaches.sum() < 3 and np.isnan(robot.inverse(pose)).all()
+    q = robot.inverse(robot.home) + np.array([10.0, -20.0, 30.0])
+    missed = robot.machine.readings(robot.slots, pose[None], q[None])[0][0]
+    for k, (limb, n) in enumerate(numbered(robot)):
+
+        def square(q: np.ndarray, limb: Any = limb, n: dict[str, float] = n) -> np.ndarray:
+            row = twin.limb_rows(limb, n, pose, q[0])[0]  # |d| - rod
+            return np.array([(row + n["rod"]) ** 2 - n["rod"] ** 2])
+
+        at = q[limb.actuator]
+        newton = -square(np.array([at])) / twin.complex_step(square, np.array([at]))[0]
+        expected = twin.limb_inverse(limb, n, pose) - at if reaches[k] else newton[0]
+        np.testing.assert_allclose(missed[k], expected, rtol=1e-9)
+
+
+def numbered(robot: pk.Robot) -> list[tuple[Any, dict[str, float]]]:
+    return list(zip(robot.model.limbs, twin.numbers(robot.model, None), strict=True))

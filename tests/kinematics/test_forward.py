@@ -189,3 +189,7 @@ def test_nearly_all_of_a_workspace_settles_in_the_quick_steps(name: str) -> None
     assert home.ok.all() and np.mean(home.iterations == 2 + 2) >= 0.9
     guessed = robot.forward(q, guess=np.tile(robot.home, (len(q), 1)))
     assert guessed.ok.all() and np.mean(guessed.iterations == 3 + 2) >= 0.8
+    at, coordinates = pose[0], q[0]  # one guess for all, which is not home
+    turned = coordinates + 0.03 * np.ptp(q, axis=0) * np.random.default_rng(4).normal(size=q.shape)
+    beside = robot.forward(turned, guess=at)
+    assert beside.ok.all() and np.mean(beside.iterations == 2 + 2) >= 0.9

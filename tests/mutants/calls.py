@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ast
 import ctypes
+import difflib
 import functools
 import json
 import subprocess
@@ -183,3 +184,12 @@ def c_function(text: str, at: int, starts: Iterable[int]) -> int | None:
     line = before.count("\n") + 1
     within = before.count("{") > before.count("}")
     return max((start for start in starts if start <= line), default=None) if within else None
+
+
+def changed_lines(before: list[str], after: list[str]) -> set[int]:
+    """Lines of a text, from 0, that another text has not or has more behind."""
+    found: set[int] = set()
+    for kind, begin, end, _, _ in difflib.SequenceMatcher(None, before, after, False).get_opcodes():
+        if kind != "equal":
+            found.update(range(begin, max(end, begin + 1)))
+    return found

@@ -79,17 +79,17 @@ class Core:
         text = "\n".join([before + include, *defined, *through, after])
         path.write_text(text, encoding="utf-8")
 
-    def mutated(self, changed: Path) -> bool:
-        """Compile what includes a changed file; whether that compiles, and to something else."""
-        units = [unit for unit in UNITS if changed.name in self.reached[unit]]
+    def mutated(self, *changed: str) -> str:
+        """Compile what includes changed files: that "fails", gives the "same", or is "made"."""
+        units = [unit for unit in UNITS if self.reached[unit].intersection(changed)]
         try:
             if not all(self._compile(f"csrc/{unit}") for unit in units):
-                return False
+                return "fails"
             if all(self._object(unit).read_bytes() == self.objects[unit] for unit in units):
-                return False
+                return "same"
             self.mutant.unlink(missing_ok=True)
             self._link(self.mutant)
-            return True
+            return "made"
         finally:
             for unit in units:
                 self._object(unit).write_bytes(self.objects[unit])
