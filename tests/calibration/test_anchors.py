@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.distance import pdist
 
 import pkmcal as pk
-from tests.robots import made
+from tests.robots import linear_delta, made
 
 
 def machine(anchors: np.ndarray, **sections: Any) -> pk.Robot:
@@ -88,3 +88,11 @@ def test_lengths_that_fall_where_they_should_grow_are_no_anchors() -> None:
     squares = true.inverse(places) ** 2
     with pytest.raises(ValueError, match="lengths that no anchors have; check offsets"):
         pk.locate_anchors(true, np.sqrt(2.0 * squares.max() - squares))
+
+
+@pytest.mark.parametrize("name", ["linear-delta", "hexapod"])
+def test_a_machine_that_is_no_point_on_limbs_of_variable_length_is_refused(name: str) -> None:
+    robot = linear_delta() if name == "linear-delta" else pk.load(name)
+    q = np.tile(robot.inverse(robot.home), (20, 1))
+    with pytest.raises(ValueError, match="is no point on limbs of variable length"):
+        pk.locate_anchors(robot, q)
