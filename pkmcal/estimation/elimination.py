@@ -24,7 +24,7 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.elimination import Fit, PoseEquations
-from pkmcal.estimation.closures import RowStates
+from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines, SessionClosures
 
 _STEPS = 50  # of finding the best poses
