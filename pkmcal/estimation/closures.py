@@ -22,56 +22,16 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, mm_per_unit
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
+from pkmcal.estimation.row_states import RowStates
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.calibratable import Calibratable
-
-
-@dataclass(frozen=True, eq=False)
-class RowStates:
-    """Where the machine is at each distinct row of actuators.
-
-    Attributes
-    ----------
-    pose : ndarray (K, 6)
-        mm and rad; NaN where there is none.
-    actuators : ndarray (K, n)
-        Where the actuators are.
-    status : ndarray of int (K,)
-        Of the forward kinematics.
-    tension : ndarray (K, n) or None
-        Of what actuators drive, N, where it is unknown and has been found.
-    """
-
-    pose: FloatArray
-    actuators: FloatArray
-    status: Int32Array
-    tension: FloatArray | None = None
-
-    def chosen(self, rows: BoolArray, others: RowStates) -> RowStates:
-        """These where `rows` (K,), else the others."""
-        if rows.all():
-            return self
-        actuators = self.actuators
-        if actuators is not others.actuators:
-            actuators = np.where(rows[:, None], actuators, others.actuators)
-        tension = self.tension
-        if tension is not None and others.tension is not None:
-            tension = np.where(rows[:, None], tension, others.tension)
-        return RowStates(
-            np.where(rows[:, None], self.pose, others.pose),
-            actuators,
-            np.where(rows, self.status, others.status),
-            tension,
-        )
-
 
 _HELD = 1e-9  # of the size: a step back onto held rows after which its square is rounding
 _STEPS = 30  # back onto them

@@ -17,13 +17,14 @@ core (`core.elimination`).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core.elimination import Fit, PoseEquations
-from pkmcal.estimation.closures import RowStates
+from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines, SessionClosures
 
 _STEPS = 50  # of finding the best poses
@@ -275,7 +276,7 @@ class Blocks:
         unsolved = (fit.gain != 0.0) & (states.status == 0)
         if unsolved.any():
             status = np.where(unsolved, 1, states.status).astype(np.int32)
-            states = RowStates(states.pose, states.actuators, status)
+            states = replace(states, status=status)
         return states, System(*there, fit.left)
 
     def at(self, there: Whitened) -> System:
@@ -293,7 +294,7 @@ class Blocks:
         moving: BoolArray,
         pulled: Callable[[FloatArray], FloatArray],
     ) -> Fit:
-        """The same for equations that bend, of poses that move; `pulled` is that of `_bent`."""
+        """Newton's steps of poses that move, equations bent as `_bent` finds them by `pulled`."""
         matrix, pull, cost = self._all.normals(*there)
         rounded = self._rounding * np.sqrt(np.einsum("kii->k", matrix))
         matrix = _bent(matrix, pull, np.where(moving, cost, 0.0), pulled)

@@ -18,13 +18,13 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
 from pkmcal.core.library import STATUS
 from pkmcal.estimation import joint_angles
-from pkmcal.estimation.closures import RowStates
 from pkmcal.estimation.elimination import Blocks, Shares, System
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.first_frames import aligned
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.readings import ROUNDING, Readings, of_read
+from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import (
     Machines,
     SessionClosures,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pkmcal.arrays import FloatArray, Int32Array
-from pkmcal.estimation.closures import RowStates
+from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines
 from pkmcal.measurements.calibratable import Calibratable
 

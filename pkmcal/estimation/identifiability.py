@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, first_largest
-from pkmcal.statistics.linear_fit import ROUNDING, triangle
+from pkmcal.statistics.linear_fit import ROUNDING, few_rows
 
 _KINDS = 4  # kinds of parameters whose combinations are looked for
 # Nuisance parameters: one kind each, however many there are. A kind more is many combinations more.
@@ -65,10 +65,10 @@ def decompose(*jacobian: FloatArray) -> Decomposed:
     The Jacobian may be in parts, below each other.
     """
     n = jacobian[0].shape[1]
-    square = np.zeros((n, n))
-    factor = triangle(*jacobian)
-    square[: len(factor)] = factor
-    _, singular, rows = np.linalg.svd(square)
+    factor = few_rows(*jacobian)
+    whole = np.zeros((max(n, len(factor)), n))
+    whole[: len(factor)] = factor
+    _, singular, rows = np.linalg.svd(whole, full_matrices=False)
     return singular, rows.T
 
 

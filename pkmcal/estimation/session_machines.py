@@ -13,7 +13,8 @@ from typing import TypeVar
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
-from pkmcal.estimation.closures import Closures, Commanded, RowStates, closures_of
+from pkmcal.estimation.closures import Closures, Commanded, closures_of
+from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import spread
 from pkmcal.estimation.tensioned_poses import Cells, tensioned_poses
 from pkmcal.exceptions import ArgumentError

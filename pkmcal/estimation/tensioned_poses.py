@@ -15,7 +15,8 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.display import first_rows
-from pkmcal.estimation.closures import FreePoses, RowStates, machine_of, one_mm
+from pkmcal.estimation.closures import FreePoses, machine_of, one_mm
+from pkmcal.estimation.row_states import RowStates
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import Load

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray
 
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 _WHOLE = 9  # decimals from which degrees of freedom are whole: limits on them are
@@ -139,7 +139,7 @@ def unit_basis(jacobian: FloatArray, prior: FloatArray, basis: FloatArray) -> Fl
 
     Arguments are those of `linear_fit`.
     """
-    whole = triangle(jacobian, prior) @ basis
+    whole = few_rows(jacobian, prior) @ basis
     _, singular, turned = np.linalg.svd(whole, full_matrices=False)
     back: FloatArray = basis @ (turned.T / singular)
     return back
@@ -190,6 +190,15 @@ def multiply_in_place(matrix: FloatArray, square: FloatArray) -> None:
         matrix[rows] = matrix[rows] @ square
 
 
+def few_rows(*stacked: FloatArray) -> FloatArray:
+    """A matrix with the same AᵀA as all of these below each other, and at most 2 n rows.
+
+    The factor of `triangle` unless they have no more as they are.
+    """
+    few = sum(map(len, stacked)) <= 2 * stacked[0].shape[1]
+    return np.concatenate(stacked) if few else triangle(*stacked)
+
+
 def triangle(*stacked: FloatArray | Sequence[FloatArray]) -> FloatArray:
     """Triangular factor R of a QR factorisation: RᵀR = AᵀA.
 
@@ -211,5 +220,12 @@ def triangle(*stacked: FloatArray | Sequence[FloatArray]) -> FloatArray:
             rows = [part[start : start + block] for part in beside]
             whole = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=1)
             whole = np.concatenate([factor, whole]) if len(factor) else whole
-            factor = np.triu(dgeqrf(whole, lwork=_COLUMNS_AT_ONCE * n or 1)[0][:n])
+            factor = dgeqrf(whole, lwork=_COLUMNS_AT_ONCE * n or 1)[0][:n]
+            factor[_below(*factor.shape)] = 0.0
     return factor
+
+
+@cache
+def _below(rows: int, columns: int) -> BoolArray:
+    """The places below the diagonal."""
+    return np.tri(rows, columns, -1, dtype=bool)

@@ -15,6 +15,7 @@ _ROUNDS, _SETTLED = 60, 1e-4
 _LEAST_FREEDOM = 5  # below, some rows are always met
 _DRAWS = 100
 _RIDGE = 1e-12  # of a normal matrix that is 1 where all rows have full weight
+_TOGETHER = 16384  # equations that are weighted at once, to bound memory
 _ENOUGH = 100.0  # rows' worth of spare equations from which chance no longer moves a ratio much
 _MET = 1e-6  # share of the first scale below which half of the rows are met exactly
 
@@ -60,10 +61,14 @@ def robust_ratio(design: FloatArray, residual: FloatArray, components: IntArray)
             break
         scale = revised
         weights = np.repeat(1.0 / (1.0 + squares / (scale * _LIMIT) ** 2 / components), components)
-        weighted = design * weights[:, None]
         # the ridge is for directions that rows without weight alone determined
-        normal = weighted.T @ design + _RIDGE * np.eye(p)
-        left = residual - design @ np.linalg.solve(normal, weighted.T @ residual)
+        normal, pull = _RIDGE * np.eye(p), np.zeros(p)
+        for at in range(0, m, _TOGETHER):
+            rows = slice(at, at + _TOGETHER)
+            weighted = design[rows] * weights[rows, None]
+            normal += weighted.T @ design[rows]
+            pull += weighted.T @ residual[rows]
+        left = residual - design @ np.linalg.solve(normal, pull)
     return float(np.sqrt(residual @ residual / (m - p)) / scale)
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.distance import pdist
 
 import pkmcal as pk
-from tests.robots import made
+from tests.robots import linear_delta, made
 
 
 def machine(anchors: np.ndarray, **sections: Any) -> pk.Robot:
@@ -80,3 +80,19 @@ def test_rows_with_nothing_read_are_refused() -> None:
     q[3, 2] = np.nan
     with pytest.raises(ValueError, match=r"actuators: must be finite, found .* in row 3"):
         pk.locate_anchors(true, q)
+
+
+def test_lengths_that_fall_where_they_should_grow_are_no_anchors() -> None:
+    """c² less the squared distance: as regular as distances, and of no point."""
+    true, places = case(3, 5, 12, 1)
+    squares = true.inverse(places) ** 2
+    with pytest.raises(ValueError, match="lengths that no anchors have; check offsets"):
+        pk.locate_anchors(true, np.sqrt(2.0 * squares.max() - squares))
+
+
+@pytest.mark.parametrize("name", ["linear-delta", "hexapod"])
+def test_a_machine_that_is_no_point_on_limbs_of_variable_length_is_refused(name: str) -> None:
+    robot = linear_delta() if name == "linear-delta" else pk.load(name)
+    q = np.tile(robot.inverse(robot.home), (20, 1))
+    with pytest.raises(ValueError, match="is no point on limbs of variable length"):
+        pk.locate_anchors(robot, q)

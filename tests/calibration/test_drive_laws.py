@@ -162,6 +162,25 @@ def test_a_law_that_is_not_there_is_called_needed_in_5_of_100() -> None:
     assert sum(said) <= 9  # of 60 at 5 %, with a chance of 0.2 % of more
 
 
+def test_of_deviations_by_the_spread_of_poses_the_test_is_hotellings() -> None:
+    """T² (ν - k + 1)/(ν k) is as F(k, ν - k + 1): few poses are no sure measure of many numbers."""
+    robot, _, free = machines("quadratic")
+    q = rows(robot, 30)
+    measured = pk.VirtualMachine(robot, noise=SIGMA, angle_noise=SIGMA / 1000.0, seed=4).measure(
+        q, kind="pose"
+    )
+    found = pk.identify(robot, measured, free=free, covariance="cluster")
+    (test,) = found.law_tests
+    columns = [found.free.index(name) for name in test.names]
+    values, covariance = found.values[columns], found.covariance[np.ix_(columns, columns)]
+    count, rest = test.freedom
+    nu = rest + count - 1.0
+    assert count == len(columns) == 6 and 6.0 < nu < len(q)
+    squares = values @ np.linalg.solve(covariance, values)
+    assert test.ratio == pytest.approx(squares / count * rest / nu, rel=1e-6)
+    assert test.chance == pytest.approx(f_distribution.sf(test.ratio, count, rest), rel=1e-9)
+
+
 def test_of_numbers_with_a_prior_nothing_is_said() -> None:
     robot, true, free = machines("quadratic")
     measured = pk.VirtualMachine(true, noise=SIGMA, angle_noise=SIGMA / 1000.0).measure(

@@ -231,6 +231,45 @@ def test_one_length_for_all_says_nothing_of_forces() -> None:
     assert not [name for each in asked for name in each if name.startswith("load")]
 
 
+def eight() -> pk.Robot:
+    """A platform on eight cables, from the corners of a frame."""
+    corners = [(x, y, z) for z in (2500.0, 0.0) for x, y in ((1, 1), (-1, 1), (-1, -1), (1, -1))]
+    limbs = [
+        {
+            "kind": "cable", "base": [2000.0 * x, 1500.0 * y, z],
+            "platform": [-150.0 * x, 120.0 * y, 80.0 if z else -80.0],
+            "drive": {"stretch": STRETCH},
+        }
+        for x, y, z in corners
+    ]  # fmt: skip
+    load = {"force": [0.0, 0, -98.1], "at": [0.0, 0, -20], "balance": True}
+    return made("spatial", {"z": 1200.0}, limbs, load=load)
+
+
+def test_six_freedoms_are_found_where_little_was_read() -> None:
+    """Anchors 30 mm off, a centre of mass and a weight: 20 positions, 10 of them with angles."""
+    robot, rng = eight(), np.random.default_rng(2)
+    at = rng.uniform(-1, 1, (40, 6)) * [900, 600, 500, 0.1, 0.1, 0.1] + robot.home
+    moved = {
+        name: robot.geometry[name] + rng.uniform(-30, 30) for name in robot.geometry.match("base*")
+    }
+    true = robot.replace(moved | {"load.at.x": 8.0, "load.at.y": -5.0, "load.force.z": -101.0})
+    held = pk.tensions(true, at, least=20.0)
+    at, tension = at[held.ok], held.tension[held.ok]
+    q = true.tensioned(tension).inverse(at) + rng.normal(0, CABLE, tension.shape)
+    sigma = np.array([0.5] * 3 + [5e-3] * 3)
+    seen = at + rng.normal(0, 1, at.shape) * sigma
+    seen[10:, 3:] = seen[20:] = np.nan
+    log = pk.Measurements(
+        q, seen, "pose", sigma=sigma, actuator_sigma=CABLE,
+        tension=tension + rng.normal(0, 1, tension.shape), tension_sigma=1.0,
+    )  # fmt: skip
+    found = pk.identify(robot, log, ["base*", "load.at.x", "load.at.y", "load.force.z"])
+    assert found.converged and found.rank == len(found.free) == 27
+    z = (found.values - [true.geometry[name] for name in found.free]) / found.stderr
+    assert np.abs(z).max() < 4.5 and 0.7 < found.chi2_per_dof < 1.3
+
+
 def test_what_forces_leave_open_is_named() -> None:
     data = simulated(7, 2.0)
     found = pk.identify(four(), rows(data, 2.0), [*FREE, *FORCES, "load.cell*"])

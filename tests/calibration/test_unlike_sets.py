@@ -72,3 +72,20 @@ def test_right_weights_are_left_alone(
         for seed in range(20)
     )
     assert said <= 2
+
+
+def test_components_whose_noise_differs_are_told_with_their_units() -> None:
+    robot = pk.load("hexapod")
+    rng = np.random.default_rng(3)
+    q = robot.inverse(hexapod_poses(robot, 60, rng))
+    noise = np.array([0.01, 0.02, 0.2, 2e-5, 4e-5, 4e-4])  # mm and rad
+    seen = robot.forward(q).pose + rng.normal(size=(60, 6)) * noise
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        text = " ".join(str(pk.identify(robot, Measurements(q, seen, "pose"), "offset*")).split())
+    told = [part.split() for part in text.split("; noise of ")[1].split("; ")[0].split(", ")]
+    names, values, units = zip(*told, strict=True)
+    assert names == ("x", "y", "z", "alpha", "beta", "gamma")
+    assert units == ("mm",) * 3 + ("deg",) * 3
+    expected = [*noise[:3], *np.degrees(noise[3:])]
+    np.testing.assert_allclose([float(value) for value in values], expected, rtol=0.4)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.estimation.closures import RowStates
 from pkmcal.estimation.elimination import Blocks
+from pkmcal.estimation.row_states import RowStates
 
 ANCHORS = np.array([[0.0, 2000], [3000, 2000], [0, 0], [3000, 0]])
 
