@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import rms
+from pkmcal.arrays import BoolArray, rms
 from pkmcal.calibration.dropped import outlying
 from pkmcal.calibration.fit import Fit
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimator import Estimator
+from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.statistics.robust_scale import median_ratio, ratio_by_chance, robust_ratio
 
@@ -32,7 +33,7 @@ class RobustCheck:
     rows : tuple of int
         Rows that disagree with the rest there.
     rms : float
-        Of the other rows there, mm.
+        Of the other rows there, mm; of their closures where nothing was read.
     """
 
     ratio: float
@@ -83,8 +84,6 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     squares = few.squares(few.residual(robust.evaluation, of_sets))
     scale = median_ratio(squares, few.components) * m / (m - p)
     named = outlying(estimator, robust)
-    commanded.warm_start(robust.evaluation)
-    off = few.distances(commanded.at(robust.evaluation.theta))[~named]
     if not scale > 0:
         return None
     ratio = float(np.sqrt(plain @ plain / (own - p) / scale))
@@ -93,8 +92,21 @@ def robust_check(fit: Fit) -> RobustCheck | None:
         ratio=ratio,
         by_chance=by_chance,
         rows=tuple(few.rows[named].tolist()),
-        rms=rms(off[np.isfinite(off)]),
+        rms=_rms_of_others(few, commanded, robust.evaluation, named),
     )
+
+
+def _rms_of_others(
+    few: Equations, commanded: Equations, there: Evaluation, named: BoolArray
+) -> float:
+    """How far off the rows are that are not named (N,), mm; closures where nothing was read."""
+    if not few.any_read:
+        poses = np.ones(len(there.pose), dtype=bool)
+        poses[np.concatenate(few.pose_of)[named]] = False
+        return few.closure_rms(there, poses)
+    commanded.warm_start(there)
+    off = few.distances(commanded.at(there.theta))[~named]
+    return rms(off[np.isfinite(off)])
 
 
 def _drawn(fit: Fit) -> list[tuple[FitData, int]]:

@@ -311,9 +311,10 @@ def _disagreement(found: Parts, robust: RobustCheck) -> str:
             " rest; fit with --loss cauchy (loss='cauchy') and look at the residuals"
         )
     rows = "row disagrees" if count == 1 else "rows disagree"
+    own = found.closure_rms if np.isnan(found.rms) else found.rms
     return (
         f"{count} {rows} with the rest: {row_names(found.fit.equations.datasets, robust.rows)};"
-        f" a robust fit leaves {_mm(robust.rms)} in the others, this one {_mm(found.rms)} in all:"
+        f" a robust fit leaves {_mm(robust.rms)} in the others, this one {_mm(own)} in all:"
         f" leave {'it' if count == 1 else 'them'} out with --drop-outliers (drop='outliers'), or"
         " fit with --loss cauchy (loss='cauchy')"
     )

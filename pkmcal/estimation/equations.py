@@ -561,11 +561,12 @@ class Equations(Readings):
         """`rms`, or `closure_rms` where nothing but the actuators was read."""
         return self.rms(evaluation) if self.any_read else self.closure_rms(evaluation)
 
-    def closure_rms(self, evaluation: Evaluation) -> float:
-        """How far off the closures are at the poses, mm of the actuators; NaN where they hold."""
+    def closure_rms(self, evaluation: Evaluation, poses: BoolArray | None = None) -> float:
+        """How far off the closures are at poses (K,), mm of the actuators; NaN where they hold."""
         off = self.closures_off(evaluation)
-        if self._counting is not None or not evaluation.ok:
-            off = off[~self._slack[:, : off.shape[1]] & (evaluation.status == 0)[:, None]]
+        if self._counting is not None or poses is not None or not evaluation.ok:
+            some = evaluation.status == 0 if poses is None else poses & (evaluation.status == 0)
+            off = off[~self._slack[:, : off.shape[1]] & some[:, None]]
         return rms(off)
 
     def worst_closures(self, evaluation: Evaluation) -> FloatArray:

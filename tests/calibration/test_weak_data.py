@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import replace
 from typing import Any
@@ -86,6 +87,23 @@ def test_a_row_far_off_is_still_found_among_few() -> None:
     verdict = fitted(robot, replace(measured, values=values), SIX).verdict
     assert verdict.state == "not calibrated"
     assert verdict.reasons[0].startswith("1 row disagrees with the rest: row 7;")
+
+
+def test_a_length_far_off_among_belts_is_said_with_the_misfit_of_the_closures() -> None:
+    robot = pk.load("examples/belts/robot.toml")
+    log = pk.read_measurements("examples/belts/belts.csv", robot)
+    good = pk.identify(robot, log)
+    actuators = log.actuators.copy()
+    actuators[7, 2] += 30.0
+    with pytest.warns(pk.CalibrationWarning):
+        found = pk.identify(robot, replace(log, actuators=actuators))
+    said = re.search(
+        r"line 9; a robust fit leaves ([\d.]+) mm in the others, this one ([\d.]+) mm in all",
+        found.verdict.reasons[0],
+    )
+    assert said is not None
+    assert float(said[1]) == pytest.approx(good.closure_rms, rel=0.2)
+    assert float(said[2]) == pytest.approx(found.closure_rms, rel=5e-3)
 
 
 # --- rows held out -------------------------------------------------------------------------------
