@@ -137,8 +137,8 @@ EXCHANGED = ("--rename", "strut3=q4", "--rename", "strut4=q3")
 
 def test_exchanged_struts_are_named(run: Any, command: list[Any], hexapod: Path) -> None:
     result = run(*command, "--controller", hexapod / "log.csv")
-    assert result.exit_code == 2
-    assert "if q3 and q4 are exchanged" in result.stderr
+    assert result.exit_code in (1, 2)  # a search that ends nowhere near, or none that can begin
+    assert "if q3 and q4 are exchanged" in " ".join(result.output.split())
 
 
 @pytest.mark.parametrize(
