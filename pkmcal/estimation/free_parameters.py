@@ -213,8 +213,8 @@ def _travel(robot: Calibratable, measured: Measurements) -> float:
 
 def _pull(robot: Calibratable, measured: Measurements) -> float:
     """Largest force that is known, N: of tensions, and of a load that they balance."""
-    load = robot.model.load if isinstance(robot, Robot) else None
-    forces = [1.0, *load.force] if load is not None and load.balance else [1.0]
+    load = robot.model.balanced_load if isinstance(robot, Robot) else None
+    forces = [1.0] if load is None else [1.0, *load.force]
     if measured.tension is not None:
         forces.append(float(np.nanmax(np.abs(measured.tension), initial=0.0)))
     return float(np.abs(forces).max())

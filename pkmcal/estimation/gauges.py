@@ -17,6 +17,7 @@ from pkmcal.core.library import AXES, SLOTS
 from pkmcal.estimation.chain_gauges import frame_motions
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.geometry.load import AT, CELL, FORCE
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
 
@@ -98,8 +99,8 @@ def _motions(robot: Robot) -> FloatArray:
     And the scale of forces, where tensions balance a load. Turns are about the mean of the base's
     points, and of the platform's.
     """
-    slots, limbs, load = robot.slots, robot.model.limbs, robot.model.load
-    balanced = load is not None and load.balance
+    slots, limbs = robot.slots, robot.model.limbs
+    balanced = robot.model.balanced_load is not None
     change = np.zeros((*slots.shape, _MOTIONS))
     over = range(len(SLOTS), robot.model.own_width, 3)
     of_base = [0, *over]  # the first of the three numbers of each point
@@ -169,8 +170,8 @@ def _of_load(parameters: Parameters) -> dict[int, FloatArray]:
     """How numbers of a load that tensions balance follow the motions, by parameter."""
     robot = parameters.robot
     assert isinstance(robot, Robot)
-    load, middle = robot.model.load, robot.slots[:, 3:6].mean(axis=0)
-    if load is None or not load.balance:
+    load, middle = robot.model.balanced_load, robot.slots[:, 3:6].mean(axis=0)
+    if load is None:
         return {}
     frames = [robot.model.base_frame, robot.model.tool_frame]
     base, tool = (np.eye(4) if frame is None else from_pose(frame) for frame in frames)
@@ -183,11 +184,11 @@ def _of_load(parameters: Parameters) -> dict[int, FloatArray]:
     _move(moved, np.concatenate([np.zeros(3), at]), 3, _PLATFORM, middle)
     moved[3:, _SCALE] = at
     for k, axis in enumerate("xyz"):
-        by[f"load.force.{axis}"][3:6] = turned[k]
-        by[f"load.force.{axis}"][_FORCES] = load.force[k]
-        by[f"load.at.{axis}"][:] = tool[:3, k] @ moved[3:]
+        by[f"{FORCE}.{axis}"][3:6] = turned[k]
+        by[f"{FORCE}.{axis}"][_FORCES] = load.force[k]
+        by[f"{AT}.{axis}"][:] = tool[:3, k] @ moved[3:]
     for j, gain in enumerate(load.cells):
-        by[f"load.cell{j + 1}"][_FORCES] = -gain
+        by[f"{CELL}{j + 1}"][_FORCES] = -gain
     return {k: by[own] for k, own in enumerate(parameters.names) if own in by}
 
 

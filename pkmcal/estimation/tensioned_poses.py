@@ -19,7 +19,7 @@ from pkmcal.estimation.closures import FreePoses, machine_of, one_mm
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.load import Load
+from pkmcal.geometry.load import CELL, Load
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.equilibrium import Equilibrium, balance, equilibrium
 from pkmcal.kinematics.robot import Robot
@@ -69,16 +69,15 @@ class TensionedPoses(FreePoses):
             )
         super().__init__(robot, read, sigma)
         count = read.shape[1]
-        load = robot.model.load
-        self._balanced = load is not None and load.balance
+        load = robot.model.balanced_load
         self.unread = np.zeros((len(read), self.equations + count), dtype=bool)
         self.unread[:, self.equations :] = np.isnan(cells.read)
         self._cells = np.nan_to_num(cells.read)
         self._last: tuple[object, RowStates, tuple[FloatArray, FloatArray]] | None = None
         self._first = filled_tension(cells.read)
-        force = 0.0 if load is None or not self._balanced else float(np.linalg.norm(load.force))
+        force = 0.0 if load is None else float(np.linalg.norm(load.force))
         largest = max(force, float(np.abs(self._first).max(initial=0.0)), 1.0)
-        balanced = robot.machine.m if self._balanced else 0
+        balanced = 0 if load is None else robot.machine.m
         closures = self._read.shape[1]
         self._read = _beside(self._read, np.eye(balanced + count)[balanced:])
         self._held = np.vstack([
@@ -118,7 +117,7 @@ class TensionedPoses(FreePoses):
         c, m = tension.shape[1], by_pose.shape[2]
         parts = [np.concatenate([by_pose, by_tension[:, :, None] * self._drives], axis=2)]
         missed = [off]
-        if self._balanced:
+        if load is not None:
             left = self._left(machine, states, load, np.empty(0, dtype=np.intp))
             missed.append(left.off)
             by_cables = left.by_tension @ self._drives
@@ -132,12 +131,12 @@ class TensionedPoses(FreePoses):
     ) -> FloatArray:
         machine, load, tension = self._at(robot, states)
         parts = [pose_steps.readings_by_numbers(machine, states.pose, self.read, places)]
-        if self._balanced:
+        if load is not None:
             parts.append(self._left(machine, states, load, places).by_number)
         of_cells = np.zeros((*tension.shape, len(places)))
         names = [machine.geometry.names[place] for place in places]
         for j in range(tension.shape[1]):
-            if (name := f"load.cell{j + 1}") in names:
+            if (name := f"{CELL}{j + 1}") in names:
                 of_cells[:, j, names.index(name)] = tension[:, j]
         return np.concatenate([*parts, of_cells], axis=1)
 
@@ -154,12 +153,12 @@ class TensionedPoses(FreePoses):
         machine, tension = machine_of(robot), np.asarray(states.tension)
         known = np.isfinite(tension).all(axis=1)
         pulled = tension if known.all() else np.where(known[:, None], tension, 0.0)
-        return machine.tensioned(pulled), machine.model.load, pulled
+        return machine.tensioned(pulled), machine.model.balanced_load, pulled
 
     def _kept(self, robot: Calibratable, states: RowStates) -> RowStates:
         """Tensions go back to balance by themselves: they are as many as coordinates, or more."""
-        load, tension = machine_of(robot).model.load, np.asarray(states.tension)
-        if self._balanced and load is not None:
+        load, tension = machine_of(robot).model.balanced_load, np.asarray(states.tension)
+        if load is not None:
             slopes, pull = balance(machine_of(robot), states.pose, load)
             slopes = slopes @ self._drives
             known = np.asarray(np.isfinite(slopes).all(axis=(1, 2)))
@@ -170,12 +169,9 @@ class TensionedPoses(FreePoses):
         return self._said(replace(states, tension=tension), states.pose)
 
     def _gains(self, load: Load | None) -> FloatArray:
-        return np.array(load.cells) if load is not None and load.cells else np.ones(self.cells)
+        return np.ones(self.cells) if load is None else np.array(load.cells)
 
-    def _left(
-        self, machine: Robot, states: RowStates, load: Load | None, places: IntArray
-    ) -> Equilibrium:
-        assert load is not None
+    def _left(self, machine: Robot, states: RowStates, load: Load, places: IntArray) -> Equilibrium:
         pulled = np.asarray(states.tension) @ self._drives.T
         return equilibrium(machine, states.pose, pulled, load, places)
 
@@ -216,8 +212,7 @@ def unknown_tensions(robot: Calibratable, sets: Sequence[Measurements]) -> bool:
         Of this machine they cannot be; or tensions that were read in part.
     """
     stated = [measured.tension_sigma is not None for measured in sets]
-    load = robot.model.load if isinstance(robot, Robot) else None
-    balanced = load is not None and load.balance
+    balanced = isinstance(robot, Robot) and robot.model.balanced_load is not None
     if not balanced and not any(stated):
         if any(m.tension is not None and np.isnan(m.tension).any() for m in sets):
             raise ArgumentError(
@@ -258,8 +253,7 @@ def check_cells(robot: Calibratable, cells: Cells, rows: IntArray) -> None:
     `rows` (K,) are the numbers of the first row at each pose.
     """
     c, machine = cells.read.shape[1], machine_of(robot)
-    load = machine.model.load
-    balanced = load is not None and load.balance
+    balanced = machine.model.balanced_load is not None
     needed = max(c - machine.machine.m, 0) if balanced else c
     few = np.flatnonzero(np.isfinite(cells.read).sum(axis=1) < needed)
     if len(few):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pkmcal.arrays import Unit
 from pkmcal.files.toml_table import Table, shown
 
-_FORCE, _AT, _CELL = "load.force", "load.at", "load.cell"
+FORCE, AT, CELL = "load.force", "load.at", "load.cell"  # begin names of its numbers
 
 Vector = tuple[float, float, float]
 
@@ -47,9 +47,9 @@ class Load:
             return {}
         cells = range(1, len(self.cells) + 1)
         return {
-            **{f"{_FORCE}.{axis}": "N" for axis in "xyz"},
-            **{f"{_AT}.{axis}": "mm" for axis in "xyz"},
-            **{f"{_CELL}{i}": "1" for i in cells},
+            **{f"{FORCE}.{axis}": "N" for axis in "xyz"},
+            **{f"{AT}.{axis}": "mm" for axis in "xyz"},
+            **{f"{CELL}{i}": "1" for i in cells},
         }
 
     @property

@@ -184,6 +184,11 @@ class Model:
         return other
 
     @property
+    def balanced_load(self) -> Load | None:
+        """The load that tensions of a calibration's rows balance; None: they need not."""
+        return self.load if self.load is not None and self.load.balance else None
+
+    @property
     def n_actuators(self) -> int:
         """Number of actuators."""
         if self.chains is not None:

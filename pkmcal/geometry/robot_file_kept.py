@@ -21,7 +21,7 @@ from pkmcal.geometry import robot_file
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.geometry.laws import LawNumber
 from pkmcal.geometry.limb_kinds import KINDS
-from pkmcal.geometry.load import is_of_load
+from pkmcal.geometry.load import AT, CELL, FORCE, is_of_load
 from pkmcal.geometry.model import Limb, Model
 from pkmcal.geometry.ties import LimbNumber
 
@@ -94,7 +94,7 @@ class _Edit:
     def load(self, table: Any) -> None:
         """The load, where its numbers are some of the geometry."""
         names = [name for name in self._new.parameters if is_of_load(name)]
-        for key, lead in (("force", "load.force."), ("at", "load.at."), ("cells", "load.cell")):
+        for key, lead in (("force", FORCE), ("at", AT), ("cells", CELL)):
             mine = [name for name in names if name.startswith(lead)]
             if not any(map(self._concerns, mine)):
                 continue

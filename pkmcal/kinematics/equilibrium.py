@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arrays import FloatArray, IntArray, mm_per_unit
 from pkmcal.core import instruments
-from pkmcal.core.library import COORDINATE_UNITS
-from pkmcal.geometry.load import Load, is_of_load
+from pkmcal.geometry.load import AT, FORCE, Load
+from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
 from pkmcal.screw import from_pose
 
@@ -55,11 +55,8 @@ def equilibrium(
 
     `places` (p,) are those of numbers in ``robot.geometry.names``.
     """
-    machine, geometry = robot.limb_machine, robot.geometry
-    chain = geometry.chain[:, places]
-    moving = np.flatnonzero(chain.any(axis=1))
-    columns = geometry.slot_index[moving].astype(np.int32)
-    arcs = _arcs(robot)
+    machine, arcs = robot.limb_machine, _arcs(robot)
+    columns, chain = robot.geometry.driven(places)
     own, m = np.ascontiguousarray(robot.frames.inward(pose)), len(arcs)
     h = _STEP * float(machine.struct.size)
     steps = np.concatenate([*(k * np.eye(m) for k in _PLACES), np.zeros((1, m))]) * (h / arcs)
@@ -71,10 +68,12 @@ def equilibrium(
     across = _derivative(pulled, m, h) * arcs[:, None, None]
     mixed = by_own.reshape(len(steps), *tension.shape, len(columns))
     mixed = np.einsum("sncp,nc->snp", _derivative(mixed, m, h), tension)
-    by_number = mixed.transpose(1, 0, 2) @ chain[moving]
+    by_number = mixed.transpose(1, 0, 2)
+    if chain is not None:
+        by_number = by_number @ chain
     of_load = _by_load(robot, own, load)
     for k, place in enumerate(places.tolist()):
-        if is_of_load(name := geometry.names[place]) and name in of_load:
+        if (name := robot.geometry.names[place]) in of_load:
             by_number[:, :, k] = -of_load[name]
     return Equilibrium(
         pulled[-1], across.transpose(1, 2, 0), slopes[-1].transpose(0, 2, 1), by_number
@@ -90,7 +89,7 @@ def balance(robot: Robot, pose: FloatArray, load: Load) -> tuple[FloatArray, Flo
 
 def _arcs(robot: Robot) -> FloatArray:
     """Factors (m,) to mm of the map's steps."""
-    return mm_per_unit([COORDINATE_UNITS[name] for name in robot.coordinates], robot.length)
+    return mm_per_unit(pose_steps.step_units(robot), robot.length)
 
 
 def _derivative(there: FloatArray, m: int, h: float) -> FloatArray:
@@ -126,7 +125,7 @@ def _by_load(robot: Robot, own: FloatArray, load: Load) -> dict[str, FloatArray]
     here = pulls_of_load(robot, own, load.force, load.at)
     found = {}
     for axis, unit in zip("xyz", np.eye(3), strict=True):
-        found[f"load.force.{axis}"] = pulls_of_load(robot, own, unit, load.at)
+        found[f"{FORCE}.{axis}"] = pulls_of_load(robot, own, unit, load.at)
         there = pulls_of_load(robot, own, load.force, np.add(load.at, unit))
-        found[f"load.at.{axis}"] = there - here
+        found[f"{AT}.{axis}"] = there - here
     return found

@@ -42,8 +42,7 @@ def planned(
     actuator_noise: ArrayLike | None,
 ) -> Measurements:
     """What would be measured, the rows of a pose one after another; `several` are targets."""
-    load = robot.model.load if isinstance(robot, Robot) else None
-    if load is not None and load.balance:
+    if isinstance(robot, Robot) and robot.model.balanced_load is not None:
         raise ArgumentError(
             f"robot: plans know no load cells, and tensions of {robot.name} are to balance its load"
             " ([load] balance)"
