@@ -319,10 +319,10 @@ def _warnings(
         names = [f"of measurements {i + 1}" for i in range(len(equations.sets))]
         names += ["of the load cells"] if equations.closures.cells else []
         names = [n for n, u in zip([*names, "of the actuators"], unknown, strict=True) if u]
-        beside = ", actuator_sigma and tension_sigma" if equations.closures.cells else ""
+        cells = equations.closures.cells
+        sigmas = "sigma, actuator_sigma and tension_sigma" if cells else "sigma and actuator_sigma"
         notes.append(
-            f"too little is left over to estimate the noise {' and '.join(names)}: state"
-            f" sigma{beside or ' and actuator_sigma'}"
+            f"too little is left over to estimate the noise {' and '.join(names)}: state {sigmas}"
         )
     kept = estimate.state.determined.rank - estimate.state.fitted.rank
     if kept:
@@ -371,10 +371,9 @@ def _result(
 ) -> Identification:
     chosen, search = estimator.equations.parameters, estimator.search
     end = estimate.evaluation
-    if commanded is not estimator.equations:
-        commanded = commanded.under(end.tension)
     robots = _robots(commanded, end)
     if commanded is not estimator.equations:
+        commanded = commanded.under(end.tension)
         commanded.warm_start(end)
         end = commanded.at(end.theta)
     return Identification(

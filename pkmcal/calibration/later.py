@@ -100,14 +100,10 @@ def noise_factors(rows: Later, equations: Equations, sure: Uncertainty) -> Float
         else:
             stated = data.measured.sigma is not None
             factors.append(1.0 if stated else float(np.sqrt(sure.noises[i].total)))
-    if len(equations.unstated) > len(rows.data):  # the actuators: stated or estimated alike
-        of_fit = sure.factors[len(sure.equations.sets) :]
-        alike = len(of_fit) == len(equations.unstated) - len(rows.data)
-        factors += [
-            float(of_fit[j - len(rows.data)]) if unstated and alike else 1.0
-            for j, unstated in enumerate(equations.unstated) if j >= len(rows.data)
-        ]  # fmt: skip
-    return np.array(factors)
+    unstated = equations.unstated[len(rows.data) :]  # load cells and actuators
+    of_fit = sure.factors[len(sure.equations.sets) :]
+    alike = len(of_fit) == len(unstated)
+    return np.concatenate([factors, np.where(unstated, of_fit if alike else 1.0, 1.0)])
 
 
 @dataclass(frozen=True, eq=False)
