@@ -68,8 +68,8 @@ test-linuxcnc: $(TESTS)
 		apt-get install -qq -y --no-install-recommends linuxcnc-uspace linuxcnc-uspace-dev; }
 	LINUXCNC=1 $(BIN)/pytest tests/controllers/test_linuxcnc.py
 
-test-avx512:
-	sh tests/fuzz/avx512.sh
+test-avx512: $(TESTS)
+	FLAGS="$$($(BIN)/python -c 'import csrc.build; print(*csrc.build.flags())')" sh tests/fuzz/avx512.sh
 
 # The wheel, not this folder, with libraries as old as may be; of its own Python if LOWEST_PYTHON names
 # one. What is deprecated there is not an error, nor what old libraries say of each other.

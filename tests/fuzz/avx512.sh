@@ -14,7 +14,7 @@ kernel=$(apt-cache depends linux-image-cloud-amd64 | sed -n 's/.*Depends: //p' |
 (cd $folder/kernel && apt-get download -qq -o APT::Sandbox::User=root "$kernel" && dpkg -x ./*.deb .)
 cp $folder/kernel/boot/vmlinuz-* $folder/disc/vmlinuz
 
-flags="-std=c11 -O3 -fno-math-errno -fno-trapping-math -ffp-contract=off -fcx-limited-range -w -Icsrc -Igenerated"
+flags="${FLAGS:?those of the build: make test-avx512} -w -Icsrc -Igenerated"
 for each in csrc/abi csrc/paths csrc/core_base csrc/core_v3 csrc/core_v4; do
     gcc $flags -fno-tree-loop-vectorize -c $each.c -o $folder/"$(basename $each)".o
 done
