@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -135,6 +135,18 @@ def furthest_axis(direction: FloatArray) -> int:
     """
     along = np.abs(direction)
     return first_largest(-along, _ALIKE * float(along.max()))
+
+
+def lots(count: int, most: int = 16384) -> Iterator[slice]:
+    """Slices of so many rows, one after another, to bound the memory of what is made of them.
+
+    Examples
+    --------
+    >>> list(lots(5, 3))
+    [slice(0, 3, None), slice(3, 6, None)]
+    """
+    for first in range(0, count, most):
+        yield slice(first, first + most)
 
 
 def rms(values: FloatArray) -> float:

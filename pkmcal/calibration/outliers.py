@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, first_largest
+from pkmcal.arrays import FloatArray, IntArray, first_largest, lots
 from pkmcal.statistics.robust_scale import median_ratio
 
 _FALSE_ALARM = 0.01  # chance of naming any row at all where the noise is as stated
@@ -48,9 +48,9 @@ def outliers(
     """
     rows = len(components)
     alike = [
-        mine[start : start + _TOGETHER]
+        mine[lot]
         for mine in (np.flatnonzero(components == k) for k in np.unique(components))
-        for start in range(0, len(mine), _TOGETHER)
+        for lot in lots(len(mine), _TOGETHER)
     ]
     first = np.cumsum(components) - components
     weight = np.repeat(weights, components)

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
 from pkmcal.core.elimination import Fit, PoseEquations
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines, SessionClosures
@@ -140,8 +140,8 @@ class Blocks:
         first, u = np.cumsum(self._count) - self._count, self.unknowns
         for left in np.unique(self.components).tolist():
             units = np.flatnonzero(self.components == left)
-            for start in range(0, len(units), _TOGETHER):
-                some = units[start : start + _TOGETHER]
+            for lot in lots(len(units), _TOGETHER):
+                some = units[lot]
                 mine, count = self.pose_of_unit[some], len(some)
                 equations = self._order[first[mine, None] + np.arange(left + u)]
                 poses = PoseEquations(equations.ravel(), np.full(count, left + u), u)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots, mm_per_unit
 from pkmcal.estimation import joint_angles
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
@@ -355,8 +355,7 @@ class Readings:
             if not self._whole:
                 np.nan_to_num(part, copy=False, nan=0.0)
             if white.ndim == 3:
-                for first in range(0, len(part), _TOGETHER):
-                    rows = slice(first, first + _TOGETHER)
+                for rows in lots(len(part), _TOGETHER):
                     part[rows] = np.einsum("nij,nj...->ni...", white[rows], part[rows])
             else:
                 part *= white.reshape(*white.shape, *(1,) * (part.ndim - 2))

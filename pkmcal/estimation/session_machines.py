@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, lots
 from pkmcal.estimation.closures import Closures, Commanded, closures_of
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import spread
@@ -196,7 +196,7 @@ class SessionClosures:
 
 
 def _lots(rows: IntArray) -> list[IntArray]:
-    return [rows[first : first + _TOGETHER] for first in range(0, len(rows) or 1, _TOGETHER)]
+    return [rows[lot] for lot in lots(len(rows) or 1, _TOGETHER)]
 
 
 def _driven(robot: Calibratable, state: DriveState) -> Calibratable:

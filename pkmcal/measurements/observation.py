@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray, mm_per_unit, wrapped
+from pkmcal.arrays import FloatArray, IntArray, lots, mm_per_unit, wrapped
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose
 from pkmcal.measurements import orientation
@@ -17,7 +17,6 @@ _ORIGIN = np.zeros(3)
 _NOWHERE = np.zeros(6)
 _ZERO = np.zeros(1)
 _UP = np.array([0.0, 0.0, 1.0])
-_TOGETHER = 16384  # rows whose derivatives are multiplied at once
 
 
 @dataclass(frozen=True)
@@ -327,8 +326,7 @@ def by_difference(kind: Kind, derivative: FloatArray, residual: FloatArray) -> F
     """How `difference` shrinks, (N, k, n), in the place of a derivative of `Predicted`."""
     first = KINDS[kind].turning
     if first is not None:
-        for start in range(0, len(residual), _TOGETHER):
-            rows = slice(start, start + _TOGETHER)
+        for rows in lots(len(residual)):
             by_turning = orientation.by_turning(residual[rows, first:])
             derivative[rows, first:] = by_turning @ derivative[rows, first:]
     return derivative

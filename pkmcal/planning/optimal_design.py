@@ -16,7 +16,7 @@ from typing import Literal
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, first_largest
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, first_largest, lots
 from pkmcal.estimation.identifiability import decompose
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics.linear_fit import ROUNDING
@@ -299,11 +299,9 @@ class Design:
         sizes, axes = np.linalg.eigh(0.5 * (square + square.T))
         root = (axes * np.sqrt(np.maximum(sizes, 0.0))).astype(np.float32)
         k, found = self._blocks.shape[1], np.empty(len(self._all))
-        for at in range(0, len(found), _TOGETHER):
-            through = self._coarse[at * k : (at + _TOGETHER) * k] @ root
-            found[at : at + _TOGETHER] = (
-                np.einsum("ij,ij->i", through, through).reshape(-1, k).sum(1)
-            )
+        for some in lots(len(found), _TOGETHER):
+            through = self._coarse[some.start * k : some.stop * k] @ root
+            found[some] = np.einsum("ij,ij->i", through, through).reshape(-1, k).sum(1)
         rounding = len(root) * np.finfo(np.float32).eps * float(np.linalg.norm(root))
         traces: FloatArray = (np.sqrt(found) + 2.0 * rounding * self._lengths) ** 2
         return k * np.log1p(traces / k) if self._determinant else traces
@@ -321,8 +319,9 @@ class Design:
     ) -> FloatArray:
         """By how much the criterion changes if a block is added to the chosen ones, or removed."""
         covariance = np.asarray(np.linalg.inv(self._information(chosen) + ridge), np.float64)
-        parts = range(0, len(blocks), _TOGETHER)
-        found = [self._change(blocks[at : at + _TOGETHER], covariance, sign) for at in parts]
+        found = [
+            self._change(blocks[some], covariance, sign) for some in lots(len(blocks), _TOGETHER)
+        ]
         return np.concatenate(found)
 
     def _change(self, blocks: FloatArray, covariance: FloatArray, sign: float) -> FloatArray:

@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, lots
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.linear_fit import orthonormal, sums, triangle
 
@@ -26,7 +26,6 @@ WAVES = 3  # of each component
 LEAST = 5  # degrees of freedom beside them: below, nothing but a large jump would show
 _NEW = 0.05  # share of a course that must be left beside the parameters
 _BOTH = 2  # visits on either side of a jump, at least
-_TOGETHER = 16384  # equations whose courses are there at once, to bound memory
 _VISITS = 1024  # visits of which jumps are looked for at once, likewise
 
 
@@ -143,7 +142,7 @@ class Series:
         k = self.by_component.shape[1]
         when = (np.arange(self.visits) + 0.5) / self.visits
         waves = np.cos(np.pi * when[:, None] * np.arange(1, WAVES + 1))
-        lots = [slice(i, i + _TOGETHER) for i in range(0, len(self.visit), _TOGETHER)]
+        count = len(self.visit)
 
         def columns(rows: slice) -> FloatArray:
             courses = self._own[rows, :, None] * waves[self.visit[rows]][:, None]
@@ -151,14 +150,14 @@ class Series:
 
         squares, pulls = np.zeros((2, k * WAVES))
         inner = np.zeros((len(self._factor), k * WAVES))
-        for rows in lots:
+        for rows in lots(count):
             some = columns(rows)
             squares += np.einsum("ij,ij->j", some, some)
             pulls += some.T @ self._left[rows]
             inner += np.concatenate([self.design[rows].T @ some, self._own[rows].T @ some])
         known = self._factor @ (self._factor.T @ inner)
         factor = np.zeros((0, k * WAVES))
-        for rows in lots:
+        for rows in lots(count):
             factor = triangle(factor, columns(rows) - self._both(known, rows))
         _, sizes, back = np.linalg.svd(factor, full_matrices=False)
         new = sizes > _NEW * float(squares.max()) ** 0.5

@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, lots
 
 _LIMIT = 2.385  # of the Cauchy loss: 95 % as efficient as least squares for Gaussian noise
 _ROUNDS, _SETTLED = 60, 1e-4
 _LEAST_FREEDOM = 5  # below, some rows are always met
 _DRAWS = 100
 _RIDGE = 1e-12  # of a normal matrix that is 1 where all rows have full weight
-_TOGETHER = 16384  # equations that are weighted at once, to bound memory
 _ENOUGH = 100.0  # rows' worth of spare equations from which chance no longer moves a ratio much
 _MET = 1e-6  # share of the first scale below which half of the rows are met exactly
 
@@ -63,8 +62,7 @@ def robust_ratio(design: FloatArray, residual: FloatArray, components: IntArray)
         weights = np.repeat(1.0 / (1.0 + squares / (scale * _LIMIT) ** 2 / components), components)
         # the ridge is for directions that rows without weight alone determined
         normal, pull = _RIDGE * np.eye(p), np.zeros(p)
-        for at in range(0, m, _TOGETHER):
-            rows = slice(at, at + _TOGETHER)
+        for rows in lots(m):
             weighted = design[rows] * weights[rows, None]
             normal += weighted.T @ design[rows]
             pull += weighted.T @ residual[rows]

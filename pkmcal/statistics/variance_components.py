@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.arrays import FloatArray, IntArray, lots
 from pkmcal.statistics.distributions import chi2_tail
 from pkmcal.statistics.linear_fit import LinearFit
 
@@ -27,7 +27,6 @@ _NO_SLOPE = 0.3  # of a score test, above which the likelihoods of both are too 
 _ROUNDS, _SETTLED, _STEP, _HALVINGS = 50, 1e-6, 1.0, 12  # of the logarithms of the variances
 _SPENT = 1e-6  # share of the equations of a class that must be left
 _TINY = 1e-18  # of the mean variance: a class that the fit meets exactly
-_TOGETHER = 16384  # equations that are looked at at once, to bound memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,8 +125,7 @@ class _Model:
         self.count = np.bincount(classes).astype(np.float64)
         p = fit.design.shape[1]
         self._inner, self._pulls = np.zeros((len(self.count), p, p)), np.zeros((len(self.count), p))
-        for first in range(0, len(classes), _TOGETHER):
-            some = slice(first, first + _TOGETHER)
+        for some in lots(len(classes)):
             design, residual, of = fit.design[some], fit.residual[some], classes[some]
             for c in range(len(self.count)):
                 part = design[of == c]
