@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import f as f_distribution
+from scipy.stats import t as t_distribution
 
 import pkmcal as pk
 
@@ -179,6 +180,20 @@ def test_of_deviations_by_the_spread_of_poses_the_test_is_hotellings() -> None:
     squares = values @ np.linalg.solve(covariance, values)
     assert test.ratio == pytest.approx(squares / count * rest / nu, rel=1e-6)
     assert test.chance == pytest.approx(f_distribution.sf(test.ratio, count, rest), rel=1e-9)
+
+
+def test_of_numbers_known_unlike_well_the_test_has_the_least_degrees_of_freedom() -> None:
+    """Of variances that were estimated apart: F and the widest of the numbers' own t agree."""
+    robot, true, free = machines("quadratic")
+    instrument = pk.VirtualMachine(true, noise=SIGMA, angle_noise=SIGMA / 20.0, seed=5)
+    measured = replace(instrument.measure(rows(true, 20), kind="pose"), sigma=None)
+    found = pk.identify(robot, measured, free=free, covariance="classical")
+    (test,) = found.law_tests
+    columns = [found.free.index(name) for name in test.names]
+    factor = np.ptp(found.interval95[columns], axis=1) / 2 / found.stderr[columns]
+    assert np.ptp(factor) > 1e-3
+    assert t_distribution.ppf(0.975, test.freedom[1]) == pytest.approx(factor.max(), rel=1e-6)
+    assert test.chance == pytest.approx(f_distribution.sf(test.ratio, *test.freedom), rel=1e-9)
 
 
 def test_of_numbers_with_a_prior_nothing_is_said() -> None:
