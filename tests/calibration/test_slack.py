@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.stats import norm
 
 import pkmcal as pk
 
@@ -153,6 +154,38 @@ def test_taut_machines_have_no_slack_cables(eight: pk.Robot) -> None:
     assert false <= 2
 
 
+@pytest.mark.parametrize(("row", "cable"), [(4, 0), (9, 5)])
+def test_a_cable_is_slack_from_where_one_of_100_taut_machines_has_one(
+    eight: pk.Robot, row: int, cable: int
+) -> None:
+    """Of readings without noise: what the place does not take up, over sigma, against a quantile.
+
+    Lengths change with the place along the cables; the anchor that is free has 30 rows.
+    """
+    at = np.random.default_rng(3).uniform([-1200, -900, 300], [1200, 900, 2000], (30, 3))
+    exact = np.linalg.norm(at[:, None] - CORNERS, axis=2)
+    along = (at[row] - CORNERS) / exact[row, :, None]
+    left = 1.0 - along[cable] @ np.linalg.solve(along.T @ along, along[cable])
+    for share in (0.95, 1.05):
+        q = exact.copy()
+        q[row, cable] += share * norm.isf(0.01 / q.size) * NOISE / np.sqrt(left)
+        log = pk.Measurements(q, None, "closure", actuator_sigma=NOISE)
+        found = pk.identify(eight, log, ["base8.x"], slack="drop")
+        assert cells(found) == ({(row, cable)} if share > 1.0 else set())
+
+
+@pytest.mark.filterwarnings("ignore:residuals are")
+def test_what_residuals_show_of_the_noise_says_from_where_on_cables_are_slack(
+    eight: pk.Robot,
+) -> None:
+    """Taut cables with five times the noise that is stated, and slack ones where it is right."""
+    _, q, _ = drawn(CORNERS, 310, 30, 0.0)
+    assert len(fitted(eight, q, "drop", NOISE / 5.0).slack) <= 1
+    _, q, slack = drawn(CORNERS, 311, 30, 0.2)
+    as_stated, wider = (fitted(eight, q, "drop", sigma) for sigma in (NOISE, NOISE / 5.0))
+    assert cells(as_stated) == cells(wider) == set(zip(*np.nonzero(slack), strict=True))
+
+
 @pytest.mark.filterwarnings("ignore:residuals are")
 def test_a_reading_that_is_too_short_is_no_slack_cable(eight: pk.Robot) -> None:
     _, q, _ = drawn(CORNERS, 4, 30, 0.0)
@@ -197,7 +230,11 @@ def test_with_one_cable_more_than_needed_it_cannot_be_told_which(tmp_path: Path)
     assert " or q" in str(cable)
 
 
-def test_the_slack_cable_is_among_those_named_where_others_would_do_as_well() -> None:
+@pytest.mark.filterwarnings("ignore:residuals are")
+@pytest.mark.parametrize("smaller", [1.0, 10.0])  # than the noise is the sigma that is stated
+def test_the_slack_cable_is_among_those_named_where_others_would_do_as_well(
+    smaller: float,
+) -> None:
     """Two cables more than needed: at some poses two pull nearly alike, and noise hides which."""
     robot = pk.load(Path(__file__).parents[2] / "examples" / "cable-robot" / "robot.toml")
     gain = np.array([robot.geometry[f"gain{i}"] for i in range(1, 9)])
@@ -211,7 +248,8 @@ def test_the_slack_cable_is_among_those_named_where_others_would_do_as_well() ->
         loose = dict(zip(rows.tolist(), cables.tolist(), strict=True))
         for row, cable in loose.items():
             q[row, cable] += rng.uniform(5, 60) / gain[cable]
-        log = pk.Measurements(q, None, "closure", actuator_sigma=0.2 / np.abs(gain))
+        sigma = 0.2 / smaller / np.abs(gain)
+        log = pk.Measurements(q, None, "closure", actuator_sigma=sigma)
         found = pk.identify(robot, log, "offset*", slack="drop")
         named = {row: each.actuators for each in found.slack for row in each.rows}
         assert named.keys() == loose.keys()
