@@ -66,6 +66,15 @@ def test_its_displacement_is_found_where_nothing_else_takes_it_up(hexapod: pk.Ro
     assert max(test.stderr) < NOISE
 
 
+@pytest.mark.parametrize(("chance", "share"), [(0.5, 0.9), (1e-9, 0.1), (0.5, 0.1), (1e-9, 0.9)])
+def test_a_displacement_is_large_where_it_is_sure_and_most_of_what_is_left(
+    chance: float, share: float
+) -> None:
+    test = DisplacedTarget("west", (0.3, 0.0, 0.0), (0.01, 0.01, 0.01), chance, share, ())
+    assert test.found == (chance < 0.01)
+    assert test.large == (chance < 0.01 and share > 0.5)
+
+
 @pytest.mark.parametrize("shared", [0.0, 3.0])
 def test_of_sound_calibrations_hardly_any_is_said_to_have_one(
     hexapod: pk.Robot, shared: float

@@ -131,6 +131,21 @@ def test_repeats_of_fitted_poses_are_no_proof_elsewhere(hexapod: pk.Robot) -> No
     assert not any("fitted as well" in text for text in drawn.verdict.remarks)
 
 
+def test_a_reading_of_minus_zero_is_a_reading_of_zero(hexapod: pk.Robot) -> None:
+    """One repeat of a pose at -0.0 mm, the other at 0.0: it is the same pose."""
+    poses = hexapod_poses(hexapod, 12, np.random.default_rng(7))
+    robot = hexapod.replace({"offset1": float(hexapod.inverse(poses[:1])[0, 0])})
+    q = robot.inverse(poses)
+    assert abs(q[0, 0]) < 1e-9
+    q[0, 0] = 0.0
+    seen = robot.forward(q).pose[:, :3] + np.random.default_rng(8).normal(0, 0.02, (12, 3))
+    again = q[:1].copy()
+    again[0, 0] = -0.0
+    held = Measurements(again, seen[:1] + 0.01, "position")
+    found = fitted(robot, Measurements(q, seen, "position"), holdout=held)
+    assert found.verdict.remarks[-1].startswith("1 of the held-out points are at poses that were")
+
+
 @pytest.mark.parametrize("spare", [1, 2, 4])
 def test_how_far_off_points_must_be_to_contradict_few_equations(spare: int) -> None:
     robot, whole = heights(18 + spare, 1)
