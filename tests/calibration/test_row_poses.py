@@ -422,6 +422,22 @@ def test_points_held_out_are_missed_as_expected(cables: pk.Robot) -> None:
     assert np.mean(off) == pytest.approx(np.mean(expected), rel=0.1)
 
 
+@pytest.mark.parametrize("repeats", [1, 6])
+def test_what_actuators_add_to_points_held_out_is_shared_by_repeats(
+    cables: pk.Robot, repeats: int
+) -> None:
+    """An instrument ten times as good as the lengths: 3 errors a pose, read however often."""
+    drawn, rng = simulated(0, 60, "all"), np.random.default_rng(0)
+    places, needed = drawn.elsewhere
+    lengths = np.repeat(needed[:8] + rng.normal(0, NOISE, (8, 4)), repeats, axis=0)
+    seen = np.repeat(places[:8], repeats, axis=0)
+    seen += rng.normal(0, NOISE / 10, seen.shape)
+    held = measured(drawn._replace(lengths=lengths, read=seen), sigma=NOISE / 10)
+    test = pk.identify(cables, measured(drawn), holdout=held).holdout.test
+    assert test is not None
+    assert 0.9 * 24 < test.freedom[0] <= 24
+
+
 def test_spoilt_cables_are_named_row_by_row(cables: pk.Robot) -> None:
     drawn = simulated(4, 60, "all")
     lengths = drawn.lengths.copy()

@@ -221,6 +221,14 @@ def test_readings_beside_the_wrong_rows_are_found(
     assert f"each reading belongs to the row {abs(by)} {where} it" in text
 
 
+def test_readings_that_nothing_makes_fit_have_no_such_cause(hexapod: pk.Robot) -> None:
+    """The machine reaches none of these rows, whichever of them a reading belongs to."""
+    q = 1e5 * (1.0 + np.random.default_rng(0).random((20, 6)))
+    with pytest.raises(ValueError) as said:
+        fitted(hexapod, Measurements(q, np.zeros((20, 3)), "position"), free="offset*")
+    assert "if " not in str(said.value)
+
+
 @pytest.mark.parametrize("holdout", [0.2, 0.5])
 def test_they_are_found_although_rows_are_missing(
     hexapod: pk.Robot, true: pk.Robot, holdout: float
