@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
 from pkmcal.calibration.identify import identify
+from pkmcal.calibration.plausibility import other_readings
 from pkmcal.core import instruments
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -45,6 +46,13 @@ MISREAD: list[tuple[str, Change]] = [
 ]
 
 
+SIGNS: list[tuple[str, Change]] = [
+    ("q2 counts the other way", lambda m: {"actuators": m.actuators * [1, -1, 1, 1]}),
+    ("q4 is in metres", lambda m: {"actuators": m.actuators / [1, 1, 1, 1e3]}),
+    ("x is in micrometres", lambda m: {"values": m.values * [1e3, 1, 1]}),
+]
+
+
 def said(robot: Robot, measured: Measurements, **options: Any) -> list[str]:
     """What `identify` says aloud: its error, or else its warnings."""
     with warnings.catch_warnings(record=True) as heard:
@@ -57,6 +65,16 @@ def said(robot: Robot, measured: Measurements, **options: Any) -> list[str]:
     assert found.warnings == tuple(texts)
     assert all(text[:40] in found.summary() for text in texts)
     return texts
+
+
+@pytest.mark.parametrize(("words", "change"), MISREAD + SIGNS)
+def test_a_reading_of_a_mistakes_name_undoes_it(
+    paper: Robot, points: Measurements, words: str, change: Change
+) -> None:
+    wrong = dataclasses.replace(points, **change(points))
+    undone = dict(other_readings(wrong, paper.actuator_units))[words]
+    np.testing.assert_allclose(undone.actuators, points.actuators, rtol=1e-12)
+    np.testing.assert_allclose(undone.values, points.values, rtol=1e-12)
 
 
 @pytest.mark.parametrize("prior", [None, 0.5])
