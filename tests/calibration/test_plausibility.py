@@ -203,6 +203,26 @@ def test_residuals_far_above_sigma_are_named(paper: Robot, points: Measurements)
     assert "contradict the prior" in second and second.endswith("or leave the outliers out")
 
 
+def test_repeats_decide_whether_sigma_or_numbers_that_are_not_free_are_to_blame(
+    paper: Robot,
+) -> None:
+    rng = np.random.default_rng(5)
+    q = np.repeat(paper.inverse(tilted_poses(paper, 20, rng)), 2, axis=0)
+    wrong = with_errors(paper, 0.5, rng)
+    repeated = VirtualMachine(wrong, 0.05).measure(q)
+    once = repeated.select(slice(0, None, 2))
+    boasted = dataclasses.replace(VirtualMachine(paper, 0.05).measure(q), sigma=0.01)
+    for measured, free_more, state_sigma in (
+        (repeated, True, False),
+        (once, True, True),
+        (boasted, False, True),
+    ):
+        texts = said(paper, measured, free="offset*")
+        (text,) = [text for text in texts if "times what sigma says" in text]
+        assert ("free more parameters" in text) == free_more
+        assert ("state the true sigma" in text) == state_sigma
+
+
 def test_good_measurements_raise_no_suspicion(paper: Robot, points: Measurements) -> None:
     assert said(paper, points, prior=0.5) == []
     large = with_errors(paper, 5.0, np.random.default_rng(3))
