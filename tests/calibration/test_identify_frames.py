@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
@@ -171,3 +172,18 @@ def test_a_target_found_far_from_the_machine_is_named() -> None:
         identify(robot, measured, **free)
     there = dataclasses.replace(measured, target=[3990.0, 0.0, 0.0])
     assert identify(robot, there, **free).warnings == ()
+
+
+def test_a_target_found_far_from_the_machine_in_one_session_is_named_with_it() -> None:
+    robot, rng = pk.load("hexapod"), np.random.default_rng(0)
+    places, sets = {"monday": [30.0, 0.0, 0.0], "friday": [4000.0, 0.0, 0.0]}, []
+    for day, place in places.items():
+        at = robot.home + rng.uniform(-1, 1, (60, 6)) * [100, 100, 80, 0.1, 0.1, 0.1]
+        points = instruments.points(at, np.array(place))[0]
+        sets.append(Measurements(robot.inverse(at), points, sigma=0.1, session=day))
+    options = {"target": "unknown", "per_session": "target*"}
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        identify(robot, sets, "offset*", **options)
+    texts = [str(each.message) for each in heard if "was found" in str(each.message)]
+    assert len(texts) == 1 and texts[0].startswith("target 1 of friday was found 4e+03 mm")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
 from pkmcal.calibration.identify import identify
-from pkmcal.calibration.plausibility import other_readings
+from pkmcal.calibration.plausibility import other_readings, shrunk
 from pkmcal.core import instruments
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -221,6 +222,29 @@ def test_repeats_decide_whether_sigma_or_numbers_that_are_not_free_are_to_blame(
         (text,) = [text for text in texts if "times what sigma says" in text]
         assert ("free more parameters" in text) == free_more
         assert ("state the true sigma" in text) == state_sigma
+
+
+def evaluated(places: np.ndarray) -> Any:
+    return SimpleNamespace(pose=np.hstack([places, np.zeros((len(places), 3))]))
+
+
+@pytest.mark.parametrize("share", [-0.1, 0.015, 0.025, 0.3])
+@pytest.mark.parametrize("kinds", [["touch"], ["touch", "tilt"], ["touch", "distance"], ["tilt"]])
+def test_poses_that_touch_closer_together_than_before_are_said(
+    share: float, kinds: list[str]
+) -> None:
+    """Whether they all lie elsewhere, and what rows that touch nothing do, is no matter."""
+    rng = np.random.default_rng(6)
+    before = rng.normal(0, 100, (30, 3))
+    after = before * (1.0 - share) + [50.0, -20.0, 7.0]
+    after[10:] = before[10:] * 0.5  # of the other set
+    sets = [SimpleNamespace(kind=kind) for kind in kinds]
+    equations: Any = SimpleNamespace(
+        sets=sets, pose_of=[np.arange(10), np.arange(10, 30)][: len(sets)]
+    )
+    found = shrunk(equations, evaluated(before), evaluated(after))
+    assert len(found) == (share > 0.02 and kinds in (["touch"], ["touch", "tilt"]))
+    assert all(f"lie {100 * share:.2g} % closer" in text for text in found)
 
 
 def test_good_measurements_raise_no_suspicion(paper: Robot, points: Measurements) -> None:
