@@ -54,13 +54,23 @@ def test_a_row_is_odd_by_its_residual_in_a_fit_of_all_others(
 
 @pytest.mark.parametrize(("gross", "odd"), [(5, 5), (9, 6)])
 def test_at_most_a_quarter_of_the_rows_and_one_are_odd(gross: int, odd: int) -> None:
-    """Of a prior alone, so that none of them hides another."""
+    """Those that are furthest off, though the chance of each is 0 to the last digit."""
     residual = np.zeros(20)
     residual[:gross] = 1e3 + np.arange(gross)
     design = np.zeros((20, 1))
     ones = np.ones(20)
     found = outliers(residual, design, np.ones(20, dtype=np.intp), ones, np.eye(1))
-    assert len(found) == odd and set(found.tolist()) <= set(range(gross))
+    assert found.tolist() == list(range(gross))[-odd:]
+
+
+def test_the_rows_of_the_least_chance_are_odd_first() -> None:
+    """Of seven rows two may be; a square of 30 in three components is likelier than 25 in one."""
+    components: IntArray = np.array([1, 3, 1, 3, 3, 1, 1])
+    residual = np.zeros(13)
+    residual[[0, 1, 4]] = np.sqrt([25.0, 30.0, 28.0])
+    found = outliers(residual, np.zeros((13, 1)), components, np.ones(7), np.eye(1))
+    assert chi2.sf(28, 1) < chi2.sf(25, 1) < chi2.sf(30, 3) < FALSE_ALARM / 7
+    assert found.tolist() == [0, 2]
 
 
 @pytest.mark.parametrize(("off", "odd"), [(3.0, []), (3.6, [0, 1])])
