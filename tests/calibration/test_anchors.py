@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
+from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
 from tests.robots import linear_delta, made
@@ -62,6 +63,29 @@ def test_misfit_says_before_any_fit_that_a_constant_is_missing(count: int) -> No
 def test_as_few_rows_as_needed_say_nothing_of_the_misfit() -> None:
     true, places = case(2, 3, 6, 0)
     assert np.isnan(pk.locate_anchors(true, true.inverse(places)).misfit)
+
+
+@pytest.mark.parametrize(("m", "count"), [(2, 3), (2, 5), (3, 4), (3, 6)])
+def test_how_much_better_anchors_lie_as_they_are_than_mirrored(m: int, count: int) -> None:
+    """Rms distances of the file's anchors from the true ones and from their mirror image."""
+    for seed in range(5):
+        true, places = case(m, count, 30, seed)
+        names = [f"base{i + 1}.{axis}" for i in range(count) for axis in "xyz"[:m]]
+        change = np.random.default_rng(seed + 100).normal(0, 300, len(names))
+        file = true.replace({n: true.geometry[n] + c for n, c in zip(names, change, strict=True)})
+        on, anchors = (robot.slots[:, :m] for robot in (file, true))
+        on, anchors = on - on.mean(axis=0), anchors - anchors.mean(axis=0)
+        rms = []
+        for sign in (1.0, -1.0):
+            mirrored = anchors * [sign, *[1.0] * (m - 1)]
+            if m == 2:  # by the angle of the best rotation of the plane
+                z, w = (p[:, 0] + 1j * p[:, 1] for p in (mirrored, on))
+                turn = np.exp(1j * np.angle(np.vdot(z, w)))
+                rms.append(np.linalg.norm(turn * z - w))
+            else:
+                rms.append(Rotation.align_vectors(on, mirrored)[1])
+        found = pk.locate_anchors(file, true.inverse(places))
+        assert found.mirrored == pytest.approx(max(rms) / min(rms), rel=1e-3)
 
 
 def test_poses_are_in_the_frames_of_the_file() -> None:

@@ -271,16 +271,17 @@ def test_a_target_is_far_beyond_thrice_the_largest_of_reach_size_and_geometry(wh
     ):
         chosen: Any = SimpleNamespace(
             robot=robot,
-            found_along={("anchor", "9"): 0, ("target", "west"): 1},
-            number_of=np.array([0, -1, -1, 1, -1, -1]),
-            names=["anchor9.x", "anchor9.y", "anchor9.z", "targetwest.x@one", "", ""],
-            start=np.array([0.0, 0, 0, 0, 0, stated]),
+            found_along={("anchor", "9"): 0, ("target", "west"): 1, ("attachment", "2"): 2},
+            number_of=np.array([0, -1, -1, 1, -1, -1, 2, -1, -1]),
+            names=["anchor9.x", "", "", "targetwest.x@one", "", "", "attachment2.x", "", ""],
+            start=np.array([0.0, 0, 0, 0, 0, stated, 0, 0, 0]),
         )
         end = evaluated(places)
-        end.theta = np.array([1e6, 0, 0, 0, 0, place])
-        found = distant_points(end, chosen)
+        end.theta = np.array([1e6, 0, 0, 0, 0, place, 7e3, 0, 0])
+        *found, last = distant_points(end, chosen)
         assert len(found) == far
         assert all(t.startswith("target west of one was found 610 mm") for t in found)
+        assert last.startswith("attachment 2 was found 7e+03 mm")
         assert all("size (600 mm)" in text for text in found)
 
 
@@ -351,6 +352,11 @@ def test_copied_rows_are_named_but_repeats_are_not(paper: Robot, points: Measure
     texts = said(paper, points.select([*range(30), 3, 4]), prior=0.5)
     assert texts == ["2 rows equal others to the last digit (row 30 of 3, 31 of 4): copied, not"
                      " measured again?"]  # fmt: skip
+    (many,) = said(paper, points.select([*range(30), *range(7)]), prior=0.5)
+    named = ", ".join(["30 of 0", *(f"{30 + i} of {i}" for i in range(1, 5))])
+    assert many.startswith(f"7 rows equal others to the last digit (row {named}, …): copied")
+    (five,) = said(paper, points.select([*range(30), *range(5)]), prior=0.5)
+    assert five.startswith(f"5 rows equal others to the last digit (row {named}): copied")
     repeats = VirtualMachine(paper).measure(np.repeat(points.actuators, 2, axis=0))
     assert said(paper, repeats, prior=0.5) == []
 

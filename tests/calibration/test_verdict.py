@@ -76,14 +76,20 @@ def test_a_table_says_in_words_that_all_held_out_points_are_outliers(
     assert "none is left (12)" in str(found) and "nan" not in str(found)
 
 
-def test_all_offsets_that_move_alike_are_named_together(hexapod: pk.Robot, true: pk.Robot) -> None:
-    names = [f"offset{i}" for i in range(1, 7)]
-    later = true.replace({name: true.geometry[name] + 0.4 for name in names})
+@pytest.mark.parametrize(
+    ("free", "said"),
+    [("offset*", "offset1 … offset6 alike"), ("offset[25]", "offset2, offset5 alike")],
+)
+def test_all_offsets_that_move_alike_are_named_together(
+    hexapod: pk.Robot, true: pk.Robot, free: str, said: str
+) -> None:
+    names = hexapod.geometry.match(free)
+    first = true if len(names) == 6 else hexapod
+    later = first.replace({name: first.geometry[name] + 0.4 for name in names})
     found = fitted(
-        hexapod, session(hexapod, true, 40, 0), free="offset*",
-        holdout=session(hexapod, later, 40, 1),
-    )  # fmt: skip
-    assert str(found.moved[0]) == "offset1 … offset6 alike"
+        hexapod, session(hexapod, first, 40, 0), free=free, holdout=session(hexapod, later, 40, 1)
+    )
+    assert str(found.moved[0]) == said
     assert found.moved[0].shift[0] == pytest.approx(0.4, abs=0.05)
 
 
