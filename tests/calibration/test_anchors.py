@@ -88,6 +88,41 @@ def test_how_much_better_anchors_lie_as_they_are_than_mirrored(m: int, count: in
         assert found.mirrored == pytest.approx(max(rms) / min(rms), rel=1e-3)
 
 
+def test_what_noise_hides_of_the_gram_matrix_is_as_large_as_noise() -> None:
+    """Places that are nearly in a plane: an eigenvalue is below its deviation, or negative.
+
+    The map x = G u is told by the lengths to the first anchor, linearly in M = GᵀG; anchors about
+    the first are orthonormal columns times the inverse of G. So their singular values are one over
+    the roots of the eigenvalues, or of these eigenvalues' deviations where those are larger.
+    """
+    hidden = 0
+    for seed in range(6):
+        true, places = case(3, 6, 40, seed)
+        places[:, 2] *= 0.01
+        q = true.inverse(places) + np.random.default_rng(seed).normal(0, 3.0, (40, 6))
+        squares = q**2
+        pattern = (squares[:1] + squares[:, :1] - squares - squares[0, 0])[:, 1:] / 2
+        left, size, _ = np.linalg.svd(pattern, full_matrices=False)
+        u = left[1:, :3] * size[:3] / size[0]
+        table = np.array([[*np.outer(row, row).ravel(), *row] for row in u])
+        target = squares[1:, 0] - squares[0, 0]
+        inverse = np.linalg.pinv(table, rcond=1e-12)  # of least norm, so that M is symmetric
+
+        def eigenvalues(target: np.ndarray, inverse: np.ndarray = inverse) -> np.ndarray:
+            return np.linalg.eigvalsh((inverse @ target)[:9].reshape(3, 3))
+
+        missed = target - table @ inverse @ target
+        slopes = [(eigenvalues(target + e) - eigenvalues(target - e)) / 2 for e in np.eye(39)]
+        deviation = np.sqrt(missed @ missed / (39 - 9)) * np.linalg.norm(slopes, axis=0)
+        values = eigenvalues(target)
+        hidden += int((values < deviation).sum())
+        base = pk.locate_anchors(true, q).robot.slots[:, :3]
+        found = np.linalg.svd(base[1:] - base[0], compute_uv=False)
+        wanted = size[0] / np.sqrt(np.sort(np.maximum(values, deviation)))
+        np.testing.assert_allclose(found, wanted, rtol=1e-3)
+    assert hidden >= 2
+
+
 def test_poses_are_in_the_frames_of_the_file() -> None:
     anchors = np.array([[0.0, -1597, -120], [1550, 900, -120], [-1370, 790, -60], [0, 0, 2355]])
     turned = machine(anchors, frames={"base": {"x": 100.0, "alpha": 0.4, "gamma": 0.7}})

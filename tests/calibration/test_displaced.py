@@ -66,6 +66,16 @@ def test_its_displacement_is_found_where_nothing_else_takes_it_up(hexapod: pk.Ro
     assert max(test.stderr) < NOISE
 
 
+def test_of_two_targets_it_cannot_be_told_which_one_moved(hexapod: pk.Robot) -> None:
+    """Where the platform is found along, one moved one way is the other moved the other way."""
+    (whole,) = read(hexapod, 4, np.array([0.3, -0.2, 0.1]))
+    assert whole.target_index is not None
+    test = displacement(pk.identify(hexapod, whole.select(np.flatnonzero(whole.target_index))))
+    assert test.found and {test.name, *test.also} == {"south", "west"}
+    told = displacement(pk.identify(hexapod, whole))
+    assert told.name == "west" and not told.also
+
+
 @pytest.mark.parametrize(("chance", "share"), [(0.5, 0.9), (1e-9, 0.1), (0.5, 0.1), (1e-9, 0.9)])
 def test_a_displacement_is_large_where_it_is_sure_and_most_of_what_is_left(
     chance: float, share: float
