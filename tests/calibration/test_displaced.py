@@ -76,6 +76,20 @@ def test_of_two_targets_it_cannot_be_told_which_one_moved(hexapod: pk.Robot) -> 
     assert told.name == "west" and not told.also
 
 
+@pytest.mark.parametrize("kind", ["pose", "orientation"])
+def test_poses_read_beside_targets_do_not_hide_which_one_moved(
+    hexapod: pk.Robot, kind: str
+) -> None:
+    """The same machine read by another instrument, which knows no target."""
+    moved = np.array([0.3, -0.2, 0.1])
+    true = with_errors(hexapod, 0.3, np.random.default_rng(5))
+    q = hexapod.inverse(hexapod_poses(hexapod, COUNT, np.random.default_rng(6)))
+    beside = pk.VirtualMachine(true, NOISE, angle_noise=1e-5, seed=7).measure(q, kind)
+    test = displacement(pk.identify(hexapod, [*read(hexapod, 5, moved), beside]))
+    assert test.found and test.name == "west"
+    assert (np.abs(test.shift - moved) < 4 * np.array(test.stderr)).all()
+
+
 @pytest.mark.parametrize(("chance", "share"), [(0.5, 0.9), (1e-9, 0.1), (0.5, 0.1), (1e-9, 0.9)])
 def test_a_displacement_is_large_where_it_is_sure_and_most_of_what_is_left(
     chance: float, share: float

@@ -14,7 +14,12 @@ from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
 from pkmcal.calibration.identify import identify
-from pkmcal.calibration.plausibility import distant_points, other_readings, shrunk
+from pkmcal.calibration.plausibility import (
+    distant_points,
+    implausible_changes,
+    other_readings,
+    shrunk,
+)
 from pkmcal.core import instruments
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -283,6 +288,21 @@ def test_a_target_is_far_beyond_thrice_the_largest_of_reach_size_and_geometry(wh
         assert all(t.startswith("target west of one was found 610 mm") for t in found)
         assert last.startswith("attachment 2 was found 7e+03 mm")
         assert all("size (600 mm)" in text for text in found)
+
+
+def test_numbers_that_moved_by_a_quarter_of_the_machine_are_named_but_loads_are_not() -> None:
+    """In mm at the platform's size; what hangs on the platform may be anything."""
+    names = ("base1.x", "gain2", "base3.z", "load.force.z", "load.at.x", "frame.x")
+    moved = np.array([-99.0, 0.101, 101.0, 5e3, 5e3, 5e3])
+    scale = np.array([1.0, 1e-3, 1.0, 1.0, 1.0, 1.0])  # of a gain per mm
+    robot = SimpleNamespace(length=400.0)
+    chosen: Any = SimpleNamespace(names=names, scale=scale, geometry=slice(0, 5), robot=robot)
+    start: Any = SimpleNamespace(theta=np.full(6, 7.0))
+    end: Any = SimpleNamespace(theta=7.0 + moved)
+    (text,) = implausible_changes(start, end, chosen)
+    assert text.startswith("gain2, base3.z moved by up to 101 mm")
+    end.theta = 7.0 + 0.9 * moved
+    assert implausible_changes(start, end, chosen) == []
 
 
 def test_good_measurements_raise_no_suspicion(paper: Robot, points: Measurements) -> None:
