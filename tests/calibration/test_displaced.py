@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -64,6 +66,15 @@ def test_its_displacement_is_found_where_nothing_else_takes_it_up(hexapod: pk.Ro
     assert test.name == "west" and not test.also
     assert (np.abs(test.shift - moved) < 4 * np.array(test.stderr)).all()
     assert max(test.stderr) < NOISE
+    # what it explains of the squares is what is gone where the target is where it should be
+    (there,) = data
+    assert there.target is not None
+    right = dataclasses.replace(there, target=there.target + np.outer([0, 0, 1], moved))
+    before, after = (
+        pk.identify(with_errors(hexapod, 0.3, np.random.default_rng(2)), each, free="offset*").rms
+        for each in (there, right)
+    )
+    assert test.share == pytest.approx(1.0 - (after / before) ** 2, abs=0.02)
 
 
 def test_of_two_targets_it_cannot_be_told_which_one_moved(hexapod: pk.Robot) -> None:

@@ -338,6 +338,19 @@ def test_a_held_out_session_finds_its_own_zeros_first(
     np.testing.assert_array_equal(found.values, alone.values)
 
 
+@pytest.mark.filterwarnings("ignore:residuals are")
+def test_a_sigma_that_is_too_small_makes_no_number_of_a_held_out_session_surer(
+    hexapod: Robot, two: tuple[list[Robot], list[Measurements]]
+) -> None:
+    """The residuals widen all deviations, those of numbers that the fit has not too."""
+    own = []
+    for smaller in (1.0, 4.0):
+        first, second = (dataclasses.replace(m, sigma=NOISE / smaller) for m in two[1])
+        found = pk.identify(hexapod, first, FREE, holdout=second, per_session="offset*")
+        own.append([each["stderr"] for each in found.holdout_parameters.values()])
+    np.testing.assert_allclose(own[1], own[0], rtol=0.2)
+
+
 def test_rows_of_a_fitted_session_are_compared_with_its_numbers(
     hexapod: Robot, two: tuple[list[Robot], list[Measurements]]
 ) -> None:

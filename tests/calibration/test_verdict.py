@@ -309,6 +309,18 @@ def test_no_spare_equation_has_no_noise_and_no_deviations(printer: pk.Robot) -> 
     assert np.isfinite(stated.stderr).all()
 
 
+@pytest.mark.parametrize("spare", [0, 1, 2])
+def test_chi_squared_is_told_from_one_spare_equation_on(printer: pk.Robot, spare: int) -> None:
+    measured = replace(probed(printer, 6 + spare), sigma=0.03)
+    found = fitted(printer, measured)
+    assert found.dof == spare
+    if not spare:
+        assert np.isnan(found.chi2_per_dof)
+    else:
+        squares = float((found.residuals[0] ** 2).sum()) / 0.03**2
+        assert found.chi2_per_dof == pytest.approx(squares / spare)
+
+
 def test_enough_points_are_calibrated(printer: pk.Robot) -> None:
     assert fitted(printer, probed(printer, 25)).verdict.state == "calibrated"
 
