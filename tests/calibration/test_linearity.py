@@ -23,10 +23,14 @@ def arm_with(name: str, value: float) -> pk.SerialArm:
     return arm.replace(values.reshape(-1, 6))
 
 
-def heights(name: str, value: float, raised: float) -> FloatArray:
+def joints(raised: float) -> FloatArray:
     """Of an arm whose upper joint is at this angle, rad, give or take."""
-    q = np.random.default_rng(0).uniform(-0.2, 0.2, (ROWS, 3)) + [0.0, raised, -0.5]
-    z: FloatArray = as_machine(arm_with(name, value)).forward(q).pose[:, 2]
+    apart: FloatArray = np.random.default_rng(0).uniform(-0.2, 0.2, (ROWS, 3))
+    return apart + np.array([0.0, raised, -0.5])
+
+
+def heights(name: str, value: float, raised: float) -> FloatArray:
+    z: FloatArray = as_machine(arm_with(name, value)).forward(joints(raised)).pose[:, 2]
     return z
 
 
@@ -38,9 +42,9 @@ def slope(name: str, raised: float) -> float:
 
 def weak(name: str, deviation: float, raised: float, prior: float | None = None) -> Weak | None:
     """What is said where heights without noise leave a number this uncertain."""
-    q = np.random.default_rng(0).uniform(-0.2, 0.2, (ROWS, 3)) + [0.0, raised, -0.5]
     read = heights(name, 0.0, raised)
-    measured = pk.Measurements(q, read, "height", sigma=deviation * slope(name, raised))
+    sigma = deviation * slope(name, raised)
+    measured = pk.Measurements(joints(raised), read, "height", sigma=sigma)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", pk.CalibrationWarning)
         found = pk.identify(pk.load("3r"), measured, free=name, prior=prior)

@@ -227,6 +227,21 @@ def test_readings_beside_the_wrong_rows_are_found(
     assert f"each reading belongs to the row {abs(by)} {where} it" in text
 
 
+@pytest.mark.parametrize("by", [2, -2])
+def test_they_are_found_although_every_other_row_was_left_out(
+    hexapod: pk.Robot, true: pk.Robot, by: int
+) -> None:
+    measured = session(hexapod, true, 40, 5)
+    wrong = replace(measured, values=np.roll(measured.values, by, axis=0))
+    try:
+        found = fitted(hexapod, wrong, free="offset*", drop=list(range(1, 40, 2)), **UNKNOWN)
+        text = "; ".join(found.verdict.reasons)
+    except ValueError as error:
+        text = str(error)
+    where = "before" if by > 0 else "after"
+    assert f"each reading belongs to the row 2 {where} it" in text
+
+
 def test_readings_that_nothing_makes_fit_have_no_such_cause(hexapod: pk.Robot) -> None:
     """The machine reaches none of these rows, whichever of them a reading belongs to."""
     q = 1e5 * (1.0 + np.random.default_rng(0).random((20, 6)))
