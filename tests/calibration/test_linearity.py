@@ -45,7 +45,8 @@ def weak(
 ) -> Weak | None:
     """What is said where heights leave a number this uncertain.
 
-    Stated, without any noise; or by residuals that neither the number nor its square can explain.
+    By the sigma that is stated, without any noise; or by residuals that neither the number nor its
+    square can explain, where sigma is ten times too small.
     """
     read = heights(name, 0.0, raised)
     sigma = deviation * slope(name, raised)
@@ -53,7 +54,9 @@ def weak(
     apart = np.linalg.qr(np.column_stack([*steps, np.random.default_rng(2).random(ROWS)]))[0][:, 2]
     if not stated:
         read = read + apart * sigma * np.sqrt(ROWS - 1)
-    measured = pk.Measurements(joints(raised), read, "height", sigma=sigma if stated else None)
+    measured = pk.Measurements(
+        joints(raised), read, "height", sigma=sigma if stated else sigma / 10.0
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", pk.CalibrationWarning)
         found = pk.identify(pk.load("3r"), measured, free=name, prior=prior)
