@@ -12,7 +12,12 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
+from pkmcal.calibration.displaced import DisplacedTarget
+from pkmcal.calibration.drift import Drift
 from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.measuring_order import MeasuringOrder
+from pkmcal.calibration.robust_check import RobustCheck
+from pkmcal.calibration.verdict import judge
 from pkmcal.measurements.measurements import Measurements
 
 from ..simulated import hexapod_poses
@@ -451,3 +456,48 @@ def test_a_deviation_that_nothing_shows_is_infinite_not_small(hexapod: pk.Robot)
     found = fitted(hexapod, measured, free="offset*", covariance="cluster")
     assert np.isinf(found.stderr).all() and np.isinf(found.interval95).all()
     assert np.isfinite(fitted(hexapod, measured, free="offset*").stderr).all()
+
+
+# what is said beside what ------------------------------------------------------------------------
+
+
+def drifted(by: float) -> Drift:
+    """Of 1 mm of scatter."""
+    return Drift(("z",), (by,), (1.0,), 1e-6, 3, 12, 2.0, (float("nan"), float("nan")))
+
+
+def ordered(share: float) -> MeasuringOrder:
+    return MeasuringOrder(("z",), (2.0,), (1.0,), ("mm",), 1e-6, share, "", 20, "")
+
+
+def elsewhere(share: float) -> DisplacedTarget:
+    return DisplacedTarget("west", (2.0,), (0.1,), 1e-6, share, ())
+
+
+BEGIN = {"drift": "3 poses, measured 12", "order": "residuals are as", "displaced": "target west"}
+
+
+@pytest.mark.parametrize("carried", [True, False])
+@pytest.mark.parametrize("large", [True, False])
+@pytest.mark.parametrize("drift", [None, "drift"])
+def test_what_may_come_of_another_cause_is_not_said_beside_it(
+    hexapod: pk.Robot, true: pk.Robot, carried: bool, large: bool, drift: str | None
+) -> None:
+    """Rows that carry a fit off explain what targets and order seem to say; a drift, the order.
+
+    What is most of what is left is a doubt, the rest a remark.
+    """
+    found = fitted(hexapod, session(hexapod, true, 40, 0), free="offset*", holdout=0.25)
+    robust = RobustCheck(100.0, 1.0, (int(found.rows[3]),), 0.02) if carried else None
+    share, by = (0.9, 5.0) if large else (0.1, 0.5)
+    verdict = judge(
+        found, robust, (), drifted(by) if drift else None, ordered(share), elsewhere(share)
+    )
+    expected = {"drift"} if drift else {"order"} - ({"order"} if carried else set())
+    expected |= set() if carried else {"displaced"}
+    for texts, mine in ((verdict.reasons, large), (verdict.remarks, not large)):
+        said = {key for key, begin in BEGIN.items() for text in texts if text.startswith(begin)}
+        assert said == (expected if mine else set())
+    doubtful = "doubtful" if large else "calibrated"
+    assert verdict.state == ("not calibrated" if carried else doubtful)
+    assert verdict.reasons[0].startswith("1 row disagrees") == carried
