@@ -139,7 +139,7 @@ def test_residuals_that_are_drawn_are_as_large_as_the_noise(hexapod: Robot) -> N
     """
     rng, ratios = np.random.default_rng(11), []
     q = hexapod.inverse(hexapod_poses(hexapod, 4, rng))
-    instrument = [pk.VirtualMachine(hexapod, 0.02, seed=seed) for seed in range(40)]
+    instrument = [pk.VirtualMachine(hexapod, 0.02, seed=seed) for seed in range(24)]
     for each in instrument:
         measured = dataclasses.replace(each.measure(q), sigma=0.02)
         with warnings.catch_warnings():

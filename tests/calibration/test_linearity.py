@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import warnings
 
 import numpy as np
@@ -15,8 +16,13 @@ from pkmcal.measurements.calibratable import as_machine
 ROWS = 12
 
 
+@functools.cache
+def nominal() -> pk.SerialArm:
+    return pk.load("3r")
+
+
 def arm_with(name: str, value: float) -> pk.SerialArm:
-    arm = pk.load("3r")
+    arm = nominal()
     geometry = as_machine(arm).geometry
     values = geometry.values.copy()
     values[geometry.names.index(name)] += value
@@ -59,7 +65,7 @@ def weak(
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", pk.CalibrationWarning)
-        found = pk.identify(pk.load("3r"), measured, free=name, prior=prior)
+        found = pk.identify(nominal(), measured, free=name, prior=prior)
     if prior is None:
         assert found.stderr[0] == pytest.approx(deviation, rel=0.05)
     return beyond_linear(found.fit.estimate, found.fit.uncertainty)
