@@ -377,6 +377,27 @@ def test_its_frame_is_found_without_a_start_near_it(hexapod: Robot) -> None:
     assert found.holdout_rms < 2.0 * found.holdout_expected
 
 
+@pytest.mark.parametrize("prior", [None, {"offset*": 5.0}])
+def test_what_moved_is_told_beside_numbers_that_each_session_has_of_its_own(
+    hexapod: Robot, prior: dict[str, float] | None
+) -> None:
+    """The instrument stood elsewhere, which its frame of that day says; and one zero moved."""
+    _, sets = three(hexapod, np.zeros(3))
+    rng = np.random.default_rng(2)
+    later = moved(hexapod, 0.5, rng)  # the same machine
+    later = later.replace({"offset3": later.geometry["offset3"] + 1.0})
+    q = hexapod.inverse(hexapod_poses(hexapod, 40, rng))
+    seen = pk.VirtualMachine(later, NOISE, 7).measure(q)
+    held = seen_from(dataclasses.replace(seen, session="friday"), STANDS[2])
+    found = pk.identify(
+        hexapod, sets[:2], "offset*", frame="unknown", per_session="frame*", holdout=held,
+        prior=prior,
+    )  # fmt: skip
+    assert found.holdout_contradicts and found.moved
+    assert found.moved[0].names == ("offset3",)
+    assert found.moved[0].shift[0] == pytest.approx(1.0, abs=5 * found.moved[0].stderr[0])
+
+
 def test_numbers_that_took_every_reading_leave_nothing_to_compare(
     hexapod: Robot, two: tuple[list[Robot], list[Measurements]]
 ) -> None:
