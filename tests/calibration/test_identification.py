@@ -99,6 +99,16 @@ def test_strong_correlations_are_in_the_order_of_size_then_of_parameters(
     ]  # fmt: skip
 
 
+def test_numbers_of_the_misfit_stand_below_the_end_of_their_heads(found: pk.Identification) -> None:
+    lines = str(found).splitlines()
+    (at,) = (k for k, line in enumerate(lines) if line.startswith("misfit [mm]"))
+    head, *rows = lines[at : at + 3]
+    assert [row.split("  ")[0] for row in rows] == ["fitted", "held out"]
+    for name in ("rms before", "rms after", "median", "95 %"):
+        end = head.index(name) + len(name)
+        assert all(row[end - 1].isdigit() and not row[end : end + 1].strip() for row in rows)
+
+
 def test_correlations_are_the_covariance_over_both_deviations(found: pk.Identification) -> None:
     expected = found.covariance / np.outer(found.stderr, found.stderr)
     np.testing.assert_allclose(found.correlation_matrix, expected, rtol=1e-12, atol=1e-12)

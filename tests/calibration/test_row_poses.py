@@ -366,6 +366,10 @@ def test_actuators_that_are_never_wrong_cannot_be_as_many_as_the_ways_to_move(
             pk.identify(cables, measured(simulated(0, 12, "all"), actuator_sigma=sigma))
     with pytest.raises(ValueError, match="actuator_sigma must be positive, or None"):
         pk.identify(cables, measured(simulated(0, 12, "all"), actuator_sigma=0.0))
+    at_some = [NOISE, 0.0, NOISE, NOISE], NOISE  # in one set and not in the other
+    sets = [measured(simulated(i, 12, "all"), actuator_sigma=at_some[i]) for i in (0, 1)]
+    with pytest.raises(ValueError, match="0 at all rows for"):
+        pk.identify(cables, sets)
     stated = measured(simulated(0, 12, "all"))
     with pytest.raises(ValueError, match="state actuator_sigma of all sets, or of none"):
         pk.identify(cables, [stated, measured(simulated(1, 12, "all"), actuator_sigma=None)])

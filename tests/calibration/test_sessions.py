@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -540,6 +541,35 @@ def test_common_numbers_are_known_better_by_all_sessions(name: str, cables: Robo
     for number, value in shared.holdout_parameters.items():
         together = found.parameters[number]
         assert abs(value["value"] - together["value"]) < 4.0 * value["stderr"]
+
+
+@pytest.mark.parametrize("anew", ["offset*", "offset2"])
+@pytest.mark.parametrize("kind", ["closure", "position"])
+def test_rows_that_tell_nothing_leave_a_sessions_numbers_as_they_were(
+    tmp_path: Path, anew: str, kind: str
+) -> None:
+    """Three lengths to a point, nothing else read: any zeros would do."""
+    head = 'name = "point"\nunits = { length = "mm", angle = "deg" }\n[pose]\nmap = "translation"\n'
+    limbs = "".join(
+        f'[[limb]]\nkind = "UPS"\nbase = {anchor}\nplatform = [0, 0, 0]\n'
+        for anchor in ([0, -1600, -120], [1550, 900, -120], [-1370, 790, 2350])
+    )
+    path = tmp_path / "point.toml"
+    path.write_text(f"{head}home = {{ z = 600 }}\n{limbs}")
+    robot, rng = pk.load(path), np.random.default_rng(0)
+    places = np.zeros((30, 6))
+    places[:, :3] = rng.uniform([-500, -500, 300], [500, 500, 900], (30, 3))
+    q = robot.inverse(places)
+    seen = places[:20, :3] + rng.normal(0, NOISE, (20, 3))
+    first = Measurements(q[:20], seen, "position", sigma=NOISE, session="monday")
+    nothing = None if kind == "closure" else np.full((10, 3), np.nan)
+    blind = Measurements(q[20:], nothing, kind, session="friday")  # type: ignore[arg-type]
+    found = pk.identify(robot, first, "offset*", per_session=anew, holdout=blind)
+    names = robot.geometry.match(anew)
+    assert [*found.holdout_parameters] == [f"{name}@friday" for name in names]
+    for name in names:
+        own = found.holdout_parameters[f"{name}@friday"]
+        assert own["value"] == robot.geometry[name] and np.isinf(own["stderr"])
 
 
 def test_closures_alone_tell_a_session_its_zeros(cables: Robot) -> None:

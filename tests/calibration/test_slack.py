@@ -129,6 +129,19 @@ def test_without_dropping_they_are_said(eight: pk.Robot) -> None:
     assert (row, int(slack[row].argmax())) in cells(found)
 
 
+def test_the_same_readings_are_left_out_where_a_datum_is_chosen(eight: pk.Robot) -> None:
+    """What says where the base frame lies is held by the user or by the package."""
+    _, q, slack = drawn(CORNERS, 0, 40, 0.3)
+    by_user = fitted(eight, q, "drop")
+    log = pk.Measurements(q, None, "closure", actuator_sigma=NOISE)
+    chosen = pk.identify(eight, log, FREE, slack="drop", datum="auto")
+    assert len(chosen.datum.names) == len(HELD)
+    wanted = set(zip(*map(np.ndarray.tolist, np.nonzero(slack)), strict=True))
+    assert cells(chosen) == cells(by_user) == wanted
+    assert chosen.dof == by_user.dof
+    assert chosen.chi2_per_dof == pytest.approx(by_user.chi2_per_dof, rel=1e-4)
+
+
 def test_deviations_are_honest_where_cables_are_slack(eight: pk.Robot) -> None:
     z, right, wrong = [], 0, 0
     for seed in range(25):
@@ -195,10 +208,13 @@ def test_a_reading_that_is_too_short_is_no_slack_cable(eight: pk.Robot) -> None:
     assert 7 in found.outliers
 
 
-def test_readings_may_count_backwards_and_in_other_units(eight: pk.Robot, tmp_path: Path) -> None:
+@pytest.mark.parametrize("first", range(0, 8, 3))
+def test_readings_may_count_backwards_and_in_other_units(
+    eight: pk.Robot, tmp_path: Path, first: int
+) -> None:
     """Drums wound the other way and winches in steps: slack is in mm of cable."""
-    _, q, _ = drawn(CORNERS, 11, 30, 0.2)
-    gain = np.array([1.0, -1.0, 0.01, -20.0, 1.0, -1.0, 2.0, -0.5])
+    _, q, _ = drawn(CORNERS, 16, 30, 0.2)
+    gain = np.roll([1.0, -1.0, 0.01, -20.0, 1.0, -1.0, 2.0, -0.5], first)
     path = tmp_path / "counts.toml"
     machine_on(CORNERS, path)
     head, *limbs = path.read_text().split("[[limb]]\n")
