@@ -129,6 +129,18 @@ def test_without_dropping_they_are_said(eight: pk.Robot) -> None:
     assert (row, int(slack[row].argmax())) in cells(found)
 
 
+def test_several_cables_of_one_pose_may_be_slack(eight: pk.Robot) -> None:
+    """The longest hides the others until it is left out."""
+    _, q, _ = drawn(CORNERS, 12, 30, 0.0)
+    loose = {(5, 1): 60.0, (5, 6): 25.0, (17, 3): 80.0, (17, 4): 40.0, (17, 0): 15.0}
+    for cell, longer in loose.items():
+        q[cell] += longer
+    found = fitted(eight, q, "drop")
+    assert cells(found) == loose.keys()
+    for each in found.slack:
+        assert each.longer == pytest.approx(loose[each.rows[0], each.actuators[0] - 1], abs=3.0)
+
+
 def test_the_same_readings_are_left_out_where_a_datum_is_chosen(eight: pk.Robot) -> None:
     """What says where the base frame lies is held by the user or by the package."""
     _, q, slack = drawn(CORNERS, 0, 40, 0.3)
