@@ -181,6 +181,16 @@ class CoreMachine(ABC):
             residual.reshape(shape),
         )
 
+    def forward_machines(
+        self, slots: FloatArray, q: FloatArray, guess: FloatArray
+    ) -> FloatArray:
+        """Poses (P, N, 6) of machines (N, …) at actuator coordinates (P, n), from guesses (P, 6)."""
+        found = np.empty((len(q), len(slots), 6))
+        for poses, at, start in zip(found, q, guess, strict=True):
+            each = np.repeat(at[None], len(slots), axis=0)
+            poses[:] = self.forward(slots, each, start, threads=1)[0]
+        return found
+
     def error_jacobian(
         self,
         slots: FloatArray,

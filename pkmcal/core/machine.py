@@ -199,6 +199,17 @@ class Machine(CoreMachine):
         call("jacobian", self.struct, len(pose), slots, _by_row(slots), pose, out, isa=self.isa)
         return self.as_written(pose, out, 2)
 
+    def forward_machines(
+        self, slots: FloatArray, q: FloatArray, guess: FloatArray
+    ) -> FloatArray:
+        """Poses (P, N, 6) of machines (N, …) at actuator coordinates (P, n), from guesses (P, 6)."""
+        shape = len(q), len(slots)
+        pose, residual = np.empty((*shape, 6)), np.empty(shape)
+        status, iterations = np.empty((2, *shape), dtype=np.int32)
+        given = (shape[1], slots, shape[0], q, guess, pose, status, iterations, residual)
+        call("forward_machines", self.struct, *given, isa=self.isa)
+        return pose
+
     def forward_jacobian(
         self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool = False
     ) -> FloatArray:

@@ -19,6 +19,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, Int32Array, IntArray
 from pkmcal.core import instruments
+from pkmcal.core.core_machine import CoreMachine
 from pkmcal.core.library import SLOTS, rows
 from pkmcal.core.machine import Closure, Machine
 from pkmcal.exceptions import ArgumentError
@@ -266,6 +267,8 @@ class PulleyMachine(Machine):
             return pose, status, iterations, residual
         parts = (status.reshape(shape), iterations.reshape(shape), residual.reshape(shape))
         return (pose.reshape(*shape, 6), *parts)
+
+    forward_machines = CoreMachine.forward_machines  # where the rope leaves depends on the pose
 
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m)."""
