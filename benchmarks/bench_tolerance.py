@@ -166,7 +166,7 @@ print(time.process_time() - begin)
 def against(checkout: Path, rounds: int = 7) -> dict[str, float]:
     """Processor time over that of another checkout, processes in turn, medians."""
     found = {}
-    for name in ("hexapod", "2tpr2tps", "linear-delta", "3prs"):
+    for name in ("hexapod", "2tpr2tps", "linear-delta", "3rps"):
         ratios = []
         for _ in range(rounds):
             took = []
