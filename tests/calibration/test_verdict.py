@@ -13,12 +13,15 @@ import pytest
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.displaced import DisplacedTarget
+from pkmcal.calibration.distances import Distances
 from pkmcal.calibration.drift import Drift
+from pkmcal.calibration.holdout import HeldOut
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.measuring_order import MeasuringOrder
 from pkmcal.calibration.robust_check import RobustCheck
 from pkmcal.calibration.verdict import judge
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.statistics.holdout_test import HoldoutTest
 
 from ..simulated import hexapod_poses
 from ..statistics.designs import UNKNOWN, seen_by_tracker, six_joints
@@ -111,6 +114,25 @@ def test_a_holdout_without_sigma_has_the_noise_of_the_fit(
     assert twice.holdout_expected == pytest.approx(stated.holdout_expected, rel=1e-6)
     rough = fitted(hexapod, both[0], free="offset*", holdout=replace(other, sigma=0.06))
     assert rough.holdout_expected == pytest.approx(3.0 * twice.holdout_expected, rel=0.03)
+
+
+@pytest.mark.parametrize(("odd", "others", "contradicts"), [
+    ((), 1.1, True), ((7,), 1.1, False), ((7,), 1.3, True), ((7, 8, 9, 11), 1.1, True),
+])  # fmt: skip
+def test_points_contradict_a_fit_unless_it_is_a_few_and_the_others_do_not(
+    odd: tuple[int, ...], others: float, contradicts: bool
+) -> None:
+    """Twelve points, whose rms may be 1.2 times what is expected; a quarter of them is a few."""
+    held = HeldOut(
+        expected=0.5,
+        off=np.append(np.ones(12), np.nan),  # one was not reached
+        odd=odd,
+        after=Distances(rms_without_outliers=0.5 * others),
+        test=HoldoutTest(ratio=3.0, median_ratio=2.0, chance=1e-6, freedom=(12.0, 30.0)),
+    )
+    assert held.contradicts == contradicts
+    agrees = HoldoutTest(ratio=3.0, median_ratio=1.1, chance=1e-6, freedom=(12.0, 30.0))
+    assert not replace(held, test=agrees).contradicts
 
 
 def test_gross_rows_among_few_held_out_points_do_not_contradict_a_sound_fit(
