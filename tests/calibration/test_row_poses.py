@@ -358,6 +358,20 @@ def test_an_actuator_that_is_never_wrong_is_met_exactly(cables: pk.Robot) -> Non
     assert np.abs(needed[:, 2]).max() < 1e-9 < 0.1 < np.abs(needed[:, 3]).max()
 
 
+@pytest.mark.parametrize(
+    ("rows", "whose"), [(4, "measurements 1"), (8, "measurements 1 and of the actuators")]
+)
+@pytest.mark.filterwarnings("ignore:14 equations for 16 parameters")
+def test_whose_noise_too_little_is_left_over_to_tell_is_named(
+    cables: pk.Robot, rows: int, whose: str
+) -> None:
+    """One of four positions, whose point is a pose's; with all anchors free nothing at all."""
+    log = measured(simulated(0, rows, "third"), sigma=None, actuator_sigma=None)
+    with pytest.warns(pk.CalibrationWarning, match=f"estimate the noise of {whose}: state sigma"):
+        found = pk.identify(cables, log, "offset*" if rows == 4 else None)
+    assert np.isinf(found.stderr).all() and found.verdict.state == "doubtful"
+
+
 def test_actuators_that_are_never_wrong_cannot_be_as_many_as_the_ways_to_move(
     cables: pk.Robot,
 ) -> None:
