@@ -12,16 +12,8 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.displaced import DisplacedTarget
-from pkmcal.calibration.distances import Distances
-from pkmcal.calibration.drift import Drift
-from pkmcal.calibration.holdout import HeldOut
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.measuring_order import MeasuringOrder
-from pkmcal.calibration.robust_check import RobustCheck
-from pkmcal.calibration.verdict import judge
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.statistics.holdout_test import HoldoutTest
 
 from ..simulated import hexapod_poses
 from ..statistics.designs import UNKNOWN, seen_by_tracker, six_joints
@@ -114,25 +106,6 @@ def test_a_holdout_without_sigma_has_the_noise_of_the_fit(
     assert twice.holdout_expected == pytest.approx(stated.holdout_expected, rel=1e-6)
     rough = fitted(hexapod, both[0], free="offset*", holdout=replace(other, sigma=0.06))
     assert rough.holdout_expected == pytest.approx(3.0 * twice.holdout_expected, rel=0.03)
-
-
-@pytest.mark.parametrize(("odd", "others", "contradicts"), [
-    ((), 1.1, True), ((7,), 1.1, False), ((7,), 1.3, True), ((7, 8, 9, 11), 1.1, True),
-])  # fmt: skip
-def test_points_contradict_a_fit_unless_it_is_a_few_and_the_others_do_not(
-    odd: tuple[int, ...], others: float, contradicts: bool
-) -> None:
-    """Twelve points, whose rms may be 1.2 times what is expected; a quarter of them is a few."""
-    held = HeldOut(
-        expected=0.5,
-        off=np.append(np.ones(12), np.nan),  # one was not reached
-        odd=odd,
-        after=Distances(rms_without_outliers=0.5 * others),
-        test=HoldoutTest(ratio=3.0, median_ratio=2.0, chance=1e-6, freedom=(12.0, 30.0)),
-    )
-    assert held.contradicts == contradicts
-    agrees = HoldoutTest(ratio=3.0, median_ratio=1.1, chance=1e-6, freedom=(12.0, 30.0))
-    assert not replace(held, test=agrees).contradicts
 
 
 def test_gross_rows_among_few_held_out_points_do_not_contradict_a_sound_fit(
@@ -478,48 +451,3 @@ def test_a_deviation_that_nothing_shows_is_infinite_not_small(hexapod: pk.Robot)
     found = fitted(hexapod, measured, free="offset*", covariance="cluster")
     assert np.isinf(found.stderr).all() and np.isinf(found.interval95).all()
     assert np.isfinite(fitted(hexapod, measured, free="offset*").stderr).all()
-
-
-# what is said beside what ------------------------------------------------------------------------
-
-
-def drifted(by: float) -> Drift:
-    """Of 1 mm of scatter."""
-    return Drift(("z",), (by,), (1.0,), 1e-6, 3, 12, 2.0, (float("nan"), float("nan")))
-
-
-def ordered(share: float) -> MeasuringOrder:
-    return MeasuringOrder(("z",), (2.0,), (1.0,), ("mm",), 1e-6, share, "", 20, "")
-
-
-def elsewhere(share: float) -> DisplacedTarget:
-    return DisplacedTarget("west", (2.0,), (0.1,), 1e-6, share, ())
-
-
-BEGIN = {"drift": "3 poses, measured 12", "order": "residuals are as", "displaced": "target west"}
-
-
-@pytest.mark.parametrize("carried", [True, False])
-@pytest.mark.parametrize("large", [True, False])
-@pytest.mark.parametrize("drift", [None, "drift"])
-def test_what_may_come_of_another_cause_is_not_said_beside_it(
-    hexapod: pk.Robot, true: pk.Robot, carried: bool, large: bool, drift: str | None
-) -> None:
-    """Rows that carry a fit off explain what targets and order seem to say; a drift, the order.
-
-    What is most of what is left is a doubt, the rest a remark.
-    """
-    found = fitted(hexapod, session(hexapod, true, 40, 0), free="offset*", holdout=0.25)
-    robust = RobustCheck(100.0, 1.0, (int(found.rows[3]),), 0.02) if carried else None
-    share, by = (0.9, 5.0) if large else (0.1, 0.5)
-    verdict = judge(
-        found, robust, (), drifted(by) if drift else None, ordered(share), elsewhere(share)
-    )
-    expected = {"drift"} if drift else {"order"} - ({"order"} if carried else set())
-    expected |= set() if carried else {"displaced"}
-    for texts, mine in ((verdict.reasons, large), (verdict.remarks, not large)):
-        said = {key for key, begin in BEGIN.items() for text in texts if text.startswith(begin)}
-        assert said == (expected if mine else set())
-    doubtful = "doubtful" if large else "calibrated"
-    assert verdict.state == ("not calibrated" if carried else doubtful)
-    assert verdict.reasons[0].startswith("1 row disagrees") == carried
