@@ -123,6 +123,17 @@ def test_what_noise_hides_of_the_gram_matrix_is_as_large_as_noise() -> None:
     assert hidden >= 2
 
 
+def test_rows_in_a_plane_and_joints_that_are_apart_are_refused() -> None:
+    true, places = case(3, 5, 20, 2)
+    flat = places.copy()
+    flat[:, 2] = 100.0
+    with pytest.raises(ValueError, match="rows or anchors span fewer than 3 dimensions"):
+        pk.locate_anchors(true, true.inverse(flat))
+    apart = true.replace({"platform2.x": true.geometry["platform2.x"] + 0.5})
+    with pytest.raises(ValueError, match="all platform joints in one point"):
+        pk.locate_anchors(apart, true.inverse(places))
+
+
 def test_poses_are_in_the_frames_of_the_file() -> None:
     anchors = np.array([[0.0, -1597, -120], [1550, 900, -120], [-1370, 790, -60], [0, 0, 2355]])
     turned = machine(anchors, frames={"base": {"x": 100.0, "alpha": 0.4, "gamma": 0.7}})
