@@ -234,6 +234,25 @@ def test_a_good_machine_is_not_said_to_have_other_errors(hexapod: pk.Robot) -> N
     assert fitted(hexapod, stated).verdict.state == "calibrated"
 
 
+@pytest.mark.parametrize("off", [0.0, 0.5])
+def test_what_the_model_misses_beyond_repeats_is_in_the_summary(
+    hexapod: pk.Robot, off: float
+) -> None:
+    """A joint that is not free is elsewhere, or nothing is."""
+    true = hexapod.replace({"base6.z": hexapod.geometry["base6.z"] + off, "offset1": 0.3})
+    found = fitted(hexapod, positions(hexapod, true, 20, 1, repeats=3), "offset1")
+    said = " ".join(str(found).split())
+    assert f"repeats scatter by {found.repeatability:.3g} mm, " in said
+    beyond = f"lack of fit beyond that {found.lack_of_fit:.3g} mm"
+    assert (beyond in said) == bool(off) and ("no lack of fit beyond that" in said) != bool(off)
+
+
+def test_the_prior_of_a_robust_fit_is_not_tested(hexapod: pk.Robot) -> None:
+    measured = positions(hexapod, hexapod.replace({"offset1": 0.4}), 30, 0)
+    assert fitted(hexapod, measured, prior=1.0).prior_test is not None
+    assert fitted(hexapod, measured, prior=1.0, loss="huber").prior_test is None
+
+
 def test_little_gained_counts_also_where_sigma_says_that_much_is_left(hexapod: pk.Robot) -> None:
     true = hexapod.replace({"base6.z": hexapod.geometry["base6.z"] + 0.03})
     measured = replace(positions(hexapod, true, 20, 2), sigma=np.full((20, 3), 0.02))
