@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -65,28 +65,81 @@ def test_the_core_refuses_counts_that_are_none(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_core_refuses_places_that_are_none(name: str) -> None:
-    """Each entry of each array, below what is there and above it."""
+    """Each entry of each array, below what is there, the first above it, and far above."""
     machine = machine_of(name)
     struct, layout = machine.struct, machine.layout
-    ends = {
-        "first": range(len(layout.first)),
-        "member": range(len(layout.member)),
-        "end_place": range(len(layout.ball)),
-        "ball_place": np.flatnonzero(layout.ball),
-        "actuator": range(len(layout.place)),
-        "coordinate": range(len(layout.place)),
-        "place": range(len(layout.place)),
-        "drive_place": range(len(layout.drive_place)),
+    joints, numbers = range(len(layout.place)), struct.numbers
+    above: dict[str, tuple[Iterable[int], int]] = {
+        "first": (range(len(layout.first)), len(layout.member) + 11),
+        "member": (range(len(layout.member)), struct.joints),
+        "end_place": (range(len(layout.ball)), numbers - 2),
+        "ball_place": (np.flatnonzero(layout.ball), numbers - 2),
+        "actuator": (joints, struct.actuators),
+        "coordinate": (joints, struct.passive),
+        "place": (joints, numbers - 5),
+        "drive_place": (range(len(layout.drive_place)), numbers - 1),
     }
-    for field, entries in ends.items():
+    for field, (entries, first) in above.items():
         array = getattr(struct, field)
         for k in entries:
             before = array[int(k)]
-            for wrong in (-2, 10_000):
+            for wrong in (-2, first, 10_000):
                 array[int(k)] = wrong
                 assert lib.pkm_chain_count(struct) == 0, (field, k, wrong)
             array[int(k)] = before
     assert lib.pkm_chain_count(struct) > 0
+
+
+class Drawn:
+    """A struct of chains of driven ("d") and passive ("p") joints, none shared, that end rigidly."""
+
+    def __init__(self, *chains: str) -> None:
+        kinds, integers = "".join(chains), "int32_t[]"
+        driven, passive = (np.cumsum([kind == each for kind in kinds]) - 1 for each in "dp")
+        is_driven = np.array([kind == "d" for kind in kinds])
+        self.struct = ffi.new("pkm_chains *")
+        self.struct.map, self.struct.length = 0, 1.0
+        self.struct.chains, self.struct.joints = len(chains), len(kinds)
+        self.struct.actuators = self.struct.tail = kinds.count("d")
+        self.struct.passive, self.struct.numbers = kinds.count("p"), lib.PKM_MAX_NUMBERS
+        self._arrays = {
+            "first": ffi.new(integers, [0, *np.cumsum([len(each) for each in chains]).tolist()]),
+            "member": ffi.new(integers, list(range(len(kinds))) + [0] * 8),
+            "actuator": ffi.new(integers, np.where(is_driven, driven, -1).tolist()),
+            "coordinate": ffi.new(integers, np.where(is_driven, -1, passive).tolist()),
+        }
+        for each in ("ball", "end_place", "ball_place", "place", "drive_place"):
+            self._arrays[each] = ffi.new(integers, len(kinds))
+        for field, array in self._arrays.items():
+            setattr(self.struct, field, array)
+
+    @property
+    def rows(self) -> int:
+        found: int = lib.pkm_chain_count(self.struct)
+        return found
+
+
+def test_the_core_takes_as_many_joints_and_actuators_as_it_has_room_for_and_no_more() -> None:
+    chain = "dppppp"  # which leaves a row
+    most = lib.PKM_MAX_JOINTS // len(chain)
+    assert Drawn(*[chain] * most).rows == most
+    assert Drawn(*[chain] * most, chain).rows == Drawn(*[chain] * most, "d").rows == 0
+    assert lib.PKM_MAX_LIMBS == 4 * 6
+    assert Drawn(*["dddd"] * 6).rows == lib.PKM_MAX_CHAIN_ROWS
+    assert Drawn(*["dddd"] * 5, "ddddd").rows == 0
+    assert Drawn(*["d" * lib.PKM_MAX_CHAIN] * 2, *["d"] * 4).rows == lib.PKM_MAX_CHAIN_ROWS
+    assert Drawn(*["d" * lib.PKM_MAX_CHAIN] * 2, "d" * 5).rows == 0
+
+
+def test_a_passive_joint_that_is_not_shared_is_in_one_chain() -> None:
+    for joint in range(1, 6):
+        one = Drawn(*["dppppp"] * 8)
+        assert one.rows == 8
+        one.struct.first[8] += 1  # the last chain has one joint more, the first chain's
+        one.struct.member[48] = joint
+        assert one.rows == 0
+    one.struct.member[48] = 0  # driven: in as many as there are
+    assert one.rows == 8
 
 
 def test_a_number_has_one_column_of_chains() -> None:
