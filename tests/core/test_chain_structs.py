@@ -91,22 +91,25 @@ def test_the_core_refuses_places_that_are_none(name: str) -> None:
 
 
 class Drawn:
-    """A struct of chains of driven ("d") and passive ("p") joints, none shared, that end rigidly."""
+    """A struct of chains that end rigidly: joints driven (d), passive (p), passive and shared (s)."""
 
     def __init__(self, *chains: str) -> None:
         kinds, integers = "".join(chains), "int32_t[]"
-        driven, passive = (np.cumsum([kind == each for kind in kinds]) - 1 for each in "dp")
-        is_driven = np.array([kind == "d" for kind in kinds])
+        places = {each: np.flatnonzero(np.array(list(kinds)) == each) for each in "dsp"}
+        actuator, coordinate = np.full((2, len(kinds)), -1)
+        actuator[places["d"]] = range(kinds.count("d"))
+        coordinate[np.concatenate([places["s"], places["p"]])] = range(len(kinds) - kinds.count("d"))
         self.struct = ffi.new("pkm_chains *")
         self.struct.map, self.struct.length = 0, 1.0
         self.struct.chains, self.struct.joints = len(chains), len(kinds)
         self.struct.actuators = self.struct.tail = kinds.count("d")
-        self.struct.passive, self.struct.numbers = kinds.count("p"), lib.PKM_MAX_NUMBERS
+        self.struct.passive = len(kinds) - kinds.count("d")
+        self.struct.shared, self.struct.numbers = kinds.count("s"), lib.PKM_MAX_NUMBERS
         self._arrays = {
             "first": ffi.new(integers, [0, *np.cumsum([len(each) for each in chains]).tolist()]),
             "member": ffi.new(integers, list(range(len(kinds))) + [0] * 8),
-            "actuator": ffi.new(integers, np.where(is_driven, driven, -1).tolist()),
-            "coordinate": ffi.new(integers, np.where(is_driven, -1, passive).tolist()),
+            "actuator": ffi.new(integers, actuator.tolist()),
+            "coordinate": ffi.new(integers, coordinate.tolist()),
         }
         for each in ("ball", "end_place", "ball_place", "place", "drive_place"):
             self._arrays[each] = ffi.new(integers, len(kinds))
@@ -167,3 +170,31 @@ def test_more_columns_than_numbers_are_refused() -> None:
     given = (ffi.NULL, 0, ffi.NULL, ffi.NULL, ffi.from_buffer("int32_t[]", columns), 5000, 0)
     code = lib.pkm_base_chain_response(machine.struct, 0, *given, ffi.NULL)
     assert code == lib.PKM_BAD_COLUMN
+
+
+def test_rows_of_chains_tell_all_free_coordinates_and_shared_joints() -> None:
+    one = "dppppp"  # which leaves a row
+    assert Drawn(*[one] * 6).rows == 6
+    assert Drawn(*[one] * 5).rows == 0
+    assert Drawn("dspppp", *[one] * 5).rows == 7  # of which the shared joint's own row is one
+    assert Drawn("dspppp", *[one] * 4).rows == 0
+
+
+def test_the_last_places_that_there_are_may_be_taken() -> None:
+    drawn = Drawn(*["dppppp"] * 6)
+    for place, of in (("place", 6), ("end_place", 6), ("drive_place", 2)):
+        getattr(drawn.struct, place)[0] = lib.PKM_MAX_NUMBERS - of
+        assert drawn.rows == 6
+        getattr(drawn.struct, place)[0] += 1
+        assert drawn.rows == 0
+        getattr(drawn.struct, place)[0] = 0
+    drawn.struct.ball[0] = 1  # which leaves no row: it takes three passive joints less
+    assert drawn.rows == 0
+    ball = Drawn("dpp", *["dppppp"] * 5)
+    ball.struct.ball[0] = 1
+    for place in ("end_place", "ball_place"):
+        getattr(ball.struct, place)[0] = lib.PKM_MAX_NUMBERS - 3
+        assert ball.rows == 6
+        getattr(ball.struct, place)[0] += 1
+        assert ball.rows == 0
+        getattr(ball.struct, place)[0] = 0
