@@ -193,3 +193,36 @@ def test_nearly_all_of_a_workspace_settles_in_the_quick_steps(name: str) -> None
     turned = coordinates + 0.03 * np.ptp(q, axis=0) * np.random.default_rng(4).normal(size=q.shape)
     beside = robot.forward(turned, guess=at)
     assert beside.ok.all() and np.mean(beside.iterations == 2 + 2) >= 0.9
+
+
+def two_poses(robot: pk.Robot, q: np.ndarray) -> np.ndarray:
+    """Where a linear delta is at coordinates (3,), above and below its carriages: (2, 3)."""
+    limbs = twin.numbers(robot.model, None)
+    names = ("x", "y", "z")
+    base, joint = (
+        np.array([[limb[f"{point}.{name}"] for name in names] for limb in limbs])
+        for point in ("base", "platform")
+    )
+    centres = base - joint + q[:, None] * [0.0, 0.0, 1.0]
+    rods = np.array([limb["rod"] for limb in limbs])
+    sides = 2.0 * (centres[1:] - centres[0])
+    squares = (centres**2).sum(axis=1) - rods**2
+    foot = np.linalg.lstsq(sides, squares[1:] - squares[0], rcond=None)[0]
+    along = np.cross(*sides) / np.linalg.norm(np.cross(*sides))
+    foot += along * (along @ (centres[0] - foot))
+    height = np.sqrt(rods[0] ** 2 - ((foot - centres[0]) ** 2).sum())
+    return np.array([foot + height * along, foot - height * along])
+
+
+def test_a_delta_goes_to_one_of_its_two_poses_from_guesses_far_away() -> None:
+    """Three spheres meet in two points; many guesses need a step halved more than once."""
+    robot = pk.load("linear-delta")
+    at = poses("linear-delta", 300, seed=8)
+    q = robot.inverse(at)
+    away = np.random.default_rng(8).uniform(-200.0, 200.0, (300, 3))
+    found = robot.forward(q, at + np.pad(away, ((0, 0), (0, 3))))
+    assert found.ok.all() and found.iterations.max() > 10
+    both = np.array([two_poses(robot, row) for row in q])
+    apart = np.linalg.norm(found.pose[:, None, :3] - both, axis=2)
+    np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-8)
+    assert set(apart.argmin(axis=1)) == {0, 1}
