@@ -292,12 +292,12 @@ class Kinematics:
             start = start[0] if guess_shape == () else _for_each("guess", start, guess_shape, shape)
         into = None
         if out is not None:
-            into = reused_forward(out, shape, rows, start)
+            into = reused_forward(out, shape, not self.frames.trivial, rows, start)
         own, status, iterations, residual = self.machine.forward(
             self.slots, rows, start, threads, shape, into
         )
         pose = self.frames.outward(own)
-        if out is not None and pose is not own:
+        if out is not None and not self.frames.trivial:
             pose = written(pose, out.pose)
         return Forward(pose, status, iterations, residual, self, own, rows, start)
 
