@@ -505,7 +505,7 @@ class Equations(Readings):
 
     def forget_following(self) -> None:
         """A search has ended: how poses follow the parameters takes memory."""
-        self._follow = None
+        self._follow = self._from = None
 
     def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n).
