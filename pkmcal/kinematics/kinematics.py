@@ -24,7 +24,7 @@ from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
 from pkmcal.kinematics.limits import kept, margin_of
 from pkmcal.kinematics.machines import machine_of
-from pkmcal.kinematics.reused import reused_forward, reused_rows
+from pkmcal.kinematics.reused import kept_rows, reused_forward, reused_rows
 from pkmcal.modes.find import AssemblyProblem
 from pkmcal.screw import to_pose
 
@@ -292,14 +292,15 @@ class Kinematics:
             start = start[0] if guess_shape == () else _for_each("guess", start, guess_shape, shape)
         into = None
         if out is not None:
-            into = reused_forward(out, shape, rows, start)
+            into = reused_forward(out, shape, not self.frames.trivial, rows, start)
         own, status, iterations, residual = self.machine.forward(
             self.slots, rows, start, threads, shape, into
         )
         pose = self.frames.outward(own)
-        if out is not None and pose is not own:
+        if out is not None and not self.frames.trivial:
             pose = written(pose, out.pose)
-        return Forward(pose, status, iterations, residual, self, own, rows, start)
+        asked, begun = kept_rows(rows, q), kept_rows(start, guess)
+        return Forward(pose, status, iterations, residual, self, own, asked, begun)
 
     def jacobian(self, pose: ArrayLike) -> FloatArray:
         """∂q/∂(free coordinates), limb by limb (eq. 12 for the 2TPR&2TPS).

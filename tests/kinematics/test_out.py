@@ -110,3 +110,40 @@ def test_what_is_still_read_is_not_written_over() -> None:
         robot.forward(robot.inverse(poses[:3]), out=found)
     with pytest.raises(TypeError, match="out must be"):
         robot.forward(robot.inverse(poses), out=poses)
+
+
+def test_results_of_robots_with_other_frames_are_refused() -> None:
+    plain, moved = pk.load("hexapod"), framed()
+    q = plain.inverse(pk.sample_poses(plain, 4, seed=7))
+    for robot, other in ((plain, moved), (moved, plain)):
+        with pytest.raises(ValueError, match="out must be a result of a robot that has base or"):
+            robot.forward(q, out=other.forward(q))
+
+
+@pytest.mark.parametrize("name", ["pose", "status", "iterations", "residual"])
+def test_results_that_are_read_only_are_refused(name: str) -> None:
+    robot = framed()
+    q = robot.inverse(pk.sample_poses(robot, 4, seed=8))
+    found = robot.forward(q)
+    getattr(found, name).flags.writeable = False
+    with pytest.raises(ValueError, match=r"out must be .* can be written to"):
+        robot.forward(q, out=found)
+
+
+def test_arrays_with_a_mask_are_refused() -> None:
+    robot = pk.load("hexapod")
+    with pytest.raises(TypeError, match="out must be an array without a mask"):
+        robot.inverse(robot.home, out=np.ma.masked_all(6))
+
+
+def test_a_result_says_what_it_did_when_its_coordinates_are_written_over() -> None:
+    plain = pk.load("hexapod")
+    poses = pk.sample_poses(plain, 8, seed=9).reshape(2, 4, 6)
+    q, guess = plain.inverse(poses[0]), poses[0].copy()
+    wanted = plain.forward(q.copy(), guess.copy())
+    found = plain.forward(q, guess)
+    plain.inverse(poses[1], out=q)
+    guess[:] = 1e6
+    np.testing.assert_array_equal(found.conditioning, wanted.conditioning)
+    np.testing.assert_array_equal(found.same_side, wanted.same_side)
+    assert found.certificate.ok.all()
