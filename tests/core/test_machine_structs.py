@@ -1,4 +1,4 @@
-"""Structs of machines of limbs: what is no machine is refused, as much as there is room for is not."""
+"""Structs of machines of limbs: what is none is refused, as much as there is room for is not."""
 
 from __future__ import annotations
 
