@@ -312,9 +312,9 @@ def test_the_core_refuses_what_it_cannot_take() -> None:
     struct.particles = 8
     state, bounds, found = np.empty(library.lib.pkm_swarm_size(struct)), np.ones(2), np.empty(9)
     for iterations, rows in ((-1, 1), (0, 0), (0, -1)):
-        given = (struct, iterations, 0, 0, 1, rows, np.ones(2), -bounds, bounds, state, found, found)
+        size, out = (iterations, 0, 0, 1, rows), (state, found, found)
         with pytest.raises(ValueError, match="the core refused the call"):
-            library.call("swarm_eq18", *given)
+            library.call("swarm_eq18", struct, *size, bounds, -bounds, bounds, *out)
 
 
 # --- order-2 stability -------------------------------------------------------------------------

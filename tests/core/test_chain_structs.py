@@ -91,19 +91,20 @@ def test_the_core_refuses_places_that_are_none(name: str) -> None:
 
 
 class Drawn:
-    """A struct of chains that end rigidly: joints driven (d), passive (p), passive and shared (s)."""
+    """A struct of chains, rigid at their ends, of driven (d), passive (p) and shared (s) joints."""
 
     def __init__(self, *chains: str) -> None:
         kinds, integers = "".join(chains), "int32_t[]"
         places = {each: np.flatnonzero(np.array(list(kinds)) == each) for each in "dsp"}
         actuator, coordinate = np.full((2, len(kinds)), -1)
         actuator[places["d"]] = range(kinds.count("d"))
-        coordinate[np.concatenate([places["s"], places["p"]])] = range(len(kinds) - kinds.count("d"))
+        passive = [*places["s"], *places["p"]]
+        coordinate[passive] = range(len(passive))
         self.struct = ffi.new("pkm_chains *")
         self.struct.map, self.struct.length = 0, 1.0
         self.struct.chains, self.struct.joints = len(chains), len(kinds)
         self.struct.actuators = self.struct.tail = kinds.count("d")
-        self.struct.passive = len(kinds) - kinds.count("d")
+        self.struct.passive = len(passive)
         self.struct.shared, self.struct.numbers = kinds.count("s"), lib.PKM_MAX_NUMBERS
         self._arrays = {
             "first": ffi.new(integers, [0, *np.cumsum([len(each) for each in chains]).tolist()]),

@@ -1,4 +1,4 @@
-"""Structs of machines of limbs: what is no machine is refused, as much as there is room for is not."""
+"""Structs of machines of limbs: what is none is refused, as much as there is room for is not."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.core.library import DRIVERS, ROWS, ffi, lib, pointer
+from pkmcal.core.library import DRIVERS, ROWS, SLOTS, ffi, lib, pointer
 
 from .. import robots, twin
 from ..workspaces import WORKSPACE
@@ -105,4 +105,9 @@ def test_a_machine_of_as_many_limbs_as_there_is_room_for_is_that_of_six_at_a_tim
     found = robot.forward(q)
     np.testing.assert_allclose(found.pose, at, atol=1e-9)
     assert robot.machine.spheres(robot.slots, q).shape == (9, MOST, lib.PKM_SPHERE)
-    assert robot.error_jacobian(at).shape[-1] == len(robot.geometry)
+    by_q = robot.machine._by_actuators(robot.slots, at, q, twists=False)
+    np.testing.assert_allclose(by_q, np.linalg.pinv(robot.jacobian(at)), atol=1e-10)
+    all_numbers = np.arange(robot.slots.size, dtype=np.int32)
+    by_number = robot.machine._by_numbers(robot.slots, at, q, all_numbers, twists=False)
+    offset = robot.slots.shape[1] * np.arange(MOST) + SLOTS.index("offset")
+    np.testing.assert_allclose(by_number[:, :, offset], by_q, atol=1e-12)

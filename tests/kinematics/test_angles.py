@@ -330,7 +330,8 @@ def test_limbs_geared_to_one_actuator_stand_where_they_agree(at_home: float, rat
 def test_geared_limbs_that_nearly_agree_stay_at_their_turn(at_home: float, ratio: float) -> None:
     """At poses that the machine misses a little no turn is one where they agree."""
     robot, q = geared(at_home, ratio), np.radians(at_home) + ABOUT_HOME
-    beside = robot.forward(q).pose + [0.0, 0.0, 0.0, 0.0, 0.0, 1e-4]
+    beside = robot.forward(q).pose
+    beside[:, 5] += 1e-4
     assert missed(robot, beside, q).max() > 1e-4
     np.testing.assert_allclose(robot.inverse(beside, near=q), q, rtol=0, atol=1e-3)
 

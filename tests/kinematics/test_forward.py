@@ -280,3 +280,13 @@ def test_a_machine_of_another_size_takes_the_same_steps(name: str, factor: float
         np.testing.assert_array_equal(status, known[1])
         np.testing.assert_array_equal(iterations, known[2])
         np.testing.assert_array_equal(residual, known[3] * factor)
+
+
+def test_the_tolerance_of_closures_is_for_more_of_them_than_coordinates() -> None:
+    """Others hold to rounding, and what is allowed beyond that says nothing of them."""
+    strict, plain = robots.hexapod(closure_tolerance=1e-300), robots.hexapod()
+    q, guess = hard_rows("hexapod", 203)
+    found, expected = strict.forward(q, guess), plain.forward(q, guess)
+    assert expected.ok.sum() > 60 and expected.iterations[expected.ok].max() > 5
+    np.testing.assert_array_equal(found.status, expected.status)
+    np.testing.assert_array_equal(found.pose, expected.pose)
