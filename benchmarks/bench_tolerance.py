@@ -2,6 +2,7 @@
 
     python benchmarks/bench_tolerance.py          ratios, everything in one run
     pytest --benchmark-only benchmarks            the parts by pytest-benchmark
+    python benchmarks/bench_tolerance.py --against CHECKOUT    its core built in place
 
 The loop draws the 28 errors of the 2TPR&2TPS, solves its four leg lengths for y z alpha beta, and
 keeps the pose error. Its closures come three ways: from the pose by R = Rz Ry Rx, as for any
@@ -11,9 +12,13 @@ runs on one core, and on two by threads.
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from statistics import median
 from typing import Any
 
@@ -24,6 +29,7 @@ from scipy.optimize import root
 import pkmcal as pk
 
 Array = np.ndarray
+HERE = Path(__file__).resolve().parents[1]
 SAMPLES = 1_000_000
 LOOPED = 2_000  # samples of the loop
 SIGMA = 0.1  # mm
@@ -146,6 +152,35 @@ def ratios(rounds: int = 5) -> dict[str, float]:
     return found
 
 
+MANY_POSES = """
+import time, pkmcal as pk
+robot = pk.load({name!r})
+poses = pk.sample_poses(robot, 30, seed=1)
+pk.tolerance(robot, poses, {sigma}, samples=100)
+begin = time.process_time()
+pk.tolerance(robot, poses, {sigma}, samples=65536)
+print(time.process_time() - begin)
+"""
+
+
+def against(checkout: Path, rounds: int = 7) -> dict[str, float]:
+    """Processor time over that of another checkout, processes in turn, medians."""
+    found = {}
+    for name in ("hexapod", "2tpr2tps", "linear-delta", "3rps"):
+        ratios = []
+        for _ in range(rounds):
+            took = []
+            for tree in (HERE, checkout):
+                command = [sys.executable, "-c", MANY_POSES.format(name=name, sigma=SIGMA)]
+                place = {**os.environ, "PYTHONPATH": str(tree)}
+                took.append(float(subprocess.check_output(command, env=place, cwd=tree)))
+            ratios.append(took[0] / took[1])
+        found[name] = median(ratios)
+        print(f"Monte Carlo of {name}, 65536 machines at 30 poses: {found[name]:.2f} of the other's"
+              f" time ({min(ratios):.2f} to {max(ratios):.2f})")  # fmt: skip
+    return found
+
+
 def processor_seconds(call: Callable[[], object]) -> float:
     """Of this process, whatever else the machine does."""
     begin = time.process_time()
@@ -154,6 +189,9 @@ def processor_seconds(call: Callable[[], object]) -> float:
 
 
 if __name__ == "__main__":
-    for each in WAYS:
-        test_both_find_the_same_spread(each)
-    ratios()
+    if sys.argv[1:2] == ["--against"]:
+        against(Path(sys.argv[2]).resolve())
+    else:
+        for each in WAYS:
+            test_both_find_the_same_spread(each)
+        ratios()

@@ -143,15 +143,3 @@ int pkm_with_errors(ptrdiff_t n, int k, const double *error, const int32_t *plac
         for (int j = 0; j < k; j++) out[i * size + place[j]] = ideal[place[j]] + error[i * k + j];
     return 0;
 }
-
-int pkm_count(int k, ptrdiff_t n, const double *value, const double *low, const double *width,
-              int bins, int64_t *count)
-{
-    for (int j = 0; j < k; j++, value += n, count += bins + 2)
-        for (ptrdiff_t i = 0; i < n; i++) {
-            const double place = (value[i] - low[j]) / width[j] + 1.0;
-            const double most = bins + 1.0;
-            count[place >= most ? bins + 1 : place >= 0.0 ? (ptrdiff_t)place : 0]++;
-        }
-    return 0;
-}

@@ -19,6 +19,12 @@ int CALL(forward)(const pkm_machine *machine, ptrdiff_t n, const double *geometr
                   ptrdiff_t guess_stride, double *pose, int32_t *status, int32_t *iterations,
                   double *residual);
 
+/* The same of n machines, geometry (n, limbs, SLOTS), at q (places, actuators) from guess (places, 6):
+ * pose (places, n, 6), and so on. */
+int CALL(forward_machines)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
+                           ptrdiff_t places, const double *q, const double *guess, double *pose,
+                           int32_t *status, int32_t *iterations, double *residual);
+
 /* pose (n, 6) -> dq/dfree (n, actuators, m), limb by limb. */
 int CALL(jacobian)(const pkm_machine *machine, ptrdiff_t n, const double *geometry,
                    ptrdiff_t geometry_stride, const double *pose, double *jacobian);
@@ -116,6 +122,16 @@ int CALL(motion)(const pkm_machine *machine, ptrdiff_t n, const double *geometry
  * zeros alone, is 4 words of each of eight generators (4, 8) and moves on; what is left of the last
  * sixteen numbers is dropped. */
 int CALL(normals)(ptrdiff_t n, uint64_t *state, double *out);
+
+/* pose (n, 6), and where it was to be (6) -> how far x … gamma are off, angles the short way round, and
+ * the distance of the positions, (7, n). */
+int CALL(pose_errors)(ptrdiff_t n, const double *pose, const double *meant, double *off);
+
+/* value (k, n) of which columns of finite numbers are added to what is known of others: mean, sum of
+ * squares about it, least and most (4, k), how many were taken and how many left out (2), and how many
+ * are in each bin (k, bins + 2), the first and last of which are below and above the others. */
+int CALL(stream)(int k, ptrdiff_t n, const double *value, const double *low,
+                 const double *width, int bins, double *moments, int64_t *taken, int64_t *count);
 
 /* A swarm step by step: start within the bounds; set the particles' values in the state and
  * update the best (pBest, gBest); move (eq. 19); update again. Of one seed the same bits with

@@ -15,4 +15,5 @@
 #include "measured.h"
 #include "pulleys.h"
 #include "tpr2tps.h"
+#include "stream.h"
 #include "row_loops.h"

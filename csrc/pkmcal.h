@@ -144,11 +144,6 @@ int pkm_paths(const pkm_machine *machine, ptrdiff_t n, const double *start, cons
  * `ideal` (size) plus the row's errors (n, k); the others are left. */
 int pkm_with_errors(ptrdiff_t n, int k, const double *error, const int32_t *place, ptrdiff_t size,
                     const double *ideal, double *out);
-
-/* Of each quantity of value (k, n), finite, how many numbers are in each bin: count (k, bins + 2) goes
- * up, its first and last column by what is below and above the bins. */
-int pkm_count(int k, ptrdiff_t n, const double *value, const double *low, const double *width,
-              int bins, int64_t *count);
 /* cffi end */
 
 /* What calls.h declares, of each ISA. */

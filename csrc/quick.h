@@ -39,7 +39,8 @@ typedef struct {
     narrow state[BLOCKS][MAX_STATE], factors[BLOCKS][36];
     real fine[PARTS][MAX_STATE], worst[PARTS];
     mask solved[PARTS];
-    int blocks; /* that hold rows: fewer at the end of the rows */
+    ptrdiff_t row[PARTS][LANES];
+    int count[PARTS], parts, blocks; /* that hold rows: fewer at the end of the rows */
 } batch;
 
 /* Sign bits of the determinant, from the factors. */

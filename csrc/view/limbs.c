@@ -37,7 +37,7 @@ EXPORT int inverse(void) { return CALL(inverse)(machine, 1, geometry, 0, pose, N
 /* q, pose as the guess -> found, residual; by safeguarded Newton alone, which is the smaller code */
 EXPORT int forward(void)
 {
-    const forward_call call = {machine, 1, geometry, 0, q, pose, 0, found, &status, &iterations, residual};
+    const forward_call call = {machine, 1, geometry, 0, q, 0, pose, 0, found, &status, &iterations, residual};
     limb_numbers limb[PKM_MAX_LIMBS];
     prepare_limbs(machine, geometry, 0, first_row, limb);
     newton_rows(machine->map, &call, limb, first_row, 1);

@@ -11,7 +11,7 @@ from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 from pkmcal.core import screws
 from pkmcal.core.chain_actuators import coordinates
 from pkmcal.core.chain_readings import readings
-from pkmcal.core.core_machine import CoreMachine, known_rows
+from pkmcal.core.core_machine import CoreMachine, known_rows, written
 from pkmcal.core.library import COORDINATE_UNITS, ISA, MAPS, call, pointer
 from pkmcal.core.machine import CLOSURE_TOLERANCE, Closure, Machine
 from pkmcal.core.path_differences import actuator_rates, platform_motion
@@ -194,17 +194,22 @@ class ChainMachine(CoreMachine):
         self._angles = sorted(int(a) for a in turning if a >= 0)
 
     def inverse(
-        self, slots: FloatArray, pose: FloatArray, near: FloatArray | None = None
+        self,
+        slots: FloatArray,
+        pose: FloatArray,
+        near: FloatArray | None = None,
+        out: FloatArray | None = None,
     ) -> FloatArray:
         """Poses (N, 6) to actuator coordinates (N, n), from home; chains one by one if that does.
 
         Angles as `pkmcal.core.machine.Machine.inverse` gives them.
         """
         if self._together:
-            return known_rows(self.nearest_turns(slots, self._all_at_once(slots, pose), near))
-        q = np.empty((len(pose), self.actuators))
-        call("chain_inverse", self.struct, len(pose), slots, 0, pose, q, isa=self.isa)
-        return known_rows(self.nearest_turns(slots, q, near))
+            found = self._all_at_once(slots, pose)
+        else:
+            found = np.empty((len(pose), self.actuators))
+            call("chain_inverse", self.struct, len(pose), slots, 0, pose, found, isa=self.isa)
+        return written(known_rows(self.nearest_turns(slots, found, near)), out)
 
     def _all_at_once(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """`inverse` of a machine whose chains cannot be taken one by one."""

@@ -30,10 +30,27 @@ def whole_turn(gains: FloatArray) -> float:
     return float((1 + int(np.argmax(whole))) * 2 * np.pi / abs(gains[0]))
 
 
+Found = tuple[FloatArray, Int32Array, Int32Array, FloatArray]
+
+
+def unwritten(n: int) -> Found:
+    """Arrays for what `CoreMachine.forward` finds in n rows."""
+    status, iterations = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
+    return np.empty((n, 6)), status, iterations, np.empty(n)
+
+
 def known_rows(q: FloatArray) -> FloatArray:
     """Rows (N, n) of which nothing is known where one number is not; in place."""
     q[~np.isfinite(q).all(axis=1)] = np.nan
     return q
+
+
+def written(values: FloatArray, out: FloatArray | None) -> FloatArray:
+    """Values in the array `out`, if there is one."""
+    if out is None:
+        return values
+    out[...] = values
+    return out
 
 
 class CoreMachine(ABC):
@@ -149,15 +166,16 @@ class CoreMachine(ABC):
         guess: FloatArray,
         threads: int | None,
         shape: tuple[int, ...] | None = None,
-    ) -> tuple[FloatArray, Int32Array, Int32Array, FloatArray]:
+        out: Found | None = None,
+    ) -> Found:
         """Actuator coordinates (N, n) to pose, status, iterations and residual.
 
         `slots` is one geometry, (limbs, SLOTS) or (1, numbers) of chains, or one per row (N, …);
-        `guess` (6,) or (N, 6). What is found has the leading `shape` of N rows, by default (N,).
+        `guess` (6,) or (N, 6). What is found has the leading `shape` of N rows, by default (N,),
+        and is in the arrays of `out` (N, …), if there are any.
         """
         n, shape = len(q), (len(q),) if shape is None else shape
-        pose, residual = np.empty((n, 6)), np.empty(n)
-        status, iterations = np.empty(n, dtype=np.int32), np.empty(n, dtype=np.int32)
+        pose, status, iterations, residual = unwritten(n) if out is None else out
         stride = slots[0].size if slots.ndim == 3 else 0
         guess_stride = 6 if guess.ndim == 2 else 0
 
@@ -180,6 +198,14 @@ class CoreMachine(ABC):
             iterations.reshape(shape),
             residual.reshape(shape),
         )
+
+    def forward_machines(self, slots: FloatArray, q: FloatArray, guess: FloatArray) -> FloatArray:
+        """Poses (P, N, 6) of N machines at coordinates (P, n), from guesses (P, 6)."""
+        found = np.empty((len(q), len(slots), 6))
+        for poses, at, start in zip(found, q, guess, strict=True):
+            each = np.repeat(at[None], len(slots), axis=0)
+            poses[:] = self.forward(slots, each, start, threads=1)[0]
+        return found
 
     def error_jacobian(
         self,

@@ -14,7 +14,7 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array
 from pkmcal.core.chains import AnyMachine, ChainMachine
-from pkmcal.core.core_machine import CoreMachine, known_rows, whole_turn
+from pkmcal.core.core_machine import CoreMachine, Found, known_rows, whole_turn, written
 from pkmcal.core.drive_turns import agreed_turns
 from pkmcal.core.laws import Drive, Laws, Ways
 from pkmcal.core.machine import Closure, Machine
@@ -199,11 +199,15 @@ class DrivenMachine(CoreMachine):
     # kinematics: as `pkmcal.core.machine.Machine` -------------------------------------------------
 
     def inverse(
-        self, slots: FloatArray, pose: FloatArray, near: FloatArray | None = None
+        self,
+        slots: FloatArray,
+        pose: FloatArray,
+        near: FloatArray | None = None,
+        out: FloatArray | None = None,
     ) -> FloatArray:
         """Poses (N, 6) to readings (N, n)."""
         way = self.inner.inverse(self._bare(slots), pose)
-        return known_rows(self.at_drives(slots, self._turned(slots, way, near)))
+        return written(known_rows(self.at_drives(slots, self._turned(slots, way, near))), out)
 
     def forward(
         self,
@@ -212,10 +216,11 @@ class DrivenMachine(CoreMachine):
         guess: FloatArray,
         threads: int | None,
         shape: tuple[int, ...] | None = None,
-    ) -> tuple[FloatArray, Int32Array, Int32Array, FloatArray]:
+        out: Found | None = None,
+    ) -> Found:
         """Readings (N, n) to pose, status, iterations and residual."""
         way = self.drives(slots, q)
-        return self.inner.forward(self._bare(slots), way, guess, threads, shape)
+        return self.inner.forward(self._bare(slots), way, guess, threads, shape, out)
 
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m)."""

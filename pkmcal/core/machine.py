@@ -131,14 +131,18 @@ class Machine(CoreMachine):
         self._angles = {a: each for a, each in driven.items() if limbs[each[0]]["angle"]}
 
     def inverse(
-        self, slots: FloatArray, pose: FloatArray, near: FloatArray | None = None
+        self,
+        slots: FloatArray,
+        pose: FloatArray,
+        near: FloatArray | None = None,
+        out: FloatArray | None = None,
     ) -> FloatArray:
-        """Poses (N, 6) to actuator coordinates (N, n).
+        """Poses (N, 6) to actuator coordinates (N, n), in the array `out` if there is one.
 
         Of angles, the turn nearest to `near` (n,) or (N, n), or to the machine's own reference:
         the middle of the stroke, or the home pose.
         """
-        q = np.empty((len(pose), self.actuators))
+        q = np.empty((len(pose), self.actuators)) if out is None else out
         stride = self.actuators if near is not None and near.ndim == 2 else 0
         given = (len(pose), slots, _by_row(slots), pose, near, stride, q)
         call("inverse", self.struct, *given, isa=self.isa)
@@ -198,6 +202,15 @@ class Machine(CoreMachine):
         out = np.empty((len(pose), self.actuators, self.m))
         call("jacobian", self.struct, len(pose), slots, _by_row(slots), pose, out, isa=self.isa)
         return self.as_written(pose, out, 2)
+
+    def forward_machines(self, slots: FloatArray, q: FloatArray, guess: FloatArray) -> FloatArray:
+        """Poses (P, N, 6) of N machines at coordinates (P, n), from guesses (P, 6)."""
+        shape = len(q), len(slots)
+        pose, residual = np.empty((*shape, 6)), np.empty(shape)
+        status, iterations = np.empty((2, *shape), dtype=np.int32)
+        given = (shape[1], slots, shape[0], q, guess, pose, status, iterations, residual)
+        call("forward_machines", self.struct, *given, isa=self.isa)
+        return pose
 
     def forward_jacobian(
         self, slots: FloatArray, pose: FloatArray, q: FloatArray, twists: bool = False

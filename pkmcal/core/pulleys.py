@@ -19,6 +19,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, Int32Array, IntArray
 from pkmcal.core import instruments
+from pkmcal.core.core_machine import CoreMachine, Found, unwritten
 from pkmcal.core.library import SLOTS, rows
 from pkmcal.core.machine import Closure, Machine
 from pkmcal.exceptions import ArgumentError
@@ -223,10 +224,14 @@ class PulleyMachine(Machine):
     # kinematics: as `Machine` ---------------------------------------------------------------------
 
     def inverse(
-        self, slots: FloatArray, pose: FloatArray, near: FloatArray | None = None
+        self,
+        slots: FloatArray,
+        pose: FloatArray,
+        near: FloatArray | None = None,
+        out: FloatArray | None = None,
     ) -> FloatArray:
         """Poses (N, 6) to actuator coordinates (N, n)."""
-        return super().inverse(self._limbs_at(slots, pose)[0], pose, near)
+        return super().inverse(self._limbs_at(slots, pose)[0], pose, near, out)
 
     def forward(
         self,
@@ -235,12 +240,14 @@ class PulleyMachine(Machine):
         guess: FloatArray,
         threads: int | None,
         shape: tuple[int, ...] | None = None,
-    ) -> tuple[FloatArray, Int32Array, Int32Array, FloatArray]:
+        out: Found | None = None,
+    ) -> Found:
         """Actuator coordinates (N, n) to pose, status, iterations and residual."""
         n = len(q)
-        pose, residual = np.full((n, 6), np.nan), np.full(n, np.nan)
-        status, iterations = np.ones(n, dtype=np.int32), np.zeros(n, dtype=np.int32)
         at = self._on_map(np.broadcast_to(guess, (n, 6)))
+        pose, status, iterations, residual = unwritten(n) if out is None else out
+        for each, value in ((pose, np.nan), (status, 1), (iterations, 0), (residual, np.nan)):
+            each.fill(value)
         going, limit = np.arange(n), _SETTLED * self.struct.size
         open_ = self.with_tolerance(np.inf)  # on the way closures need not agree
         for _ in range(_STEPS):
@@ -266,6 +273,8 @@ class PulleyMachine(Machine):
             return pose, status, iterations, residual
         parts = (status.reshape(shape), iterations.reshape(shape), residual.reshape(shape))
         return (pose.reshape(*shape, 6), *parts)
+
+    forward_machines = CoreMachine.forward_machines  # where the rope leaves depends on the pose
 
     def jacobian(self, slots: FloatArray, pose: FloatArray) -> FloatArray:
         """∂q/∂free at poses (N, 6): (N, n, m)."""

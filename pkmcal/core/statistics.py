@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pkmcal._core import lib
 from pkmcal.arrays import FloatArray
-from pkmcal.core.library import pointer
+from pkmcal.core.library import call
 
 BINS = 2048
 REACH = 8.0  # standard deviations, to either side of the mean, that the bins cover
@@ -44,6 +43,16 @@ class Bins:
         return Bins(values.mean(axis=1) - REACH * spread, 2 * REACH / BINS * spread)
 
 
+def pose_errors(poses: FloatArray, meant: FloatArray) -> FloatArray:
+    """How far poses (N, 6) are off (6,), and the distance of the positions: (7, N).
+
+    Eq. 16; angles the short way round.
+    """
+    off = np.empty((7, len(poses)))
+    call("pose_errors", len(poses), poses, meant, off)
+    return off
+
+
 class Stream:
     """What is kept of values (k, n): count, mean, spread, extremes, and counts in bins.
 
@@ -56,66 +65,57 @@ class Stream:
     def __init__(self, bins: Bins) -> None:
         k = len(bins.low)
         self.bins = bins
-        self.count = 0
-        self.n_failed = 0
-        self._mean = np.zeros(k)
-        self._squares = np.zeros(k)  # sum of squares about the mean
-        self._least, self._most = np.full(k, np.inf), np.full(k, -np.inf)
+        self._moments = np.zeros((4, k))  # mean, squares about the mean, least, most
+        self._moments[2], self._moments[3] = np.inf, -np.inf
+        self._taken = np.zeros(2, dtype=np.int64)  # columns, and those that failed
         self._in_bin = np.zeros((k, BINS + 2), dtype=np.int64)
+
+    @property
+    def count(self) -> int:
+        """How many columns have been taken, without those that failed."""
+        return int(self._taken[0])
+
+    @property
+    def n_failed(self) -> int:
+        """How many columns had a number that is not finite."""
+        return int(self._taken[1])
 
     def add(self, values: FloatArray) -> None:
         """Take a batch (k, n); columns with NaN count as failed and no more."""
-        good = np.isfinite(values).all(axis=0)
-        if not good.all():
-            self.n_failed += int((~good).sum())
-            values = values[:, good]
         k, n = values.shape
-        if not n:
-            return
-        mean = values.mean(axis=1)
-        off = values - mean[:, None]
-        squares = np.einsum("ij,ij->i", off, off)
-        self._combine(n, mean, squares, values.min(axis=1), values.max(axis=1))
-        values = np.ascontiguousarray(values)
-        bins, count = (self.bins.low, self.bins.width), self._in_bin
-        lib.pkm_count(k, n, pointer(values), *map(pointer, bins), BINS, pointer(count))
+        given = k, n, np.ascontiguousarray(values), self.bins.low, self.bins.width, BINS
+        call("stream", *given, self._moments, self._taken, self._in_bin)
 
     def merge(self, other: Stream) -> None:
         """Take what another stream with the same bins has taken."""
-        self.n_failed += other.n_failed
         self._in_bin += other._in_bin
-        if other.count:
-            self._combine(other.count, other._mean, other._squares, other._least, other._most)
-
-    def _combine(
-        self, count: int, mean: FloatArray, squares: FloatArray, least: FloatArray, most: FloatArray
-    ) -> None:
-        total = self.count + count
-        step = mean - self._mean
-        self._squares = self._squares + squares + step**2 * (self.count * count / total)
-        self._mean = self._mean + step * (count / total)
-        self.count = total
-        self._least = np.minimum(self._least, least)
-        self._most = np.maximum(self._most, most)
+        total = max(self.count + other.count, 1)
+        mean, squares, least, most = other._moments
+        step, share = mean - self._moments[0], other.count / total
+        self._moments[1] += squares + step**2 * (self.count * share)
+        self._moments[0] += share * step
+        self._moments[2] = np.minimum(self._moments[2], least)
+        self._moments[3] = np.maximum(self._moments[3], most)
+        self._taken += other._taken
 
     @property
     def mean(self) -> FloatArray:
         """Mean (k,); NaN without values."""
-        return self._mean if self.count else np.full(len(self._mean), np.nan)
+        return self._moments[0].copy() if self.count else np.full(len(self._in_bin), np.nan)
 
     @property
     def std(self) -> FloatArray:
         """Standard deviation (k,), with n - 1; NaN for fewer than two values."""
         if self.count < 2:
-            return np.full(len(self._mean), np.nan)
-        return np.asarray(np.sqrt(self._squares / (self.count - 1)))
+            return np.full(len(self._in_bin), np.nan)
+        return np.asarray(np.sqrt(self._moments[1] / (self.count - 1)))
 
     @property
     def mean_square(self) -> FloatArray:
         """Mean of the squares (k,)."""
         if not self.count:
-            return np.full(len(self._mean), np.nan)
-        return np.asarray(self._squares / self.count + self._mean**2)
+            return np.full(len(self._in_bin), np.nan)
+        return np.asarray(self._moments[1] / self.count + self._moments[0] ** 2)
 
     def quantile(self, share: float, failed_below: float = 0.0) -> FloatArray:
         """Value (k,) that `share` of all columns do not exceed, the failed ones among them.
@@ -127,16 +127,17 @@ class Stream:
         """
         rank = share * (self.count + self.n_failed - 1) - failed_below * self.n_failed
         if not self.count and not self.n_failed:
-            return np.full(len(self._mean), np.nan)
+            return np.full(len(self._in_bin), np.nan)
         if rank < 0 or rank > self.count - 1:
-            return np.full(len(self._mean), -np.inf if rank < 0 else np.inf)
+            return np.full(len(self._in_bin), -np.inf if rank < 0 else np.inf)
         below = np.cumsum(self._in_bin, axis=1)
-        found = np.empty(len(self._mean))
+        found = np.empty(len(self._in_bin))
+        _, _, least, most = self._moments
         for i, (ends, inside) in enumerate(zip(below, self._in_bin, strict=True)):
             at = int(np.searchsorted(ends, rank, side="right"))
             edge = self.bins.low[i] + self.bins.width[i] * np.arange(at - 1, at + 1)
-            low = self._least[i] if at == 0 else max(edge[0], self._least[i])
-            high = self._most[i] if at == BINS + 1 else min(edge[1], self._most[i])
+            low = least[i] if at == 0 else max(edge[0], least[i])
+            high = most[i] if at == BINS + 1 else min(edge[1], most[i])
             part = (rank - (ends[at] - inside[at]) + 0.5) / inside[at]
             found[i] = low + (high - low) * min(part, 1.0)
         return found

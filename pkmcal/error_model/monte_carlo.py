@@ -18,13 +18,13 @@ import numpy as np
 from pkmcal import arguments
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.random import Normals
-from pkmcal.core.statistics import Bins, Stream
+from pkmcal.core.statistics import Bins, Stream, pose_errors
 from pkmcal.geometry.model import Model
-from pkmcal.kinematics.perturbed import Geometries, forward_of, quantities_off
+from pkmcal.kinematics.perturbed import Geometries, forward_of
 from pkmcal.kinematics.robot import Robot
 
 CHUNK = 16_384  # machines that share a seed
-BATCH = 2_048  # of these solved at a time: what fits the cache
+BATCH = 1_024  # of these solved at a time: what fits the cache
 POSES = 16  # solved by one task
 PILOT = 1_024  # machines that determine how wide the bins must be; one batch
 AHEAD = 32  # tasks that are handed to an executor before the first of them is looked at
@@ -74,11 +74,8 @@ class Draw:
         for start in range(0, self.count, BATCH):
             drawn = normals.fill(errors[: self.count - start])
             drawn *= self.sigma
-            slots = geometries.with_errors(drawn)
-            yield [
-                quantities_off(forward_of(robot, slots, q, pose), pose)
-                for pose, q in zip(self.poses, self.actuators, strict=True)
-            ]
+            found = forward_of(robot, geometries.with_errors(drawn), self.actuators, self.poses)
+            yield [pose_errors(*each) for each in zip(found, self.poses, strict=True)]
 
     def run(self) -> list[Stream]:
         """Moments and counts of each pose."""

@@ -13,11 +13,12 @@ from pkmcal import display
 from pkmcal.arguments import checked_seed, number, whole
 from pkmcal.arrays import FloatArray, IntArray, as_numbers, largest_first, rms
 from pkmcal.core.library import POSE
+from pkmcal.core.statistics import pose_errors
 from pkmcal.display import Table
 from pkmcal.error_model.monte_carlo import Draw, Progress, simulate
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.load import is_of_load
-from pkmcal.kinematics.perturbed import Geometries, Ideal, forward_of, ideal, quantities_off
+from pkmcal.kinematics.perturbed import Geometries, Ideal, forward_of, ideal
 from pkmcal.kinematics.robot import Robot, require_parallel
 from pkmcal.result import Result
 
@@ -289,7 +290,8 @@ def _worst_case(
     for row in np.flatnonzero(np.isfinite(effect).all(axis=(1, 2))).tolist():
         errors = WORST * deviations * np.vstack([sides[row], -sides[row]])
         slots, pose = geometries.with_errors(errors), at.poses[row]
-        moved = quantities_off(forward_of(robot, slots, at.actuators[row], pose), pose)[:6]
+        (there,) = forward_of(robot, slots, at.actuators[row : row + 1], pose[None])
+        moved = pose_errors(there, pose)[:6]
         two = np.abs(np.stack([moved[:, :6].diagonal(), moved[:, 6:].diagonal()]))
         found[row] = np.where(np.isnan(two), np.inf, two).max(axis=0)
     return found

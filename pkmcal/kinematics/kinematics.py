@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from pkmcal.arguments import instance
 from pkmcal.arrays import BoolArray, FloatArray, Unit, as_numbers, as_rows, mm_per_unit
 from pkmcal.core.chains import ChainMachine
+from pkmcal.core.core_machine import written
 from pkmcal.core.driven import DrivenMachine
 from pkmcal.core.library import MAPS, POSE
 from pkmcal.core.machine import Machine
@@ -23,6 +24,7 @@ from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
 from pkmcal.kinematics.limits import kept, margin_of
 from pkmcal.kinematics.machines import machine_of
+from pkmcal.kinematics.reused import kept_rows, reused_forward, reused_rows
 from pkmcal.modes.find import AssemblyProblem
 from pkmcal.screw import to_pose
 
@@ -145,7 +147,12 @@ class Kinematics:
         return 1.0
 
     def inverse(
-        self, pose: ArrayLike, match: Match = None, *, near: ArrayLike | None = None
+        self,
+        pose: ArrayLike,
+        match: Match = None,
+        *,
+        near: ArrayLike | None = None,
+        out: FloatArray | None = None,
     ) -> FloatArray:
         """Actuator coordinates of a pose, limb by limb in closed form.
 
@@ -161,6 +168,8 @@ class Kinematics:
             Coordinates: an actuator that turns is given at the turn nearest to them. By default
             it is the turn nearest to the middle of its stroke, or, where the file states none, to
             the home pose.
+        out : ndarray (..., n), optional
+            float64, contiguous: written to and returned, in place of a new array.
 
         Returns
         -------
@@ -171,7 +180,7 @@ class Kinematics:
         Raises
         ------
         ValueError, TypeError
-            A wrong shape, no numbers, unknown coordinates to match.
+            A wrong shape, no numbers, unknown coordinates to match, `out` that does not fit.
 
         Notes
         -----
@@ -179,10 +188,13 @@ class Kinematics:
         """
         rows, shape = as_rows("pose", pose, 6)
         about = None if near is None else self._near(near, shape)
+        into = None
+        if out is not None:
+            into = reused_rows(out, (*shape, self.n_actuators), rows, about)
         if match is None:
-            q = self.machine.inverse(self.slots, self.frames.inward(rows), about)
+            q = self.machine.inverse(self.slots, self.frames.inward(rows), about, into)
         else:
-            q = self._completed(rows, match, about).q
+            q = written(self._completed(rows, match, about).q, into)
         return q.reshape(*shape, self.n_actuators)
 
     @property
@@ -228,7 +240,11 @@ class Kinematics:
         return rows[0] if near_shape == () else _for_each("near", rows, near_shape, shape)
 
     def forward(
-        self, q: ArrayLike, guess: ArrayLike | None = None, threads: int | None = None
+        self,
+        q: ArrayLike,
+        guess: ArrayLike | None = None,
+        threads: int | None = None,
+        out: Forward | None = None,
     ) -> Forward:
         """Pose at given actuator coordinates, by Newton's method on the closures (eq. 13).
 
@@ -240,6 +256,9 @@ class Kinematics:
             Where to start; the home pose by default. Which assembly mode is found depends on it.
         threads : int, optional
             As many as pay by default.
+        out : Forward, optional
+            An earlier result of as many rows. Its arrays are written to, those of what is returned
+            are the same; what it said is lost.
 
         Returns
         -------
@@ -250,7 +269,20 @@ class Kinematics:
         Raises
         ------
         ValueError, TypeError
-            A wrong shape, or no numbers.
+            A wrong shape, no numbers, or `out` that does not fit.
+
+        Examples
+        --------
+        Batch after batch in the same memory:
+
+        >>> import pkmcal as pk
+        >>> robot = pk.load("linear-delta")
+        >>> batches = robot.inverse(pk.sample_poses(robot, 30, seed=1)).reshape(3, 10, 3)
+        >>> found = None
+        >>> for q in batches:
+        ...     found = robot.forward(q, out=found)
+        >>> found.pose.shape
+        (10, 6)
         """
         rows, shape = as_rows("q", q, self.n_actuators)
         if guess is None:
@@ -258,11 +290,17 @@ class Kinematics:
         else:
             start, guess_shape = self.own_rows(guess, "guess")
             start = start[0] if guess_shape == () else _for_each("guess", start, guess_shape, shape)
+        into = None
+        if out is not None:
+            into = reused_forward(out, shape, not self.frames.trivial, rows, start)
         own, status, iterations, residual = self.machine.forward(
-            self.slots, rows, start, threads, shape
+            self.slots, rows, start, threads, shape, into
         )
         pose = self.frames.outward(own)
-        return Forward(pose, status, iterations, residual, self, own, rows, start)
+        if out is not None and not self.frames.trivial:
+            pose = written(pose, out.pose)
+        asked, begun = kept_rows(rows, q), kept_rows(start, guess)
+        return Forward(pose, status, iterations, residual, self, own, asked, begun)
 
     def jacobian(self, pose: ArrayLike) -> FloatArray:
         """∂q/∂(free coordinates), limb by limb (eq. 12 for the 2TPR&2TPS).

@@ -113,7 +113,7 @@ def _tied(tie: Tie, geometry: Geometry, changed: Mapping[str, FloatArray]) -> Fl
 def forward_of(
     robot: Robot, slots: FloatArray, actuators: FloatArray, guess: FloatArray
 ) -> FloatArray:
-    """Poses of machines that differ in geometry and have the same actuator coordinates.
+    """Poses of machines that differ in geometry, at the same actuator coordinates.
 
     Parameters
     ----------
@@ -121,20 +121,18 @@ def forward_of(
         What the machines have in common.
     slots : ndarray (N, limbs, SLOTS)
         Their geometries.
-    actuators : ndarray (n,)
+    actuators : ndarray (P, n)
         mm or rad.
-    guess : ndarray (6,)
+    guess : ndarray (P, 6)
         Where to start, in the robot's frames.
 
     Returns
     -------
-    ndarray (N, 6)
+    ndarray (P, N, 6)
         NaN where a machine has no pose near the guess.
     """
-    q = np.repeat(actuators[None], len(slots), axis=0)
-    start = robot.frames.inward(guess[None])[0]
-    own = robot.machine.forward(slots, q, start, threads=1)[0]
-    return robot.frames.outward(own)
+    own = robot.machine.forward_machines(slots, actuators, robot.frames.inward(guess))
+    return robot.frames.outward(own.reshape(-1, 6)).reshape(own.shape)
 
 
 def off(poses: FloatArray, from_poses: FloatArray) -> FloatArray:
@@ -142,12 +140,3 @@ def off(poses: FloatArray, from_poses: FloatArray) -> FloatArray:
     error = poses - from_poses
     error[..., 3:] = wrapped(error[..., 3:])
     return error
-
-
-def quantities_off(poses: FloatArray, from_pose: FloatArray) -> FloatArray:
-    """Errors of poses (N, 6) from one pose and the distance of their positions, (7, N)."""
-    found = np.empty((7, len(poses)))
-    np.subtract(poses.T, from_pose[:, None], out=found[:6])
-    found[3:6] = wrapped(found[3:6])
-    np.sqrt(found[0] ** 2 + found[1] ** 2 + found[2] ** 2, out=found[6])
-    return found

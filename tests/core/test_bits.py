@@ -31,6 +31,7 @@ ELSEWHERE = {
     *("inverse", "forward", "jacobian", "forward_jacobian", "error_jacobian", "closure", "limbs"),
     *("rates", "motion", "compose", "invert", "compose_rates", "compose_twists", "normals"),
     *("swarm_start", "swarm_update_best", "swarm_move", "swarm_eq18"),
+    *("forward_machines", "pose_errors", "stream"),
     *("chain_forward", "chain_inverse", "chain_closure", "chain_response", "chain_frames"),
 }
 
@@ -275,6 +276,29 @@ def test_angles_have_the_same_bits_near_anything(kind: str) -> None:
         for part in TAILS:
             for one, other in zip(found(isa, part), whole, strict=True):
                 assert np.array_equal(one, other[part], equal_nan=one.dtype.kind == "f")
+
+
+@pytest.mark.parametrize("kind", generated.KINDS)
+def test_machines_at_places_have_the_bits_of_each_alone(kind: str) -> None:
+    """Whatever the number of machines and the ISA; some are so far off that they do not close."""
+    rng = np.random.default_rng([11, generated.KINDS.index(kind)])
+    robot = generated.machine(kind, rng, errors=0.3)
+    machine = robot.machine
+    guess = np.ascontiguousarray(generated.poses(kind, robot, 3, rng))
+    q = np.ascontiguousarray(machine.inverse(robot.slots, guess))
+    slots = robot.slots + rng.normal(size=(ROWS, *robot.slots.shape)) * 1e-3
+    slots[5:9] += 30.0 * rng.normal(size=(4, *robot.slots.shape))
+    slots[11, 0, 0] = np.nan
+    alone = np.empty((3, ROWS, 6))
+    for place, row in np.ndindex(3, ROWS):
+        alone[place, row] = machine.forward(slots[row], q[place][None], guess[place][None], 1)[0][0]
+    assert np.isfinite(alone[:, :5]).any()
+    assert np.isnan(alone[:, 11]).all()
+    for isa in ISAS:
+        machine.isa = isa
+        for part in TAILS:
+            found = machine.forward_machines(slots[part].copy(), q, guess)
+            np.testing.assert_array_equal(found, alone[:, part])
 
 
 def test_every_call_that_is_compiled_for_each_isa_is_looked_at() -> None:

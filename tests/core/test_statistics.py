@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
-from pkmcal.core.statistics import BINS, REACH, Bins, Stream
+from pkmcal.core import library
+from pkmcal.core.statistics import BINS, REACH, Bins, Stream, pose_errors
 
 SHARES = (0.0, 0.0015, 0.025, 0.5, 0.975, 0.997, 0.9985, 1.0)
 
@@ -73,15 +75,15 @@ def test_columns_with_nan_fail_and_count_in_nothing() -> None:
     np.testing.assert_allclose(stream.mean, np.delete(values, range(10, 30), axis=1).mean(axis=1))
 
 
-def test_merged_streams_are_one_stream() -> None:
+def test_merged_streams_are_one_stream_to_rounding() -> None:
     values = np.random.default_rng(4).normal(size=(2, 900))
     bins = Bins.around(values)
     whole = streamed(values, [300, 600], bins)
     parts = [streamed(part, [], bins) for part in np.split(values, 3, axis=1)]
     for other in parts[1:]:
         parts[0].merge(other)
-    np.testing.assert_array_equal(parts[0].mean, whole.mean)
-    np.testing.assert_array_equal(parts[0].std, whole.std)
+    np.testing.assert_allclose(parts[0].mean, whole.mean, rtol=1e-13)
+    np.testing.assert_allclose(parts[0].std, whole.std, rtol=1e-13)
     for share in SHARES:
         np.testing.assert_array_equal(parts[0].quantile(share), whole.quantile(share))
 
@@ -92,3 +94,35 @@ def test_without_values_nothing_is_known() -> None:
     assert np.isnan(stream.std).all()
     assert (stream.quantile(0.5) == np.inf).all()  # a machine without a pose is beyond all limits
     assert np.isnan(stream.mean_square).all()
+
+
+@pytest.mark.parametrize("rows", [1, 7, 255, 256, 257, 1000])
+def test_what_poses_are_off_is_their_difference_the_short_way_round(rows: int) -> None:
+    """Eq. 16, and the distance of the positions."""
+    rng = np.random.default_rng(rows)
+    meant, poses = rng.normal(size=6) * 2, rng.normal(size=(rows, 6)) * 2
+    poses[-1] = np.nan
+    off = pose_errors(poses, meant)
+    turned = Rotation.from_rotvec(np.array([0, 0, 1]) * (poses[:-1, 3:] - meant[3:]).reshape(-1, 1))
+    np.testing.assert_allclose(off[:3, :-1], (poses[:-1, :3] - meant[:3]).T, rtol=1e-15)
+    np.testing.assert_allclose(off[3:6, :-1].T.ravel(), turned.as_rotvec()[:, 2], atol=1e-14)
+    np.testing.assert_allclose(off[6, :-1], np.linalg.norm(off[:3, :-1], axis=0), rtol=1e-14)
+    assert np.isnan(off[:, -1]).all()
+
+
+def test_moments_and_counts_have_the_same_bits_on_every_isa(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(6)
+    values = rng.normal(size=(7, 1031)) + 100.0
+    values[3, rng.integers(0, 1031, 40)] = np.nan
+    meant = rng.normal(size=6)
+    seen = []
+    for isa in range(library.lib.pkm_best_isa() + 1):
+        monkeypatch.setattr(library, "ISA", isa)
+        stream = streamed(values, [1, 300, 556], Bins.around(values[:, ~np.isnan(values[3])]))
+        stream.add(pose_errors(meant + np.linspace(99.0, 101.0, 54).reshape(9, 6), meant))
+        seen.append((stream.mean, stream.std, *(stream.quantile(share) for share in SHARES)))
+        assert stream.n_failed == np.isnan(values[3]).sum()
+    for other in seen[1:]:
+        np.testing.assert_array_equal(np.array(other), np.array(seen[0]))

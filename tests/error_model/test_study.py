@@ -39,7 +39,8 @@ def apart(one: str, other: str, machines: int = 2000, sigma: float = 0.5) -> np.
     for robot in (model(one), model(other)):
         places = np.array([robot.geometry.names.index(name) for name in names])
         slots = Geometries(robot.geometry, places, machines).with_errors(drawn)
-        poses.append(forward_of(robot, slots, robot.inverse(robot.home), robot.home)[:, :3])
+        (found,) = forward_of(robot, slots, robot.inverse(robot.home[None]), robot.home[None])
+        poses.append(found[:, :3])
     return np.linalg.norm(poses[0] - poses[1], axis=1)
 
 

@@ -60,7 +60,7 @@ def test_a_row_with_its_own_geometry_is_that_robot(name: str) -> None:
     (pose,) = robot.complete(poses(name, 1)) if name in WORKSPACE else robot.home[None]
     q = robot.inverse(pose)
     slots = Geometries(geometry, places, len(errors)).with_errors(errors)
-    found = forward_of(robot, slots, q, pose)
+    (found,) = forward_of(robot, slots, q[None], pose[None])
     for row, given_slots, each in zip(errors, slots, found, strict=True):
         values = {n: geometry[n] + e for n, e in zip(own, row, strict=True)}
         single = robot.replace(values)

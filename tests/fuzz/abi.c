@@ -243,6 +243,7 @@ static void of_machine(ptrdiff_t n, unsigned strange, int isas)
     const double *guess = numbers(6 * n + 6, strange), *motion = numbers(48 * n, strange);
     const double *q1 = numbers(q * n, strange), *q2 = numbers(q * n, strange);
     double *drives = numbers(q * n, strange);
+    const double *places = numbers(2 * q, strange), *starts = numbers(12, strange);
     if (count && byte() & 1) pkm_base_inverse(&machine, n, geometry, stride, pose, NULL, 0, drives);
     const ptrdiff_t some = byte() & 1 ? 6 : 0, about = byte() & 1 ? q : 0;
     int32_t column[8];
@@ -252,11 +253,15 @@ static void of_machine(ptrdiff_t n, unsigned strange, int isas)
     }
     const pkm_machine *is = &machine;
     const int twists = byte() & 1;
-    one_of(13);
+    one_of(14);
 
     EACH_ISA(inverse, is, n, geometry, stride, pose, near, about, D(0, n * q));
     EACH_ISA(forward, is, n, geometry, stride, drives, guess, some, D(0, 6 * n), I(1, n), I(2, n),
              D(3, n));
+    if (stride) {
+        EACH_ISA(forward_machines, is, n, geometry, 2, places, starts, D(0, 12 * n), I(1, 2 * n),
+                 I(2, 2 * n), D(3, 2 * n));
+    }
     EACH_ISA(jacobian, is, n, geometry, stride, pose, D(0, n * q * m));
     EACH_ISA(forward_jacobian, is, n, geometry, stride, pose, drives, twists, D(0, 6 * n * q));
     EACH_ISA(error_jacobian, is, n, geometry, stride, pose, drives, column, 8, twists,
@@ -363,7 +368,7 @@ static void of_rows(ptrdiff_t n, unsigned strange, int isas)
     const double *a = numbers(6 * n + 6, strange), *b = numbers(6 * n + 6, strange);
     const double *c = numbers(6 * n + 6, strange), *motion = numbers(16 * n + 9, strange);
     const ptrdiff_t six = byte() & 1 ? 6 : 0, three = byte() & 1 ? 3 : 0;
-    one_of(26);
+    one_of(28);
     EACH_ISA(compose, n, a, six, b, 6 - six, D(0, 6 * n));
     EACH_ISA(invert, n, a, D(0, 6 * n));
     EACH_ISA(compose_rates, n, a, b, c, six, a, D(0, 36 * n));
@@ -391,14 +396,14 @@ static void of_rows(ptrdiff_t n, unsigned strange, int isas)
     EACH_ISA(exp_jacobian, n, a, D(0, 36 * n));
     EACH_ISA(log_jacobian, n, a, D(0, 36 * n));
     EACH_ISA(joint_motions, n, a, b, D(0, 16 * n));
+    EACH_ISA(pose_errors, n, a, b, D(0, 7 * n));
+    EACH_ISA(stream, 6, n, a, b, c, 8, memset(output(isa, 0, 192), 0, 192), memset(output(isa, 1, 16), 0, 16),
+             memset(output(isa, 2, 480), 0, 480));
     const uint64_t seed[32] = {bits(), bits(), bits(), bits()};
     EACH_ISA(normals, 17 * n, memcpy(output(isa, 1, sizeof seed), seed, sizeof seed), D(0, 17 * n));
     int32_t place[8];
     for (int k = 0; k < 8; k++) place[k] = (int32_t)(byte() < 250 ? byte() % 6 : bits());
     pkm_with_errors(n, 6, a, place, 6, b, memcpy(fresh(48 * (size_t)n), a, 48 * (size_t)n));
-    int64_t *count = fresh(6 * 10 * sizeof *count);
-    memset(count, 0, 6 * 10 * sizeof *count);
-    pkm_count(6, n, a, b, c, 8, count);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
