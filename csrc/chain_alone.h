@@ -105,10 +105,11 @@ SHARED mask chain_reclose(const pkm_chains *machine, int l, const chain_numbers 
         if (!any(open)) break;
         memcpy(trial, theta, sizeof(real) * machine->passive);
         chain_posture(machine, l, attempt < 0 ? 0 : attempt, trial);
-        for (int a = 0; a < machine->actuators; a++)
-            own[a] = attempt < 0 && !of_tail(machine, a) ? fill(0.0) : drive[a];
-        if (attempt < 0)
+        if (attempt < 0) {
+            for (int a = 0; a < machine->actuators; a++)
+                own[a] = of_tail(machine, a) ? drive[a] : fill(0.0);
             chain_assemble(machine, l, numbers, R, p, NULL, MAX_ASSEMBLY, trial, own);
+        }
         const mask settled = chain_assemble(machine, l, numbers, R, p, drive,
                                             attempt < 3 ? FEW_ASSEMBLY : MAX_ASSEMBLY, trial, own);
         const real misses = chain_missed(machine, l, numbers, R, p, trial, drive, r);

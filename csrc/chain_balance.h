@@ -122,7 +122,6 @@ SHARED void chain_rest(const pkm_chains *machine, int l, const chain_numbers *nu
                        const real *twist, chain_balance *rest, real *all)
 {
     const int m = map_m(machine->map), unknowns = m + machine->shared, first = machine->first[l];
-    const double inverse_length = 1.0 / machine->length;
     chain_view view;
     real by[MAX_BALANCE][MAX_BALANCE], A[36], B[6 * MAX_CHAIN_UNKNOWNS], pivot;
     chain_look(machine, l, numbers, at->theta, drive, R, p, &view);

@@ -92,9 +92,8 @@ SHARED void prepare_chains(const pkm_chains *machine, const double *geometry, pt
                 e[i] = chain_number(geometry, stride, machine->place[joint] + i, row);
             FN(arm_link)(e, from.Q, from.r, to.Q, to.r, link[j].R, link[j].p);
         }
-        for (int i = 0; i < 6; i++)
-            e[i] = i < 3 || !machine->ball[l]
-                       ? chain_number(geometry, stride, machine->end_place[l] + i, row) : fill(0.0);
+        for (int i = 0; i < (machine->ball[l] ? 3 : 6); i++)
+            e[i] = chain_number(geometry, stride, machine->end_place[l] + i, row);
         if (!machine->ball[l]) {
             link[k] = chain_end(machine, l, &from, e);
             continue;
@@ -244,8 +243,7 @@ INLINE void chain_compliance(const pkm_chains *machine, int l, const motion *fra
             C[3 + i][3 + i] += soft * (1.0 + square);
             for (int j = 0; j < 3; j++) {
                 C[3 + i][3 + j] -= soft * (d[i] * d[j]);
-                C[3 + i][j] += soft * cross[i][j];
-                C[j][3 + i] += soft * cross[i][j];
+                C[3 + i][j] += soft * cross[i][j]; /* below the diagonal: no more is read */
             }
         }
     }

@@ -91,6 +91,16 @@ def test_forward_stays_at_a_pose_that_it_found_by_any_turn(
     assert home.ok.all() and off(home.pose, found.pose[known]).max() < 1e-6
 
 
+@pytest.mark.parametrize("seed", (1, 3))
+def test_forward_comes_back_from_a_guess_beside_its_pose(seed: int, tmp_path: Path) -> None:
+    """Of what is found with the drives asked for and from home it is the nearer one."""
+    robot, rng = machine("spatial", seed, tmp_path)
+    found, q = solved(robot, rng, 60)
+    beside = found.pose + rng.uniform(-1, 1, found.pose.shape) * ([3.0] * 3 + [0.006] * 3)
+    again = robot.forward(q, guess=beside)
+    assert again.ok.all() and off(again.pose, found.pose).max() < 1e-6
+
+
 @each_map
 @pytest.mark.parametrize("seed", SEEDS)
 def test_twists_by_actuators_are_those_of_small_steps_or_nan(

@@ -188,6 +188,8 @@ def test_commands_come_back(name: str) -> None:
     found = robot.forward(q)
     assert found.ok.all()
     assert found.iterations.mean() < 5.5
+    again = robot.forward(q, guess=found.pose)  # one step, and the first, of which nothing is left
+    assert again.iterations.max() == 2 and np.abs(again.pose - found.pose).max() < 1e-9
     assert np.abs(robot.inverse(found.pose) - q).max() < 1e-8
     assert robot.violation(found.pose).max() < 1e-9
     step = 1e-5
@@ -230,9 +232,23 @@ def test_closures_of_chains_are_known_as_a_whole_or_not_at_all(name: str) -> Non
     q[[1, 4], 0] = np.nan, np.inf
     poses[2, POSE.index(robot.coordinates[0])] = np.nan
     found = robot.machine.closure(robot.slots, poses, q)
-    for each in (found.residual, found.by_step, found.by_free, found.by_q):
+    looked = robot.machine.frames(robot.slots, poses, q)
+    for each in (found.residual, found.by_step, found.by_free, found.by_q, *looked):
         assert np.isnan(each[[1, 2, 4]]).all() and np.isfinite(each[[0, 3, 5]]).all()
         np.testing.assert_array_equal(each[[3, 5]], each[[0, 0]])
+
+
+@pytest.mark.parametrize("name", ("tricept", "tripteron"))
+def test_an_effect_does_not_depend_on_what_else_is_asked_for(name: str) -> None:
+    """The column of a number is the same wherever it comes, the first one too."""
+    robot = disturbed(pk.load(name), 0.1)
+    q = commands(robot, 2, share=0.3)
+    pose, columns = robot.forward(q).pose, np.arange(robot.machine.layout.numbers, dtype=np.int32)
+    every = robot.machine.error_jacobian(robot.slots, pose, q, columns)
+    assert np.isfinite(every).all()
+    for column in columns:
+        alone = robot.machine.error_jacobian(robot.slots, pose, q, columns[[column]])
+        np.testing.assert_array_equal(alone[..., 0], every[..., column])
 
 
 def test_rows_fail_alone_and_say_why() -> None:

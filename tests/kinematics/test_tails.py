@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.core.library import ISA, call
 from pkmcal.exceptions import FileError
 from pkmcal.geometry import robot_file
 from pkmcal.screw import from_pose
@@ -249,3 +250,14 @@ def test_dexterity_sees_axes_of_a_wrist_in_line(tmp_path: Path) -> None:
     assert (np.abs(ratio / ratio[0] - 1) < 0.1).all() and 0.1 < ratio[0] < 10
     straight = pk.dexterity(robot, robot.forward(q[0] * [1, 1, 1, 0, 0, 0]).pose)
     assert straight.transmission < 1e-6 and straight.conditioning > 1e-3
+
+
+def test_chains_one_by_one_leave_the_wrist_at_home(tmp_path: Path) -> None:
+    """What the core says of a pose of the tool: the platform is where the wrist at home carries it."""
+    robot = loaded(tricept(), tmp_path)
+    gain = {n: 2.0 for n in robot.geometry.names if n in ("gain4", "gain5", "gain6")}
+    robot = robot.replace(gain | {"offset5": 0.1})
+    q = np.hstack([commands(pk.load("tricept"), 5), np.tile([0.0, -0.05, 0.0], (5, 1))])
+    pose, back = robot.forward(q).pose, np.empty_like(q)
+    call("chain_inverse", robot.machine.struct, len(q), robot.slots, 0, pose, back, isa=ISA)
+    assert np.abs(back - q).max() < 1e-9
