@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import multiprocessing
 import resource
 import time
@@ -247,7 +248,7 @@ def _many(free: str | None, rows: int) -> tuple[float, float]:
 def bench_many(report: Report) -> None:
     """Many positions of a hexapod."""
     rows = []
-    for free, count in (("offset*", 100_000), (None, 100_000), ("offset*", 1_000_000)):
+    for free, count in itertools.product(("offset*", None), (100_000, 1_000_000)):
         with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as alone:
             took, held = alone.submit(_many, free, count).result()
         numbers = "6" if free else "42"

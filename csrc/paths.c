@@ -126,17 +126,18 @@ INLINE void exchange_substitute(int m, const real *A, const int *row, real *b)
     }
 }
 
-/* How large a step is beside its state. */
+/* How large a step is beside its state; infinite where it is no number, which fmax would drop. */
 INLINE double relative(int map, const real *state, const real *step)
 {
     double moved = 0.0, largest = 1.0;
     real rate[MAX_STATE] = {0};
     FN(map_velocity)(map, state, step, rate);
     for (int s = 0; s < MAX_STATE; s++) {
+        if (!isfinite(creal(rate[s])) || !isfinite(cimag(rate[s]))) return INFINITY;
         moved = fmax(moved, size(rate[s]));
         largest = fmax(largest, size(state[s]));
     }
-    return isfinite(moved) ? moved / largest : INFINITY;
+    return moved / largest;
 }
 
 /* Newton's method from a predicted state; the factors of its last matrix stay. Returns the first
@@ -205,7 +206,8 @@ INLINE int follow(int map, const homotopy *path, double accuracy, real *x, int32
         real trial[MAX_STATE] = {0};
         *reached = t;
         if (reach(map, x) > FARTHEST) return 1.0 - t < NEARLY ? PKM_FAR : PKM_LOST;
-        if (++*steps > MAX_STEPS || h < LEAST_STEP) return PKM_LOST;
+        if (*steps == MAX_STEPS || h < LEAST_STEP) return PKM_LOST;
+        ++*steps;
         const double next = t + h < 1.0 ? t + h : 1.0, step = next - t;
         if (before > 0.0) extrapolate(x0, v0, x, v, before, step, trial);
         else

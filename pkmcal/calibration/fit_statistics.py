@@ -160,7 +160,6 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
     if mirror_fits(equations, estimate.evaluation, estimate.state.noise):
         named_freedoms = replace(named_freedoms, texts=(*named_freedoms.texts, MIRROR))
     open_ones = sparse_basis(named_freedoms.rest, chosen.names).T
-    jacobian = estimator.scaled_jacobian(estimate.evaluation)
     return Identifiability(
         rank=measured.rank,
         gap=measured.gap,
@@ -169,7 +168,9 @@ def identifiability(estimator: Estimator, estimate: Estimate) -> Identifiability
             for combination in open_ones
         ),
         gauges=named_freedoms.texts,
-        observability=observability(jacobian, len(equations.actuators), measured.rank),
+        observability=observability(
+            estimator.scaled_triangle(estimate.evaluation), len(equations.actuators), measured.rank
+        ),
     )
 
 

@@ -89,15 +89,14 @@ def law_tests(
         if size[0] <= len(columns) * np.finfo(float).eps * size[-1]:
             continue
         squares = float(((axes.T @ (values / scale)) ** 2 / size).sum())
-        count, freedom = float(len(columns)), float(table.dof[columns].min())
-        ratio = squares / count
+        count, freedom, spent = float(len(columns)), float(table.dof[columns].min()), 0.0
         if table.rule == "cluster":
             freedom = uncertainty.covariance.sandwich.joint_freedom(uncertainty.reported[columns])
-            ratio *= (freedom - count + 1.0) / max(freedom, 1.0)
-            freedom -= count - 1.0
-        if freedom > 0.0:
-            chance = f_tail(ratio, count, freedom)
-            found.append(LawTest(names, ratio, (count, freedom), chance))
+            spent = count - 1.0
+        rest = freedom - spent
+        if rest > 0.0:
+            ratio = squares / count * (1.0 - spent / freedom)
+            found.append(LawTest(names, ratio, (count, rest), f_tail(ratio, count, rest)))
     return tuple(found)
 
 

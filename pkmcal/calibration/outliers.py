@@ -58,7 +58,9 @@ def outliers(
     kept = np.ones(rows, dtype=bool)
     for _ in range(rows // _MOST + 1):
         used = np.where(np.repeat(kept, components), weight, 0.0)
-        normal = (used[:, None] * jacobian).T @ jacobian + prior.T @ prior
+        normal = prior.T @ prior
+        for lot in lots(len(residual)):
+            normal += (used[lot, None] * jacobian[lot]).T @ jacobian[lot]
         # the ridge is for directions that only rows set aside determined
         covariance = np.linalg.inv(normal + 1e-14 * np.trace(normal) * np.eye(len(normal)))
         shift = covariance @ (jacobian.T @ (used * residual) - pull)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from pkmcal.display import printable
 from pkmcal.estimation.fit_data import FitData
 
@@ -12,10 +14,14 @@ _MOST = 6  # places that are listed
 
 def row_names(datasets: Sequence[FitData], rows: Iterable[int]) -> str:
     """Name rows by line of their file, or by number, with the targets that each line has."""
-    where = {int(row): (data, i) for data in datasets for i, row in enumerate(data.rows)}
+    named = [int(row) for row in rows]
+    where: dict[int, tuple[FitData, int]] = {}
+    for data in datasets:
+        mine = np.flatnonzero(np.isin(data.rows, named))
+        where.update(zip(data.rows[mine].tolist(), ((data, i) for i in mine.tolist()), strict=True))
     places: dict[str, list[str]] = {}
-    for row in rows:
-        data, i = where[int(row)]
+    for row in named:
+        data, i = where[row]
         measured = data.measured
         if measured.lines is None:
             place = f"row {row}"

@@ -384,10 +384,15 @@ def _larger_sigma(found: Parts) -> float:
 
 def _fitted_again(found: Parts) -> int:
     """How many rows were held out at actuators where others were fitted."""
-    fitted = {row.tobytes() for m in found.fit.equations.sets for row in _commands(m)}
-    return sum(
-        row.tobytes() in fitted for data in found.holdout.data for row in _commands(data.measured)
-    )
+    held = [row.tobytes() for data in found.holdout.data for row in _commands(data.measured)]
+    sought = set(held)
+    fitted = {
+        key
+        for m in found.fit.equations.sets
+        for row in (_commands(m) if sought else ())
+        if (key := row.tobytes()) in sought
+    }
+    return sum(key in fitted for key in held)
 
 
 def _commands(measured: Measurements) -> FloatArray:

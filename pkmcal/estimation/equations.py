@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import copy
 import weakref
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, lots, rms
 from pkmcal.core.library import STATUS
 from pkmcal.estimation import joint_angles
 from pkmcal.estimation.elimination import Blocks, Shares, System
@@ -42,10 +43,27 @@ from pkmcal.measurements.observation import (
 )
 from pkmcal.result import failed_rows
 
-_TOGETHER = 16384  # rows whose derivatives are multiplied at once, or kept
+_TOGETHER = 16384  # rows whose readings are kept with their derivatives
+_LOT = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
 
 # Whose, where, with which noise, and the equations there; copies have another "whose".
 _Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, System]
+
+
+class Lot(NamedTuple):
+    """Some of the equations.
+
+    Attributes
+    ----------
+    units, equations : slice
+        Which.
+    by_parameters : ndarray (m, n)
+        Their derivative.
+    """
+
+    units: slice
+    equations: slice
+    by_parameters: FloatArray
 
 
 class Equations(Readings):
@@ -320,8 +338,30 @@ class Equations(Readings):
 
     def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """Derivative (M, n) of what is predicted by the parameters; of what is left likewise."""
-        if not self.closures.unknowns:
-            return self.whiten(self.jacobian(evaluation), noise)
+        found = np.empty((int(self.components.sum()), len(self.parameters)))
+        for lot in self.lots(evaluation, noise):
+            found[lot.equations] = lot.by_parameters
+        return found
+
+    def lots(self, evaluation: Evaluation, noise: FloatArray) -> Iterator[Lot]:
+        """The same in lots of whole units, in order; in one where poses have unknowns."""
+        units = equations = slice(0, 0)
+        for count, by_parameters in self._units(evaluation, noise):
+            units = slice(units.stop, units.stop + count)
+            equations = slice(equations.stop, equations.stop + len(by_parameters))
+            yield Lot(units, equations, by_parameters)
+
+    def _units(self, evaluation: Evaluation, noise: FloatArray) -> Iterator[tuple[int, FloatArray]]:
+        if self.closures.unknowns:
+            yield len(self.components), self._left(evaluation, noise)
+            return
+        for lot, parts in self.derivatives(evaluation):
+            white = [self.whiten_rows(part, i, rows, noise) for i, rows, part in parts]
+            whole = white[0] if len(white) == 1 else np.concatenate(white)
+            yield int(np.count_nonzero(self.count[lot])), whole
+
+    def _left(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """Derivative (M, n) of what is left when poses have taken their part."""
         p, by_unknown = self.parameters, self._at(evaluation, noise).by_unknown
         of_closures = self.closures.by_numbers(
             evaluation.machines, evaluation.states, p.places, self.machine_columns, len(p)
@@ -465,39 +505,78 @@ class Equations(Readings):
 
     def forget_following(self) -> None:
         """A search has ended: how poses follow the parameters takes memory."""
-        self._follow = None
+        self._follow = self._from = None
 
     def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
         """Derivative of the predicted values of each set to the parameters, (N, k, n).
 
         With the opposite sign that of the residuals.
         """
+        n = len(self.parameters)
+        found = [np.empty((*each.shape, n)) for each in evaluation.residuals]
+        for _, parts in self.derivatives(evaluation):
+            for i, rows, part in parts:
+                found[i][rows] = part
+        return found
+
+    def derivatives(
+        self, evaluation: Evaluation
+    ) -> Iterator[tuple[slice, list[tuple[int, slice, FloatArray]]]]:
+        """`jacobian` in lots: rows through all sets, and set, rows of it and derivative (b, k, n).
+
+        One lot where poses have unknowns.
+        """
         p, numbers = self.parameters, self.spread.columns.shape[1]
         every = self.seen(evaluation)
-        by_all = [np.zeros((*seen.values.shape, numbers)) for seen in every]
-        for poses, twists in self.closures.twists_by_numbers(
-            evaluation.machines, evaluation.states, p.places
-        ):
-            place = np.full(len(evaluation.pose), NONE)
-            place[poses] = np.arange(len(poses))
-            for i, seen in enumerate(every):
-                _add_motion(by_all[i], seen.by_twist, twists, place[self.pose_of[i]])
-                if seen.by_other is not None:
-                    _add_motion(by_all[i], seen.by_other, twists, place[self.other_of[i]])
-        parts = []
-        for i, seen in enumerate(every):
-            part = by_all[i]
-            direct = self.by_numbers(i, evaluation.pose, evaluation.theta)
-            if direct is not None:
-                part[:, :, : len(p.places)] += direct
-            if seen.by_frame is not None and p.frame is not None:
-                part[:, :, p.frame : p.frame + 6] = seen.by_frame
-            for name, mine in self._numbers[i].items():
-                row, slot = np.nonzero(mine != NONE)
-                part[row, :, mine[row, slot]] += seen.by[name][row, :, slot]
-            wide = self.spread.of_rows(part, i)
-            parts.append(by_difference(self.sets[i].kind, wide, evaluation.residuals[i]))
-        return parts
+        direct = [
+            self.by_numbers(i, evaluation.pose, evaluation.theta) for i in range(len(self.sets))
+        ]
+        place = np.full(len(evaluation.pose), NONE)
+        for lot in lots(len(self.rows), len(self.rows) if self.closures.unknowns else _LOT):
+            some = list(self._in_sets(lot))
+            parts = [np.zeros((*every[i].values[rows].shape, numbers)) for i, rows in some]
+            for poses, twists in self.closures.twists_by_numbers(
+                evaluation.machines, evaluation.states, p.places, self._poses_of(some)
+            ):
+                place[poses] = np.arange(len(poses))
+                for (i, rows), part in zip(some, parts, strict=True):
+                    seen, there = every[i], self.other_of[i]
+                    _add_motion(part, seen.by_twist[rows], twists, place[self.pose_of[i][rows]])
+                    if seen.by_other is not None and there is not None:
+                        _add_motion(part, seen.by_other[rows], twists, place[there[rows]])
+                place[poses] = NONE
+            found = []
+            for (i, rows), part in zip(some, parts, strict=True):
+                seen, along = every[i], direct[i]
+                if along is not None:
+                    part[:, :, : len(p.places)] += along[rows]
+                if seen.by_frame is not None and p.frame is not None:
+                    part[:, :, p.frame : p.frame + 6] = seen.by_frame[rows]
+                for name, columns in self._numbers[i].items():
+                    mine = columns[rows]
+                    row, slot = np.nonzero(mine != NONE)
+                    part[row, :, mine[row, slot]] += seen.by[name][rows][row, :, slot]
+                wide = self.spread.of_rows(part, i, rows)
+                kind, residual = self.sets[i].kind, evaluation.residuals[i][rows]
+                found.append((i, rows, by_difference(kind, wide, residual)))
+            yield lot, found
+
+    def _in_sets(self, lot: slice) -> Iterator[tuple[int, slice]]:
+        """Rows of each set that has some of these, which count through all sets."""
+        first = 0
+        for i, measured in enumerate(self.sets):
+            last = first + len(measured)
+            if lot.start < last and first < lot.stop:
+                yield i, slice(max(lot.start - first, 0), min(lot.stop, last) - first)
+            first = last
+
+    def _poses_of(self, some: Sequence[tuple[int, slice]]) -> IntArray:
+        """Distinct poses of rows of sets, in order."""
+        if sum(rows.stop - rows.start for _, rows in some) == len(self.rows):
+            return np.arange(len(self.actuators))
+        pairs = [((self.pose_of[i], self.other_of[i]), rows) for i, rows in some]
+        ends = [end[rows] for both, rows in pairs for end in both if end is not None]
+        return np.unique(np.concatenate(ends))
 
     def by_groups(
         self,
@@ -621,5 +700,4 @@ def _add_motion(
     `by_twist` is (N, k, 6), `place` (N,) which of the twists moves each row; `NONE`: none of them.
     """
     moved = np.flatnonzero(place != NONE)
-    for rows in np.array_split(moved, 1 + len(moved) // _TOGETHER):
-        part[rows, :, : twists.shape[2]] += by_twist[rows] @ twists[place[rows]]
+    part[moved, :, : twists.shape[2]] += by_twist[moved] @ twists[place[moved]]

@@ -222,7 +222,7 @@ class Estimator:
             if (factors == factors[0]).all():
                 grown: FloatArray = last.triangle / factors[0]
                 return grown
-        return triangle(self.search.jacobian(evaluation, noise))
+        return self.search.triangle(evaluation, noise)
 
     def _fewer(self, estimate: Estimate) -> IterationState | None:
         """The state to begin again with after a search without an end; None where there is none.
@@ -312,25 +312,20 @@ class Estimator:
         alone = not (self._priors or self.equations.closures.unknowns)
         return factor if (factors == factor).all() and (factor == 1.0 or alone) else None
 
-    def scaled_jacobian(self, evaluation: Evaluation) -> FloatArray:
-        """Scaled Jacobian (M, n), not whitened: mm per mm, angles as their arc.
+    def scaled_triangle(self, evaluation: Evaluation) -> FloatArray:
+        """R of the scaled Jacobian, not whitened: mm per mm, angles as their arc.
 
         Where poses have unknowns it is that of what is left of all equations, whitened as stated.
         """
         if self.equations.closures.unknowns:
-            return self.search.jacobian(evaluation, np.ones(len(self.unstated)))
-        parts = []
-        for part, measured in zip(
-            self.equations.jacobian(evaluation), self.equations.sets, strict=True
-        ):
-            arcs = mm_per_unit(measured.units, self.start.robot.length)
-            part *= arcs[:, None]
-            parts.append(part.reshape(-1, part.shape[2]))
-        jacobian: FloatArray = parts[0] if len(parts) == 1 else np.concatenate(parts)
-        if not self.equations.present.all():
-            jacobian = jacobian[self.equations.present]
-        jacobian *= self.scale
-        return jacobian
+            return self.search.triangle(evaluation, np.ones(len(self.unstated)))
+        arcs = [mm_per_unit(m.units, self.start.robot.length) for m in self.equations.sets]
+        factor = np.zeros((0, len(self.scale)))
+        for _, parts in self.equations.derivatives(evaluation):
+            for i, rows, part in parts:
+                part *= arcs[i][:, None] * self.scale
+                factor = triangle(factor, self.equations.read(part, i, rows))
+        return factor
 
     def _estimate(self, u: FloatArray, state: IterationState) -> Estimate:
         evaluation = self.search.at(u, state.noise)

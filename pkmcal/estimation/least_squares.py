@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
-from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.equations import Equations, Lot
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.loss import Loss
 from pkmcal.exceptions import ArgumentError
@@ -61,6 +61,7 @@ class Search:
         ones = np.ones(len(equations.unstated))
         self._last: tuple[FloatArray, FloatArray, Evaluation]
         self._last = (np.zeros(len(self.scale)), ones, start)
+        self._equations = int(equations.components.sum())
         self._last_jacobian: tuple[Evaluation, FloatArray, FloatArray] | None = None
         self._refused = np.zeros(len(equations.components), dtype=bool)
         self.evaluations = 0
@@ -112,21 +113,38 @@ class Search:
 
     def taken(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """The same, which is the caller's: it is not kept."""
-        return _finite(self._taken(evaluation, noise))
+        found = np.empty((self._equations, len(self.scale)))
+        for _, some, by_u in self._lots(evaluation, noise):
+            if len(by_u) == len(found):
+                return _finite(by_u)
+            found[some] = _finite(by_u)
+        return found
+
+    def triangle(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+        """R of a QR factorisation of it. Of several lots none is kept."""
+        factor = np.zeros((0, len(self.scale)))
+        for _, _, by_u in self._lots(evaluation, noise):
+            factor = triangle(factor, _finite(by_u))
+            if len(by_u) == self._equations:
+                self._last_jacobian = evaluation, noise, by_u
+        return factor
 
     def forget(self) -> None:
         """A search has ended: what is kept for its next step takes memory."""
         self._last_jacobian = None
         self.equations.forget_following()
 
-    def _taken(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
+    def _lots(self, evaluation: Evaluation, noise: FloatArray) -> Iterator[Lot]:
+        """`taken` in lots, finite or not."""
         last, self._last_jacobian = self._last_jacobian, None
         if last is not None and last[0] is evaluation and _same(last[1], noise):
-            return last[2]
+            yield Lot(slice(0, len(self.equations.components)), slice(0, self._equations), last[2])
+            return
         del last
-        found: FloatArray = self.equations.by_parameters(evaluation, noise)[:, self._found]
-        found *= self.scale
-        return found
+        for lot in self.equations.lots(evaluation, noise):
+            by_u: FloatArray = lot.by_parameters[:, self._found]
+            by_u *= self.scale
+            yield lot._replace(by_parameters=by_u)
 
     def best(self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray) -> FloatArray:
         """Where the cost is least, from `u` (n,).
@@ -167,8 +185,7 @@ class Search:
     ) -> tuple[FloatArray, float]:
         """A minimum of the cost of the rows not set aside, and the cost."""
         equations = self.equations
-        without = np.flatnonzero(np.repeat(aside, equations.components))
-
+        without = np.repeat(aside, equations.components)
         last: tuple[Evaluation, FloatArray] | None = None
 
         def data(evaluation: Evaluation) -> FloatArray:
@@ -211,11 +228,13 @@ class Search:
         def jacobian(u: FloatArray) -> FloatArray:
             evaluation = self.at(u, noise)
             take(evaluation)
-            by_u = self._taken(evaluation, noise)
-            by_u[without] = 0.0
             whitened = data(evaluation)
-            by_u = loss.jacobian(whitened, _finite(by_u))
-            turned = _turned(-loss.residual(whitened), by_u)
+            left, factor = -loss.residual(whitened), np.zeros((0, 1 + len(u)))
+            for units, some, by_u in self._lots(evaluation, noise):
+                by_u[without[some]] = 0.0
+                by_u = loss.of(units).jacobian(whitened[some], _finite(by_u))
+                factor = triangle(factor, [left[some], by_u])
+            turned = _turned(factor)
             return np.concatenate([turned, self.prior(evaluation.theta), pins, still])
 
         found, cost, self.converged = self._searched(residual, jacobian, u)
@@ -258,12 +277,12 @@ class Search:
         return trf.x, float(trf.cost), bool(trf.status > 0)
 
 
-def _turned(residual: FloatArray, jacobian: FloatArray) -> FloatArray:
+def _turned(factor: FloatArray) -> FloatArray:
     """Derivative (min(M, n + 1), n) of residuals (M,) turned so that the first has all of them.
 
-    Squares, gradient and Gauss-Newton matrix are those of all M rows, so are the steps of a search.
+    `factor` is R of the residuals and their derivative, side by side. Squares, gradient and
+    Gauss-Newton matrix are those of all M rows, so are the steps of a search.
     """
-    factor = triangle([residual, jacobian])
     factor[0] *= np.copysign(1.0, factor[0, 0])
     return factor[:, 1:]
 

@@ -47,6 +47,10 @@ class Loss:
     components: IntArray
     width: FloatArray
 
+    def of(self, units: slice) -> Loss:
+        """The same for some of the rows."""
+        return Loss(self.name, self.components[units], self.width[units])
+
     def _lengths(self, residual: FloatArray) -> FloatArray:
         first = np.cumsum(self.components) - self.components
         lengths: FloatArray = np.sqrt(np.add.reduceat(residual**2, first))

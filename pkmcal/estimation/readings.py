@@ -351,18 +351,35 @@ class Readings:
 
     def whiten(self, parts: Sequence[FloatArray], noise: FloatArray) -> FloatArray:
         """The same as `whitened`, in the place of the parts: a Jacobian is large."""
-        for part, white, factor in zip(parts, self._whiten, noise[: len(parts)], strict=True):
-            if not self._whole:
-                np.nan_to_num(part, copy=False, nan=0.0)
-            if white.ndim == 3:
-                for rows in lots(len(part), _TOGETHER):
-                    part[rows] = np.einsum("nij,nj...->ni...", white[rows], part[rows])
-            else:
-                part *= white.reshape(*white.shape, *(1,) * (part.ndim - 2))
-            part /= factor
+        for i, part in enumerate(parts):
+            for rows in lots(len(part), _TOGETHER):
+                self._whiten_rows(part[rows], i, rows, noise)
         flat = [part.reshape(-1, *part.shape[2:]) for part in parts]
         whole = flat[0] if len(flat) == 1 else np.concatenate(flat)
         return whole if self._whole else whole[self.present]
+
+    def whiten_rows(self, part: FloatArray, i: int, rows: slice, noise: FloatArray) -> FloatArray:
+        """The same of some rows of set `i` alone."""
+        self._whiten_rows(part, i, rows, noise)
+        return self.read(part, i, rows)
+
+    def read(self, part: FloatArray, i: int, rows: slice) -> FloatArray:
+        """What was read of a part (b, k, ...), which is of some rows of set `i`, stacked."""
+        flat = part.reshape(-1, *part.shape[2:])
+        if self._whole:
+            return flat
+        read: FloatArray = flat[np.isfinite(self.sets[i].values[rows]).reshape(-1)]
+        return read
+
+    def _whiten_rows(self, part: FloatArray, i: int, rows: slice, noise: FloatArray) -> None:
+        white = self._whiten[i][rows]
+        if not self._whole:
+            np.nan_to_num(part, copy=False, nan=0.0)
+        if white.ndim == 3:
+            part[:] = np.einsum("nij,nj...->ni...", white, part)
+        else:
+            part *= white.reshape(*white.shape, *(1,) * (part.ndim - 2))
+        part /= noise[i]
 
     def unwhiten(self, whitened: FloatArray, noise: FloatArray) -> list[FloatArray]:
         """Invert `whitened` for vectors (M,): parts (N, k) of all sets, mm and rad.

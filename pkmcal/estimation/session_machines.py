@@ -163,19 +163,19 @@ class SessionClosures:
         return _joined(wide, self._rows)
 
     def twists_by_numbers(
-        self, machines: Machines, states: RowStates, places: IntArray
+        self, machines: Machines, states: RowStates, places: IntArray, poses: IntArray
     ) -> Iterator[tuple[IntArray, FloatArray]]:
         """How the platform moves with numbers of its machine, unknowns held.
 
-        Poses and their twists (b, 6, g), in lots where poses follow from the actuators: those of
-        all poses at once would be most of what a fit holds. Nothing where it does not move.
+        Of distinct poses, all where they have unknowns: those of each machine, and their twists
+        (b, 6, g). Nothing where it does not move.
         """
         for part, robot, rows in zip(self._parts, machines.robots, self._rows, strict=True):
-            for own in [rows] if self.unknowns else _lots(rows):
-                driven = _driven(robot, machines.state.at(own))
-                found = part.twists_by_numbers(driven, _some(states, own), places)
-                if found is not None:
-                    yield own, found
+            own = poses[rows.take(np.searchsorted(rows, poses), mode="clip") == poses]
+            driven = _driven(robot, machines.state.at(own))
+            found = part.twists_by_numbers(driven, _some(states, own), places)
+            if found is not None:
+                yield own, found
 
     def _each(
         self, machines: Machines, states: RowStates

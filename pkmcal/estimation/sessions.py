@@ -51,9 +51,9 @@ class Spread:
         """Whether the numbers of a row are the parameters themselves."""
         return self.columns.shape == (1, self.size)
 
-    def of_rows(self, derivative: FloatArray, i: int) -> FloatArray:
-        """Derivative (N, k, n) by the parameters, from one (N, k, m) by the numbers of set `i`."""
-        return spread(derivative, self.columns, self.part_of[i], self.size)
+    def of_rows(self, derivative: FloatArray, i: int, rows: slice) -> FloatArray:
+        """Derivative (b, k, n) by the parameters, from one (b, k, m) by the numbers of set `i`."""
+        return spread(derivative, self.columns, self.part_of[i][rows], self.size)
 
     def machines(self, geometry: int) -> tuple[IntArray, tuple[IntArray, ...]]:
         """Different machines: columns (S, g) of their numbers, and which each row of each set has.

@@ -32,15 +32,22 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
     squares, freedom = (part[: len(ratios)] for part in estimate.shares[:2])
     unstated = estimator.unstated[: len(ratios)]
     common = 1.0 if unstated.any() else float(squares.sum() / max(freedom.sum(), 1e-9))
+    if not common > 0.0:
+        return ratios  # no residual at all
     rows, set_of = equations.squares(estimate.residual), equations.set_of
     for i in np.flatnonzero(~unstated & (freedom >= FEW)):
         above = chi2_tail(float(squares[i]) / common, float(freedom[i]))
         components = equations.components[set_of == i]
         median = median_ratio(rows[set_of == i], components) * components.sum() / freedom[i]
-        half = np.sqrt(median / common)  # of the rows: outliers are no slip
-        if min(above, 1.0 - above) < _CHANCE / 2.0 and max(half, 1.0 / half) > _APART:
+        half = float(np.sqrt(median / common))  # of the rows: outliers are no slip
+        if min(above, 1.0 - above) < _CHANCE / 2.0 and _apart(half):
             ratios[i] = np.sqrt(squares[i] / freedom[i])
     return ratios if ratios.max() > _APART * ratios.min() else np.ones_like(ratios)
+
+
+def _apart(ratio: float) -> bool:
+    """Whether a ratio of deviations matters; 0 where a set has no residual at all."""
+    return ratio > _APART or ratio * _APART < 1.0
 
 
 def unlike_noise(equations: Equations, ratios: FloatArray, with_outliers: bool) -> list[str]:
@@ -49,7 +56,7 @@ def unlike_noise(equations: Equations, ratios: FloatArray, with_outliers: bool) 
         "touch_distances" if m.kind == "touch-distance" else f"measurements {i + 1}"
         for i, m in enumerate(equations.sets)
     ]
-    wrong = [i for i, ratio in enumerate(ratios) if max(ratio, 1.0 / ratio) > _APART]
+    wrong = [i for i, ratio in enumerate(ratios.tolist()) if _apart(ratio)]
     if not wrong:
         return []
     parts = " and ".join(f"{names[i]} are {ratios[i]:.2g}" for i in wrong)

@@ -170,7 +170,9 @@ class Uncertainty:
     @cached_property
     def _repeated(self) -> IntArray:
         """Number of the reading of each equation (M,): repeats of it have the same."""
-        return numbered(self.fit.key, self.labels.target)
+        key = self.fit.key
+        alone = int(key.max()) + 1 == len(key)
+        return key if alone else numbered(key, self.labels.target)
 
     def repeats(self, plain: bool = False) -> Split:
         """Pure error and lack of fit, whitened; `plain`: of lengths in mm.

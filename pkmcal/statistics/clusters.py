@@ -14,14 +14,16 @@ statsmodels has CR1 and CR3, neither CR2 nor its degrees of freedom.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.statistics.linear_fit import LinearFit, sums
+from pkmcal.arrays import FloatArray, IntArray, lots
+from pkmcal.statistics.linear_fit import LinearFit, grouped, sums
 
+_FEW = 4096  # equations of which what adjusts them is there at once
 _SPENT = 1e-8  # share of a residual's variance below which the fit follows it wherever it lies
 
 
@@ -35,16 +37,55 @@ def shared_error_score(fit: LinearFit) -> float:
     freedom = fit.freedom
     if counts.max() < 2 or freedom <= 0:
         return float("-inf")
-    z = sums(fit.design, fit.key)
-    inner = z.T @ z
+    inner, by_count, together = np.zeros((fit.design.shape[1],) * 2), 0.0, 0.0
+    for rows in grouped(fit.key):
+        key = fit.key[rows]
+        z = sums(fit.design[rows], key)
+        inner += z.T @ z
+        by_count += float(counts[key[0] : key[-1] + 1] @ (z**2).sum(axis=1))
+        together += float((sums(fit.residual[rows], key) ** 2).sum())
     mean = len(fit.residual) - np.trace(inner)
-    second = (counts**2).sum() - 2.0 * (counts @ (z**2).sum(axis=1)) + (inner**2).sum()
+    second = (counts**2).sum() - 2.0 * by_count + (inner**2).sum()
     spread = 2.0 * (second - mean**2 / freedom) * freedom / (freedom + 2.0)
     variance = fit.squares / freedom
     if spread <= _SPENT * second or variance <= 0:
         return float("-inf")
-    together = float((sums(fit.residual, fit.key) ** 2).sum())
     return float((together / variance - mean) / np.sqrt(spread))
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Clusters of the same size.
+
+    Their equations (g, m), what adjusts them, and what is retained of each.
+    """
+
+    rows: IntArray
+    matrix: FloatArray
+    retained: FloatArray
+
+    def adjusted(self, values: FloatArray, design: FloatArray) -> FloatArray:
+        """Values (g, m, k) times (1 - H)^(-1/2)."""
+        if self.rows.shape[1] <= design.shape[1]:
+            return self.matrix @ values
+        part = design[self.rows]
+        along: FloatArray = self.matrix @ (part.transpose(0, 2, 1) @ values)
+        return values + part @ along
+
+
+def _block(rows: IntArray, design: FloatArray) -> _Block:
+    part = design[rows]
+    wide = rows.shape[1] <= part.shape[2]
+    inner = part @ part.transpose(0, 2, 1) if wide else part.transpose(0, 2, 1) @ part
+    values, vectors = np.linalg.eigh(inner)
+    left = 1.0 - values > _SPENT
+    root = np.where(left, np.sqrt(np.maximum(1.0 - values, 0.0)), 1.0)
+    if wide:  # (1 - H)^(-1/2) itself
+        factor, spent = np.where(left, 1.0 / root, 0.0), vectors
+    else:  # 1 + A W Aᵀ, by the smaller AᵀA
+        factor, spent = np.where(left, 1.0 / (root * (1.0 + root)), -1.0), part @ vectors
+    matrix = (vectors * factor[:, None, :]) @ vectors.transpose(0, 2, 1)
+    return _Block(rows, matrix, 1.0 - (spent**2 @ ~left[:, :, None])[:, :, 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,28 +94,22 @@ class Sandwich:
 
     fit: LinearFit
 
+    def _blocks(self) -> Iterable[_Block]:
+        """Lots of clusters of the same size; of few equations they are kept."""
+        return self._made() if self._kept is None else self._kept
+
     @cached_property
-    def _blocks(self) -> list[tuple[IntArray, FloatArray, FloatArray]]:
-        """Rows (g, m) of clusters of the same size, what adjusts and what is retained of them."""
+    def _kept(self) -> list[_Block] | None:
+        return list(self._made()) if len(self.fit.residual) <= _FEW else None
+
+    def _made(self) -> Iterator[_Block]:
         order = np.argsort(self.fit.cluster, kind="stable")
         sizes = np.bincount(self.fit.cluster)
         first = np.cumsum(sizes) - sizes
-        blocks = []
-        for size in np.unique(sizes):
-            rows = order[first[sizes == size, None] + np.arange(size)]
-            part = self.fit.design[rows]
-            wide = size <= part.shape[2]
-            inner = part @ part.transpose(0, 2, 1) if wide else part.transpose(0, 2, 1) @ part
-            values, vectors = np.linalg.eigh(inner)
-            left = 1.0 - values > _SPENT
-            root = np.where(left, np.sqrt(np.maximum(1.0 - values, 0.0)), 1.0)
-            if wide:  # (1 - H)^(-1/2) itself
-                factor, spent = np.where(left, 1.0 / root, 0.0), vectors
-            else:  # 1 + A W Aᵀ, by the smaller AᵀA
-                factor, spent = np.where(left, 1.0 / (root * (1.0 + root)), -1.0), part @ vectors
-            matrix = (vectors * factor[:, None, :]) @ vectors.transpose(0, 2, 1)
-            blocks.append((rows, matrix, 1.0 - (spent**2 @ ~left[:, :, None])[:, :, 0]))
-        return blocks
+        for size in np.unique(sizes[sizes > 0]).tolist():
+            alike = first[sizes == size, None] + np.arange(size)
+            for lot in lots(len(alike), max(_FEW // size, 1)):
+                yield _block(order[alike[lot]], self.fit.design)
 
     def adjusted(self, values: FloatArray) -> FloatArray:
         """Multiply the part of each cluster by (1 - H)^(-1/2): values (M, k).
@@ -82,52 +117,61 @@ class Sandwich:
         H is the cluster's block of the hat matrix. Residuals then have the variance of the errors.
         """
         out = np.empty_like(values)
-        for rows, matrix, _ in self._blocks:
-            mine = values[rows]
-            if rows.shape[1] <= self.fit.design.shape[1]:
-                out[rows] = matrix @ mine
-            else:
-                part = self.fit.design[rows]
-                out[rows] = mine + part @ (matrix @ (part.transpose(0, 2, 1) @ mine))
+        for block in self._blocks():
+            out[block.rows] = block.adjusted(values[block.rows], self.fit.design)
         return out
 
     @cached_property
+    def _residual(self) -> tuple[FloatArray, FloatArray]:
+        left, kept = np.empty((2, len(self.fit.residual)))
+        for block in self._blocks():
+            mine = self.fit.residual[block.rows][:, :, None]
+            left[block.rows] = block.adjusted(mine, self.fit.design)[:, :, 0]
+            kept[block.rows] = block.retained
+        return left, kept
+
+    @property
     def residual(self) -> FloatArray:
         """Adjusted residuals (M,)."""
-        return self.adjusted(self.fit.residual[:, None])[:, 0]
+        return self._residual[0]
 
-    @cached_property
+    @property
     def retained(self) -> FloatArray:
         """Variance of each adjusted residual (M,), in that of its error.
 
         1, or less where the fit has used up what the cluster could show.
         """
-        kept = np.empty(len(self.fit.residual))
-        for rows, _, share in self._blocks:
-            kept[rows] = share
-        return kept
+        return self._residual[1]
 
     @cached_property
     def data(self) -> FloatArray:
         """Covariance (p, p) in the basis as far as the data's errors make it."""
-        pulls = sums(self.fit.design * self.residual[:, None], self.fit.cluster)
-        covariance: FloatArray = pulls.T @ pulls
+        covariance = np.zeros((self.fit.design.shape[1],) * 2)
+        for rows in grouped(self.fit.cluster):
+            weighted = self.fit.design[rows] * self.residual[rows, None]
+            pulls = sums(weighted, self.fit.cluster[rows])
+            covariance += pulls.T @ pulls
         return covariance
 
     def freedom(self, contrasts: FloatArray) -> FloatArray:
         """Degrees of freedom of the variances of contrasts (k, p) in `data`; 0 where none."""
-        fit = self.fit
-        found = np.zeros(len(contrasts))
-        alpha = self.adjusted(fit.design @ contrasts.T)
-        own = sums(alpha**2, fit.cluster)
-        for i in range(len(contrasts)):
-            pulls = sums(fit.design * alpha[:, i, None], fit.cluster)
-            lengths = (pulls**2).sum(axis=1)
-            trace = float(own[:, i].sum() - lengths.sum())
-            square = float((own[:, i] ** 2).sum() - 2.0 * own[:, i] @ lengths)
-            square += float(((pulls.T @ pulls) ** 2).sum())
-            if square > 0 and trace > _SPENT * own[:, i].sum():
-                found[i] = trace**2 / square
+        k, p = contrasts.shape
+        every, trace, square, inner = np.zeros(k), np.zeros(k), np.zeros(k), np.zeros((k, p, p))
+        for block in self._blocks():
+            part = self.fit.design[block.rows]
+            alpha = block.adjusted(part @ contrasts.T, self.fit.design)
+            own = (alpha**2).sum(axis=1)
+            every += own.sum(axis=0)
+            for i in range(k):
+                pulls = (part * alpha[:, :, i, None]).sum(axis=1)
+                lengths = (pulls**2).sum(axis=1)
+                trace[i] += own[:, i].sum() - lengths.sum()
+                square[i] += own[:, i] @ (own[:, i] - 2.0 * lengths)
+                inner[i] += pulls.T @ pulls
+        square += (inner**2).sum(axis=(1, 2))
+        found = np.zeros(k)
+        shown = (square > 0) & (trace > _SPENT * every)
+        found[shown] = trace[shown] ** 2 / square[shown]
         return found
 
     def joint_freedom(self, contrasts: FloatArray) -> float:

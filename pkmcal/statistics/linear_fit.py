@@ -7,18 +7,19 @@ spoil the others.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
 
 ROUNDING = 1e-9  # a singular value below this share of the largest is zero
 _WHOLE = 9  # decimals from which degrees of freedom are whole: limits on them are
 _IN_ONE_THREAD = 8192  # numbers
 _COLUMNS_AT_ONCE = 32  # of a factorisation
+_KEYS = 4096  # of rows that are added up at once
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +165,20 @@ def sums(rows: FloatArray, key: IntArray) -> FloatArray:
     first = np.flatnonzero(np.diff(key[order], prepend=-1))
     total: FloatArray = np.add.reduceat(rows[order], first, axis=0)
     return total
+
+
+def grouped(key: IntArray) -> Iterator[IntArray]:
+    """Rows in lots that have all rows of a key (M,), in its order.
+
+    Examples
+    --------
+    >>> [rows.tolist() for rows in grouped(np.array([1, 0, 1]))]
+    [[1, 0, 2]]
+    """
+    order = np.argsort(key, kind="stable")
+    first = np.flatnonzero(np.diff(key[order], prepend=-1))
+    for lot in lots(len(first), _KEYS):
+        yield order[first[lot.start] : first[lot.stop] if lot.stop < len(first) else None]
 
 
 def column_basis(matrix: FloatArray) -> FloatArray:

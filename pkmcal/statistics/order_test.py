@@ -107,35 +107,45 @@ class Series:
     @cached_property
     def _unit(self) -> FloatArray:
         """How much of each component (k,) changes an equation by 1; 0 of what was not read."""
-        mine = self.by_component[self.visit >= 0]
-        squares, count = np.einsum("ij,ij->j", mine, mine), np.count_nonzero(mine, axis=0)
+        squares, count = np.zeros((2, self.by_component.shape[1]))
+        for rows in lots(len(self.visit)):
+            mine = self.by_component[rows][self.visit[rows] >= 0]
+            squares += np.einsum("ij,ij->j", mine, mine)
+            count += np.count_nonzero(mine, axis=0)
         unit: FloatArray = np.sqrt(count / np.where(count, squares, 1.0))
         return unit
 
-    @cached_property
-    def _own(self) -> FloatArray:
-        """`by_component` of this series, in these units."""
-        own: FloatArray = self.by_component * self._unit
-        own[self.visit < 0] = 0.0
+    def _own(self, rows: slice | IntArray) -> FloatArray:
+        """Rows of `by_component` of this series, in these units."""
+        own: FloatArray = self.by_component[rows] * self._unit
+        own[self.visit[rows] < 0] = 0.0
         return own
 
     @cached_property
     def _factor(self) -> FloatArray:
         """What `_both` is multiplied by, (p + k, r), to become a basis."""
-        return orthonormal([self.design, self._own])
+        factor = np.zeros((0, self.design.shape[1] + self.by_component.shape[1]))
+        for rows in lots(len(self.visit)):
+            factor = triangle(factor, [self.design[rows], self._own(rows)])
+        return orthonormal(factor)
 
-    def _both(self, steps: FloatArray, rows: slice | IntArray = slice(None)) -> FloatArray:
+    def _both(self, steps: FloatArray, rows: slice | IntArray) -> FloatArray:
         """Rows of what parameters and a constant of each component explain by (p + k, ...)."""
         p = self.design.shape[1]
-        both: FloatArray = self.design[rows] @ steps[:p] + self._own[rows] @ steps[p:]
+        both: FloatArray = self.design[rows] @ steps[:p] + self._own(rows) @ steps[p:]
         return both
+
+    def _onto(self, columns: FloatArray, rows: slice) -> FloatArray:
+        """What parameters and constants have in common with rows of columns (b, ...)."""
+        return np.concatenate([self.design[rows].T @ columns, self._own(rows).T @ columns])
 
     @cached_property
     def _left(self) -> FloatArray:
         """The residuals beside that."""
-        along = np.concatenate([self.design.T @ self.residual, self._own.T @ self.residual])
-        left: FloatArray = self.residual - self._both(self._factor @ (self._factor.T @ along))
-        return left
+        every = list(lots(len(self.visit)))
+        along = sum(self._onto(self.residual[rows], rows) for rows in every)
+        steps = self._factor @ (self._factor.T @ along)
+        return np.concatenate([self.residual[rows] - self._both(steps, rows) for rows in every])
 
     def course(self) -> Course | None:
         """Test the series; None where too little is left to say."""
@@ -145,7 +155,7 @@ class Series:
         count = len(self.visit)
 
         def columns(rows: slice) -> FloatArray:
-            courses = self._own[rows, :, None] * waves[self.visit[rows]][:, None]
+            courses = self._own(rows)[:, :, None] * waves[self.visit[rows]][:, None]
             return courses.reshape(len(courses), k * WAVES)
 
         squares, pulls = np.zeros((2, k * WAVES))
@@ -154,7 +164,7 @@ class Series:
             some = columns(rows)
             squares += np.einsum("ij,ij->j", some, some)
             pulls += some.T @ self._left[rows]
-            inner += np.concatenate([self.design[rows].T @ some, self._own[rows].T @ some])
+            inner += self._onto(some, rows)
         known = self._factor @ (self._factor.T @ inner)
         factor = np.zeros((0, k * WAVES))
         for rows in lots(count):
@@ -173,13 +183,17 @@ class Series:
         if not variance > 0:
             return None
         shares = (onto @ along).reshape(k, WAVES)
-        course = np.einsum("ij,ij->i", self._own, (waves @ shares.T)[self.visit])
-        course -= self._both(known @ (onto @ along))
+        values, steps = waves @ shares.T, known @ (onto @ along)
+        course = np.concatenate([
+            np.einsum("ij,ij->i", self._own(rows), values[self.visit[rows]])
+            - self._both(steps, rows)
+            for rows in lots(count)
+        ])  # fmt: skip
         return Course(
             chance=f_tail(min(explained / taken / variance, 1e300), taken, freedom),
             explained=explained,
             share=self._share(course, freedom / len(self.residual)),
-            values=waves @ shares.T * self._unit,
+            values=values * self._unit,
             scatter=np.sqrt(variance) * self._unit,
         )
 
@@ -189,7 +203,9 @@ class Series:
         `spare` are the degrees of freedom of an equation.
         """
         largest = 0.0
-        of = np.abs(self._own).argmax(axis=1)
+        of = np.concatenate([
+            np.abs(self._own(rows)).argmax(axis=1) for rows in lots(len(self.visit))
+        ])  # fmt: skip
         for component in np.flatnonzero(self._unit):
             mine = (self.visit >= 0) & (of == component)
             before, after = (
@@ -210,7 +226,7 @@ class Series:
         for first in reversed(range(0, self.visits, _VISITS)):
             some = slice(*np.searchsorted(visit, [first, first + _VISITS]))
             mine = rows[some]
-            own = self._own[mine]
+            own = self._own(mine)
             known = self._both(self._factor, mine)
             parts = np.concatenate([known, self._left[mine, None], own], axis=1)
             of_visit = sums(own[:, :, None] * parts[:, None], visit[some])

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.distance import pdist
+from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
 from tests.robots import linear_delta, made
@@ -62,6 +63,64 @@ def test_misfit_says_before_any_fit_that_a_constant_is_missing(count: int) -> No
 def test_as_few_rows_as_needed_say_nothing_of_the_misfit() -> None:
     true, places = case(2, 3, 6, 0)
     assert np.isnan(pk.locate_anchors(true, true.inverse(places)).misfit)
+
+
+@pytest.mark.parametrize(("m", "count"), [(2, 3), (2, 5), (3, 4), (3, 6)])
+def test_how_much_better_anchors_lie_as_they_are_than_mirrored(m: int, count: int) -> None:
+    """Rms distances of the file's anchors from the true ones and from their mirror image."""
+    for seed in range(5):
+        true, places = case(m, count, 30, seed)
+        names = [f"base{i + 1}.{axis}" for i in range(count) for axis in "xyz"[:m]]
+        change = np.random.default_rng(seed + 100).normal(0, 300, len(names))
+        file = true.replace({n: true.geometry[n] + c for n, c in zip(names, change, strict=True)})
+        on, anchors = (robot.slots[:, :m] for robot in (file, true))
+        on, anchors = on - on.mean(axis=0), anchors - anchors.mean(axis=0)
+        rms = []
+        for sign in (1.0, -1.0):
+            mirrored = anchors * [sign, *[1.0] * (m - 1)]
+            if m == 2:  # by the angle of the best rotation of the plane
+                z, w = (p[:, 0] + 1j * p[:, 1] for p in (mirrored, on))
+                turn = np.exp(1j * np.angle(np.vdot(z, w)))
+                rms.append(np.linalg.norm(turn * z - w))
+            else:
+                rms.append(Rotation.align_vectors(on, mirrored)[1])
+        found = pk.locate_anchors(file, true.inverse(places))
+        assert found.mirrored == pytest.approx(max(rms) / min(rms), rel=1e-3)
+
+
+def test_what_noise_hides_of_the_gram_matrix_is_as_large_as_noise() -> None:
+    """Places that are nearly in a plane: an eigenvalue is below its deviation, or negative.
+
+    The map x = G u is told by the lengths to the first anchor, linearly in M = GᵀG; anchors about
+    the first are orthonormal columns times the inverse of G. So their singular values are one over
+    the roots of the eigenvalues, or of these eigenvalues' deviations where those are larger.
+    """
+    hidden = 0
+    for seed in range(6):
+        true, places = case(3, 6, 40, seed)
+        places[:, 2] *= 0.01
+        q = true.inverse(places) + np.random.default_rng(seed).normal(0, 3.0, (40, 6))
+        squares = q**2
+        pattern = (squares[:1] + squares[:, :1] - squares - squares[0, 0])[:, 1:] / 2
+        left, size, _ = np.linalg.svd(pattern, full_matrices=False)
+        u = left[1:, :3] * size[:3] / size[0]
+        table = np.array([[*np.outer(row, row).ravel(), *row] for row in u])
+        target = squares[1:, 0] - squares[0, 0]
+        inverse = np.linalg.pinv(table, rcond=1e-12)  # of least norm, so that M is symmetric
+
+        def eigenvalues(target: np.ndarray, inverse: np.ndarray = inverse) -> np.ndarray:
+            return np.linalg.eigvalsh((inverse @ target)[:9].reshape(3, 3))
+
+        missed = target - table @ inverse @ target
+        slopes = [(eigenvalues(target + e) - eigenvalues(target - e)) / 2 for e in np.eye(39)]
+        deviation = np.sqrt(missed @ missed / (39 - 9)) * np.linalg.norm(slopes, axis=0)
+        values = eigenvalues(target)
+        hidden += int((values < deviation).sum())
+        base = pk.locate_anchors(true, q).robot.slots[:, :3]
+        found = np.linalg.svd(base[1:] - base[0], compute_uv=False)
+        wanted = size[0] / np.sqrt(np.sort(np.maximum(values, deviation)))
+        np.testing.assert_allclose(found, wanted, rtol=1e-3)
+    assert hidden >= 2
 
 
 def test_poses_are_in_the_frames_of_the_file() -> None:

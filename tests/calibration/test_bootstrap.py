@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pickle
+import warnings
 from collections.abc import Callable
 from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.calibration.bootstrap import Replicate
 from pkmcal.calibration.identification import Identification
 from pkmcal.kinematics.robot import Robot
 
@@ -124,6 +126,31 @@ def test_bootstrap_is_read_by_a_person(offsets: Identification) -> None:
     assert lines[0] == "40 bootstrap replicates"
     assert lines[1].split() == ["parameter", "stderr", "linear", "bias", "2.5", "%", "97.5", "%"]
     assert len(lines) == 8
+    # numbers end below the end of what heads them
+    for head in ("stderr", "linear", "bias"):
+        end = lines[1].index(head) + len(head)
+        assert all(line[end - 1].isdigit() and line[end] == " " for line in lines[2:])
+
+
+def test_residuals_that_are_drawn_are_as_large_as_the_noise(hexapod: Robot) -> None:
+    """Four positions for six numbers: half of what the noise did is in these, and is put back.
+
+    The mean of the variances of the bootstrap is the variance, however few equations are left.
+    """
+    rng, ratios = np.random.default_rng(11), []
+    q = hexapod.inverse(hexapod_poses(hexapod, 4, rng))
+    instrument = [pk.VirtualMachine(hexapod, 0.02, seed=seed) for seed in range(24)]
+    for each in instrument:
+        measured = dataclasses.replace(each.measure(q), sigma=0.02)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", pk.CalibrationWarning)
+            found = pk.identify(hexapod, measured, free="offset*", covariance="classical")
+        fit = found.fit
+        true = np.diag(fit.covariance) / fit.uncertainty.covariance.scale**2
+        seeds = np.random.SeedSequence(1).spawn(12)
+        off = Replicate(fit)(seeds) - found.values
+        ratios.append(np.mean(off**2, axis=0) / true)
+    assert np.mean(ratios) == pytest.approx(1.0, abs=0.2)
 
 
 @pytest.mark.parametrize("replicates", [0, 1, 2.5, True])

@@ -254,3 +254,15 @@ def test_json_has_held_numbers_apart_from_the_parameters(run: Any, tmp_path: Pat
     assert "6 for the base frame" in text and "± inf" not in text
     assert "--datum auto" in run(*command).stdout
     assert "base1.x " not in run(*command, "--fix", "base1.x,base2.*").stdout
+
+
+def test_a_datum_is_advised_where_frames_were_sought() -> None:
+    """Too few poses leave numbers open that no datum would fix."""
+    robot, rng = pk.load("hexapod"), np.random.default_rng(2)
+    readings = measured(robot, actuators("hexapod", 4, 3), rng)
+    with pytest.warns(pk.CalibrationWarning):
+        known = pk.identify(robot, readings)
+    with pytest.warns(pk.CalibrationWarning):
+        sought = pk.identify(robot, readings, frame="unknown")
+    assert known.unidentifiable and "--datum" not in str(known)
+    assert sought.unidentifiable and "--datum auto" in str(sought)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -64,6 +66,48 @@ def test_its_displacement_is_found_where_nothing_else_takes_it_up(hexapod: pk.Ro
     assert test.name == "west" and not test.also
     assert (np.abs(test.shift - moved) < 4 * np.array(test.stderr)).all()
     assert max(test.stderr) < NOISE
+    # what it explains of the squares is what is gone where the target is where it should be
+    (there,) = data
+    assert there.target is not None
+    right = dataclasses.replace(there, target=there.target + np.outer([0, 0, 1], moved))
+    before, after = (
+        pk.identify(with_errors(hexapod, 0.3, np.random.default_rng(2)), each, free="offset*").rms
+        for each in (there, right)
+    )
+    assert test.share == pytest.approx(1.0 - (after / before) ** 2, abs=0.02)
+
+
+def test_of_two_targets_it_cannot_be_told_which_one_moved(hexapod: pk.Robot) -> None:
+    """Where the platform is found along, one moved one way is the other moved the other way."""
+    (whole,) = read(hexapod, 4, np.array([0.3, -0.2, 0.1]))
+    assert whole.target_index is not None
+    test = displacement(pk.identify(hexapod, whole.select(np.flatnonzero(whole.target_index))))
+    assert test.found and {test.name, *test.also} == {"south", "west"}
+    told = displacement(pk.identify(hexapod, whole))
+    assert told.name == "west" and not told.also
+
+
+@pytest.mark.parametrize("kind", ["pose", "orientation"])
+def test_poses_read_beside_targets_do_not_hide_which_one_moved(
+    hexapod: pk.Robot, kind: str
+) -> None:
+    """The same machine read by another instrument, which knows no target."""
+    moved = np.array([0.3, -0.2, 0.1])
+    true = with_errors(hexapod, 0.3, np.random.default_rng(5))
+    q = hexapod.inverse(hexapod_poses(hexapod, COUNT, np.random.default_rng(6)))
+    beside = pk.VirtualMachine(true, NOISE, angle_noise=1e-5, seed=7).measure(q, kind)
+    test = displacement(pk.identify(hexapod, [*read(hexapod, 5, moved), beside]))
+    assert test.found and test.name == "west"
+    assert (np.abs(test.shift - moved) < 4 * np.array(test.stderr)).all()
+
+
+@pytest.mark.parametrize(("chance", "share"), [(0.5, 0.9), (1e-9, 0.1), (0.5, 0.1), (1e-9, 0.9)])
+def test_a_displacement_is_large_where_it_is_sure_and_most_of_what_is_left(
+    chance: float, share: float
+) -> None:
+    test = DisplacedTarget("west", (0.3, 0.0, 0.0), (0.01, 0.01, 0.01), chance, share, ())
+    assert test.found == (chance < 0.01)
+    assert test.large == (chance < 0.01 and share > 0.5)
 
 
 @pytest.mark.parametrize("shared", [0.0, 3.0])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import f as f_distribution
+from scipy.stats import t as t_distribution
 
 import pkmcal as pk
 
@@ -181,6 +182,20 @@ def test_of_deviations_by_the_spread_of_poses_the_test_is_hotellings() -> None:
     assert test.chance == pytest.approx(f_distribution.sf(test.ratio, count, rest), rel=1e-9)
 
 
+def test_of_numbers_known_unlike_well_the_test_has_the_least_degrees_of_freedom() -> None:
+    """Of variances that were estimated apart: F and the widest of the numbers' own t agree."""
+    robot, true, free = machines("quadratic")
+    instrument = pk.VirtualMachine(true, noise=SIGMA, angle_noise=SIGMA / 20.0, seed=5)
+    measured = replace(instrument.measure(rows(true, 20), kind="pose"), sigma=None)
+    found = pk.identify(robot, measured, free=free, covariance="classical")
+    (test,) = found.law_tests
+    columns = [found.free.index(name) for name in test.names]
+    factor = np.ptp(found.interval95[columns], axis=1) / 2 / found.stderr[columns]
+    assert np.ptp(factor) > 1e-3
+    assert t_distribution.ppf(0.975, test.freedom[1]) == pytest.approx(factor.max(), rel=1e-6)
+    assert test.chance == pytest.approx(f_distribution.sf(test.ratio, *test.freedom), rel=1e-9)
+
+
 def test_of_numbers_with_a_prior_nothing_is_said() -> None:
     robot, true, free = machines("quadratic")
     measured = pk.VirtualMachine(true, noise=SIGMA, angle_noise=SIGMA / 1000.0).measure(
@@ -291,3 +306,29 @@ def test_a_batch_of_directions_goes_with_as_many_rows() -> None:
     assert np.allclose(ways[1] - ways[0], [0.1, 0, 0, 0, 0, 0])
     with pytest.raises(ValueError, match="approach is of 2 rows, but 1 were asked for"):
         from_both.forward(q)
+
+
+def test_a_node_beyond_all_rows_is_as_smooth_as_the_nodes_that_are_held_let_it_be() -> None:
+    """Bends are those of held corrections, too: a node is off the line through its neighbours."""
+    places = np.array([300.0, 400.0, 520.0, 700.0, 1000.0])
+    values = np.array([0.3, 0.0, 0.1, -0.05, 0.0])
+    law = {"table": np.column_stack([places, values]).tolist(), "smoothness": 0.01}
+    robot = hexapod(*[{"drive": law, "stroke": [250.0, 1100.0]}] * 6)
+    q = rows(robot, 20)
+    assert q.min() > 520.0
+    measured = pk.VirtualMachine(robot, noise=0.005, angle_noise=5e-6).measure(q, kind="pose")
+    found = pk.identify(robot, measured, free=["offset*", "drive*.table2"])
+
+    def bends(second: float) -> np.ndarray:
+        table = values.copy()
+        table[1] = second
+        return np.array([
+            table[j] - np.interp(places[j], places[[j - 1, j + 1]], table[[j - 1, j + 1]])
+            for j in (1, 2, 3)
+        ])  # fmt: skip
+
+    constant, slope = bends(0.0), bends(1.0) - bends(0.0)
+    wanted = -(slope @ constant) / (slope @ slope)
+    assert abs(wanted) > 0.1
+    nodes = [v for name, v in zip(found.free, found.values, strict=True) if "table2" in name]
+    np.testing.assert_allclose(nodes, wanted, atol=1e-6)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -77,6 +78,35 @@ def test_redchi_is_the_weighted_sum_of_squares_per_degree_of_freedom(
     squares = float(((found.residuals[0] / measured.sigma) ** 2).sum())
     assert found.dof == measured.values.size - len(found.free)
     assert found.redchi == pytest.approx(squares / found.dof, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("more", "first"), [(1e-13, "offset2"), (3e-10, "offset2"), (3e-9, "offset3")]
+)
+def test_strong_correlations_are_in_the_order_of_size_then_of_parameters(
+    found: pk.Identification, more: float, first: str
+) -> None:
+    """Of equal ones rounding does not say which is the first."""
+    matrix = np.eye(6)
+    matrix[0, 1] = matrix[1, 0] = 0.97
+    matrix[0, 2] = matrix[2, 0] = -0.97 - more
+    matrix[3, 4] = matrix[4, 3] = 0.99
+    matrix[3, 5] = matrix[5, 3] = 0.94
+    pairs = replace(found, table=replace(found.table, correlation=matrix)).correlations
+    second = "offset3" if first == "offset2" else "offset2"
+    assert [(a, b) for a, b, _ in pairs] == [
+        ("offset4", "offset5"), ("offset1", first), ("offset1", second)
+    ]  # fmt: skip
+
+
+def test_numbers_of_the_misfit_stand_below_the_end_of_their_heads(found: pk.Identification) -> None:
+    lines = str(found).splitlines()
+    (at,) = (k for k, line in enumerate(lines) if line.startswith("misfit [mm]"))
+    head, *rows = lines[at : at + 3]
+    assert [row.split("  ")[0] for row in rows] == ["fitted", "held out"]
+    for name in ("rms before", "rms after", "median", "95 %"):
+        end = head.index(name) + len(name)
+        assert all(row[end - 1].isdigit() and not row[end : end + 1].strip() for row in rows)
 
 
 def test_correlations_are_the_covariance_over_both_deviations(found: pk.Identification) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
@@ -171,3 +172,41 @@ def test_a_target_found_far_from_the_machine_is_named() -> None:
         identify(robot, measured, **free)
     there = dataclasses.replace(measured, target=[3990.0, 0.0, 0.0])
     assert identify(robot, there, **free).warnings == ()
+
+
+def test_a_target_found_far_from_the_machine_in_one_session_is_named_with_it() -> None:
+    robot, rng = pk.load("hexapod"), np.random.default_rng(0)
+    places, sets = {"monday": [30.0, 0.0, 0.0], "friday": [4000.0, 0.0, 0.0]}, []
+    for day, place in places.items():
+        at = robot.home + rng.uniform(-1, 1, (60, 6)) * [100, 100, 80, 0.1, 0.1, 0.1]
+        points = instruments.points(at, np.array(place))[0]
+        sets.append(Measurements(robot.inverse(at), points, sigma=0.1, session=day))
+    options = {"target": "unknown", "per_session": "target*"}
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        identify(robot, sets, "offset*", **options)
+    texts = [str(each.message) for each in heard if "was found" in str(each.message)]
+    assert len(texts) == 1 and texts[0].startswith("target 1 of friday was found 4e+03 mm")
+
+
+@pytest.mark.parametrize("turned", [0.3, 2.5, -3.0])
+@pytest.mark.filterwarnings("ignore::pkmcal.exceptions.CalibrationWarning")
+def test_the_frame_of_poses_in_a_plane_is_found_from_what_was_read_of_them(turned: float) -> None:
+    """An instrument above a planar machine, however it is turned, reads all but its height."""
+    robot, rng = pk.load("3rrr-planar"), np.random.default_rng(4)
+    true = robot.replace({f"offset{i}": robot.geometry[f"offset{i}"] + 1e-3 * i for i in (1, 2, 3)})
+    at = pk.sample_poses(robot, 30, seed=1, share=0.3)
+    q = robot.inverse(at)
+    pose = true.forward(q, guess=at).pose
+    values = np.full((30, 6), np.nan)
+    turn = Rotation.from_euler("z", turned)
+    values[:, :2] = turn.apply(pose[:, :3])[:, :2] + [700.0, -300.0] + rng.normal(0, 0.01, (30, 2))
+    values[:, 5] = np.remainder(pose[:, 5] + turned + np.pi, 2 * np.pi) - np.pi
+    values[:, 3:] = np.c_[np.zeros((30, 2)), values[:, 5]] + rng.normal(0, 1e-5, (30, 3))
+    measured = Measurements(q, values, "pose", sigma=[0.01] * 3 + [1e-5] * 3)
+    found = identify(robot, measured, free="offset*", frame="unknown")
+    value = dict(zip(found.free, found.values.tolist(), strict=True))
+    assert found.converged and found.rms < 0.03
+    assert value["frame.x"] == pytest.approx(700.0, abs=1.0)
+    assert value["frame.y"] == pytest.approx(-300.0, abs=1.0)
+    assert value["frame.gamma"] == pytest.approx(turned, abs=0.01)

@@ -11,6 +11,7 @@ import pytest
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.measuring_order import MeasuringOrder
 from pkmcal.statistics.order_test import Series
 
 from ..simulated import hexapod_poses, tilted_poses, with_errors
@@ -203,3 +204,17 @@ def test_one_of_a_hundred_sound_calibrations_is_said_to_follow_the_order(machine
         order = pk.identify(robot, data, **words).measuring_order  # type: ignore[arg-type]
         found += order is not None and order.found
     assert found <= 12  # of 5 expected, exceeded once in 500 times
+
+
+@pytest.mark.parametrize(("units", "said"), [
+    (("mm", "mm", "rad", "rad"), "shifted by 0.5 mm in the course of measuring, most of it b"),
+    (("rad", "rad", "rad", "rad"), "shifted by 11.5 deg in the course of measuring, most of it d"),
+])  # fmt: skip
+def test_a_shift_is_that_of_lengths_or_of_angles_where_no_length_was_read(
+    units: tuple[str, ...], said: str
+) -> None:
+    shift = (0.3, -0.4, 0.01, 0.02) if "mm" in units else (0.0, 0.12, 0.0, -0.16)
+    order = MeasuringOrder(
+        ("a", "b", "c", "d"), shift, (0.1,) * 4, units, 1e-6, 0.9, jump="", visits=20, series=""
+    )
+    assert said in str(order)

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import pkmcal as pk
 from pkmcal.calibration.identify import identify
+from pkmcal.calibration.plausibility import other_readings
 from pkmcal.core import instruments
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -45,6 +46,13 @@ MISREAD: list[tuple[str, Change]] = [
 ]
 
 
+SIGNS: list[tuple[str, Change]] = [
+    ("q2 counts the other way", lambda m: {"actuators": m.actuators * [1, -1, 1, 1]}),
+    ("q4 is in metres", lambda m: {"actuators": m.actuators / [1, 1, 1, 1e3]}),
+    ("x is in micrometres", lambda m: {"values": m.values * [1e3, 1, 1]}),
+]
+
+
 def said(robot: Robot, measured: Measurements, **options: Any) -> list[str]:
     """What `identify` says aloud: its error, or else its warnings."""
     with warnings.catch_warnings(record=True) as heard:
@@ -57,6 +65,16 @@ def said(robot: Robot, measured: Measurements, **options: Any) -> list[str]:
     assert found.warnings == tuple(texts)
     assert all(text[:40] in found.summary() for text in texts)
     return texts
+
+
+@pytest.mark.parametrize(("words", "change"), MISREAD + SIGNS)
+def test_a_reading_of_a_mistakes_name_undoes_it(
+    paper: Robot, points: Measurements, words: str, change: Change
+) -> None:
+    wrong = dataclasses.replace(points, **change(points))
+    undone = dict(other_readings(wrong, paper.actuator_units))[words]
+    np.testing.assert_allclose(undone.actuators, points.actuators, rtol=1e-12)
+    np.testing.assert_allclose(undone.values, points.values, rtol=1e-12)
 
 
 @pytest.mark.parametrize("prior", [None, 0.5])
@@ -185,6 +203,26 @@ def test_residuals_far_above_sigma_are_named(paper: Robot, points: Measurements)
     assert "contradict the prior" in second and second.endswith("or leave the outliers out")
 
 
+def test_repeats_decide_whether_sigma_or_numbers_that_are_not_free_are_to_blame(
+    paper: Robot,
+) -> None:
+    rng = np.random.default_rng(5)
+    q = np.repeat(paper.inverse(tilted_poses(paper, 20, rng)), 2, axis=0)
+    wrong = with_errors(paper, 0.5, rng)
+    repeated = VirtualMachine(wrong, 0.05).measure(q)
+    once = repeated.select(slice(0, None, 2))
+    boasted = dataclasses.replace(VirtualMachine(paper, 0.05).measure(q), sigma=0.01)
+    for measured, free_more, state_sigma in (
+        (repeated, True, False),
+        (once, True, True),
+        (boasted, False, True),
+    ):
+        texts = said(paper, measured, free="offset*")
+        (text,) = [text for text in texts if "times what sigma says" in text]
+        assert ("free more parameters" in text) == free_more
+        assert ("state the true sigma" in text) == state_sigma
+
+
 def test_good_measurements_raise_no_suspicion(paper: Robot, points: Measurements) -> None:
     assert said(paper, points, prior=0.5) == []
     large = with_errors(paper, 5.0, np.random.default_rng(3))
@@ -252,6 +290,11 @@ def test_copied_rows_are_named_but_repeats_are_not(paper: Robot, points: Measure
     texts = said(paper, points.select([*range(30), 3, 4]), prior=0.5)
     assert texts == ["2 rows equal others to the last digit (row 30 of 3, 31 of 4): copied, not"
                      " measured again?"]  # fmt: skip
+    (many,) = said(paper, points.select([*range(30), *range(7)]), prior=0.5)
+    named = ", ".join(["30 of 0", *(f"{30 + i} of {i}" for i in range(1, 5))])
+    assert many.startswith(f"7 rows equal others to the last digit (row {named}, …): copied")
+    (five,) = said(paper, points.select([*range(30), *range(5)]), prior=0.5)
+    assert five.startswith(f"5 rows equal others to the last digit (row {named}): copied")
     repeats = VirtualMachine(paper).measure(np.repeat(points.actuators, 2, axis=0))
     assert said(paper, repeats, prior=0.5) == []
 

@@ -147,6 +147,17 @@ def test_tied_numbers_follow_their_parameters(tmp_path: Path) -> None:
     assert abs(found.values[0] - 1001.0) < 1e-3
 
 
+@pytest.mark.filterwarnings("ignore:the measurements contradict the prior")
+def test_priors_hold_in_whatever_order_they_are_given(sled: pk.Robot) -> None:
+    _, lengths, tape = drawn(2, 15)
+    stated = {**PRIOR, "|base2 - base3|": (tape, TAPE), "base4.x": 1e-3, "base3.y": 2.0}
+    first = fitted(sled, lengths, stated)
+    last = fitted(sled, lengths, dict(reversed(stated.items())))
+    np.testing.assert_allclose(last.values, first.values, rtol=1e-9)
+    np.testing.assert_allclose(last.stderr, first.stderr, rtol=1e-6)
+    assert abs((first.values - first.start)[first.free.index("base4.x")]) < 0.01
+
+
 def test_numbers_of_each_session_have_the_function_in_each(sled: pk.Robot) -> None:
     _, lengths, _ = drawn(5, 16, off=0.0)
     days = ["monday"] * 8 + ["tuesday"] * 8

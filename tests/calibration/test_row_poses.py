@@ -358,6 +358,20 @@ def test_an_actuator_that_is_never_wrong_is_met_exactly(cables: pk.Robot) -> Non
     assert np.abs(needed[:, 2]).max() < 1e-9 < 0.1 < np.abs(needed[:, 3]).max()
 
 
+@pytest.mark.parametrize(
+    ("rows", "whose"), [(4, "measurements 1"), (8, "measurements 1 and of the actuators")]
+)
+@pytest.mark.filterwarnings("ignore:14 equations for 16 parameters")
+def test_whose_noise_too_little_is_left_over_to_tell_is_named(
+    cables: pk.Robot, rows: int, whose: str
+) -> None:
+    """One of four positions, whose point is a pose's; with all anchors free nothing at all."""
+    log = measured(simulated(0, rows, "third"), sigma=None, actuator_sigma=None)
+    with pytest.warns(pk.CalibrationWarning, match=f"estimate the noise of {whose}: state sigma"):
+        found = pk.identify(cables, log, "offset*" if rows == 4 else None)
+    assert np.isinf(found.stderr).all() and found.verdict.state == "doubtful"
+
+
 def test_actuators_that_are_never_wrong_cannot_be_as_many_as_the_ways_to_move(
     cables: pk.Robot,
 ) -> None:
@@ -366,6 +380,10 @@ def test_actuators_that_are_never_wrong_cannot_be_as_many_as_the_ways_to_move(
             pk.identify(cables, measured(simulated(0, 12, "all"), actuator_sigma=sigma))
     with pytest.raises(ValueError, match="actuator_sigma must be positive, or None"):
         pk.identify(cables, measured(simulated(0, 12, "all"), actuator_sigma=0.0))
+    at_some = [NOISE, 0.0, NOISE, NOISE], NOISE  # in one set and not in the other
+    sets = [measured(simulated(i, 12, "all"), actuator_sigma=at_some[i]) for i in (0, 1)]
+    with pytest.raises(ValueError, match="0 at all rows for"):
+        pk.identify(cables, sets)
     stated = measured(simulated(0, 12, "all"))
     with pytest.raises(ValueError, match="state actuator_sigma of all sets, or of none"):
         pk.identify(cables, [stated, measured(simulated(1, 12, "all"), actuator_sigma=None)])
@@ -420,6 +438,22 @@ def test_points_held_out_are_missed_as_expected(cables: pk.Robot) -> None:
         off.append(found.holdout_rms)
         expected.append(found.holdout_expected)
     assert np.mean(off) == pytest.approx(np.mean(expected), rel=0.1)
+
+
+@pytest.mark.parametrize("repeats", [1, 6])
+def test_what_actuators_add_to_points_held_out_is_shared_by_repeats(
+    cables: pk.Robot, repeats: int
+) -> None:
+    """An instrument ten times as good as the lengths: 3 errors a pose, read however often."""
+    drawn, rng = simulated(0, 60, "all"), np.random.default_rng(0)
+    places, needed = drawn.elsewhere
+    lengths = np.repeat(needed[:8] + rng.normal(0, NOISE, (8, 4)), repeats, axis=0)
+    seen = np.repeat(places[:8], repeats, axis=0)
+    seen += rng.normal(0, NOISE / 10, seen.shape)
+    held = measured(drawn._replace(lengths=lengths, read=seen), sigma=NOISE / 10)
+    test = pk.identify(cables, measured(drawn), holdout=held).holdout.test
+    assert test is not None
+    assert 0.9 * 24 < test.freedom[0] <= 24
 
 
 def test_spoilt_cables_are_named_row_by_row(cables: pk.Robot) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -338,6 +339,19 @@ def test_a_held_out_session_finds_its_own_zeros_first(
     np.testing.assert_array_equal(found.values, alone.values)
 
 
+@pytest.mark.filterwarnings("ignore:residuals are")
+def test_a_sigma_that_is_too_small_makes_no_number_of_a_held_out_session_surer(
+    hexapod: Robot, two: tuple[list[Robot], list[Measurements]]
+) -> None:
+    """The residuals widen all deviations, those of numbers that the fit has not too."""
+    own = []
+    for smaller in (1.0, 4.0):
+        first, second = (dataclasses.replace(m, sigma=NOISE / smaller) for m in two[1])
+        found = pk.identify(hexapod, first, FREE, holdout=second, per_session="offset*")
+        own.append([each["stderr"] for each in found.holdout_parameters.values()])
+    np.testing.assert_allclose(own[1], own[0], rtol=0.2)
+
+
 def test_rows_of_a_fitted_session_are_compared_with_its_numbers(
     hexapod: Robot, two: tuple[list[Robot], list[Measurements]]
 ) -> None:
@@ -362,6 +376,27 @@ def test_its_frame_is_found_without_a_start_near_it(hexapod: Robot) -> None:
            for c, v in zip(pk_pose(), STANDS[2], strict=True)]  # fmt: skip
     assert np.abs(off).max() < 4.0 and not found.holdout_contradicts
     assert found.holdout_rms < 2.0 * found.holdout_expected
+
+
+@pytest.mark.parametrize("prior", [None, {"offset*": 5.0}])
+def test_what_moved_is_told_beside_numbers_that_each_session_has_of_its_own(
+    hexapod: Robot, prior: dict[str, float] | None
+) -> None:
+    """The instrument stood elsewhere, which its frame of that day says; and one zero moved."""
+    _, sets = three(hexapod, np.zeros(3))
+    rng = np.random.default_rng(2)
+    later = moved(hexapod, 0.5, rng)  # the same machine
+    later = later.replace({"offset3": later.geometry["offset3"] + 1.0})
+    q = hexapod.inverse(hexapod_poses(hexapod, 40, rng))
+    seen = pk.VirtualMachine(later, NOISE, 7).measure(q)
+    held = seen_from(dataclasses.replace(seen, session="friday"), STANDS[2])
+    found = pk.identify(
+        hexapod, sets[:2], "offset*", frame="unknown", per_session="frame*", holdout=held,
+        prior=prior,
+    )  # fmt: skip
+    assert found.holdout_contradicts and found.moved
+    assert found.moved[0].names == ("offset3",)
+    assert found.moved[0].shift[0] == pytest.approx(1.0, abs=5 * found.moved[0].stderr[0])
 
 
 def test_numbers_that_took_every_reading_leave_nothing_to_compare(
@@ -506,6 +541,35 @@ def test_common_numbers_are_known_better_by_all_sessions(name: str, cables: Robo
     for number, value in shared.holdout_parameters.items():
         together = found.parameters[number]
         assert abs(value["value"] - together["value"]) < 4.0 * value["stderr"]
+
+
+@pytest.mark.parametrize("anew", ["offset*", "offset2"])
+@pytest.mark.parametrize("kind", ["closure", "position"])
+def test_rows_that_tell_nothing_leave_a_sessions_numbers_as_they_were(
+    tmp_path: Path, anew: str, kind: str
+) -> None:
+    """Three lengths to a point, nothing else read: any zeros would do."""
+    head = 'name = "point"\nunits = { length = "mm", angle = "deg" }\n[pose]\nmap = "translation"\n'
+    limbs = "".join(
+        f'[[limb]]\nkind = "UPS"\nbase = {anchor}\nplatform = [0, 0, 0]\n'
+        for anchor in ([0, -1600, -120], [1550, 900, -120], [-1370, 790, 2350])
+    )
+    path = tmp_path / "point.toml"
+    path.write_text(f"{head}home = {{ z = 600 }}\n{limbs}")
+    robot, rng = pk.load(path), np.random.default_rng(0)
+    places = np.zeros((30, 6))
+    places[:, :3] = rng.uniform([-500, -500, 300], [500, 500, 900], (30, 3))
+    q = robot.inverse(places)
+    seen = places[:20, :3] + rng.normal(0, NOISE, (20, 3))
+    first = Measurements(q[:20], seen, "position", sigma=NOISE, session="monday")
+    nothing = None if kind == "closure" else np.full((10, 3), np.nan)
+    blind = Measurements(q[20:], nothing, kind, session="friday")  # type: ignore[arg-type]
+    found = pk.identify(robot, first, "offset*", per_session=anew, holdout=blind)
+    names = robot.geometry.match(anew)
+    assert [*found.holdout_parameters] == [f"{name}@friday" for name in names]
+    for name in names:
+        own = found.holdout_parameters[f"{name}@friday"]
+        assert own["value"] == robot.geometry[name] and np.isinf(own["stderr"])
 
 
 def test_closures_alone_tell_a_session_its_zeros(cables: Robot) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.stats import norm
 
 import pkmcal as pk
 
@@ -128,6 +129,31 @@ def test_without_dropping_they_are_said(eight: pk.Robot) -> None:
     assert (row, int(slack[row].argmax())) in cells(found)
 
 
+def test_several_cables_of_one_pose_may_be_slack(eight: pk.Robot) -> None:
+    """The longest hides the others until it is left out."""
+    _, q, _ = drawn(CORNERS, 12, 30, 0.0)
+    loose = {(5, 1): 60.0, (5, 6): 25.0, (17, 3): 80.0, (17, 4): 40.0, (17, 0): 15.0}
+    for cell, longer in loose.items():
+        q[cell] += longer
+    found = fitted(eight, q, "drop")
+    assert cells(found) == loose.keys()
+    for each in found.slack:
+        assert each.longer == pytest.approx(loose[each.rows[0], each.actuators[0] - 1], abs=3.0)
+
+
+def test_the_same_readings_are_left_out_where_a_datum_is_chosen(eight: pk.Robot) -> None:
+    """What says where the base frame lies is held by the user or by the package."""
+    _, q, slack = drawn(CORNERS, 0, 40, 0.3)
+    by_user = fitted(eight, q, "drop")
+    log = pk.Measurements(q, None, "closure", actuator_sigma=NOISE)
+    chosen = pk.identify(eight, log, FREE, slack="drop", datum="auto")
+    assert len(chosen.datum.names) == len(HELD)
+    wanted = set(zip(*map(np.ndarray.tolist, np.nonzero(slack)), strict=True))
+    assert cells(chosen) == cells(by_user) == wanted
+    assert chosen.dof == by_user.dof
+    assert chosen.chi2_per_dof == pytest.approx(by_user.chi2_per_dof, rel=1e-4)
+
+
 def test_deviations_are_honest_where_cables_are_slack(eight: pk.Robot) -> None:
     z, right, wrong = [], 0, 0
     for seed in range(25):
@@ -153,6 +179,38 @@ def test_taut_machines_have_no_slack_cables(eight: pk.Robot) -> None:
     assert false <= 2
 
 
+@pytest.mark.parametrize(("row", "cable"), [(4, 0), (9, 5)])
+def test_a_cable_is_slack_from_where_one_of_100_taut_machines_has_one(
+    eight: pk.Robot, row: int, cable: int
+) -> None:
+    """Of readings without noise: what the place does not take up, over sigma, against a quantile.
+
+    Lengths change with the place along the cables; the anchor that is free has 30 rows.
+    """
+    at = np.random.default_rng(3).uniform([-1200, -900, 300], [1200, 900, 2000], (30, 3))
+    exact = np.linalg.norm(at[:, None] - CORNERS, axis=2)
+    along = (at[row] - CORNERS) / exact[row, :, None]
+    left = 1.0 - along[cable] @ np.linalg.solve(along.T @ along, along[cable])
+    for share in (0.95, 1.05):
+        q = exact.copy()
+        q[row, cable] += share * norm.isf(0.01 / q.size) * NOISE / np.sqrt(left)
+        log = pk.Measurements(q, None, "closure", actuator_sigma=NOISE)
+        found = pk.identify(eight, log, ["base8.x"], slack="drop")
+        assert cells(found) == ({(row, cable)} if share > 1.0 else set())
+
+
+@pytest.mark.filterwarnings("ignore:residuals are")
+def test_what_residuals_show_of_the_noise_says_from_where_on_cables_are_slack(
+    eight: pk.Robot,
+) -> None:
+    """Taut cables with five times the noise that is stated, and slack ones where it is right."""
+    _, q, _ = drawn(CORNERS, 310, 30, 0.0)
+    assert len(fitted(eight, q, "drop", NOISE / 5.0).slack) <= 1
+    _, q, slack = drawn(CORNERS, 311, 30, 0.2)
+    as_stated, wider = (fitted(eight, q, "drop", sigma) for sigma in (NOISE, NOISE / 5.0))
+    assert cells(as_stated) == cells(wider) == set(zip(*np.nonzero(slack), strict=True))
+
+
 @pytest.mark.filterwarnings("ignore:residuals are")
 def test_a_reading_that_is_too_short_is_no_slack_cable(eight: pk.Robot) -> None:
     _, q, _ = drawn(CORNERS, 4, 30, 0.0)
@@ -162,10 +220,13 @@ def test_a_reading_that_is_too_short_is_no_slack_cable(eight: pk.Robot) -> None:
     assert 7 in found.outliers
 
 
-def test_readings_may_count_backwards_and_in_other_units(eight: pk.Robot, tmp_path: Path) -> None:
+@pytest.mark.parametrize("first", range(0, 8, 3))
+def test_readings_may_count_backwards_and_in_other_units(
+    eight: pk.Robot, tmp_path: Path, first: int
+) -> None:
     """Drums wound the other way and winches in steps: slack is in mm of cable."""
-    _, q, _ = drawn(CORNERS, 11, 30, 0.2)
-    gain = np.array([1.0, -1.0, 0.01, -20.0, 1.0, -1.0, 2.0, -0.5])
+    _, q, _ = drawn(CORNERS, 16, 30, 0.2)
+    gain = np.roll([1.0, -1.0, 0.01, -20.0, 1.0, -1.0, 2.0, -0.5], first)
     path = tmp_path / "counts.toml"
     machine_on(CORNERS, path)
     head, *limbs = path.read_text().split("[[limb]]\n")
@@ -197,7 +258,11 @@ def test_with_one_cable_more_than_needed_it_cannot_be_told_which(tmp_path: Path)
     assert " or q" in str(cable)
 
 
-def test_the_slack_cable_is_among_those_named_where_others_would_do_as_well() -> None:
+@pytest.mark.filterwarnings("ignore:residuals are")
+@pytest.mark.parametrize("smaller", [1.0, 10.0])  # than the noise is the sigma that is stated
+def test_the_slack_cable_is_among_those_named_where_others_would_do_as_well(
+    smaller: float,
+) -> None:
     """Two cables more than needed: at some poses two pull nearly alike, and noise hides which."""
     robot = pk.load(Path(__file__).parents[2] / "examples" / "cable-robot" / "robot.toml")
     gain = np.array([robot.geometry[f"gain{i}"] for i in range(1, 9)])
@@ -211,7 +276,8 @@ def test_the_slack_cable_is_among_those_named_where_others_would_do_as_well() ->
         loose = dict(zip(rows.tolist(), cables.tolist(), strict=True))
         for row, cable in loose.items():
             q[row, cable] += rng.uniform(5, 60) / gain[cable]
-        log = pk.Measurements(q, None, "closure", actuator_sigma=0.2 / np.abs(gain))
+        sigma = 0.2 / smaller / np.abs(gain)
+        log = pk.Measurements(q, None, "closure", actuator_sigma=sigma)
         found = pk.identify(robot, log, "offset*", slack="drop")
         named = {row: each.actuators for each in found.slack for row in each.rows}
         assert named.keys() == loose.keys()

@@ -9,6 +9,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
+from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.measurements import Measurements
 
 from ..simulated import hexapod_poses
@@ -89,3 +90,24 @@ def test_components_whose_noise_differs_are_told_with_their_units() -> None:
     assert units == ("mm",) * 3 + ("deg",) * 3
     expected = [*noise[:3], *np.degrees(noise[3:])]
     np.testing.assert_allclose([float(value) for value in values], expected, rtol=0.4)
+
+
+@pytest.mark.parametrize("exact", [1, 2])
+def test_sets_without_any_residual_are_no_division_by_zero(exact: int) -> None:
+    """An arm read where its own numbers have it, to the last bit; or one of two sets of it."""
+    arm = pk.load("3r")
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, (30, 3))
+    place = as_machine(arm).forward(q).pose[:, :3]
+    noise = np.random.default_rng(1).normal(0, NOISE, place.shape)
+    sets = [
+        Measurements(q, place, sigma=NOISE),
+        Measurements(q, place + noise * (exact < 2), sigma=NOISE),
+    ]
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        found = pk.identify(arm, sets, "joint1.d[xyz]")
+        said = str(found) + "".join(str(each.message) for each in heard)
+    assert {each.category for each in heard} <= {pk.CalibrationWarning}
+    assert ("weighted wrongly" in said) == (exact == 1)
+    if exact == 2:
+        assert not found.rms and not (found.values - found.start).any()

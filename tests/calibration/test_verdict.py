@@ -76,14 +76,20 @@ def test_a_table_says_in_words_that_all_held_out_points_are_outliers(
     assert "none is left (12)" in str(found) and "nan" not in str(found)
 
 
-def test_all_offsets_that_move_alike_are_named_together(hexapod: pk.Robot, true: pk.Robot) -> None:
-    names = [f"offset{i}" for i in range(1, 7)]
-    later = true.replace({name: true.geometry[name] + 0.4 for name in names})
+@pytest.mark.parametrize(
+    ("free", "said"),
+    [("offset*", "offset1 … offset6 alike"), ("offset[25]", "offset2, offset5 alike")],
+)
+def test_all_offsets_that_move_alike_are_named_together(
+    hexapod: pk.Robot, true: pk.Robot, free: str, said: str
+) -> None:
+    names = hexapod.geometry.match(free)
+    first = true if len(names) == 6 else hexapod
+    later = first.replace({name: first.geometry[name] + 0.4 for name in names})
     found = fitted(
-        hexapod, session(hexapod, true, 40, 0), free="offset*",
-        holdout=session(hexapod, later, 40, 1),
-    )  # fmt: skip
-    assert str(found.moved[0]) == "offset1 … offset6 alike"
+        hexapod, session(hexapod, first, 40, 0), free=free, holdout=session(hexapod, later, 40, 1)
+    )
+    assert str(found.moved[0]) == said
     assert found.moved[0].shift[0] == pytest.approx(0.4, abs=0.05)
 
 
@@ -221,6 +227,29 @@ def test_readings_beside_the_wrong_rows_are_found(
     assert f"each reading belongs to the row {abs(by)} {where} it" in text
 
 
+@pytest.mark.parametrize("by", [2, -2])
+def test_they_are_found_although_every_other_row_was_left_out(
+    hexapod: pk.Robot, true: pk.Robot, by: int
+) -> None:
+    measured = session(hexapod, true, 40, 5)
+    wrong = replace(measured, values=np.roll(measured.values, by, axis=0))
+    try:
+        found = fitted(hexapod, wrong, free="offset*", drop=list(range(1, 40, 2)), **UNKNOWN)
+        text = "; ".join(found.verdict.reasons)
+    except ValueError as error:
+        text = str(error)
+    where = "before" if by > 0 else "after"
+    assert f"each reading belongs to the row 2 {where} it" in text
+
+
+def test_readings_that_nothing_makes_fit_have_no_such_cause(hexapod: pk.Robot) -> None:
+    """The machine reaches none of these rows, whichever of them a reading belongs to."""
+    q = 1e5 * (1.0 + np.random.default_rng(0).random((20, 6)))
+    with pytest.raises(ValueError) as said:
+        fitted(hexapod, Measurements(q, np.zeros((20, 3)), "position"), free="offset*")
+    assert "if " not in str(said.value)
+
+
 @pytest.mark.parametrize("holdout", [0.2, 0.5])
 def test_they_are_found_although_rows_are_missing(
     hexapod: pk.Robot, true: pk.Robot, holdout: float
@@ -293,6 +322,18 @@ def test_no_spare_equation_has_no_noise_and_no_deviations(printer: pk.Robot) -> 
     assert "noise" not in text.split("O1")[0].split("\n", 3)[3] and "expected" not in text
     stated = fitted(printer, replace(probed(printer, 6), sigma=0.03))
     assert np.isfinite(stated.stderr).all()
+
+
+@pytest.mark.parametrize("spare", [0, 1, 2])
+def test_chi_squared_is_told_from_one_spare_equation_on(printer: pk.Robot, spare: int) -> None:
+    measured = replace(probed(printer, 6 + spare), sigma=0.03)
+    found = fitted(printer, measured)
+    assert found.dof == spare
+    if not spare:
+        assert np.isnan(found.chi2_per_dof)
+    else:
+        squares = float((found.residuals[0] ** 2).sum()) / 0.03**2
+        assert found.chi2_per_dof == pytest.approx(squares / spare)
 
 
 def test_enough_points_are_calibrated(printer: pk.Robot) -> None:

@@ -13,6 +13,7 @@ from scipy.stats import f as f_distribution
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.robust_check import robust_check
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.linear_fit import column_basis
 from pkmcal.statistics.robust_scale import ratio_by_chance, robust_ratio
@@ -89,6 +90,24 @@ def test_a_row_far_off_is_still_found_among_few() -> None:
     assert verdict.reasons[0].startswith("1 row disagrees with the rest: row 7;")
 
 
+def test_the_ratio_of_both_noises_is_that_of_the_least_squares_over_the_true_one(
+    hexapod: pk.Robot,
+) -> None:
+    """24 numbers of 20 positions, two of them far off: the robust fit leaves the noise there is."""
+    noise = []
+    for seed in range(8):
+        measured = positions(hexapod, hexapod.replace({"offset1": 0.4}), 20, seed)
+        values = measured.values.copy()
+        values[3] += [5.0, 0.0, 0.0]
+        values[11] += [0.0, -4.0, 3.0]
+        found = fitted(hexapod, replace(measured, values=values), ["offset*", "base*"])
+        check = robust_check(found.fit)
+        assert found.rank == 24 and check is not None and check.rows == (3, 11)
+        plain = np.sqrt((found.residuals[0] ** 2).sum() / (60 - 24))
+        noise.append(plain / check.ratio)
+    assert np.mean(noise) == pytest.approx(0.02, rel=0.15)  # within 3.4 deviations
+
+
 def test_a_length_far_off_among_belts_is_said_with_the_misfit_of_the_closures() -> None:
     robot = pk.load("examples/belts/robot.toml")
     log = pk.read_measurements("examples/belts/belts.csv", robot)
@@ -129,6 +148,21 @@ def test_repeats_of_fitted_poses_are_no_proof_elsewhere(hexapod: pk.Robot) -> No
     assert found.verdict.remarks[-1].startswith("17 of the held-out points are at poses that were")
     drawn = fitted(hexapod, whole, holdout=0.3)
     assert not any("fitted as well" in text for text in drawn.verdict.remarks)
+
+
+def test_a_reading_of_minus_zero_is_a_reading_of_zero(hexapod: pk.Robot) -> None:
+    """One repeat of a pose at -0.0 mm, the other at 0.0: it is the same pose."""
+    poses = hexapod_poses(hexapod, 12, np.random.default_rng(7))
+    robot = hexapod.replace({"offset1": float(hexapod.inverse(poses[:1])[0, 0])})
+    q = robot.inverse(poses)
+    assert abs(q[0, 0]) < 1e-9
+    q[0, 0] = 0.0
+    seen = robot.forward(q).pose[:, :3] + np.random.default_rng(8).normal(0, 0.02, (12, 3))
+    again = q[:1].copy()
+    again[0, 0] = -0.0
+    held = Measurements(again, seen[:1] + 0.01, "position")
+    found = fitted(robot, Measurements(q, seen, "position"), holdout=held)
+    assert found.verdict.remarks[-1].startswith("1 of the held-out points are at poses that were")
 
 
 @pytest.mark.parametrize("spare", [1, 2, 4])

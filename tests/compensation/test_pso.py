@@ -15,6 +15,7 @@ from pkmcal.core import library, swarm
 from pkmcal.core.swarm import CONSTRICTION, PAPER, SwarmSettings, minimise_eq18
 from pkmcal.kinematics.limb_residual import LimbResidual
 
+from ..kinematics.test_closures_twin import head_with_a_leg
 from ..simulated import hexapod_poses, tilted_poses, with_errors
 from ..twin import closures
 
@@ -256,6 +257,19 @@ def test_nan_is_never_the_best() -> None:
     assert lost.value == np.inf
 
 
+def test_before_any_value_the_first_particle_leads() -> None:
+    """And it goes on to lead where no particle ever has a number."""
+    low, high = np.array([-1.0, 10.0, 200.0]), np.array([1.0, 20.0, 300.0])
+    flock = swarm.Swarm(SwarmSettings(particles=9), low, high, seed=7)
+    first = flock.positions[0]
+    for _ in range(3):
+        leader, value = flock.best
+        np.testing.assert_array_equal(leader, first)
+        assert value == np.inf
+        flock.update_best(np.full(9, np.nan))
+        flock.move()
+
+
 BAD: list[tuple[dict[str, Any], type[Exception], str]] = [
     ({"lower": [0.0, 2.0]}, ValueError, r"lower\[1\] = 2.0 is above upper\[1\] = 1.0"),
     ({"lower": [0.0]}, ValueError, "lower has 1 entries, upper 2"),
@@ -295,6 +309,12 @@ def test_the_core_refuses_what_it_cannot_take() -> None:
     assert library.lib.pkm_base_swarm_update_best(struct, null) == library.lib.PKM_BAD_SWARM
     with pytest.raises(ValueError, match="the core refused the call"):
         library.call("swarm_update_best", struct, np.empty(1))
+    struct.particles = 8
+    state, bounds, found = np.empty(library.lib.pkm_swarm_size(struct)), np.ones(2), np.empty(9)
+    for iterations, rows in ((-1, 1), (0, 0), (0, -1)):
+        given = (struct, iterations, 0, 0, 1, rows, np.ones(2), -bounds, bounds, state, found, found)
+        with pytest.raises(ValueError, match="the core refused the call"):
+            library.call("swarm_eq18", *given)
 
 
 # --- order-2 stability -------------------------------------------------------------------------
@@ -330,14 +350,14 @@ def test_constriction_settles_and_the_printed_factors_do_not() -> None:
 MACHINES = ("2tpr2tps", "2tpr2tps-spatial", "hexapod", "rbt-6t03p", "rotary-delta", "3rps")
 
 
-@pytest.mark.parametrize("name", MACHINES)
+@pytest.mark.parametrize("name", [*MACHINES, "with weights"])
 def test_limb_residual_is_that_of_the_plain_twin(name: str) -> None:
-    robot = pk.load(name)
+    robot = pk.load(name) if name in MACHINES else head_with_a_leg()
     rng = np.random.default_rng(6)
     poses = robot.home + rng.uniform(-1, 1, (40, 6)) * [5, 5, 5, 0.02, 0.02, 0.02]
     q = robot.inverse(poses)
     assert np.isfinite(q).all()
-    cost = LimbResidual(robot, poses, q)
+    cost = LimbResidual(robot, poses, q, free=robot.model.free or robot.geometry.names)
     values = cost.nominal + rng.normal(0, 1e-2, (11, len(cost.free)))
     found = cost(values)
     for row in (0, 10):

@@ -93,6 +93,34 @@ def test_what_is_left_is_the_part_across_the_unknowns(drawn: Drawn) -> None:
             assert not np.isfinite(following[i]).any()
 
 
+def test_an_unknown_that_no_equation_has_takes_no_step_and_no_part(drawn: Drawn) -> None:
+    """So it is as if it were not there, which a pose with one fewer tells."""
+    undamped, wider = np.zeros(len(drawn.count)), drawn.unknowns + 1
+    more = PoseEquations(drawn.order, drawn.count, wider)
+    for place in range(wider):
+        by_unknown = np.insert(drawn.by_unknown, place, 0.0, axis=1)
+        expected = drawn.poses.fit(drawn.residual, drawn.by_unknown, undamped)
+        found = more.fit(drawn.residual, by_unknown, undamped)
+        assert not found.step[:, place].any()
+        step = np.delete(found.step, place, axis=1)
+        tall = drawn.count >= drawn.unknowns  # of others many steps are as good
+        np.testing.assert_allclose(step[tall], expected.step[tall], rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(found.gain, expected.gain, rtol=1e-6, atol=1e-8)
+
+
+def test_slopes_of_one_are_slopes(drawn: Drawn) -> None:
+    """Each unknown is read by an equation of its own, as an offset is; the others have no part."""
+    by_unknown, undamped = np.zeros_like(drawn.by_unknown), np.zeros(len(drawn.count))
+    for _, mine, _ in drawn.each():
+        by_unknown[mine] = np.eye(len(mine), drawn.unknowns)
+    step, _, _, left = drawn.poses.fit(drawn.residual, by_unknown, undamped)
+    for i, mine, _ in drawn.each():
+        own, place = min(len(mine), drawn.unknowns), drawn.poses.place[i]
+        np.testing.assert_allclose(step[i, :own], -drawn.residual[mine[:own]], rtol=1e-9)
+        rest = left[place : place + len(mine) - own]
+        np.testing.assert_allclose(np.abs(rest), np.abs(drawn.residual[mine[own:]]), rtol=1e-9)
+
+
 def test_numbers_that_are_not_finite_stay_with_their_pose() -> None:
     drawn = Drawn(3)
     bad = int(np.flatnonzero(drawn.count > 3)[0])

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import pkmcal as pk
 from pkmcal.estimation import equations, readings, session_machines
+from pkmcal.statistics import clusters, linear_fit
 
 
-def fitted(robot: pk.Robot) -> pk.Identification:
+def fitted(robot: pk.Robot, **options: Any) -> pk.Identification:
     """Poses with full covariances, and positions of repeats in any order."""
     rng = np.random.default_rng(3)
     q = robot.inverse(pk.sample_poses(robot, 30, seed=4))
@@ -22,7 +25,37 @@ def fitted(robot: pk.Robot) -> pk.Identification:
         pk.Measurements(q, true.forward(q).pose + noise, "pose", sigma=covariance),
         machine.measure(np.repeat(q[:12], 3, axis=0)[rng.permutation(36)], "position"),
     ]
-    return pk.identify(robot, sets, free="offset*")
+    return pk.identify(robot, sets, free="offset*", **options)
+
+
+def in_small_lots(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module, name, together in (
+        (session_machines, "_TOGETHER", 7),
+        (readings, "_TOGETHER", 4),
+        (equations, "_LOT", 5),
+        (clusters, "_FEW", 7),
+        (linear_fit, "_KEYS", 3),
+    ):
+        monkeypatch.setattr(module, name, together)
+
+
+@pytest.mark.parametrize("options", [{}, {"loss": "huber"}, {"covariance": "cluster"}])
+def test_a_calibration_in_lots_is_that_made_at_once(
+    hexapod: pk.Robot, options: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    at_once = fitted(hexapod, **options)
+    in_small_lots(monkeypatch)
+    in_lots = fitted(hexapod, **options)
+    np.testing.assert_array_less(abs(in_lots.values - at_once.values), 1e-6 * at_once.stderr)
+    np.testing.assert_allclose(in_lots.stderr, at_once.stderr, rtol=1e-6)
+    np.testing.assert_allclose(in_lots.table.dof, at_once.table.dof, rtol=1e-6)
+    for name, index in at_once.observability.items():
+        assert abs(in_lots.observability[name] / index - 1.0) < 1e-9
+    first, second = at_once.fit.uncertainty, in_lots.fit.uncertainty
+    assert abs(second.covariance.score - first.covariance.score) < 1e-6
+    np.testing.assert_allclose(
+        second.adjusted, first.adjusted, atol=1e-6 * abs(first.adjusted).max()
+    )
 
 
 def test_derivatives_in_lots_are_those_made_at_once(
@@ -31,8 +64,7 @@ def test_derivatives_in_lots_are_those_made_at_once(
     fit = fitted(hexapod).fit
     noise = np.ones(2)
     at_once = fit.equations.by_parameters(fit.end, noise)
-    for module, together in ((session_machines, 7), (equations, 5), (readings, 4)):
-        monkeypatch.setattr(module, "_TOGETHER", together)
+    in_small_lots(monkeypatch)
     in_lots = fit.equations.by_parameters(fit.end, noise)
     assert np.abs(at_once).max() > 1.0
     np.testing.assert_allclose(in_lots, at_once, rtol=0, atol=1e-12 * np.abs(at_once).max())

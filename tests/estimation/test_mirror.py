@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
+from pkmcal.estimation.mirror import _mirror
 from tests.robots import made
 
 CORNERS = np.array([[0.0, 0, 0], [2400, 1800, 0], [-300, 2300, 0], [2500, -400, 0]])
@@ -100,3 +101,18 @@ def test_a_platform_whose_joints_are_in_a_plane_is_its_own_mirror_image() -> Non
     _, q = log(solid, spread, rows=80)
     assert MIRROR not in fitted(solid, q, "base*").gauges
     assert MIRROR in fitted(solid, q, ["base*", "platform*"]).gauges
+
+
+def test_a_mirror_keeps_what_is_held_and_nothing_else_of_a_plane_beside_the_origin() -> None:
+    """Twice is once: a mirror image of a mirror image is where it was."""
+    points = {"base1": np.array([5.0, 1, 2]), "base2": np.array([5.0, 8, -3]),
+              "base3": np.array([-40.0, 0, 7])}  # fmt: skip
+    free = ("base1.y", "base1.z", "base2.y", "base3.x", "base3.y", "base3.z")
+    mirror = _mirror(points, free, np.array([1.0, 0, 0]), 1e-6)
+    assert mirror is not None
+    image = {name: mirror[:3, :3] @ place + mirror[:3, 3] for name, place in points.items()}
+    np.testing.assert_allclose(image["base1"], points["base1"], atol=1e-12)
+    np.testing.assert_allclose(image["base2"], points["base2"], atol=1e-12)
+    np.testing.assert_allclose(image["base3"], [50.0, 0, 7], atol=1e-12)
+    np.testing.assert_allclose(mirror @ mirror, np.eye(4), atol=1e-12)
+    assert _mirror(points, free[:3], np.array([1.0, 0, 0]), 1e-6) is None  # base3.x is held too

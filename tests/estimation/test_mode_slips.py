@@ -88,3 +88,34 @@ def test_held_out_rows_are_solved_in_their_modes_too() -> None:
         warnings.simplefilter("error")
         found = pk.identify(robot, readings, "offset*", holdout=0.4)
     assert found.holdout_rms < 3 * found.holdout_expected
+
+
+@pytest.mark.filterwarnings("ignore::pkmcal.exceptions.CalibrationWarning")
+def test_how_far_off_a_pose_is_counts_angles_as_their_arc(hexapod: pk.Robot) -> None:
+    """In mm, the worst of what was read there; inf where there is no pose."""
+    at = hexapod.home + np.random.default_rng(3).uniform(-1, 1, (6, 6)) * [
+        50,
+        50,
+        50,
+        0.2,
+        0.2,
+        0.2,
+    ]
+    q = hexapod.inverse(at)
+    values = at.copy()
+    values[4, 3:] = np.nan
+    sets = [
+        pk.Measurements(q, values, "pose", sigma=0.01),
+        pk.Measurements(q[2:3], at[2:3, :3] + [0.0, 0.0, 7.0], "position", sigma=0.01),
+    ]
+    fit = pk.identify(hexapod, sets, "offset*").fit
+    order = [int(np.argmin(np.abs(fit.equations.actuators - row).sum(axis=1))) for row in q]
+    pose = np.empty((6, 6))
+    pose[order] = at + np.array([
+        [0, 0, 0, 1e-3, 0, 0], [3, 4, 0, 0, 0, 0], [0, 0, 0, 0, 0, 2e-3], [0, 0, 0, 0, 0, 0],
+        [0, 2, 0, 0.1, 0, 0], [0, 0, 0, 0, 0, 0],
+    ])  # fmt: skip
+    pose[order[3]] = np.nan
+    off = fit.equations.misfit(pose, fit.start.theta)[order]
+    arc = 1e-3 * hexapod.length
+    np.testing.assert_allclose(off, [arc, 5.0, 7.0, np.inf, 2.0, 0.0], atol=1e-6)

@@ -289,10 +289,12 @@ def test_homes_at_half_a_turn_do_not_hang_on_rounding() -> None:
     assert len(signs) == 1
 
 
-@pytest.mark.parametrize("ratio", [0.5, 2.0, -0.5, 1.5, 3.0])
-@pytest.mark.parametrize("at_home", [30.0, 170.0, 190.0])
-def test_limbs_geared_to_one_actuator_stand_where_they_agree(at_home: float, ratio: float) -> None:
-    """A whole turn of one crank is none of the other: only some turns of the first do."""
+ratios = pytest.mark.parametrize("ratio", [0.5, 2.0, -0.5, 1.5, 3.0])
+homes = pytest.mark.parametrize("at_home", [30.0, 170.0, 190.0])
+
+
+def geared(at_home: float, ratio: float) -> pk.Robot:
+    """A delta with two cranks to an actuator, one of them geared to it."""
     home, limbs = np.radians(at_home), []
     for angle in (0.0, 120.0, 240.0):
         out, side = ring(1.0, angle), ring(1.0, angle + 90.0)
@@ -303,8 +305,17 @@ def test_limbs_geared_to_one_actuator_stand_where_they_agree(at_home: float, rat
                 "axis": side, "zero": zero, "crank": 200.0, "rod": 500.0, "branch": 1,
                 "actuator": int(angle) // 120 + 1, "gain": gain, "offset": home * (1 - gain),
             })  # fmt: skip
-    robot = made("spatial", {"z": -435.0}, limbs, match=["x", "y", "z"])
-    q = home + np.array([[0, 0, 0], [0.1, 0.12, 0.11], [-0.1, 0.0, 0.03]])
+    return made("spatial", {"z": -435.0}, limbs, match=["x", "y", "z"])
+
+
+ABOUT_HOME = np.array([[0, 0, 0], [0.1, 0.12, 0.11], [-0.1, 0.0, 0.03]])
+
+
+@ratios
+@homes
+def test_limbs_geared_to_one_actuator_stand_where_they_agree(at_home: float, ratio: float) -> None:
+    """A whole turn of one crank is none of the other: only some turns of the first do."""
+    robot, q = geared(at_home, ratio), np.radians(at_home) + ABOUT_HOME
     found = robot.forward(q)
     assert found.ok.all()
     np.testing.assert_allclose(robot.inverse(found.pose, near=q), q, rtol=0, atol=1e-9)
@@ -312,6 +323,16 @@ def test_limbs_geared_to_one_actuator_stand_where_they_agree(at_home: float, rat
     assert missed(robot, found.pose, back).max() < CLOSED
     np.testing.assert_allclose(robot.nearest_turns(back, near=q), q, rtol=0, atol=1e-9)
     assert missed(robot, found.pose, back + robot.turns).max() < CLOSED
+
+
+@ratios
+@homes
+def test_geared_limbs_that_nearly_agree_stay_at_their_turn(at_home: float, ratio: float) -> None:
+    """At poses that the machine misses a little no turn is one where they agree."""
+    robot, q = geared(at_home, ratio), np.radians(at_home) + ABOUT_HOME
+    beside = robot.forward(q).pose + [0.0, 0.0, 0.0, 0.0, 0.0, 1e-4]
+    assert missed(robot, beside, q).max() > 1e-4
+    np.testing.assert_allclose(robot.inverse(beside, near=q), q, rtol=0, atol=1e-3)
 
 
 @pytest.mark.parametrize("home_value", [0.0, 200.0, -170.0])

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from tests.chain_files import drawn
+from pkmcal.core.library import POSE
+from tests.chain_files import BOOMS, as_chains, drawn, leg_on_leg
 from tests.chain_twin import Twin, posed
+from tests.kinematics.test_chains import loaded
 from tests.workspaces import CHAINS
 
 CLOSED = 1e-7  # mm
@@ -122,3 +124,33 @@ def test_forward_of_builtin_chains_stays_at_a_pose_that_it_found(name: str) -> N
     again = robot.forward(q[ok], guess=found.pose[ok])
     assert ok.sum() > 50 or name in ("exechon", "tripteron", "2tpr2tps-chains")
     assert again.ok.all() and (off(again.pose, found.pose[ok]) < 1e-6).all()
+
+
+@pytest.mark.parametrize("boom", BOOMS)
+def test_passive_joints_close_where_a_chain_is_held_by_another(boom: str, tmp_path: Path) -> None:
+    """Also the boom, which the third chain has not."""
+    robot = loaded(leg_on_leg(boom), tmp_path)
+    rng = np.random.default_rng(4)
+    poses = robot.home + rng.uniform(-1, 1, (30, 6)) * [40, 40, 0, 0, 0, 0.2]
+    q = robot.inverse(poses)
+    found = robot.forward(q)
+    assert found.ok.all()
+    assert found.iterations.mean() < 7.0
+    for pose, row, passive in zip(found.pose, q, found.passive, strict=True):
+        assert missed(robot, pose, row, passive) < CLOSED
+
+
+@pytest.mark.parametrize("name", ("6-rus", "3rrr-planar"))
+def test_cranks_as_chains_come_from_home_to_the_side_of_the_closed_form(
+    name: str, tmp_path: Path
+) -> None:
+    """Passive joints far from home are on the way there from it, not beyond a stretched leg."""
+    robot = pk.load(name)
+    chained = loaded(as_chains(robot), tmp_path)
+    rng = np.random.default_rng(0)
+    way = [75.0] * 3 + [0.22] * 3
+    poses = robot.home + rng.uniform(-1, 1, (500, 6)) * way * np.isin(POSE, robot.coordinates)
+    q = robot.inverse(poses)
+    reached = np.isfinite(q).all(axis=1)
+    assert reached.sum() > 200
+    assert np.abs(chained.inverse(poses[reached]) - q[reached]).max() < 1e-7

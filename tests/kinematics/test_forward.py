@@ -9,7 +9,8 @@ import pytest
 
 import pkmcal as pk
 
-from .. import twin
+from .. import robots, twin
+from ..core.test_core import hard_rows
 from ..workspaces import WORKSPACE, poses
 
 SQUARE = [name for name in WORKSPACE if name != "linear-delta-6"]
@@ -193,3 +194,89 @@ def test_nearly_all_of_a_workspace_settles_in_the_quick_steps(name: str) -> None
     turned = coordinates + 0.03 * np.ptp(q, axis=0) * np.random.default_rng(4).normal(size=q.shape)
     beside = robot.forward(turned, guess=at)
     assert beside.ok.all() and np.mean(beside.iterations == 2 + 2) >= 0.9
+
+
+def two_poses(robot: pk.Robot, q: np.ndarray) -> np.ndarray:
+    """Where a linear delta is at coordinates (3,), above and below its carriages: (2, 3)."""
+    limbs = twin.numbers(robot.model, None)
+    names = ("x", "y", "z")
+    base, joint = (
+        np.array([[limb[f"{point}.{name}"] for name in names] for limb in limbs])
+        for point in ("base", "platform")
+    )
+    centres = base - joint + q[:, None] * [0.0, 0.0, 1.0]
+    rods = np.array([limb["rod"] for limb in limbs])
+    sides = 2.0 * (centres[1:] - centres[0])
+    squares = (centres**2).sum(axis=1) - rods**2
+    foot = np.linalg.lstsq(sides, squares[1:] - squares[0], rcond=None)[0]
+    along = np.cross(*sides) / np.linalg.norm(np.cross(*sides))
+    foot += along * (along @ (centres[0] - foot))
+    height = np.sqrt(rods[0] ** 2 - ((foot - centres[0]) ** 2).sum())
+    return np.array([foot + height * along, foot - height * along])
+
+
+def test_a_delta_goes_to_one_of_its_two_poses_from_guesses_far_away() -> None:
+    """Three spheres meet in two points; many guesses need a step halved more than once."""
+    robot = pk.load("linear-delta")
+    at = poses("linear-delta", 300, seed=8)
+    q = robot.inverse(at)
+    away = np.random.default_rng(8).uniform(-200.0, 200.0, (300, 3))
+    found = robot.forward(q, at + np.pad(away, ((0, 0), (0, 3))))
+    assert found.ok.all() and found.iterations.max() > 10
+    both = np.array([two_poses(robot, row) for row in q])
+    apart = np.linalg.norm(found.pose[:, None, :3] - both, axis=2)
+    np.testing.assert_allclose(apart.min(axis=1), 0.0, atol=1e-8)
+    assert set(apart.argmin(axis=1)) == {0, 1}
+
+
+def leaning() -> pk.Robot:
+    """Moved by a leg that keeps to an oblique plane, and by another one."""
+    limbs = [
+        {"kind": "RPS", "base": [0.0, 0.0, 0.0], "platform": [0.0, 0.0, 0.0]}
+        | {"normal": [3.0, 4.0, 1.0]},
+        {"kind": "UPS", "base": [400.0, -50.0, 20.0], "platform": [0.0, 20.0, 5.0]},
+    ]
+    return robots.made("translation", {"x": 160.0, "y": -205.0, "z": 340.0}, limbs)
+
+
+@pytest.mark.parametrize("robot", [pk.load("linear-delta"), pk.load("rotary-delta"), leaning()])
+def test_the_residual_is_the_largest_of_what_closures_miss(robot: pk.Robot) -> None:
+    """Of rounding, in which the poses of these machines, which do not turn, have no part."""
+    reach = [20.0 if unit == "mm" else 0.1 for unit in robot.actuator_units]
+    draw = np.random.default_rng(4).uniform(-1.0, 1.0, (400, len(reach)))
+    q = robot.inverse(robot.home) + draw * reach
+    found = robot.forward(q)
+    assert found.ok.all() and np.median(found.iterations) == 4  # mixed precision, and not Newton
+    missed = np.abs(robot.machine.closure(robot.slots, found.pose, q).residual)
+    assert set(missed.argmax(axis=1)) == set(range(missed.shape[1]))
+    np.testing.assert_allclose(found.residual, missed.max(axis=1), rtol=1e-5)
+
+
+@pytest.mark.parametrize("factor", [2.0**-10, 2.0**10])
+@pytest.mark.parametrize("name", WORKSPACE)
+def test_a_machine_of_another_size_takes_the_same_steps(name: str, factor: float) -> None:
+    """All lengths by a power of two: no rounding differs, where they are asked for one's own."""
+    robot = pk.load(name)
+    assert isinstance(robot, pk.Robot)
+    machine, slots = robot.machine, robot.slots.copy()
+    q, guess = hard_rows(name, 203)
+    expected = machine.forward(slots, q, guess, threads=1)
+    near = machine.forward(slots, q, robot.own_home, threads=1)
+    lengths = [*range(6), *(twin.SLOTS.index(each) for each in ("rod", "crank"))]
+    slots[:, lengths] *= factor
+    slots[~machine.turning, twin.SLOTS.index("offset")] *= factor
+    by_unit = np.array([1.0 if unit == "rad" else factor for unit in robot.actuator_units])
+    in_pose = np.repeat([factor, 1.0], 3)
+    struct = machine.struct
+    for field in ("size", "length", "closure_tolerance"):
+        setattr(struct, field, factor * getattr(struct, field))
+    for i in range(struct.limbs):
+        struct.lever[i] *= factor
+    for start, known in ((guess, expected), (robot.own_home, near)):
+        pose, status, iterations, residual = machine.forward(
+            slots, q * by_unit, start * in_pose, threads=1
+        )
+        np.testing.assert_array_equal(pose, known[0] * in_pose)
+        np.testing.assert_array_equal(status, known[1])
+        np.testing.assert_array_equal(iterations, known[2])
+        np.testing.assert_array_equal(residual, known[3] * factor)

@@ -62,6 +62,7 @@ class Folder:
         self.name, self.copy, self.tests, self.most = name, copy, tests, most
         self.known: dict[str, dict] = {}
         self.killers = Counter[str]()
+        self.sharing = set[str]()  # files whose tests share what one of them computes
         self.below: Folder | None = None
         self.requests: Connection | None = None
         self.functions: list[tuple[str, int]] = []
@@ -94,6 +95,10 @@ class Folder:
         self.known = {
             k: test for k, test in self.known.items() if test["ran"] and not test["failed"]
         }
+        for file in {k.split("::")[0] for k in self.known}:
+            text = (self.copy / file).read_text(encoding="utf-8")
+            if "functools.cache" in text or 'scope="module"' in text:
+                self.sharing.add(file)
         seconds = sum(test["seconds"] for test in self.known.values())
         print(f"{len(self.known)} tests, {seconds:.0f} s", flush=True)
 
@@ -205,11 +210,14 @@ class Folder:
     def shown(self, change: Change, function: int | None) -> list[str]:
         """The tests that see it, up to the time there is: first of files named as its own.
 
-        Where none calls anything of its file, some that import it.
+        Where none calls anything of its file, some that import it. What tests of a file share, one
+        of them computes: where one sees it, all of that file do.
         """
         inside = [k for k, test in self.known.items() if [change.file, function] in test["calls"]]
         files = {k: {file for file, _ in test["calls"]} for k, test in self.known.items()}
         inside = inside or [k for k in self.known if change.file in files[k]]
+        of_files = {k.split("::")[0] for k in inside} & self.sharing
+        inside += [k for k in self.known if k.split("::")[0] in of_files and k not in inside]
         stem = Path(change.file).stem.split("_")[0]
         if not inside:
             return sorted(self.known, key=lambda k: self.known[k]["seconds"])[:5]

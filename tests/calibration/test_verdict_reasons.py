@@ -1,0 +1,91 @@
+"""What is said beside what: reasons that explain others, few points beside the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pkmcal as pk
+from pkmcal.calibration.displaced import DisplacedTarget
+from pkmcal.calibration.distances import Distances
+from pkmcal.calibration.drift import Drift
+from pkmcal.calibration.holdout import HeldOut
+from pkmcal.calibration.identification import Identification
+from pkmcal.calibration.measuring_order import MeasuringOrder
+from pkmcal.calibration.robust_check import RobustCheck
+from pkmcal.calibration.verdict import judge
+from pkmcal.statistics.holdout_test import HoldoutTest
+
+from ..simulated import hexapod_poses
+
+
+@pytest.mark.parametrize(("odd", "others", "contradicts"), [
+    ((), 1.1, True), ((7,), 1.1, False), ((7,), 1.3, True), ((7, 8, 9, 11), 1.1, True),
+])  # fmt: skip
+def test_points_contradict_a_fit_unless_it_is_a_few_and_the_others_do_not(
+    odd: tuple[int, ...], others: float, contradicts: bool
+) -> None:
+    """Twelve points, whose rms may be 1.2 times what is expected; a quarter of them is a few."""
+    held = HeldOut(
+        expected=0.5,
+        off=np.append(np.ones(12), np.nan),  # one was not reached
+        odd=odd,
+        after=Distances(rms_without_outliers=0.5 * others),
+        test=HoldoutTest(ratio=3.0, median_ratio=2.0, chance=1e-6, freedom=(12.0, 30.0)),
+    )
+    assert held.contradicts == contradicts
+    agrees = HoldoutTest(ratio=3.0, median_ratio=1.1, chance=1e-6, freedom=(12.0, 30.0))
+    assert not replace(held, test=agrees).contradicts
+
+
+@pytest.fixture(scope="module")
+def found(hexapod: pk.Robot) -> Identification:
+    """A sound calibration, a quarter of its points held out."""
+    rng = np.random.default_rng(0)
+    q = hexapod.inverse(hexapod_poses(hexapod, 40, rng))
+    seen = hexapod.replace({"offset1": 0.3, "offset4": -0.4}).forward(q).pose[:, :3]
+    measured = pk.Measurements(q, seen + rng.normal(0, 0.02, (40, 3)), "position")
+    return pk.identify(hexapod, measured, "offset*", holdout=0.25)
+
+
+def drifted(by: float) -> Drift:
+    """Of 1 mm of scatter."""
+    return Drift(("z",), (by,), (1.0,), 1e-6, 3, 12, 2.0, (float("nan"), float("nan")))
+
+
+def ordered(share: float) -> MeasuringOrder:
+    return MeasuringOrder(("z",), (2.0,), (1.0,), ("mm",), 1e-6, share, "", 20, "")
+
+
+def elsewhere(share: float) -> DisplacedTarget:
+    return DisplacedTarget("west", (2.0,), (0.1,), 1e-6, share, ())
+
+
+BEGIN = {"drift": "3 poses, measured 12", "order": "residuals are as", "displaced": "target west"}
+
+
+@pytest.mark.parametrize("carried", [True, False])
+@pytest.mark.parametrize("large", [True, False])
+@pytest.mark.parametrize("drift", [None, "drift"])
+def test_what_may_come_of_another_cause_is_not_said_beside_it(
+    found: Identification, carried: bool, large: bool, drift: str | None
+) -> None:
+    """Rows that carry a fit off explain what targets and order seem to say; a drift, the order.
+
+    What is most of what is left is a doubt, the rest a remark.
+    """
+    robust = RobustCheck(100.0, 1.0, (int(found.rows[3]),), 0.02) if carried else None
+    share, by = (0.9, 5.0) if large else (0.1, 0.5)
+    verdict = judge(
+        found, robust, (), drifted(by) if drift else None, ordered(share), elsewhere(share)
+    )
+    expected = {"drift"} if drift else {"order"} - ({"order"} if carried else set())
+    expected |= set() if carried else {"displaced"}
+    for texts, mine in ((verdict.reasons, large), (verdict.remarks, not large)):
+        said = {key for key, begin in BEGIN.items() for text in texts if text.startswith(begin)}
+        assert said == (expected if mine else set())
+    doubtful = "doubtful" if large else "calibrated"
+    assert verdict.state == ("not calibrated" if carried else doubtful)
+    assert verdict.reasons[0].startswith("1 row disagrees") == carried
