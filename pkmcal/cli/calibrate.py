@@ -42,6 +42,7 @@ from pkmcal.display import printable
 from pkmcal.estimation.loss import LIMITS
 from pkmcal.estimation.parameters import KNOWN, Known
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.number_text import typed
 from pkmcal.files.reading import Input
 from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurements import Measurements
@@ -342,7 +343,7 @@ def read_tracker(text: str) -> Tracker:
         Not three or six numbers, or not positive.
     """
     try:
-        numbers = [float(part) for part in text.split(",")]
+        numbers = [typed(part) for part in text.split(",")]
     except ValueError:
         numbers = []
     if len(numbers) not in (3, 6):
@@ -384,7 +385,7 @@ def _read_holdout(
 ) -> float | Measurements:
     """Return a fraction, a number of poses, or the measurements of a file."""
     try:
-        number = float(text)
+        number = typed(text)
     except ValueError:
         return reading.measurements(text, read, robot)
     return int(number) if number.is_integer() else number

@@ -14,6 +14,7 @@ import pkmcal as pk
 from pkmcal.cli.inputs import Inputs
 from pkmcal.cli.output import say
 from pkmcal.exceptions import ArgumentError, FileError
+from pkmcal.files.number_text import typed
 from pkmcal.files.reading import MOST_ROBOT
 from pkmcal.files.toml_lines import Source
 from pkmcal.files.toml_table import Table
@@ -164,7 +165,7 @@ def without_lines(
 
 def _offset(text: str) -> list[float]:
     try:
-        numbers = [float(part) for part in text.split(",")]
+        numbers = [typed(part) for part in text.split(",")]
     except ValueError:
         numbers = []
     if len(numbers) != 3:

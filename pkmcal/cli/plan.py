@@ -19,6 +19,7 @@ from pkmcal.cli.output import Output, say
 from pkmcal.cli.progress import progress
 from pkmcal.core.library import COORDINATE_UNITS
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.number_text import typed
 from pkmcal.geometry.box import Box
 from pkmcal.kinematics.reading_units import reading_units
 from pkmcal.kinematics.robot import Robot
@@ -192,7 +193,7 @@ def _points(given: list[str], kinds: Kind | dict[Kind, int]) -> Any:
     for text in given:
         name, equals, numbers = text.partition("=")
         try:
-            point = [float(each) for each in (numbers if equals else name).split(",")]
+            point = [typed(each) for each in (numbers if equals else name).split(",")]
         except ValueError:
             point = []
         if len(point) != 3:
@@ -209,7 +210,7 @@ def _noise(text: str, kinds: Kind | dict[Kind, int]) -> Any:
     for part in text.split(","):
         name, equals, number = (each.strip() for each in part.partition("="))
         try:
-            value = float(number if equals else name)
+            value = typed(number if equals else name)
         except ValueError:
             raise ArgumentError(f"--noise {text}: expected a number, or KIND=NUMBER") from None
         found[_of_plan("--noise", text, name, kinds) if equals else ""] = value
@@ -250,7 +251,7 @@ def _box(machine: Robot | SerialArm, given: list[str]) -> Box:
             known = did_you_mean(name.strip(), units)
             raise ArgumentError(f"--within {text}: {name.strip()!r} is no coordinate{known}")
         try:
-            numbers = float(low), float(high)
+            numbers = typed(low), typed(high)
         except ValueError:
             raise ArgumentError(f"--within {text}: expected NAME=LO:HI, such as z=0:300") from None
         if not numbers[0] < numbers[1]:

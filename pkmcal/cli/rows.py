@@ -9,6 +9,7 @@ import numpy as np
 from pkmcal import display
 from pkmcal.arrays import FloatArray
 from pkmcal.exceptions import ArgumentError
+from pkmcal.files.number_text import typed
 
 POSE_UNITS = ("mm", "mm", "mm", "rad", "rad", "rad")
 
@@ -16,7 +17,7 @@ POSE_UNITS = ("mm", "mm", "mm", "rad", "rad", "rad")
 def numbers_on_line(what: str, text: str, units: Sequence[str], rad: bool) -> FloatArray | None:
     """Return the numbers of one row (1, n) in mm and rad; None for the name of a file."""
     try:
-        row = np.array([float(part) for part in text.split(",")])
+        row = np.array([typed(part) for part in text.split(",")])
     except ValueError:
         return None
     if len(row) != len(units):

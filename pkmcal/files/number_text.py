@@ -31,6 +31,17 @@ def thousands(cells: Iterable[str]) -> tuple[Signs, str] | None:
     return None
 
 
+def typed(text: str) -> float:
+    """A number as it is typed on a command line.
+
+    Raises
+    ------
+    ValueError
+        It is none: 1_0, which Python takes for 10, is more likely meant as 1.0.
+    """
+    return float(plain(text, None, False))
+
+
 def plain(cell: str, signs: Signs | None, decimal_comma: bool) -> str:
     """A cell as `float` reads it; what is none there is no number.
 

@@ -96,6 +96,16 @@ def _read(path: Path, most: int) -> bytes:
         raise MissingFileError(
             f"{path}: no such file{arguments.did_you_mean(path.name, near, listed=0)}"
         )
+    try:
+        return _up_to(path, most)
+    except OSError as error:  # of a device or a network that fails: names nothing
+        if error.filename or error.errno is None:
+            raise
+        raise OSError(error.errno, error.strerror, str(path)) from None
+
+
+def _up_to(path: Path, most: int) -> bytes:
+    """What `_read` returns, of a file that is there."""
     found = bytearray()
     with open(path, "rb", buffering=0) as file:
         expected = os.fstat(file.fileno()).st_size

@@ -46,6 +46,21 @@ def test_first_number_may_be_negative(run: Any) -> None:
     assert result.exit_code == 0 and "x [mm]" in result.stdout
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        ["forward", "2tpr2tps", "45_0,452,400,405"],
+        ["plan", "hexapod", "--noise", "0_1"],
+        ["plan", "hexapod", "--target", "0,0,1_0"],
+        ["plan", "hexapod", "--within", "z=8_00:900"],
+    ],
+    ids=["row", "noise", "target", "within"],
+)
+def test_underscores_are_in_no_number(run: Any, line: list[str]) -> None:
+    result = run(*line)
+    assert result.exit_code == 2 and line[-1] in result.stderr
+
+
 def test_arm_goes_forward_and_its_inverse_is_refused(run: Any) -> None:
     found = json.loads(run("forward", "3r", "10,20,30", "--json").stdout)
     at = pk.load("3r").forward(np.radians([10, 20, 30]))

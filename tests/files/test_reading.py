@@ -101,3 +101,9 @@ def test_standard_input_is_read() -> None:
         [sys.executable, "-c", program], input=POSES, capture_output=True, text=True
     )
     assert (done.stdout, done.stderr) == ("1\n", "")
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/mem"), reason="a file that fails when read")
+def test_what_fails_while_it_is_read_is_named() -> None:
+    with pytest.raises(OSError, match="Input/output error: '/proc/self/mem'"):
+        content("/proc/self/mem", 10)
