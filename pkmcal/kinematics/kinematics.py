@@ -24,7 +24,7 @@ from pkmcal.kinematics.forward import Forward
 from pkmcal.kinematics.frames import Frames
 from pkmcal.kinematics.limits import kept, margin_of
 from pkmcal.kinematics.machines import machine_of
-from pkmcal.kinematics.reused import kept_rows, reused_forward, reused_rows
+from pkmcal.kinematics.reused import reused_forward, reused_rows
 from pkmcal.modes.find import AssemblyProblem
 from pkmcal.screw import to_pose
 
@@ -169,7 +169,9 @@ class Kinematics:
             it is the turn nearest to the middle of its stroke, or, where the file states none, to
             the home pose.
         out : ndarray (..., n), optional
-            float64, contiguous: written to and returned, in place of a new array.
+            float64, contiguous: written to and returned, in place of a new array. What `forward`
+            found at coordinates that stood there is to be asked for its certificate and passive
+            joints before: it refers to them.
 
         Returns
         -------
@@ -258,7 +260,8 @@ class Kinematics:
             As many as pay by default.
         out : Forward, optional
             An earlier result of as many rows. Its arrays are written to, those of what is returned
-            are the same; what it said is lost.
+            are the same; what it said is lost. A result refers to `q` and `guess`, for what is
+            computed when asked for.
 
         Returns
         -------
@@ -299,8 +302,7 @@ class Kinematics:
         pose = self.frames.outward(own)
         if out is not None and not self.frames.trivial:
             pose = written(pose, out.pose)
-        asked, begun = kept_rows(rows, q), kept_rows(start, guess)
-        return Forward(pose, status, iterations, residual, self, own, asked, begun)
+        return Forward(pose, status, iterations, residual, self, own, rows, start)
 
     def jacobian(self, pose: ArrayLike) -> FloatArray:
         """∂q/∂(free coordinates), limb by limb (eq. 12 for the 2TPR&2TPS).

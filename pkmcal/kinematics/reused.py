@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from pkmcal.arguments import instance
 from pkmcal.arrays import FloatArray
@@ -67,8 +66,3 @@ def reused_forward(out: Forward, shape: tuple[int, ...], framed: bool, *read: Fl
         raise ArgumentError("out must be a result that can be written to")
     own, _ = (reused_rows(each, (*shape, 6), *read) for each in (out._own, out.pose))
     return own, out.status.reshape(-1), out.iterations.reshape(-1), out.residual.reshape(-1)
-
-
-def kept_rows(rows: FloatArray, given: ArrayLike | None) -> FloatArray:
-    """Rows that stay what they are when the caller writes to the array it has `given`."""
-    return rows if given is None or isinstance(given, list | tuple) else rows.copy()
