@@ -169,9 +169,8 @@ class Kinematics:
             it is the turn nearest to the middle of its stroke, or, where the file states none, to
             the home pose.
         out : ndarray (..., n), optional
-            float64, contiguous: written to and returned, in place of a new array. What `forward`
-            found at coordinates that stood there is to be asked for its certificate and passive
-            joints before: it refers to them.
+            float64, contiguous: written to and returned, in place of a new array. A result of
+            `forward` refers to its coordinates: ask it for conditioning and certificate before.
 
         Returns
         -------
