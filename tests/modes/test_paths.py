@@ -37,11 +37,7 @@ def test_a_point_goes_straight_with_its_circles_in_steps_that_double(centres: ob
     """The point is straight above one of the centres: x has no part in that equation."""
     centres = np.array(centres, dtype=float)
     radii = np.hypot(*(centres - [3.0, 0.0]).T)
-<<<<<<< HEAD
-    a, b = circles(centres, radii), circles([*centres, 5.0, -2.0], radii)
-=======
     a, b = circles(centres, radii), circles(centres + np.array([5.0, -2.0]), radii)
->>>>>>> s33-csrc
     found = follow(two_circles(), a, b, np.array([[3.0, 0.0]], dtype=complex), 1e-6)
     assert found.status == ARRIVED and found.reached == 1.0 and found.steps == STEPS
     assert np.abs(point(found) - [8.0, -2.0]).max() < 1e-14
