@@ -33,11 +33,7 @@ joints = [
 
 @pytest.mark.parametrize("idle", (PASSIVE, SPARE), ids=("passive", "a joint too many"))
 def test_a_chain_that_holds_nothing_goes_along(idle: str, tmp_path: Path) -> None:
-<<<<<<< HEAD
-    """Beside six legs, which say where the platform is; its joints close there as soon."""
-=======
     """Beside six legs, which say where the platform is; its joints close as soon as theirs."""
->>>>>>> s33-csrc
     plain = pk.load("hexapod")
     legs, robot = (loaded(as_chains(plain) + more, tmp_path) for more in ("", idle))
     q, spare = commands(plain, 8, share=0.3), np.linspace(-20.0, 20.0, 8)[:, None]

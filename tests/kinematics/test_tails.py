@@ -253,11 +253,7 @@ def test_dexterity_sees_axes_of_a_wrist_in_line(tmp_path: Path) -> None:
 
 
 def test_chains_one_by_one_leave_the_wrist_at_home(tmp_path: Path) -> None:
-<<<<<<< HEAD
-    """Of a pose of the tool the platform is where the wrist at home carries it."""
-=======
     """The core itself: the platform is where the wrist at home carries the tool."""
->>>>>>> s33-csrc
     robot = loaded(tricept(), tmp_path)
     gain = {n: 2.0 for n in robot.geometry.names if n in ("gain4", "gain5", "gain6")}
     robot = robot.replace(gain | {"offset5": 0.1})
