@@ -45,7 +45,7 @@ def test_a_header_that_was_edited_or_is_left_over_is_shown(
     assert "-int old;" in diff
 
 
-def test_the_text_is_the_same_in_another_process_with_another_hash_seed() -> None:
+def test_the_text_is_the_same_in_another_process_with_another_hash_seed(tmp_path: Path) -> None:
     program = (
         "import sys; from pkmcal.derive import limb_functions, screws, tpr2tps;"
         "made = limb_functions.functions() + screws.functions() + tpr2tps.functions();"
@@ -54,6 +54,7 @@ def test_the_text_is_the_same_in_another_process_with_another_hash_seed() -> Non
     seed = "1" if os.environ.get("PYTHONHASHSEED") != "1" else "2"
     there = subprocess.run(
         [sys.executable, "-c", program],
+        cwd=tmp_path,
         env={**os.environ, "PYTHONHASHSEED": seed},
         stdout=subprocess.PIPE,
         check=True,
