@@ -16,15 +16,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, lots, rms
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
 from pkmcal.core.library import STATUS
 from pkmcal.estimation import joint_angles
+from pkmcal.estimation.derivatives import Derivatives
 from pkmcal.estimation.elimination import Blocks, Shares, System
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.first_frames import aligned
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
-from pkmcal.estimation.readings import ROUNDING, Readings, of_read
+from pkmcal.estimation.readings import ROUNDING, of_read
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import (
     Machines,
@@ -32,7 +33,6 @@ from pkmcal.estimation.session_machines import (
     closures_of_sessions,
     commanded_closures,
 )
-from pkmcal.estimation.sessions import NONE
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements import orientation
 from pkmcal.measurements.observation import (
@@ -44,7 +44,6 @@ from pkmcal.measurements.observation import (
 from pkmcal.result import failed_rows
 
 _TOGETHER = 16384  # rows whose readings are kept with their derivatives
-_LOT = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
 
 # Whose, where, with which noise, and the equations there; copies have another "whose".
 _Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, System]
@@ -66,7 +65,7 @@ class Lot(NamedTuple):
     by_parameters: FloatArray
 
 
-class Equations(Readings):
+class Equations(Derivatives):
     """The stacked residual equations of all measurements, and their Jacobian.
 
     Parameters
@@ -265,12 +264,6 @@ class Equations(Readings):
         p = self.parameters
         robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
         return Machines(tuple(robots), self._own, self.state)
-
-    def seen(self, evaluation: Evaluation) -> tuple[Predicted, ...]:
-        """Readings of each set at an evaluation, with derivatives; of few rows the last is kept."""
-        if self._seen is not None and self._seen[0] is evaluation:
-            return self._seen[1]
-        return self.predicted(evaluation.pose, evaluation.theta)
 
     def _states_ahead(self, machines: Machines, theta: FloatArray) -> RowStates:
         """Where to look for the states: as they follow the parameters from the last step taken."""
@@ -507,77 +500,6 @@ class Equations(Readings):
         """A search has ended: how poses follow the parameters takes memory."""
         self._follow = self._from = None
 
-    def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:
-        """Derivative of the predicted values of each set to the parameters, (N, k, n).
-
-        With the opposite sign that of the residuals.
-        """
-        n = len(self.parameters)
-        found = [np.empty((*each.shape, n)) for each in evaluation.residuals]
-        for _, parts in self.derivatives(evaluation):
-            for i, rows, part in parts:
-                found[i][rows] = part
-        return found
-
-    def derivatives(
-        self, evaluation: Evaluation
-    ) -> Iterator[tuple[slice, list[tuple[int, slice, FloatArray]]]]:
-        """`jacobian` in lots: rows through all sets, and set, rows of it and derivative (b, k, n).
-
-        One lot where poses have unknowns.
-        """
-        p, numbers = self.parameters, self.spread.columns.shape[1]
-        every = self.seen(evaluation)
-        direct = [
-            self.by_numbers(i, evaluation.pose, evaluation.theta) for i in range(len(self.sets))
-        ]
-        place = np.full(len(evaluation.pose), NONE)
-        for lot in lots(len(self.rows), len(self.rows) if self.closures.unknowns else _LOT):
-            some = list(self._in_sets(lot))
-            parts = [np.zeros((*every[i].values[rows].shape, numbers)) for i, rows in some]
-            for poses, twists in self.closures.twists_by_numbers(
-                evaluation.machines, evaluation.states, p.places, self._poses_of(some)
-            ):
-                place[poses] = np.arange(len(poses))
-                for (i, rows), part in zip(some, parts, strict=True):
-                    seen, there = every[i], self.other_of[i]
-                    _add_motion(part, seen.by_twist[rows], twists, place[self.pose_of[i][rows]])
-                    if seen.by_other is not None and there is not None:
-                        _add_motion(part, seen.by_other[rows], twists, place[there[rows]])
-                place[poses] = NONE
-            found = []
-            for (i, rows), part in zip(some, parts, strict=True):
-                seen, along = every[i], direct[i]
-                if along is not None:
-                    part[:, :, : len(p.places)] += along[rows]
-                if seen.by_frame is not None and p.frame is not None:
-                    part[:, :, p.frame : p.frame + 6] = seen.by_frame[rows]
-                for name, columns in self._numbers[i].items():
-                    mine = columns[rows]
-                    row, slot = np.nonzero(mine != NONE)
-                    part[row, :, mine[row, slot]] += seen.by[name][rows][row, :, slot]
-                wide = self.spread.of_rows(part, i, rows)
-                kind, residual = self.sets[i].kind, evaluation.residuals[i][rows]
-                found.append((i, rows, by_difference(kind, wide, residual)))
-            yield lot, found
-
-    def _in_sets(self, lot: slice) -> Iterator[tuple[int, slice]]:
-        """Rows of each set that has some of these, which count through all sets."""
-        first = 0
-        for i, measured in enumerate(self.sets):
-            last = first + len(measured)
-            if lot.start < last and first < lot.stop:
-                yield i, slice(max(lot.start - first, 0), min(lot.stop, last) - first)
-            first = last
-
-    def _poses_of(self, some: Sequence[tuple[int, slice]]) -> IntArray:
-        """Distinct poses of rows of sets, in order."""
-        if sum(rows.stop - rows.start for _, rows in some) == len(self.rows):
-            return np.arange(len(self.actuators))
-        pairs = [((self.pose_of[i], self.other_of[i]), rows) for i, rows in some]
-        ends = [end[rows] for both, rows in pairs for end in both if end is not None]
-        return np.unique(np.concatenate(ends))
-
     def by_groups(
         self,
         evaluation: Evaluation,
@@ -690,14 +612,3 @@ class Equations(Readings):
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""
         return failed_rows(self.status(evaluation), STATUS, self.rows, most=10)
-
-
-def _add_motion(
-    part: FloatArray, by_twist: FloatArray, twists: FloatArray, place: IntArray
-) -> None:
-    """Add how readings follow the twists (b, 6, g) to their derivatives (N, k, m), g ≤ m.
-
-    `by_twist` is (N, k, 6), `place` (N,) which of the twists moves each row; `NONE`: none of them.
-    """
-    moved = np.flatnonzero(place != NONE)
-    part[moved, :, : twists.shape[2]] += by_twist[moved] @ twists[place[moved]]
