@@ -26,6 +26,7 @@ from pkmcal.statistics.prior_test import PriorTest
 GROSS = 0.05  # share of the machine's size by which measurements may be off before a calibration
 FAR = 0.25  # share of the machine's size by which errors of manufacture do not move a parameter
 _BEYOND = 0.01  # share of a stroke by which errors of a machine may carry it beyond its ends
+_CHANCE = 3  # rows of a set that may equal those of another one by coarse digits alone
 _LEAST_FREEDOM = 0.5  # degrees of freedom from which residuals show how good a fit is
 MISFIT_RATIO = 0.2  # of the misfit that another reading may leave to be named as what was meant
 _SHRUNK = 0.02  # share of its size by which errors of manufacture do not shrink a machine
@@ -346,11 +347,16 @@ def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: b
             f"{count} equations for {rank} identifiable combinations: no degrees of"
             " freedom are left to show how good the fit is; measure more poses"
         )
-    start = 0
+    return [*found, *_copies(equations)]
+
+
+def _copies(equations: Equations) -> list[str]:
+    """Rows that equal others of their set to the last digit, and sets whose rows all do."""
+    found, earlier, start = list[str](), list[tuple[str, int, set[bytes]]](), 0
     for measured, pose in zip(equations.sets, equations.pose_of, strict=True):
         rows = equations.rows[start : start + len(measured)]
         start += len(measured)
-        if not measured.components or len(np.unique(pose)) == len(pose):
+        if not measured.components:
             continue  # the same readings of actuators alone may well occur twice
         table = np.column_stack([
             measured.actuators,
@@ -358,8 +364,18 @@ def insufficient_data(equations: Equations, rank: int, dof: float, with_prior: b
             measured.values.reshape(len(measured), -1),
             repeats.targets(measured),
         ])  # fmt: skip
-        _, first, inverse = np.unique(table, axis=0, return_index=True, return_inverse=True)
-        twins = first[inverse.reshape(-1)]
+        keys = {row.tobytes() for row in table} if len(equations.sets) > 1 else set()
+        for kind, first, others in earlier:
+            if kind == measured.kind and len(keys) > _CHANCE and keys <= others:
+                found.append(
+                    f"all {len(measured)} rows from row {rows[0]} equal rows from row {first} to"
+                    " the last digit: the same measurements twice?"
+                )
+        earlier.append((measured.kind, int(rows[0]), keys))
+        if len(np.unique(pose)) == len(pose):
+            continue
+        _, twin, inverse = np.unique(table, axis=0, return_index=True, return_inverse=True)
+        twins = twin[inverse.reshape(-1)]
         copies = np.flatnonzero(twins != np.arange(len(measured)))
         if len(copies):
             pairs = [f"{rows[i]} of {rows[twins[i]]}" for i in copies[:5]]

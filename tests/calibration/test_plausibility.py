@@ -299,6 +299,17 @@ def test_copied_rows_are_named_but_repeats_are_not(paper: Robot, points: Measure
     assert said(paper, repeats, prior=0.5) == []
 
 
+def test_measurements_that_are_given_twice_are_named(paper: Robot, points: Measurements) -> None:
+    """In another order, too; readings of another day are no copies, whatever rows are equal."""
+    again = points.select([*range(29, -1, -1)])
+    with pytest.warns(pk.CalibrationWarning, match="all 30 rows from row 30 equal rows from row 0"):
+        found = identify(paper, [points, again], prior=0.5)
+    assert "the same measurements twice?" in str(found.verdict)
+    values = points.values + np.where(np.arange(30) < 20, 0.0, 0.01)[:, None]
+    found = identify(paper, [points, dataclasses.replace(points, values=values)], prior=0.5)
+    assert "twice" not in str(found.verdict)
+
+
 def test_no_identifiable_parameter_is_an_error(paper: Robot, points: Measurements) -> None:
     with pytest.raises(ValueError, match=r"they depend on none of platform3.x, platform4.x"):
         identify(paper, points, free=["platform3.x", "platform4.x"])
