@@ -1,8 +1,12 @@
-"""What a call costs beside the kinematics: single poses, threads, the inverse, importing."""
+"""What a call costs beside the kinematics: single poses, threads, the inverse, importing.
+
+And what a new array costs, and a whole command.
+"""
 
 from __future__ import annotations
 
 import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -105,6 +109,31 @@ def bench_inverse(report: Report) -> None:
     report.table(["machine", "rows", *native.available()], rows)
 
 
+def bench_reused(report: Report) -> None:
+    """A million rows written to arrays that are there, against new ones."""
+    robot = pk.load("hexapod")
+    at = poses("hexapod", 1_000_000)
+    q = robot.inverse(at)
+    found, other = robot.forward(q, threads=1), q.copy()
+    took = medians(
+        {
+            "forward": lambda: robot.forward(q, threads=1),
+            "forward(out=)": lambda: robot.forward(q, threads=1, out=found),
+            "inverse": lambda: robot.inverse(at),
+            "inverse(out=)": lambda: robot.inverse(at, out=other),
+        },
+        9,
+        time.process_time,
+        warm=True,
+    )
+    rows = [
+        [name, f"{1e3 * took[name]:.0f}", f"{took[f'{name}(out=)'] / took[name]:.2f}"]
+        for name in ("forward", "inverse")
+    ]
+    report.text("A million rows of the hexapod, one thread: processor time, and with `out=`.")
+    report.table(["call", "ms", "with out="], rows)
+
+
 def bench_import(report: Report) -> None:
     """Importing in fresh processes, wanted at most twice as long as NumPy.
 
@@ -135,12 +164,47 @@ def bench_import(report: Report) -> None:
     )
 
 
+def bench_commands(report: Report) -> None:
+    """Whole commands over importing SciPy's search, from compiled bytecode; wanted 1.0."""
+    delta = Path(__file__).resolve().parents[1] / "examples" / "linear-delta"
+    command = str(Path(sys.executable).with_name("pkmcal"))
+    base = "import numpy, scipy.optimize"
+    runs = {
+        base: [sys.executable, "-c", base],
+        "import numpy, scipy.special": [sys.executable, "-c", "import numpy, scipy.special"],
+        "pkmcal machines": [command, "machines"],
+        "pkmcal calibrate, 41 heights": [
+            *(command, "calibrate"),
+            *(str(delta / name) for name in ("robot.toml", "probe.csv")),
+        ],
+    }
+    found: dict[str, list[float]] = {name: [] for name in runs}
+    with tempfile.TemporaryDirectory() as folder:
+        environment = os.environ | {"PYTHONPYCACHEPREFIX": folder, "PYTHONDONTWRITEBYTECODE": ""}
+        for turn in range(10):
+            for name, run in runs.items():
+                before = resource.getrusage(resource.RUSAGE_CHILDREN)
+                subprocess.run(run, capture_output=True, check=True, env=environment)
+                after = resource.getrusage(resource.RUSAGE_CHILDREN)
+                if turn:  # the first compiles
+                    took = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+                    found[name].append(took)
+    middle = {name: statistics.median(each) for name, each in found.items()}
+    rows = [
+        [name, f"{1e3 * took:.0f}", f"{took / middle[base]:.2f}"] for name, took in middle.items()
+    ]
+    report.text("Whole commands, processor time (wanted: a calibration at 1.0 of the imports).")
+    report.table(["command", "ms", "over the search's import"], rows)
+
+
 def main() -> None:
     report = Report("Calls")
     bench_one_pose(report)
     bench_threads(report)
     bench_inverse(report)
+    bench_reused(report)
     bench_import(report)
+    bench_commands(report)
     report.write("calls")
 
 

@@ -36,7 +36,6 @@ from pkmcal.estimation.session_machines import (
 from pkmcal.exceptions import ArgumentError
 from pkmcal.measurements import orientation
 from pkmcal.measurements.observation import (
-    Predicted,
     by_difference,
     corrected,
     distance_per_point,
@@ -116,7 +115,7 @@ class Equations(Derivatives):
         unknown = np.zeros(len(guess), dtype=np.int32)
         self._states = RowStates(guess, self.actuators, unknown)
         self._last: _Last | None = None
-        self._seen: tuple[Evaluation, tuple[Predicted, ...]] | None = None
+        self._seen = None
         self._from: Evaluation | None = None  # that the states are of
         self._follow: tuple[Evaluation, FloatArray] | None = None  # and how they follow theta
         self._no_sigma = np.array([

@@ -1,4 +1,4 @@
-"""Arrays of callers that results are written to: large new ones cost a tenth of the time."""
+"""Arrays of callers that results are written to: large new ones take time of their own."""
 
 from __future__ import annotations
 

@@ -212,6 +212,14 @@ def test_outliers_are_named_by_line_and_target(tmp_path: Path) -> None:
     assert "outliers: row 37: log.csv line 15 (B)" in str(found)
 
 
+def said_of(robot: pk.Robot, wrong: pk.Measurements, **options: Any) -> str:
+    """Reasons of the verdict, or why there is none."""
+    try:
+        return "; ".join(fitted(robot, wrong, free="offset*", **options, **UNKNOWN).verdict.reasons)
+    except ValueError as error:
+        return str(error)
+
+
 @pytest.mark.parametrize("by", [1, -1, 2])
 def test_readings_beside_the_wrong_rows_are_found(
     hexapod: pk.Robot, true: pk.Robot, by: int
@@ -219,10 +227,7 @@ def test_readings_beside_the_wrong_rows_are_found(
     """The machine then fits nothing, or cannot reach what it reads."""
     measured = session(hexapod, true, 40, 5)
     wrong = replace(measured, values=np.roll(measured.values, by, axis=0))
-    try:
-        text = "; ".join(fitted(hexapod, wrong, free="offset*", **UNKNOWN).verdict.reasons)
-    except ValueError as error:
-        text = str(error)
+    text = said_of(hexapod, wrong)
     where = "before" if by > 0 else "after"
     assert f"each reading belongs to the row {abs(by)} {where} it" in text
 
@@ -233,11 +238,7 @@ def test_they_are_found_although_every_other_row_was_left_out(
 ) -> None:
     measured = session(hexapod, true, 40, 5)
     wrong = replace(measured, values=np.roll(measured.values, by, axis=0))
-    try:
-        found = fitted(hexapod, wrong, free="offset*", drop=list(range(1, 40, 2)), **UNKNOWN)
-        text = "; ".join(found.verdict.reasons)
-    except ValueError as error:
-        text = str(error)
+    text = said_of(hexapod, wrong, drop=list(range(1, 40, 2)))
     where = "before" if by > 0 else "after"
     assert f"each reading belongs to the row 2 {where} it" in text
 
