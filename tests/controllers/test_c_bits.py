@@ -6,6 +6,7 @@ import subprocess
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -174,3 +175,31 @@ def test_bits_are_the_same(
     want = reference(machine)
     assert int(want.split()[1]) > SOLVED.get(machine, 900)
     assert printed(machine, *TARGETS[target], tmp_path) == want
+
+
+# processors with half precision: in gcc's GNU mode FLT_EVAL_METHOD is 16 for them
+HALF = {
+    "x86": "gcc -O2 -mavx512fp16",
+    "aarch64": "aarch64-linux-gnu-gcc -O2 -mcpu=cortex-a76",
+}
+
+
+@pytest.mark.parametrize("number", ["double", "float"])
+@pytest.mark.parametrize("build", HALF.values(), ids=HALF)
+def test_compiles_for_processors_with_half_precision(
+    build: str, number: Any, tmp_path: Path
+) -> None:
+    compiler, *options = build.split()
+    needed(compiler)
+    folder = {"cwd": tmp_path, "capture_output": True, "text": True, "check": False}
+    (tmp_path / "empty.c").write_text("")
+    ask = [compiler, *options, "-dM", "-E", "-include", "float.h", "empty.c"]
+    macros = subprocess.run(ask, **folder)
+    if macros.returncode:
+        pytest.skip(f"{compiler} does not know {options[-1]}")
+    if "#define FLT_EVAL_METHOD __FLT_EVAL_METHOD__" in macros.stdout:
+        assert "#define __FLT_EVAL_METHOD__ 16" in macros.stdout
+    pk.export.c_header(pk.load("6-rus"), tmp_path / "robot.h", number)
+    (tmp_path / "robot.c").write_text('#include "robot.h"\n')
+    done = subprocess.run([compiler, *options, "-c", "robot.c"], **folder)
+    assert (done.returncode, done.stderr) == (0, "")
