@@ -21,12 +21,12 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.arms.inputs import joint_frames
-from pkmcal.estimation.alignment import PointPairs, of_points
 from pkmcal.geometry.chain_joints import across
 from pkmcal.geometry.model import Cone
 from pkmcal.kinematics.independent import independent_numbers
 from pkmcal.modes.find import frames_of
 from pkmcal.planning.optimal_design import CRITERIA
+from pkmcal.readings.alignment import PointPairs, of_points
 from pkmcal.statistics.shifts import shifted
 
 from .robots import made, ring

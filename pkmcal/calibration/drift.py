@@ -11,8 +11,8 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.holdout import HeldOut
 from pkmcal.display import chance_text
+from pkmcal.effects.expansion import temperatures
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.expansion import temperatures
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit, rms
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, rms
 from pkmcal.calibration.distances import Distances, distances
 from pkmcal.calibration.dropped import outlying
 from pkmcal.estimation.estimate import Estimate
@@ -193,7 +193,7 @@ def misfit(
     split = uncertainty.noises
     shown = np.where(estimator.unstated & ~uncertainty.unknown, state.noise, np.nan)
     by_component = tuple(
-        tuple((sigma * relative / mm_per_unit(m.units, estimator.start.robot.length)).tolist())
+        tuple((sigma * relative / m.instrument.mm(m, estimator.start.robot.length)).tolist())
         for m, relative, sigma in zip(equations.sets, equations.deviations, shown, strict=False)
     )
     named = outlying(estimator, estimate)

@@ -25,12 +25,12 @@ from pkmcal.calibration.robust_check import robust_check
 from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.verdict import Verdict, judge
 from pkmcal.display import Table
+from pkmcal.effects.expansion import in_words
 from pkmcal.estimation.estimator import FEW
-from pkmcal.estimation.expansion import in_words
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.observation import predict
+from pkmcal.readings.calibratable import as_machine
 from pkmcal.result import Result
 
 if TYPE_CHECKING:

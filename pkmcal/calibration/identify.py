@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -44,13 +45,13 @@ from pkmcal.calibration.plausibility import (
 from pkmcal.calibration.row_errors import likely_mistakes
 from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.slack import SLACK, Cell, Slack, said_slack, slack_cables, taut
+from pkmcal.effects.expansion import Coefficients, expansion_of
 from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.datasets import as_fit_data, as_fitted, by_set, informative
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import LEAST_FREEDOM, Estimator
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.estimation.expansion import Coefficients, expansion_of
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LIMITS, LossName
@@ -61,8 +62,8 @@ from pkmcal.estimation.starts import known_distances
 from pkmcal.estimation.uncertainty import Uncertainty, solved, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import as_given, as_machine
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.calibratable import as_given, as_machine
 from pkmcal.statistics.covariance import RULES, CovarianceRule
 
 _POOR = 0.1  # share of the misfit that a fit worth its name does not leave
@@ -88,6 +89,7 @@ def identify(
     drop: Drop = None,
     expansion: Coefficients = None,
     slack: Slack = "keep",
+    effects: Sequence[Any] = (),
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -201,7 +203,7 @@ def identify(
     anew = words("per_session", per_session)
     asked = Asked(free, prior, bounds, anew, by_set(unknown), words("fix", fix))
     grows = expansion_of(machine, expansion)
-    given = as_fit_data(machine, measurements, unknown, bool(anew), grows)
+    given = as_fit_data(machine, measurements, unknown, bool(anew), grows, tuple(effects))
     dropped = named_rows(drop, sum(len(data.rows) for data in given))
     datasets, unread = informative(machine, given)
     held: list[tuple[FitData, int]] = []
@@ -374,8 +376,7 @@ def _result(
     robots = _robots(commanded, end)
     if commanded is not estimator.equations:
         commanded = commanded.under(end.tension)
-        commanded.warm_start(end)
-        end = commanded.at(end.theta)
+        end = commanded.at(end.theta, near=end)
     return Identification(
         robot=robots[chosen.sessions[-1] if chosen.sessions else ""],
         robots=_of_sessions(robots, held),

@@ -138,8 +138,7 @@ def compared(
         return commanded, in_their_modes(commanded, commanded.at(theta)), None
     start = start_in_modes(commanded, theta, rows.own)
     found, own = _own_numbers(rows, whole, whole.begin(commanded, start), estimate, sure)
-    commanded.warm_start(found)
-    return commanded, commanded.at(found.theta), own
+    return commanded, commanded.at(found.theta, near=found), own
 
 
 def _own_numbers(

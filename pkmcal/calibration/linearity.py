@@ -66,14 +66,13 @@ def beyond_linear(estimate: Estimate, uncertainty: Uncertainty) -> Weak | None:
     rises = []
     for draw in np.random.default_rng(0).normal(size=(_DRAWS, root.shape[1])):
         step = root @ draw
-        equations.warm_start(estimate.evaluation)
-        there = equations.at(estimate.evaluation.theta + chosen.scale * step, state.noise)
+        here = estimate.evaluation
+        there = equations.at(here.theta + chosen.scale * step, state.noise, here)
         residual = equations.residual(there, state.noise)
         change = estimate.change(step)
         linear = estimate.residual - change
         beyond = weights @ residual**2 - weights @ linear**2
         rises.append(beyond / (weights @ change**2))
-    equations.warm_start(estimate.evaluation)
     off = np.nan_to_num(np.abs(rises), nan=np.inf)
     if np.median(off) < _OFF:
         return None

@@ -147,13 +147,12 @@ def _later_session(
     sure = fit.uncertainty
     whole = later.equations(sure.equations)
     commanded = whole.commanded()
-    commanded.warm_start(end)
-    evaluation = in_their_modes(commanded, commanded.at(end.theta))
+    evaluation = in_their_modes(commanded, commanded.at(end.theta, near=end))
     if not sure.equations.closures.unknowns:
         return commanded, evaluation, noise_factors(later, commanded, sure)
     noise = noise_factors(later, whole, sure)
     begun = whole.begin(commanded, evaluation)
-    return whole, whole.at(begun.theta, noise), noise
+    return whole, whole.at(begun.theta, noise, begun), noise
 
 
 def _first_session(fit: Fit) -> tuple[FloatArray, FloatArray, np.ndarray]:

@@ -104,8 +104,7 @@ def _rms_of_others(
         poses = np.ones(len(there.pose), dtype=bool)
         poses[np.concatenate(few.pose_of)[named]] = False
         return few.closure_rms(there, poses)
-    commanded.warm_start(there)
-    off = few.distances(commanded.at(there.theta))[~named]
+    off = few.distances(commanded.at(there.theta, near=there))[~named]
     return rms(off[np.isfinite(off)])
 
 

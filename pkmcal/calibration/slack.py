@@ -23,7 +23,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.readings.calibratable import Calibratable
 from pkmcal.statistics.robust_scale import median_ratio
 
 Slack = Literal["keep", "drop"]
@@ -125,8 +125,7 @@ def _without_each(
     for k in range(shape[1]):
         cells = [(pose, k) for pose in poses.tolist()]
         other = equations.without_closures([*equations.slack_cells, *cells], evaluation)
-        other.warm_start(evaluation)
-        there = other.at(evaluation.theta, noise)
+        there = other.at(evaluation.theta, noise, evaluation)
         gain[:, k] = np.where(
             there.status[poses] == 0, before - _squares(other, there, noise)[poses], 0.0
         )
@@ -192,8 +191,7 @@ def slack_cables(
     evaluation = estimate.evaluation
     keys = [(cell.pose, cell.closures[0]) for cell in cells]
     without = equations.without_closures(keys, evaluation)
-    without.warm_start(evaluation)
-    there = without.at(evaluation.theta, estimate.state.noise)
+    there = without.at(evaluation.theta, estimate.state.noise, evaluation)
     off = -without.readings_off(there) * _slopes(equations, there)
     pose_of, actuator = np.concatenate(equations.pose_of), equations.closures.actuators
     cables = [

@@ -15,9 +15,9 @@ from pkmcal.cli.output import Output, say
 from pkmcal.cli.rows import POSE_UNITS, numbers_on_line, table
 from pkmcal.core.library import POSE, STATUS
 from pkmcal.kinematics.reading_units import reading_units
-from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.command_csv import read_commands
 from pkmcal.measurements.pose_csv import write_poses
+from pkmcal.readings.calibratable import as_machine
 from pkmcal.report.as_json import as_json
 
 

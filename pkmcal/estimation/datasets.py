@@ -5,21 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePath
+from typing import Any
 
 import numpy as np
 
 from pkmcal.arguments import instance, word
+from pkmcal.effects.expansion import Expansion
 from pkmcal.estimation.closures import has_equations
-from pkmcal.estimation.expansion import Expansion
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import KNOWN, Known
 from pkmcal.estimation.sessions import in_sessions, set_names
 from pkmcal.estimation.starts import with_starts
 from pkmcal.estimation.tensioned_poses import unknown_tensions
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.calibratable import Calibratable
 
 Said = Mapping[str, Known | Sequence[Known]]  # of "frame", "target" and "attachment"
 
@@ -30,6 +31,7 @@ def as_fit_data(
     said: Said,
     sessions: bool,
     expansion: Expansion | None = None,
+    others: tuple[Any, ...] = (),
 ) -> list[FitData]:
     """The sets of measurements with what is unknown of each.
 
@@ -59,7 +61,16 @@ def as_fit_data(
         of_frame, of_target, of_attachment = flags
         rows = np.arange(first, first + len(measured))
         datasets.append(
-            FitData(measured, rows, of_frame, of_target, of_attachment, name, expansion=expansion)
+            FitData(
+                measured,
+                rows,
+                of_frame,
+                of_target,
+                of_attachment,
+                name,
+                expansion=expansion,
+                others=others,
+            )
         )
         first += len(measured)
     known = [data.measured.actuator_sigma is not None for data in datasets]

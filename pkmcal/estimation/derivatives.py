@@ -26,12 +26,13 @@ class Derivatives(Readings):
     """
 
     closures: SessionClosures
-    _seen: tuple[Evaluation, tuple[Predicted, ...]] | None  # the last that was predicted
 
     def seen(self, evaluation: Evaluation) -> tuple[Predicted, ...]:
         """Readings of each set at an evaluation, with derivatives; of few rows the last is kept."""
-        if self._seen is not None and self._seen[0] is evaluation:
-            return self._seen[1]
+        whose, seen = evaluation.kept.get("seen", (None, ()))
+        if whose is not None and whose() is self:
+            known: tuple[Predicted, ...] = seen
+            return known
         return self.predicted(evaluation.pose, evaluation.theta)
 
     def jacobian(self, evaluation: Evaluation) -> list[FloatArray]:

@@ -18,7 +18,6 @@ import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, rms
 from pkmcal.core.library import STATUS
-from pkmcal.estimation import joint_angles
 from pkmcal.estimation.derivatives import Derivatives
 from pkmcal.estimation.elimination import Blocks, Shares, System
 from pkmcal.estimation.evaluation import Evaluation
@@ -34,18 +33,17 @@ from pkmcal.estimation.session_machines import (
     commanded_closures,
 )
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements import orientation
 from pkmcal.measurements.observation import (
     by_difference,
     corrected,
     distance_per_point,
 )
+from pkmcal.readings import joint_angles, orientation
 from pkmcal.result import failed_rows
 
 _TOGETHER = 16384  # rows whose readings are kept with their derivatives
 
-# Whose, where, with which noise, and the equations there; copies have another "whose".
-_Last = tuple["weakref.ref[Equations]", Evaluation, FloatArray, System]
+Near = Evaluation | RowStates | None  # where a search for poses begins
 
 
 class Lot(NamedTuple):
@@ -113,11 +111,7 @@ class Equations(Derivatives):
         length, *most = parameters.robot.length, np.abs(guess).max(), np.abs(self.actuators).max()
         self._size = float(max(length, *most))
         unknown = np.zeros(len(guess), dtype=np.int32)
-        self._states = RowStates(guess, self.actuators, unknown)
-        self._last: _Last | None = None
-        self._seen = None
-        self._from: Evaluation | None = None  # that the states are of
-        self._follow: tuple[Evaluation, FloatArray] | None = None  # and how they follow theta
+        self.guess = RowStates(guess, self.actuators, unknown)
         self._no_sigma = np.array([
             m.sigma is None and bool(np.isfinite(m.values).any()) for m in self.sets
         ])  # fmt: skip
@@ -139,7 +133,7 @@ class Equations(Derivatives):
             self._counts &= ~closures.unread
         self._counting = None if self._counts.all() else np.flatnonzero(self._counts)
         if closures.unknowns:
-            if any(growth is not None for growth in self._growth):
+            if any(self._effects):
                 raise ArgumentError(
                     "expansion: needs poses that follow from the actuators: no actuator_sigma, and"
                     " no surplus actuators; found others"
@@ -199,10 +193,11 @@ class Equations(Derivatives):
 
     def begin(self, commanded: Equations, start: Evaluation) -> Evaluation:
         """Evaluate where the same with commanded poses has been started."""
-        self.parameters, self._states, self._from = commanded.parameters, start.states, None
+        self.parameters = commanded.parameters
+        near = start.states
         if self.closures.unknowns:  # closures that contradict each other may still have a best pose
-            self.start_from(np.flatnonzero(start.status), self.parameters.robot.home)
-        return start if commanded is self else self.at(start.theta)
+            near = near.at_poses(np.flatnonzero(start.status), self.parameters.robot.home)
+        return start if commanded is self else self.at(start.theta, near=near)
 
     @property
     def sigma_stated(self) -> bool:
@@ -223,13 +218,16 @@ class Equations(Derivatives):
         groups = np.arange(len(self.unstated))
         return np.zeros_like(groups) if self.closures.unknowns else groups
 
-    def at(self, theta: FloatArray, noise: FloatArray | None = None) -> Evaluation:
+    def at(
+        self, theta: FloatArray, noise: FloatArray | None = None, near: Near = None
+    ) -> Evaluation:
         """Evaluate at `theta` (n,), every pose where it fits best what was read of it.
 
-        `noise` (G,) multiplies the stated deviations of each group, as in `whitened`.
+        `noise` (G,) multiplies the stated deviations of each group, as in `whitened`. The search for
+        the poses begins `near` another evaluation, or states; by default at home and what was read.
         """
         machines = self._machines_at(theta)
-        states, self._last = self._states_ahead(machines, theta), None
+        states, begun = self._states_ahead(machines, theta, near), _begun(near, self.guess)
         if self.closures.unknowns:
             factors = np.ones(len(self.unstated)) if noise is None else noise
 
@@ -247,16 +245,18 @@ class Equations(Derivatives):
             tuple(each.values for each in seen),
             self.residuals(seen),
             states.tension,
+            begun,
         )
-        self._seen = (found, seen) if len(self.rows) <= _TOGETHER else None
+        if len(self.rows) <= _TOGETHER:
+            found.kept["seen"] = weakref.ref(self), seen
         if self.closures.unknowns:
-            self._last = weakref.ref(self), found, factors, there
+            found.kept["system"] = weakref.ref(self), factors, there
         return found
 
-    def squares_ahead(self, theta: FloatArray, noise: FloatArray) -> float:
+    def squares_ahead(self, theta: FloatArray, noise: FloatArray, near: Near) -> float:
         """Sum of the squared equations at `theta` where poses are looked for, none fitted yet."""
         machines = self._machines_at(theta)
-        off, _ = self._system(machines, self._states_ahead(machines, theta), theta, noise)
+        off, _ = self._system(machines, self._states_ahead(machines, theta, near), theta, noise)
         return float(off @ off)
 
     def _machines_at(self, theta: FloatArray) -> Machines:
@@ -264,19 +264,20 @@ class Equations(Derivatives):
         robots = [p.robot.with_values(p.values_at(theta, own)) for own in self.machine_columns]
         return Machines(tuple(robots), self._own, self.state)
 
-    def _states_ahead(self, machines: Machines, theta: FloatArray) -> RowStates:
-        """Where to look for the states: as they follow the parameters from the last step taken."""
-        if self._follow is None or self._follow[0] is not self._from:
-            return self.closures.settled(machines, self._states)
-        begin, following = self._follow
+    def _states_ahead(self, machines: Machines, theta: FloatArray, near: Near) -> RowStates:
+        """Where to look for the states: as they follow the parameters from where a search is."""
+        states = _begun(near, self.guess)
+        if not isinstance(near, Evaluation) or "following" not in near.kept:
+            return self.closures.settled(machines, states)
+        begin, following = near, near.kept["following"]
         step = (following.reshape(-1, len(theta)) @ (theta - begin.theta)).reshape(
             following.shape[:2]
         )
         if not np.isfinite(step).all():
             step[~np.isfinite(step).all(axis=1)] = 0.0
-        ahead = self.closures.moved(machines, self._states, step)
+        ahead = self.closures.moved(machines, states, step)
         if ahead.status.any():
-            ahead = ahead.chosen(ahead.status == 0, self.closures.settled(machines, self._states))
+            ahead = ahead.chosen(ahead.status == 0, self.closures.settled(machines, states))
         return ahead
 
     def _system(
@@ -306,14 +307,13 @@ class Equations(Derivatives):
 
     def _at(self, evaluation: Evaluation, noise: FloatArray) -> System:
         """The system at an evaluation; the last one is kept, which a step asks for three times."""
-        last = self._last
-        mine = last is not None and last[0]() is self and last[1] is evaluation
-        if last is not None and mine and (last[2] is noise or np.array_equal(last[2], noise)):
-            return last[3]
-        self._last = None
+        whose, factors, known = evaluation.kept.get("system", (None, None, None))
+        if whose is not None and whose() is self:
+            if factors is noise or np.array_equal(factors, noise):
+                return known
         there = self._system(evaluation.machines, evaluation.states, evaluation.theta, noise)
         found = self._blocks.at(there)
-        self._last = weakref.ref(self), evaluation, noise, found
+        evaluation.kept["system"] = weakref.ref(self), noise, found
         return found
 
     def residual(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
@@ -364,7 +364,7 @@ class Equations(Derivatives):
             readings = self.whiten(self.jacobian(evaluation), noise)
             by_all = np.concatenate([by_all, readings])
         found, following = self._blocks.left(by_unknown, by_all)
-        self._follow = evaluation, following
+        evaluation.kept["following"] = following
         return found
 
     @property
@@ -413,12 +413,6 @@ class Equations(Derivatives):
         other._take(self.closures, bool(self.unstated[-1]))
         return other
 
-    def start_from(self, rows: IntArray, poses: FloatArray) -> None:
-        """Start the forward kinematics of some distinct rows of actuators from poses (s, 6)."""
-        guess = self._states.pose.copy()
-        guess[rows] = poses
-        self._states, self._from = replace(self._states, pose=guess), None
-
     def redrawn(
         self,
         at: Evaluation,
@@ -457,10 +451,9 @@ class Equations(Derivatives):
             for m, values, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
         other.parameters = replace(self.parameters, start=prior_centre, drawn=drawn)
-        other.warm_start(at)
         if unknowns:
-            return other, other.at(at.theta, noise)
-        return other, replace(at, residuals=residuals)
+            return other, other.at(at.theta, noise, at)
+        return other, replace(at, residuals=residuals, kept={})
 
     def reweighted(self, deviations: Sequence[FloatArray]) -> Equations:
         """The same where the components (k,) of each set have other relative deviations."""
@@ -470,7 +463,12 @@ class Equations(Derivatives):
         other.deviations = tuple(deviations)
         return other
 
-    def start(self, near: FloatArray | None = None, own: BoolArray | None = None) -> Evaluation:
+    def start(
+        self,
+        near: FloatArray | None = None,
+        own: BoolArray | None = None,
+        states: RowStates | None = None,
+    ) -> Evaluation:
         """Evaluate at the present parameters, unknown frames aligned with the readings.
 
         Rows that fail from a measured pose are tried from home, those that then miss grossly in
@@ -478,26 +476,19 @@ class Equations(Derivatives):
         (n,) are aligned.
         """
         theta = self.parameters.start.copy() if near is None else near.copy()
-        evaluation = self.at(theta)
+        states = self.guess if states is None else states
+        evaluation = self.at(theta, near=states)
         if not evaluation.ok:
-            self.start_from(np.flatnonzero(evaluation.status), self.parameters.robot.home)
-            evaluation = self.at(theta)
+            home = self.parameters.robot.home
+            states = states.at_poses(np.flatnonzero(evaluation.status), home)
+            evaluation = self.at(theta, near=states)
         if not evaluation.ok:
             return evaluation
         before = self.parameters
         self.parameters, theta = aligned(self, evaluation, own)
         if self.parameters is before and np.array_equal(theta, evaluation.theta):
             return evaluation
-        return self.at(theta)
-
-    def warm_start(self, evaluation: Evaluation) -> None:
-        """Start the forward kinematics of later calls of `at` from its poses."""
-        self._states = evaluation.states.chosen(evaluation.status == 0, self._states)
-        self._from = evaluation
-
-    def forget_following(self) -> None:
-        """A search has ended: how poses follow the parameters takes memory."""
-        self._follow = self._from = None
+        return self.at(theta, near=states)
 
     def by_groups(
         self,
@@ -548,7 +539,7 @@ class Equations(Derivatives):
     def distances(self, evaluation: Evaluation) -> FloatArray:
         """How far off each measured point is, mm, in the order of the sets."""
         return np.concatenate([
-            distance_per_point(of_read(m, r), m.units, self.parameters.robot.length)
+            distance_per_point(of_read(m, r), m, self.parameters.robot.length)
             for m, r in zip(self.sets, evaluation.residuals, strict=True)
         ])  # fmt: skip
 
@@ -577,15 +568,10 @@ class Equations(Derivatives):
 
     def readings_off(self, evaluation: Evaluation) -> FloatArray:
         """What actuators would read at the poses less what they read (K, equations)."""
-        last = self._last
-        if (
-            last is not None
-            and last[0]() is self
-            and last[1] is evaluation
-            and self._counting is None
-        ):
-            off = last[3].off[: self._slack.size].reshape(self._slack.shape)
-            off = off * last[2][self._groups]
+        whose, factors, known = evaluation.kept.get("system", (None, None, None))
+        if whose is not None and whose() is self and self._counting is None:
+            off = known.off[: self._slack.size].reshape(self._slack.shape)
+            off = off * factors[self._groups]
         else:
             off, _ = self.closures.residual(evaluation.machines, evaluation.states)
         needed: FloatArray = off if self.closures.sigma is None else off * self.closures.sigma
@@ -611,3 +597,9 @@ class Equations(Derivatives):
     def failures(self, evaluation: Evaluation) -> str:
         """Say which rows failed and why; empty where the forward kinematics solved all."""
         return failed_rows(self.status(evaluation), STATUS, self.rows, most=10)
+
+
+def _begun(near: Near, guess: RowStates) -> RowStates:
+    if near is None:
+        return guess
+    return near.onward if isinstance(near, Evaluation) else near

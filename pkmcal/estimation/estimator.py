@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, mm_per_unit
+from pkmcal.arrays import BoolArray, FloatArray
 from pkmcal.estimation.elimination import Shares
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate, IterationState
@@ -88,7 +88,7 @@ class Estimator:
             raise ArgumentError(f"they depend on none of {names}")
         u = np.zeros(len(self.scale))
         if near is not None:
-            self.equations.warm_start(near)
+            self.search.near = near
             u = (near.theta - self.start.theta) / self.scale
         risen: set[tuple[int, int]] = set()
         for _ in range(_ROUNDS):
@@ -101,7 +101,7 @@ class Estimator:
             fewer = None if self.search.converged else self._fewer(estimate)
             if fewer is not None:
                 state, u = fewer, np.zeros(len(self.scale))
-                self.equations.warm_start(self.start)
+                self.search.near = self.start
                 continue
             if self.equations.closures.unknowns and self._at_first is None:
                 self._at_first = estimate.freedom
@@ -319,7 +319,7 @@ class Estimator:
         """
         if self.equations.closures.unknowns:
             return self.search.triangle(evaluation, np.ones(len(self.unstated)))
-        arcs = [mm_per_unit(m.units, self.start.robot.length) for m in self.equations.sets]
+        arcs = [m.instrument.mm(m, self.start.robot.length) for m in self.equations.sets]
         factor = np.zeros((0, len(self.scale)))
         for _, parts in self.equations.derivatives(evaluation):
             for i, rows, part in parts:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 from pkmcal.arrays import FloatArray, Int32Array
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines
-from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.readings.calibratable import Calibratable
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,10 @@ class Evaluation:
         Measured less predicted of each set, mm and rad.
     tension : ndarray (K, n) or None
         Of what the actuators drive, N, where it is unknown and has been found.
+    begun : RowStates
+        Where the search for the poses began.
+    kept : dict
+        What was computed here and may be asked for again; it goes when this goes.
     """
 
     theta: FloatArray
@@ -42,6 +47,17 @@ class Evaluation:
     predicted: tuple[FloatArray, ...]
     residuals: tuple[FloatArray, ...]
     tension: FloatArray | None = None
+    begun: RowStates | None = None
+    kept: dict[str, Any] = field(default_factory=dict)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "kept": {}}
+
+    @property
+    def onward(self) -> RowStates:
+        """Where a search for the poses begins from here; of a row without one, where this did."""
+        assert self.begun is not None
+        return self.states.chosen(self.status == 0, self.begun)
 
     @property
     def ok(self) -> bool:

@@ -14,10 +14,10 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose, invert
-from pkmcal.estimation.alignment import PointPairs, of_heights, of_points, of_poses
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.hand_eye import of_frame_and_tool, of_tool
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.readings.alignment import PointPairs, of_heights, of_points, of_poses
 
 if TYPE_CHECKING:
     from pkmcal.estimation.readings import Readings

@@ -20,8 +20,8 @@ from pkmcal.estimation.sessions import Scope, label, matches, scopes
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.load import is_of_load
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.calibratable import Calibratable
 
 _LEAST_PRIOR, _MOST_PRIOR = 1e-15, 1e15  # mm or rad, whose squares are numbers
 
@@ -64,7 +64,10 @@ def parameters(
     of_unit["1/mm2"] = of_unit["1/mm"] / robot.length
     pull = max(_pull(robot, data.measured) for data in datasets)
     of_unit |= {"1/N": 1.0 / travel / pull, "N": pull / robot.length}
-    scale = np.array([of_unit[unit] for unit in units])
+    scale = np.array([
+        of_unit[unit] if row.scale[j] is None else row.scale[j]
+        for j, unit in zip(number_of.tolist(), units, strict=True)
+    ])  # fmt: skip
     if like is not None:
         known = dict(zip(like.names, like.scale.tolist(), strict=True))
         scale = np.array([known.get(n, own) for n, own in zip(names, scale.tolist(), strict=True)])
@@ -106,6 +109,7 @@ class _Row:
     names: list[str]
     units: list[str]
     start: list[float]
+    scale: list[float | None]
     places: IntArray
     frame: int | None
     found_along: dict[tuple[str, str], int]
@@ -133,12 +137,14 @@ def _numbers_of_a_row(robot: Calibratable, datasets: Sequence[FitData], asked: A
     places = np.array([geometry.names.index(name) for name in chosen], dtype=np.intp)
     names, units = list(chosen), [str(geometry.units[i]) for i in places]
     start = list(geometry.values[places])
+    scale: list[float | None] = [None] * len(start)
     frame = None
     if any(data.framed for data in datasets):
         frame = len(names)
         names += [f"frame.{axis}" for axis, _ in PLACE]
         units += [unit for _, unit in PLACE]
         start += [0.0] * 6
+        scale += [None] * 6
     found_along: dict[tuple[str, str], int] = {}
     known: dict[tuple[str, str], Numbers] = {}
     for dependence in (each for data in datasets for each in data.dependences()):
@@ -155,8 +161,9 @@ def _numbers_of_a_row(robot: Calibratable, datasets: Sequence[FitData], asked: A
             names += mine.names
             units += mine.units
             start += mine.start.tolist()
+            scale += [None] * len(mine.start) if mine.scale is None else mine.scale.tolist()
     width = {key: len(mine.names) for key, mine in known.items()}
-    return _Row(names, units, start, places, frame, found_along, width)
+    return _Row(names, units, start, scale, places, frame, found_along, width)
 
 
 def _sessions(datasets: Sequence[FitData]) -> tuple[str, ...]:

@@ -12,14 +12,14 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.estimation.alignment import (
+from pkmcal.readings import orientation
+from pkmcal.readings.alignment import (
     TILT,
     centred,
     frame_of,
     inverse_above,
     nearest_rotations,
 )
-from pkmcal.measurements import orientation
 
 _ALIKE = 1e-4  # share by which singular values differ of turnings that poses do not tell apart
 _ROUNDS = 30  # of turning frame and tool in turn

@@ -51,7 +51,7 @@ class Search:
     ) -> None:
         parameters = equations.parameters
         self._found: IntArray | slice = slice(None) if columns is None else columns
-        self.equations, self.start = equations, start
+        self.equations, self.start, self.near = equations, start, start
         self.scale = parameters.scale[self._found]
         rows = parameters.prior_rows(start.theta)[:, self._found]
         self._stated = np.flatnonzero(rows.any(axis=1))
@@ -72,7 +72,7 @@ class Search:
         """The equations at scaled parameters (n,), poses found with this noise (G,)."""
         same = not self.equations.closures.unknowns or _same(noise, self._last[1])
         if not (same and _same(u, self._last[0])):
-            there = self.equations.at(self._theta(u), noise)
+            there = self.equations.at(self._theta(u), noise, self.near)
             self._last = (u.copy(), noise, there)
             self.evaluations += 1
         return self._last[2]
@@ -132,7 +132,7 @@ class Search:
     def forget(self) -> None:
         """A search has ended: what is kept for its next step takes memory."""
         self._last_jacobian = None
-        self.equations.forget_following()
+        self.near.kept.pop("following", None)
 
     def _lots(self, evaluation: Evaluation, noise: FloatArray) -> Iterator[Lot]:
         """`taken` in lots, finite or not."""
@@ -163,7 +163,6 @@ class Search:
         pins : ndarray (d, n)
             Rows that hold the combinations that measurements and prior do not identify.
         """
-        equations = self.equations
         self._refused[:] = False
         everything = np.zeros_like(self._refused)
         straight, cost = self._minimum(u, noise, loss, pins, everything)
@@ -177,7 +176,7 @@ class Search:
             if other < cost:
                 return around
         self.converged, self._last = converged, (straight, noise, here)
-        equations.warm_start(here)
+        self.near = here
         return straight
 
     def _minimum(
@@ -222,7 +221,8 @@ class Search:
             nonlocal taken
             if evaluation is not taken:
                 taken = evaluation
-                equations.warm_start(evaluation)
+                self.near.kept.pop("following", None)
+                self.near = evaluation
                 self.history.append(equations.progress(evaluation))
 
         def jacobian(u: FloatArray) -> FloatArray:

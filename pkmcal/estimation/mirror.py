@@ -7,7 +7,6 @@ all distances are what they were. Both are minima, apart from each other.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator
 
 import numpy as np
@@ -51,12 +50,13 @@ def mirror_fits(equations: Equations, evaluation: Evaluation, noise: FloatArray)
         if np.abs(theta - evaluation.theta).max() <= _FLAT * robot.machine.struct.size:
             continue  # another pose of the same machine
         pose = robot.frames.outward(to_pose(on_base @ motions @ on_platform))
-        image = copy.copy(equations)
-        image.warm_start(evaluation)
-        image.start_from(np.arange(len(pose)), pose)
-        if image.squares_ahead(theta, noise) > _FAR * (cost + equations.rounding(noise) ** 2):
+        image = equations
+        states = evaluation.onward.at_poses(np.arange(len(pose)), pose)
+        if image.squares_ahead(theta, noise, states) > _FAR * (
+            cost + equations.rounding(noise) ** 2
+        ):
             continue
-        there = image.at(theta, noise)
+        there = image.at(theta, noise, states)
         if there.ok and _cost(image, there, noise) <= (1.0 + _ALIKE) * cost:
             return True
     return False

@@ -30,8 +30,8 @@ def in_their_modes(equations: Equations, evaluation: Evaluation) -> Evaluation:
     better, poses = _better(equations, evaluation)
     if not len(better):
         return evaluation
-    equations.start_from(better, poses)
-    return equations.at(evaluation.theta)
+    states = evaluation.onward.at_poses(better, poses)
+    return equations.at(evaluation.theta, near=states)
 
 
 def start_in_modes(
@@ -39,9 +39,8 @@ def start_in_modes(
 ) -> Evaluation:
     """`Equations.start`, once more where rows of other modes had laid unknown frames."""
     start = equations.start(near, own)
-    if in_their_modes(equations, start) is not start:
-        start = equations.start(near, own)
-    return start
+    better = in_their_modes(equations, start)
+    return start if better is start else equations.start(near, own, better.begun)
 
 
 def in_other_modes(equations: Equations, evaluation: Evaluation) -> list[str]:

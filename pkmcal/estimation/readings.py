@@ -8,26 +8,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots, mm_per_unit
-from pkmcal.estimation import joint_angles
+from pkmcal.arrays import BoolArray, FloatArray, IntArray, lots
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.sessions import NONE
 from pkmcal.estimation.tensioned_poses import Cells, cells_of, check_cells
 from pkmcal.kinematics.drive_state import DriveState
-from pkmcal.measurements import orientation
-from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.fields import filled_tension
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import (
-    Predicted,
-    corrected,
-    difference,
-    joined,
-    predict,
-    read_angles,
-)
+from pkmcal.measurements.observation import Predicted, corrected, difference, joined
+from pkmcal.readings import orientation
+from pkmcal.readings.calibratable import Calibratable
+from pkmcal.readings.reading import At
 
 _TOGETHER = 16384  # rows that are whitened at once by matrices
 ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
@@ -106,10 +99,11 @@ class Readings:
             for of_set, part in zip(self._numbers, self.spread.part_of, strict=True)
         ]
         self._along = [data.along for data in datasets]
-        self._growth = [
-            None if data.expansion is None else data.expansion.growth(data.measured)
+        self._of_effects = [
+            [each.argument for e in data.effects for each in e.dependences(data.measured)]
             for data in datasets
         ]
+        self._effects = [[e.of_rows(data.measured) for e in data.effects] for data in datasets]
         # several targets or repeats at the same actuators are one pose
         double = [i for i, m in enumerate(self.sets) if m.other is not None]
         actuators = np.concatenate([
@@ -170,7 +164,7 @@ class Readings:
         self.present: BoolArray = np.concatenate([
             np.isfinite(m.values).reshape(-1) for m in self.sets
         ])  # fmt: skip
-        self.arcs = tuple(1.0 if "mm" in m.units else parameters.robot.length for m in self.sets)
+        self.arcs = tuple(m.instrument.arc(m, parameters.robot.length) for m in self.sets)
         self._whole, self.any_read = bool(self.present.all()), bool(self.present.any())
         self.set_of = np.repeat(np.arange(len(self.sets)), count)
         self.count = np.concatenate([
@@ -231,85 +225,65 @@ class Readings:
 
     def _grown(self, i: int, seen: Predicted, pose: FloatArray, theta: FloatArray) -> Predicted:
         """What is read of set `i` where the machine has grown with its temperature."""
-        growth = self._growth[i]
-        if growth is None:
+        if not self._effects[i]:
             return seen
-        by_number, of_platform = growth
         places = [(self.pose_of[i], seen.by_twist)]
         if seen.by_other is not None and (there := self.other_of[i]) is not None:
             places.append((there, seen.by_other))
+        numbers, by = self.arguments_of(i, theta), dict(seen.by)
         moved = np.zeros(seen.values.shape)
-        for machine, rows in self._machines(i, theta):
-            grown = machine.geometry.values[: by_number.shape[1]] * by_number[rows]
-            for place, by_twist in places:
-                at = place[rows]
-                twists = machine.error_twists(pose[at], self.actuators[at])[..., : grown.shape[1]]
-                twist = np.einsum("nij,nj->ni", twists, grown)
-                moved[rows] += np.einsum("nki,ni->nk", by_twist[rows], twist)
-        target = self.arguments_of(i, theta).get("target")
-        if target is not None and "target" in seen.by:
-            moved += np.einsum("nki,ni->nk", seen.by["target"], target * of_platform[:, None])
+        for effect in self._effects[i]:
+            for machine, rows in self._machines(i, theta):
+                for place, by_twist in places:
+                    at = place[rows]
+                    found = effect.moved(machine, pose[at], self.actuators[at], rows, numbers)
+                    moved[rows] += np.einsum("nki,ni->nk", by_twist[rows], found.twist)
+                    for name, rates in found.by.items():
+                        by.setdefault(name, np.zeros((*moved.shape, rates.shape[2])))
+                        by[name][rows] += by_twist[rows] @ rates
+            grown, target = effect.growth_of_targets(), numbers.get("target")
+            if grown is not None and target is not None and "target" in seen.by:
+                moved += np.einsum("nki,ni->nk", seen.by["target"], target * grown[:, None])
         values = corrected(self.sets[i].kind, seen.values, moved)
-        return replace(seen, values=values)
+        return replace(seen, values=values, by=by)
 
     def _predicted_of(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
-        places, measured = self.arguments_of(i, theta), self.sets[i]
-        kind, mine, there = measured.kind, pose[self.pose_of[i]], self.other_of[i]
-        touching = (measured.artefact, self._along[i])
-        if measured.joint is not None:
-            return read_angles(*self._angles(i, pose, theta), **places)
+        places, at = self.arguments_of(i, theta), self._seen_at(i, pose, theta)
+        reading = self.sets[i].instrument
+        for name in self._of_effects[i]:
+            del places[name]
         if not self._frames[i]:
-            return predict(
-                kind,
-                mine,
-                touching=touching,
-                other=None if there is None else pose[there],
-                **places,
-            )
+            return reading.predict(at, **places)
         parts = [
-            predict(
-                kind,
-                mine[rows],
-                frame=theta[first : first + 6],
-                origin=self.parameters.origin[first],
-                touching=touching,
+            reading.predict(
+                replace(
+                    at,
+                    pose=at.pose[rows],
+                    frame=theta[first : first + 6],
+                    origin=self.parameters.origin[first],
+                ),
                 **{name: place[rows] for name, place in places.items()},
             )
             for first, rows in self._frames[i]
         ]
         return joined(parts, [rows for _, rows in self._frames[i]])
 
-    def _angles(
-        self, i: int, pose: FloatArray, theta: FloatArray
-    ) -> tuple[FloatArray, FloatArray | None]:
-        """Angles (N,) of the passive joint that set `i` reads, and by the twist (N, 6), or None."""
-        measured, joint = self.sets[i], str(self.sets[i].joint)
-        found, by_twist = np.empty(len(measured)), np.empty((len(measured), 6))
-        if joint_angles.follows_pose(self.parameters.robot, joint):
-            for machine, rows in self._machines(i, theta):
-                at, none = pose[self.pose_of[i][rows]], np.empty(0, dtype=np.intp)
-                found[rows], by_twist[rows], _ = joint_angles.swivels(machine, at, joint, none)
-            return found, by_twist
-        for machine, rows in self._machines(i, theta):
-            q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
-            state = measured.drive_state.at(rows)
-            found[rows] = joint_angles.angles(machine, q, at, joint, state)
-        return found, None
+    def _seen_at(self, i: int, pose: FloatArray, theta: FloatArray) -> At:
+        """Where the machine is in the rows of set `i`."""
+        measured, there = self.sets[i], self.other_of[i]
+        return At(
+            pose[self.pose_of[i]],
+            None if there is None else pose[there],
+            along=self._along[i],
+            artefact=measured.artefact,
+            machines=lambda: self._machines(i, theta),
+            measured=measured,
+        )
 
     def by_numbers(self, i: int, pose: FloatArray, theta: FloatArray) -> FloatArray | None:
         """How readings of set `i` follow the geometry not by the pose alone, (N, k, g)."""
-        measured, places = self.sets[i], self.parameters.places
-        if measured.joint is None:
-            return None
-        found = np.empty((len(measured), 1, len(places)))
-        for machine, rows in self._machines(i, theta):
-            q, at = measured.actuators[rows], pose[self.pose_of[i][rows]]
-            if joint_angles.follows_pose(machine, measured.joint):
-                found[rows, 0] = joint_angles.swivels(machine, at, measured.joint, places)[2]
-                continue
-            state = measured.drive_state.at(rows)
-            found[rows, 0] = joint_angles.rates(machine, q, at, measured.joint, places, state)
-        return found
+        reading = self.sets[i].instrument
+        return reading.by_geometry(self._seen_at(i, pose, theta), self.parameters.places)
 
     def _machines(self, i: int, theta: FloatArray) -> Iterator[tuple[Calibratable, IntArray]]:
         """The machines of set `i`, one or one a session, and the rows of each."""
@@ -334,7 +308,7 @@ class Readings:
         worst = np.full(len(pose), np.nan)
         residuals = self.residuals(self.predicted(pose, theta))
         for measured, place, residual in zip(self.sets, self.pose_of, residuals, strict=True):
-            arcs = mm_per_unit(measured.units, self.parameters.robot.length)
+            arcs = measured.instrument.mm(measured, self.parameters.robot.length)
             known = np.where(np.isfinite(measured.values.reshape(residual.shape)), residual, 0.0)
             off = np.linalg.norm(known * arcs, axis=1)
             off = np.where(np.isfinite(off), off, np.inf)
@@ -424,7 +398,7 @@ def _rounded(measured: Measurements, length: float) -> FloatArray:
     values = measured.values.reshape(len(measured), -1)
     lengths = np.array([unit == "mm" for unit in measured.units], dtype=bool)
     size = np.max(np.nan_to_num(np.abs(values[:, lengths])), initial=0.0) + length
-    return np.broadcast_to(ROUNDING * size / mm_per_unit(measured.units, length), values.shape)
+    return np.broadcast_to(ROUNDING * size / measured.instrument.mm(measured, length), values.shape)
 
 
 def of_read(measured: Measurements, residual: FloatArray) -> FloatArray:
@@ -443,7 +417,7 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     """Factors (N, k) or matrices (N, k, k) that make the noise one; 1 mm where it is not known."""
     sigma = measured.sigma
     if sigma is None:
-        return np.tile(mm_per_unit(measured.units, length), (len(measured), 1))
+        return np.tile(measured.instrument.mm(measured, length), (len(measured), 1))
     first = KINDS[measured.kind].turning
     if first is not None and not _same_turnings(sigma, first):
         sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, first:]))

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pkmcal.arrays import BoolArray, FloatArray, Int32Array
+from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +29,12 @@ class RowStates:
     actuators: FloatArray
     status: Int32Array
     tension: FloatArray | None = None
+
+    def at_poses(self, rows: IntArray, poses: FloatArray) -> RowStates:
+        """These with some rows at poses (s, 6)."""
+        pose = self.pose.copy()
+        pose[rows] = poses
+        return replace(self, pose=pose)
 
     def chosen(self, rows: BoolArray, others: RowStates) -> RowStates:
         """These where `rows` (K,), else the others."""

@@ -20,7 +20,7 @@ from pkmcal.estimation.tensioned_poses import Cells, tensioned_poses
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.readings.calibratable import Calibratable
 
 AnyArray = TypeVar("AnyArray", FloatArray, Int32Array, BoolArray)
 

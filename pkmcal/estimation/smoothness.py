@@ -12,7 +12,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.readings.calibratable import Calibratable
 
 
 def smoothness_rows(

@@ -83,6 +83,7 @@ def names_of_kinds(table: Table) -> set[str]:
     names |= {f"to.{name}" for name in actuators_in(table)}
     names |= {"tilt1", "tilt2", "touch", *(f"touch:{name}" for name in TOUCHES), *_STATED}
     names |= {name for name in _offsets() if name in table.columns}
+    names |= {name for each in KINDS.values() for name in (*each.headings, *each.besides)}
     return names | ({"run"} if "distance" in table.columns else set())
 
 
@@ -110,6 +111,9 @@ def kinds_in(table: Table) -> dict[str, Kind]:
             found[name] = "angle"
         elif _ARTEFACT.fullmatch(name):
             found[name] = "touch"
+    for each in KINDS.values():
+        if any(name in table.columns for name in each.headings):
+            found[", ".join(each.headings)] = cast(Kind, each.name)
     return found
 
 
@@ -139,7 +143,7 @@ def read_kind_fields(table: Table, kind: Kind, units: Sequence[str]) -> dict[str
         name, artefact = _artefact(table)
         fields = {"touched": np.array(table.texts(name)), "artefact": artefact}
         return fields | {"touch_distances": _known_distances(table, name)}
-    return {}
+    return KINDS[kind].read(table)
 
 
 def _artefact(table: Table) -> tuple[str, Artefact]:
@@ -189,6 +193,7 @@ def kind_cells(m: OfAKind, units: Sequence[str]) -> Iterator[tuple[str, Sequence
     if m.other is not None:
         for i, unit in enumerate(units):
             yield f"to.q{i + 1} [{unit}]", [repr(float(value)) for value in m.other[:, i]]
+    yield from m.instrument.cells(m)
     if m.run is not None:
         yield "run", m.run.tolist()
     if m.touched is None:

@@ -66,7 +66,6 @@ from pkmcal.measurements.actuator_columns import (
     read_actuators,
     read_of_actuators,
 )
-from pkmcal.measurements.calibratable import as_machine
 from pkmcal.measurements.components import KINDS, Kind
 from pkmcal.measurements.join import join as joined
 from pkmcal.measurements.join import way_and_shift
@@ -99,6 +98,7 @@ from pkmcal.measurements.table_layout import (
 from pkmcal.measurements.target_columns import read_several, read_targets, several_targets
 from pkmcal.measurements.temperature_columns import WHOLE, parts_of, read_temperature
 from pkmcal.measurements.time_stamps import times_of
+from pkmcal.readings.calibratable import as_machine
 
 _AXES = ("x", "y", "z")
 _TRIED = 200  # rows by which an order of angles is told

@@ -47,6 +47,7 @@ from pkmcal.measurements.listing import deviations, table, title
 from pkmcal.measurements.measurement_writer import write_measurements
 from pkmcal.measurements.poses import pose_index
 from pkmcal.measurements.tracker import Tracker
+from pkmcal.readings.reading import Reading
 from pkmcal.result import Result
 
 _PER_ROW = (
@@ -185,13 +186,15 @@ class Measurements(Result):
     lines: Int64Array | None = None
     file: str = ""
     notes: tuple[str, ...] = ()
+    instrument: Reading = KINDS["position"]
+    labels: Mapping[str, TextArray] = dataclasses.field(default_factory=dict)
 
     # The types above are those of the attributes; anything array-like is taken.
     def __init__(
         self,
         actuators: ArrayLike,
         values: ArrayLike | None,
-        kind: Kind = "position",
+        kind: Kind | Reading = "position",
         *,
         sigma: ArrayLike | Tracker | None = None,
         target: ArrayLike | None = None,
@@ -216,7 +219,11 @@ class Measurements(Result):
         lines: ArrayLike | None = None,
         file: str = "",
         notes: Sequence[str] = (),
+        instrument: Reading | None = None,
+        labels: Mapping[str, Sequence[str]] | None = None,
     ) -> None:
+        if isinstance(kind, Reading):
+            kind, instrument = kind.name, kind
         word("kind", kind, KINDS)
         q = numbers("actuators", actuators)
         if q.ndim not in (1, 2) or 0 in q.shape:
@@ -263,6 +270,8 @@ class Measurements(Result):
             "lines": None if lines is None else integers("lines", lines, len(q)),
             "file": file,
             "notes": words("notes", notes),
+            "instrument": instrument or KINDS[kind],
+            "labels": {k: np.array(each) for k, each in (labels or {}).items()},
         }
         self.__setstate__(fields)
 
@@ -354,6 +363,7 @@ class Measurements(Result):
             for name, value in vars(self).items()
             if name in _PER_ROW
         }
+        per_row["labels"] = {name: each[picked] for name, each in self.labels.items()}
         for name in ("target", "attachment"):
             place = getattr(self, name)
             if place is not None and place.ndim == 2 and self.target_index is None:

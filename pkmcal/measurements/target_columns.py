@@ -21,7 +21,8 @@ def several_targets(table: Table) -> tuple[str, ...]:
     """Names of the targets that have columns of their own, in the order of the columns."""
     matches = (_OF_A_TARGET.fullmatch(name) for name in table.columns)
     found = dict.fromkeys(match["target"] for match in matches if match)
-    return tuple(name for name in found if name.partition(".")[0] not in RESERVED)
+    taken = {b.partition(".")[0] for each in KINDS.values() for b in each.besides}
+    return tuple(name for name in found if name.partition(".")[0] not in {*RESERVED, *taken})
 
 
 def read_several(

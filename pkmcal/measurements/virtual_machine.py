@@ -11,16 +11,17 @@ from numpy.typing import ArrayLike
 
 from pkmcal.arguments import checked_seed, did_you_mean, number, shown, word
 from pkmcal.arms.arm import SerialArm
-from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.arrays import FloatArray
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import ArmMachine, Solvable
 from pkmcal.measurements.components import KINDS, Artefact, Kind, components
 from pkmcal.measurements.fields import numbers
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import corrected, predict
+from pkmcal.measurements.observation import corrected
 from pkmcal.measurements.tracker import Tracker
+from pkmcal.readings.calibratable import ArmMachine, Solvable
+from pkmcal.readings.reading import At, Reading
 
 _ARM = 200.0  # mm; an instrument good to 0.02 mm over it is good to 1e-4 rad
 
@@ -79,9 +80,10 @@ class VirtualMachine:
     def measure(
         self,
         q: ArrayLike,
-        kind: Kind = "position",
+        kind: Kind | Reading = "position",
         target: ArrayLike | None = None,
         *,
+        labels: Mapping[str, Sequence[str]] | None = None,
         attachment: ArrayLike | None = None,
         other: ArrayLike | None = None,
         run: Sequence[str] | None = None,
@@ -141,11 +143,12 @@ class VirtualMachine:
         n = getattr(self._machine, "n_actuators", actuators.shape[-1])
         if actuators.ndim != 2 or actuators.shape[1] != n or not actuators.size:
             raise ArgumentError(f"q must have shape (N, {n}) or ({n},); found {np.shape(q)}")
-        word("kind", kind, KINDS)
+        if not isinstance(kind, Reading):
+            kind = KINDS[word("kind", kind, KINDS)]
         if tension is not None:
             numbers("tension", tension)  # of what is driven it is known
-        touching = kind == "touch"
-        width = len(components(kind, artefact if touching else None))
+        touching = kind.name == "touch"
+        width = len(components(kind.name, artefact if touching else None))
         blank = Measurements(
             actuators,
             np.zeros((len(actuators), width) if width > 1 else len(actuators)),
@@ -160,13 +163,14 @@ class VirtualMachine:
             touched=touches,
             artefact=artefact if touching else None,
             joint=joint,
+            labels=labels,
         )
         exact = self._exact(blank, mounting, touched)
         if blank.run is not None:
             first = np.unique(blank.run, return_index=True, return_inverse=True)[1:]
             exact -= exact[first[0]][first[1].reshape(-1)]
         noise, sigma = self._drawn(blank, exact)
-        values = corrected(kind, exact, noise).reshape(blank.values.shape)
+        values = corrected(kind.name, exact, noise).reshape(blank.values.shape)
         return dataclasses.replace(blank, values=values, sigma=sigma)
 
     def _exact(
@@ -183,37 +187,20 @@ class VirtualMachine:
                 known = did_you_mean(blank.joint, names)
                 raise ArgumentError(f"joint: no passive joint is called {blank.joint!r}{known}")
             return np.array(solved.passive[:, [names.index(blank.joint)]])
-        return predict(
-            blank.kind,
+        at = At(
             np.asarray(solved.pose),
-            other=None if blank.other is None else _solved(machine, blank.other, "other").pose,
-            touching=(blank.artefact, np.full(len(blank), 2)),
-            **self._arguments(blank, mounting, touched),
-        ).values
+            None if blank.other is None else _solved(machine, blank.other, "other").pose,
+            along=np.full(len(blank), 2),
+            artefact=blank.artefact,
+        )
+        return blank.instrument.predict(at, **self._arguments(blank, mounting, touched)).values
 
     def _arguments(
         self, blank: Measurements, mounting: ArrayLike, touched: Mapping[str, ArrayLike] | None
     ) -> dict[str, FloatArray]:
         """What the readings depend on beside the pose, as `predict` takes it."""
-        if blank.kind in ("tilt", "orientation"):
-            return {"mounting": as_rows("mounting", mounting, 3)[0][0]}
-        if KINDS[blank.kind].point == "base":
-            return {"target": blank.attachments, "anchor": blank.targets}
-        found = {"target": blank.targets}
-        if blank.touched is None:
-            return found
-        wide = {"point": 3, "sphere": 4}.get(blank.artefact or "", 6)
-        places = {
-            name: as_rows(f"touched[{name!r}]", place, wide)[0][0]
-            for name, place in (touched or {}).items()
-        }
-        missing = [name for name in np.unique(blank.touched).tolist() if name not in places]
-        if missing:
-            raise ArgumentError(f"touched: where {missing[0]!r} is has to be given")
-        rows = np.array([places[name] for name in blank.touched.tolist()])
-        if wide == 4:
-            return found | {"anchor": rows[:, :3], "zero": rows[:, 3:]}
-        return found | {"place": np.hstack([rows, np.zeros((len(rows), 6 - wide))])}
+        truth = {"mounting": mounting, "touched": touched}
+        return blank.instrument.simulated(blank, truth)
 
     def _drawn(self, blank: Measurements, exact: FloatArray) -> tuple[FloatArray, Any]:
         """Noise (N, k), and the sigma to state."""
@@ -223,8 +210,8 @@ class VirtualMachine:
                 raise ArgumentError(f"kind: a tracker measures positions, found {blank.kind!r}")
             covariance = self.noise.covariance(exact)
             return (np.linalg.cholesky(covariance) @ drawn[:, :, None])[:, :, 0], self.noise
-        deviations = {"mm": self.noise, "rad": self.angle_noise}
-        sigma = np.array([deviations[unit] for unit in blank.units])
+        deviations = {"rad": self.angle_noise}  # every other unit: the instrument's noise
+        sigma = np.array([deviations.get(unit, self.noise) for unit in blank.units])
         return sigma * drawn, sigma if (sigma > 0).all() else None
 
 

@@ -19,7 +19,6 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.pulled import pulled
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import Calibratable, as_machine
 from pkmcal.measurements.components import Kind
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.planning.optimal_design import CRITERIA, Criterion
@@ -33,6 +32,8 @@ from pkmcal.planning.planned import (
 )
 from pkmcal.planning.tour import short_tour
 from pkmcal.planning.travel_weight import with_travel
+from pkmcal.readings.calibratable import Calibratable, as_machine
+from pkmcal.readings.reading import Reading
 from pkmcal.result import Result
 
 PLANNED: tuple[Kind, ...] = ("position", "pose", "height", "distance", "orientation", "closure")
@@ -320,7 +321,8 @@ def _counts(
                 f" accuracy; found {kind!r}"
             )
         return {word("kind", each, PLANNED): n for each, n in kind.items()}
-    word("kind", kind, PLANNED)
+    if not isinstance(kind, Reading):
+        word("kind", kind, PLANNED)
     if (count is None) == (accuracy is None):
         raise ArgumentError(
             "give either count, how many poses, or accuracy, the error wanted in mm"

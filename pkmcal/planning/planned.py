@@ -16,15 +16,17 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.identifiability import as_sum, sparse_basis
 from pkmcal.estimation.parameters import Asked, Parameters, Prior
+from pkmcal.estimation.starts import with_starts
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics import pose_steps
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.components import Kind
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.measurements.virtual_machine import VirtualMachine
 from pkmcal.planning.optimal_design import Criterion, Design
+from pkmcal.readings.calibratable import Calibratable
+from pkmcal.readings.reading import Reading
 from pkmcal.statistics.linear_fit import column_basis
 
 Unknown = Literal["frame", "target"]
@@ -54,6 +56,9 @@ def planned(
             " measured, too: state how well they are read"
         )
     count = 1 if several is None else len(several)
+    of_pose: dict[str, list[str]] = kind.of_each_pose() if isinstance(kind, Reading) else {}
+    count = max([count, *map(len, of_pose.values())])
+    labels = {name: each * len(q) for name, each in of_pose.items()}
     rows = np.repeat(q, count, axis=0)
     if kind == "closure":
         if not surplus:
@@ -64,14 +69,14 @@ def planned(
         measured = Measurements(rows, None, kind, actuator_units=robot.actuator_units)
     else:
         places = None if several is None else np.tile(several, (len(q), 1))
-        measured = VirtualMachine(robot, noise).measure(rows, kind, places)
+        measured = VirtualMachine(robot, noise).measure(rows, kind, places, labels=labels)
         if measured.sigma is None:
             raise ArgumentError(
                 f"noise must be above 0, found {noise}: without it any poses will do"
             )
         # a frame laid through noise is tilted by as much as heights can tell, and what is never
         # seen of a level machine would seem to be
-        exact = VirtualMachine(robot, 0.0).measure(rows, kind, places)
+        exact = VirtualMachine(robot, 0.0).measure(rows, kind, places, labels=labels)
         measured = replace(measured, values=exact.values)
         if several is not None:
             index = np.tile(np.arange(count), len(q))
@@ -96,6 +101,7 @@ def equations_of(
         FitData(measured, np.arange(len(measured)), "frame" in sought, "target" in sought)
         for measured in sets
     ]
+    datasets = with_starts(robot, datasets)
     chosen = parameters(robot, datasets, Asked(free, prior))
     return [Equations([data], chosen) for data in datasets]
 

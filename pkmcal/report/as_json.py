@@ -12,7 +12,7 @@ import numpy as np
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import as_machine
+from pkmcal.readings.calibratable import as_machine
 
 VERSION = 1  # of `schema.json`: keys are added to it, never taken away or changed
 

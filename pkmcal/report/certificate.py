@@ -11,7 +11,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, rms
 from pkmcal.calibration.identification import Identification
-from pkmcal.estimation.expansion import REFERENCE, coefficients, temperatures
+from pkmcal.effects.expansion import REFERENCE, coefficients, temperatures
 from pkmcal.estimation.identifiability import listed
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files import reading

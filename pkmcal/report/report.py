@@ -13,7 +13,7 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
 from pkmcal.calibration.row_names import row_names
 from pkmcal.display import printable
-from pkmcal.estimation.expansion import in_words
+from pkmcal.effects.expansion import in_words
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import checksums, comment, version
 from pkmcal.report import certificate, contents, machine_view, pdf

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from pkmcal.core import instruments
 from pkmcal.core.poses import compose
-from pkmcal.estimation import alignment
-from pkmcal.estimation.alignment import PointPairs
+from pkmcal.readings import alignment
+from pkmcal.readings.alignment import PointPairs
 
 TURNS = {
     "none": np.zeros(3),

@@ -76,8 +76,8 @@ def test_rows_that_stay_in_another_mode_are_named() -> None:
     start = equations.start()
     assert in_other_modes(equations, start) == []
     others = robot.forward_all(equations.actuators[5]).poses
-    equations.start_from(np.array([5]), others[-1:])
-    (text,) = in_other_modes(equations, equations.at(start.theta))
+    states = start.states.at_poses(np.array([5]), others[-1:])
+    (text,) = in_other_modes(equations, equations.at(start.theta, near=states))
     row = int(np.flatnonzero(equations.pose_of[0] == 5)[0])
     assert text.startswith("1 row fits another assembly mode") and f"rows {row}" in text
 

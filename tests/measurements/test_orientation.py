@@ -13,8 +13,8 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
-from pkmcal.measurements import orientation
 from pkmcal.measurements.observation import corrected, difference
+from pkmcal.readings import orientation
 
 from ..workspaces import WORKSPACE, poses
 

@@ -19,7 +19,7 @@ from pkmcal.core.pulleys import PulleyMachine
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import Calibratable
+from pkmcal.readings.calibratable import Calibratable
 
 _STEP = 1e-5  # of the machine's size
 

@@ -9,18 +9,20 @@ the square of 0.01 % and its like.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 
 from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.effects.effect import Moved
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
+from pkmcal.readings.calibratable import Calibratable
+from pkmcal.readings.unknowns import Dependence
 
 Coefficients = float | Mapping[str, float] | None
 REFERENCE = 20.0  # °C
@@ -50,7 +52,11 @@ class Expansion:
     column: IntArray
     platform: float
 
-    def growth(self, measured: Measurements) -> tuple[FloatArray, FloatArray]:
+    def dependences(self, measured: Measurements) -> Iterator[Dependence]:
+        """None: its coefficients are exact."""
+        return iter(())
+
+    def of_rows(self, measured: Measurements) -> Growth:
         """Relative growth of each number (N, k), and of places on the platform (N,).
 
         Raises
@@ -73,7 +79,29 @@ class Expansion:
             where = f"row {row}" if measured.lines is None else f"line {measured.lines[row]}"
             file = f"{measured.file}, " if measured.file else ""
             raise ArgumentError(f"expansion: {file}{where}: a temperature is missing")
-        return by_number * self.coefficient, platform * self.platform
+        return Growth(by_number * self.coefficient, platform * self.platform)
+
+
+@dataclass(frozen=True, eq=False)
+class Growth:
+    """Relative growth of each number (N, k), and of places on the platform (N,)."""
+
+    by_number: FloatArray
+    of_platform: FloatArray
+
+    def moved(
+        self, machine: Any, pose: FloatArray, actuators: FloatArray, rows: IntArray,
+        numbers: Mapping[str, FloatArray],
+    ) -> Moved:  # fmt: skip
+        """How the platform moves at poses (N, 6) of some rows."""
+        k = self.by_number.shape[1]
+        grown = machine.geometry.values[:k] * self.by_number[rows]
+        twists = machine.error_twists(pose, actuators)[..., :k]
+        return Moved(np.einsum("nij,nj->ni", twists, grown))
+
+    def growth_of_targets(self) -> FloatArray:
+        """Relative growth of places on the platform (N,)."""
+        return self.of_platform
 
 
 def expansion_of(robot: Calibratable, given: Coefficients) -> Expansion | None:

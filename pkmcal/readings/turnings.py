@@ -1,0 +1,202 @@
+"""Orientations, tilts and whole poses of the platform, or of what is mounted on it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, as_rows
+from pkmcal.core import instruments
+from pkmcal.core.poses import compose
+from pkmcal.readings import orientation
+from pkmcal.readings.alignment import angles_of, nearest_rotations, of_directions
+from pkmcal.readings.points import points
+from pkmcal.readings.reading import At, Components, Predicted, Reading
+from pkmcal.readings.unknowns import ANGLES, PLACE, Dependence, Found, Start, always
+
+_ORIGIN = np.zeros(3)
+_NOWHERE = np.zeros(6)
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Pose(Reading):
+    """Where the platform is and how it is turned, or a tool on it."""
+
+    name: str = "pose"
+    components: Components = PLACE
+    turning: int | None = 3
+    framed: bool = True
+
+    def predict(
+        self,
+        at: At,
+        tool: FloatArray | None = None,
+        tool_origin: FloatArray = _NOWHERE,
+        **_: FloatArray,
+    ) -> Predicted:
+        return _poses(at.pose, tool, tool_origin, at.frame, at.origin)
+
+    def dependences(self, data: Any) -> Iterator[Dependence]:
+        if data.unknown_target:
+            yield always("tool", "tool", PLACE, [""] * len(data.measured), data.starts)
+
+    def starts(self, machine: Any, sets: Sequence[tuple[Any, FloatArray]], found: Found) -> None:
+        found["tool", ""] = Start(tuple(range(6)), np.zeros(6))  # `first_frames` lays it
+
+
+@dataclass(frozen=True)
+class Orientation(Reading):
+    """How the platform is turned, or a sensor on it."""
+
+    name: str = "orientation"
+    components: Components = ANGLES
+    turning: int | None = 0
+    framed: bool = True
+    starts_by_pose = True
+
+    def predict(self, at: At, mounting: FloatArray = _ORIGIN, **_: FloatArray) -> Predicted:
+        return _orientations(at.pose, mounting, at.frame, at.origin)
+
+    def dependences(self, data: Any) -> Iterator[Dependence]:
+        if data.unknown_target:
+            yield always("mounting", "mounting", ANGLES, [""] * len(data.measured), data.starts)
+
+    def starts(self, machine: Any, sets: Sequence[tuple[Any, FloatArray]], found: Found) -> None:
+        _mounted(sets, found, _of_orientations)
+
+    def simulated(self, m: Any, truth: Any) -> dict[str, FloatArray]:
+        return {"mounting": as_rows("mounting", truth["mounting"], 3)[0][0]}
+
+
+@dataclass(frozen=True)
+class Tilt(Orientation):
+    """How far the x and y axes of a sensor point up."""
+
+    name: str = "tilt"
+    components: Components = (("tilt1", "rad"), ("tilt2", "rad"))
+    turning: int | None = None
+
+    def predict(self, at: At, mounting: FloatArray = _ORIGIN, **_: FloatArray) -> Predicted:
+        return _tilts(at.pose, mounting, at.frame, at.origin)
+
+    def dependences(self, data: Any) -> Iterator[Dependence]:
+        yield always("mounting", "mounting", ANGLES, [""] * len(data.measured), data.starts)
+
+    def starts(self, machine: Any, sets: Sequence[tuple[Any, FloatArray]], found: Found) -> None:
+        _mounted(sets, found, _of_tilts)
+
+
+def _mounted(sets: Sequence[tuple[Any, FloatArray]], found: Found, of: Any) -> None:
+    """How a sensor is mounted: by orientations if any were read, else by tilts."""
+    if ("mounting", "") in found:
+        return
+    values = np.concatenate([data.measured.values for data, _ in sets])
+    pose = np.concatenate([pose for _, pose in sets])
+    known = np.isfinite(values).all(axis=1) & np.isfinite(pose).all(axis=1)
+    mounting = np.zeros(3)
+    if known.any():
+        mounting = of(values[known], pose[known, 3:], sets[0][0].unknown_frame)
+    found["mounting", ""] = Start((0, 1, 2), mounting)
+
+
+def _poses(
+    pose: FloatArray,
+    tool: FloatArray | None,
+    tool_origin: FloatArray,
+    frame: FloatArray | None,
+    origin: FloatArray,
+) -> Predicted:
+    """Poses of the platform, or of a tool that is mounted on it."""
+    whole = np.zeros_like(pose) if tool is None else compose(tool_origin, tool)
+    place = points(pose, np.ascontiguousarray(whole[:, :3]), frame, origin)
+    turned = _orientations(pose, None if tool is None else whole[:, 3:], frame, origin)
+    by, by_frame = {}, None
+    if tool is not None:  # its six numbers move and turn it in the axes of its origin
+        outer = orientation.rotations(tool_origin[:, 3:])
+        seen = place.by["target"] @ outer
+        by["tool"] = np.zeros((len(pose), 6, 6))
+        by["tool"][:, :3, :3] = seen
+        by["tool"][:, 3:, 3:] = seen @ orientation.axes_of_angles(tool[:, 3:])
+    if place.by_frame is not None and turned.by_frame is not None:
+        by_frame = np.concatenate([place.by_frame, turned.by_frame], axis=1)
+    return Predicted(
+        np.hstack([place.values, turned.values]),
+        np.concatenate([place.by_twist, turned.by_twist], axis=1),
+        by,
+        by_frame=by_frame,
+    )
+
+
+def _orientations(
+    pose: FloatArray, mounting: FloatArray | None, frame: FloatArray | None, origin: FloatArray
+) -> Predicted:
+    """Orientations of the platform, or of a sensor that is mounted on it."""
+    carried = pose
+    if mounting is not None:
+        carried = compose(pose, np.hstack([np.zeros_like(mounting), mounting]))
+    whole, by_angles = _frame_turning(frame, origin)
+    seen = carried if frame is None else compose(compose(origin, frame[None])[0], carried)
+    by_twist = np.zeros((len(pose), 3, 6))
+    by_twist[:, :, :3] = whole
+    by = {}
+    if mounting is not None:
+        axes = orientation.axes_of_angles(mounting.reshape(-1, 3))
+        by["mounting"] = whole @ orientation.rotations(pose[:, 3:]) @ axes
+    by_frame = None
+    if frame is not None:
+        by_frame = np.zeros((len(pose), 3, 6))
+        by_frame[:, :, 3:] = by_angles
+    return Predicted(seen[:, 3:], by_twist, by, by_frame=by_frame)
+
+
+def _tilts(
+    pose: FloatArray, mounting: FloatArray, frame: FloatArray | None, origin: FloatArray
+) -> Predicted:
+    whole, by_angles = _frame_turning(frame, origin)
+    tilt, by_turn, by_mounting, by_up = instruments.tilts(pose, mounting, whole[2])
+    by_twist = np.concatenate([by_turn, np.zeros_like(by_turn)], axis=2)
+    by_frame = None
+    if frame is not None:  # up = Rᵀ z, of R that turns by ω: Rᵀ (z × ω)
+        by_frame = np.zeros((len(pose), 2, 6))
+        by_frame[:, :, 3:] = by_up @ (whole.T @ np.cross(_UP, by_angles.T).T)
+    return Predicted(tilt, by_twist, {"mounting": by_mounting}, by_frame=by_frame)
+
+
+def _frame_turning(frame: FloatArray | None, origin: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """From the base's axes to the instrument's (3, 3), and turnings there by the frame's angles."""
+    if frame is None:
+        return np.eye(3), np.zeros((3, 3))
+    outer = orientation.rotations(origin[None, 3:])[0]
+    inner = orientation.rotations(frame[None, 3:])[0]
+    by_angles: FloatArray = outer @ orientation.axes_of_angles(frame[None, 3:])[0]
+    return outer @ inner, by_angles
+
+
+def _of_orientations(values: FloatArray, turned: FloatArray, framed: bool) -> FloatArray:
+    """Mounting (3,) with which a sensor reads these orientations."""
+    platform, sensor = orientation.rotations(turned), orientation.rotations(values)
+    frame = np.eye(3)
+    if framed:  # turnings from the first reading on do not depend on the mounting
+        first = np.zeros(len(turned), dtype=np.intp)
+        turnings = [orientation.between(each, each[first]) for each in (values, turned)]
+        frame = of_directions(*turnings)
+    mountings = platform.transpose(0, 2, 1) @ frame.T @ sensor
+    return angles_of(nearest_rotations(mountings.sum(axis=0)))
+
+
+def _of_tilts(values: FloatArray, turned: FloatArray, framed: bool) -> FloatArray:
+    """Mounting (3,) with which a sensor reads these tilts, whichever side up."""
+    up = orientation.rotations(turned)[:, 2, :]  # the vertical in platform axes
+    level = np.sin(values)
+    rest = np.sqrt(np.maximum(0.0, 1.0 - (level**2).sum(axis=1)))
+    trials = []
+    for side in (1.0, -1.0):
+        seen = np.column_stack([level, side * rest])
+        turn = of_directions(up, seen)
+        trials.append((float(((seen @ turn.T - up) ** 2).sum()), turn))
+    upright, hanging = trials
+    return angles_of(upright[1] if upright[0] <= hanging[0] else hanging[1])

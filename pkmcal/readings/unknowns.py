@@ -1,0 +1,141 @@
+"""What readings depend on beside the pose: numbers that are given, or found along."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray, Unit
+from pkmcal.exceptions import ArgumentError
+
+POINT: tuple[tuple[str, Unit], ...] = (("x", "mm"), ("y", "mm"), ("z", "mm"))
+ANGLES: tuple[tuple[str, Unit], ...] = (("alpha", "rad"), ("beta", "rad"), ("gamma", "rad"))
+PLACE = POINT + ANGLES
+_WHOLE_POINT = (0, 1, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """Numbers that are found along, and that some rows have in common: a point, a zero.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the parameters, as ``touch.A.x``.
+    units : tuple of str
+        Their units.
+    slots : ndarray of int
+        Which numbers of the argument they are.
+    start : ndarray
+        Where the search for them starts.
+    scale : ndarray or None
+        Change of each that moves readings about as 1 mm of the machine does; None: by the unit.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[Unit, ...]
+    slots: IntArray
+    start: FloatArray
+    scale: FloatArray | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Dependence:
+    """What an argument of `Reading.predict` is in the rows of a set.
+
+    Attributes
+    ----------
+    argument : str
+        Its name there.
+    role : str
+        What it is to users: "target", "anchor", "attachment", "tool", "run", "angle" …
+    given : ndarray (N, w)
+        Its numbers, as far as they are known.
+    sought : mapping of str to Numbers
+        Those that are found along, by the name that rows have in common.
+    index : ndarray of int (N,)
+        Which of them each row has, in their order.
+    """
+
+    argument: str
+    role: str
+    given: FloatArray
+    sought: Mapping[str, Numbers]
+    index: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Where an artefact, a zero or a sensor is found with the nominal machine.
+
+    Attributes
+    ----------
+    slots : tuple of int
+        Which numbers of the argument are sought: a plane has one place and two turnings.
+    values : ndarray
+        Their values.
+    along : int
+        Which axis of its own a line has, or is normal to a plane: 0, 1 or 2.
+    """
+
+    slots: tuple[int, ...]
+    values: FloatArray
+    along: int = 0
+
+
+Found = dict[tuple[str, str], Start]  # by role and name
+
+
+def always(argument, role, numbers, names, starts) -> Dependence:
+    """What is never known before: `numbers` are the argument's, `names` (N,) whose they are."""
+    sought = {}
+    for name in dict.fromkeys(names):
+        start = starts[role, name]
+        chosen = [numbers[slot] for slot in start.slots]
+        whose = ".".join(filter(None, (role.partition(" ")[0], name)))
+        sought[name] = Numbers(
+            tuple(f"{whose}.{number}" for number, _ in chosen),
+            tuple(unit for _, unit in chosen),
+            np.array(start.slots, dtype=np.intp),
+            start.values,
+        )
+    order = {name: i for i, name in enumerate(sought)}
+    index = np.array([order[name] for name in names], dtype=np.intp)
+    return Dependence(argument, role, np.zeros((len(names), len(numbers))), sought, index)
+
+
+def point(m, argument, role, unknown) -> Dependence:
+    """A point of platform or base, which the user places."""
+    if not unknown:
+        given = m.attachments if role == "attachment" else m.targets
+        return Dependence(argument, role, given, {}, np.zeros(len(m), dtype=np.intp))
+    places, index = points_of(role, m)
+    units = tuple(unit for _, unit in POINT)
+    sought = {
+        name: Numbers(
+            tuple(f"{role}{name}.{axis}" for axis, _ in POINT), units, np.array(_WHOLE_POINT), place
+        )
+        for name, place in places.items()
+    }
+    given = np.array(list(places.values()))[index]  # which counts where they are held
+    return Dependence(argument, role, given, sought, index)
+
+
+def points_of(role: str, measured: Any) -> tuple[dict[str, FloatArray], IntArray]:
+    """The points of one role by name, where the user puts them, and which one each row has."""
+    given = measured.attachment if role == "attachment" else measured.target
+    names, index = measured.target_names, measured.target_index
+    one = given is None if role == "attachment" else names is None and given is None
+    if one or (given is not None and given.ndim == 1):
+        place = np.zeros(3) if given is None else given
+        return {"1": place}, np.zeros(len(measured), dtype=np.intp)
+    if names is None or index is None:
+        raise ArgumentError(
+            f"{role}: one place per row cannot be estimated; say with target_index which of a few"
+            " each row measured"
+        )
+    places = np.zeros((len(names), 3)) if given is None else given
+    return dict(zip(names, places, strict=True)), index
