@@ -220,7 +220,9 @@ class Replicate:
         search = Search(equations, at)
         kept = state.fitted.unidentifiable
         pins = state.fitted.singular[0] * kept.T
-        u = search.best(np.zeros(len(at.theta)), state.noise, state.loss, pins)
+        u, trail = search.best(
+            search.begin(), np.zeros(len(at.theta)), state.noise, state.loss, pins
+        )
         theta = at.theta + search.scale * (u - kept @ (kept.T @ u))
         found = equations.parameters.reported(theta)
-        return found if search.converged else np.full_like(found, np.nan)
+        return found if trail.converged else np.full_like(found, np.nan)

@@ -371,7 +371,7 @@ def _result(
     held: HeldOut,
     sure: Uncertainty,
 ) -> Identification:
-    chosen, search = estimator.equations.parameters, estimator.search
+    chosen = estimator.equations.parameters
     end = estimate.evaluation
     robots = _robots(commanded, end)
     if commanded is not estimator.equations:
@@ -386,7 +386,7 @@ def _result(
         misfit=misfit(estimator, estimate, sure, (start, end)),
         holdout=held,
         repeats=repeats(sure),
-        search=SearchRecord(search.converged, search.evaluations, tuple(search.history)),
+        search=SearchRecord(estimate.converged, estimate.evaluations, estimate.history),
         fit=Fit(commanded, start, end, estimate, sure),
     )
 

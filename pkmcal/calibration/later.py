@@ -154,7 +154,8 @@ def _own_numbers(
         width = np.full(len(equations.components), float(np.median(loss.width)))
         same = Loss(loss.name, equations.components, width)
         none = np.zeros((0, len(columns)))
-        found = search.at(search.best(np.zeros(len(columns)), noise, same, none), noise)
+        u, trail = search.best(search.begin(), np.zeros(len(columns)), noise, same, none)
+        found = search.at(trail, u, noise).here
         jacobian = search.jacobian(found, noise)
     left, singular, right = np.linalg.svd(
         np.vstack([jacobian, search.prior(found.theta)]), full_matrices=False

@@ -68,9 +68,10 @@ def worst_closures(equations: Equations, evaluation: Evaluation) -> FloatArray:
     system = equations.system
     if system is None:
         return np.full(len(equations.actuators), np.nan)
-    off = np.abs(_closures_off(system, evaluation))
+    off: FloatArray = np.abs(_closures_off(system, evaluation))
     off[system.blocks.slack[:, : off.shape[1]]] = 0.0
-    return off.max(axis=1)
+    worst: FloatArray = off.max(axis=1)
+    return worst
 
 
 def cell_rms(equations: Equations, evaluation: Evaluation) -> float:
