@@ -272,11 +272,11 @@ def held_out_numbers(found: Identification) -> list[dict[str, Any]]:
     return [
         {
             "name": printable(name),
-            "unit": found.holdout.units[name],
+            "unit": found.holdout_units[name],
             "value": value,
             "stderr": stderr,
         }
-        for name, (value, stderr) in found.holdout.own.items()
+        for name, (value, stderr) in found.holdout_own.items()
     ]
 
 

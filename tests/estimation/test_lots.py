@@ -48,7 +48,7 @@ def test_a_calibration_in_lots_is_that_made_at_once(
     in_lots = fitted(hexapod, **options)
     np.testing.assert_array_less(abs(in_lots.values - at_once.values), 1e-6 * at_once.stderr)
     np.testing.assert_allclose(in_lots.stderr, at_once.stderr, rtol=1e-6)
-    np.testing.assert_allclose(in_lots.table.dof, at_once.table.dof, rtol=1e-6)
+    np.testing.assert_allclose(in_lots.parameter_dof, at_once.parameter_dof, rtol=1e-6)
     for name, index in at_once.observability.items():
         assert abs(in_lots.observability[name] / index - 1.0) < 1e-9
     first, second = at_once.fit.uncertainty, in_lots.fit.uncertainty

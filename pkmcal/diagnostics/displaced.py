@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
-from pkmcal.calibration.fit import Fit
 from pkmcal.display import chance_text, displayed, printable
 from pkmcal.estimation.fit_data import Dependence
 from pkmcal.estimation.uncertainty import Uncertainty
+from pkmcal.fitted.fit import Fit
 from pkmcal.statistics.score_test import Score, score_test
 
 CHANCE = 0.01  # below which a target is said to be displaced

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.calibration.plausibility import (
+from pkmcal.diagnostics.plausibility import (
     GROSS,
     MISFIT_RATIO,
     exchanges,

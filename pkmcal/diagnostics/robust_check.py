@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray, rms
-from pkmcal.calibration.dropped import outlying
-from pkmcal.calibration.fit import Fit
 from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.fitted.dropped import outlying
+from pkmcal.fitted.fit import Fit
 from pkmcal.statistics.robust_scale import median_ratio, ratio_by_chance, robust_ratio
 
 _SUSPECT = 1.25  # ratio of the linear model's noises from which the robust fit is made

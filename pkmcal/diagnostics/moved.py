@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.fit import Fit
-from pkmcal.calibration.later import Later, noise_factors
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import listed
 from pkmcal.estimation.labels import labels
 from pkmcal.estimation.mode_slips import in_their_modes
+from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.later import Later, noise_factors
 from pkmcal.statistics.shifts import shifted
 
 _MAY_MOVE = re.compile(  # what is found anew in each session has an @ in its name

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.calibration.fit import Fit
-from pkmcal.calibration.row_names import row_names
 from pkmcal.display import chance_text, displayed, printable
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.row_names import row_names
 from pkmcal.statistics.linear_fit import means, numbered
 from pkmcal.statistics.order_test import Course, Series
 
