@@ -54,7 +54,8 @@ class Trail:
 
     def after(self, step: Evaluation, misfit: float) -> Trail:
         """The trail with another step; poses follow the parameters from there."""
-        self.near.cache.pop("following", None)
+        if self.near is not step:
+            self.near.cache.pop("following", None)
         return replace(self, near=step, history=(*self.history, misfit))
 
 
