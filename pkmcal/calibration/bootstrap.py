@@ -27,6 +27,7 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.labels import labels
 from pkmcal.estimation.least_squares import Search
+from pkmcal.estimation.redrawn import redrawn
 from pkmcal.exceptions import ArgumentError
 from pkmcal.fitted.fit import Fit
 from pkmcal.result import Result
@@ -213,7 +214,9 @@ class Replicate:
         left = signs[self._pose] * self._left
         drawn, _ = equations.parameters.off_functions(at.theta)
         drawn = drawn + random.standard_normal(len(drawn))
-        return self._solved(*equations.redrawn(at, self._estimate.state.noise, left, centre, drawn))
+        return self._solved(
+            *redrawn(equations, at, self._estimate.state.noise, left, centre, drawn)
+        )
 
     def _solved(self, equations: Equations, at: Evaluation) -> FloatArray:
         state = self._estimate.state

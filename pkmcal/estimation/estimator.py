@@ -174,7 +174,7 @@ class Estimator:
 
     def _medians(self, residual: FloatArray) -> FloatArray:
         """Variance (F,) that whitened residuals (M,) of each family show by their median."""
-        squares, components = self.equations.squares(residual), self.equations.components
+        squares, components = self.equations.blocks.squares(residual), self.equations.components
         family_of = self.equations.blocks.family_of_block
         return np.array([
             median_ratio(squares[family_of == f], components[family_of == f])

@@ -11,7 +11,7 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray
 from pkmcal.estimation.equations import Batch, Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.loss import Loss
-from pkmcal.estimation.misfits import progress
+from pkmcal.estimation.misfits import progress, rounding
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics.linear_fit import triangle
 
@@ -238,7 +238,7 @@ class Search:
             return last[1]
 
         # a cost that nothing lowers: by less than rounding it need not fall
-        floor = equations.rounding(noise) / np.sqrt(_FTOL)
+        floor = rounding(equations, noise) / np.sqrt(_FTOL)
         trail = self.at(trail, u, noise)
         first = data(trail.here)
         worse = 10.0 * (1.0 + float(np.linalg.norm(first)))

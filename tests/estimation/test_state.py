@@ -24,9 +24,9 @@ def assigned(source: str) -> Iterator[tuple[str, str, int]]:
         for node in ast.walk(function):
             if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store | ast.Del):
                 yield function.name, node.attr, node.lineno
-            elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("__setattr__"):
-                yield function.name, ast.unparse(node), node.lineno
-            elif ast.unparse(node).endswith(".__dict__") and function.name != "__getstate__":
+            elif ast.unparse(node).endswith((".__setattr__", ".__dict__", "setattr")) and (
+                function.name != "__getstate__"
+            ):
                 yield function.name, ast.unparse(node), node.lineno
 
 
