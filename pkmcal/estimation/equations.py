@@ -180,8 +180,9 @@ class Equations:
     @property
     def slack_cells(self) -> list[tuple[int, int]]:
         """Closures that are left out, of slack cables: their poses and numbers."""
-        slack = np.argwhere(self.blocks.slack) if isinstance(self.blocks, PoseBlocks) else []
-        return [(int(pose), int(closure)) for pose, closure in slack]
+        if not isinstance(self.blocks, PoseBlocks):
+            return []
+        return [(int(pose), int(closure)) for pose, closure in np.argwhere(self.blocks.slack)]
 
     @cached_property
     def system(self) -> PoseSystem | None:
@@ -328,9 +329,10 @@ class Equations:
     def _states_ahead(self, machines: Machines, theta: FloatArray, near: Near) -> RowStates:
         """Where to look for the states: as they follow the parameters from where a search is."""
         states = self._begun(near)
-        if not isinstance(near, Evaluation) or "following" not in near.cache:
+        known = near.cache.get("following") if isinstance(near, Evaluation) else None
+        if known is None or known[0] is not self.system or not isinstance(near, Evaluation):
             return self.closures.settled(machines, states)
-        following = near.cache["following"]
+        _, following = known
         step = (following.reshape(-1, len(theta)) @ (theta - near.theta)).reshape(
             following.shape[:2]
         )

@@ -23,7 +23,7 @@ class Cache(TypedDict, total=False):
 
     predicted: tuple[object, tuple[Predicted, ...]]
     system: tuple[object, FloatArray, System]
-    following: FloatArray
+    following: tuple[object, FloatArray]
 
 
 @dataclass(frozen=True, eq=False)

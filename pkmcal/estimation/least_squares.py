@@ -161,7 +161,8 @@ class Search:
     def end(self, trail: Trail) -> None:
         """Forget what the next step would need: it takes memory."""
         self._cache.clear()
-        trail.near.cache.pop("following", None)
+        for evaluation in (self.start, trail.near, trail.here):
+            evaluation.cache.pop("following", None)
 
     def _batches(self, evaluation: Evaluation, noise: FloatArray) -> Iterator[Batch]:
         """`own_jacobian` in batches, finite or not."""

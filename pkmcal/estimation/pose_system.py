@@ -91,7 +91,8 @@ class PoseSystem:
             of_readings = self.prediction.jacobian(evaluation, self.closures)
             by_all = np.concatenate([by_all, self.whitening.whiten(of_readings, noise)])
         by_unknown = self.at(evaluation, noise).by_unknown
-        found, evaluation.cache["following"] = blocks.elimination.reduced(by_unknown, by_all)
+        found, following = blocks.elimination.reduced(by_unknown, by_all)
+        evaluation.cache["following"] = self, following
         return found
 
     def by_groups(
