@@ -40,12 +40,12 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
         components = equations.components[set_of == i]
         median = median_ratio(rows[set_of == i], components) * components.sum() / freedom[i]
         half = float(np.sqrt(median / common))  # of the rows: outliers are no slip
-        if min(above, 1.0 - above) < _CHANCE / 2.0 and _apart(half):
+        if min(above, 1.0 - above) < _CHANCE / 2.0 and apart(half):
             ratios[i] = np.sqrt(squares[i] / freedom[i])
     return ratios if ratios.max() > _APART * ratios.min() else np.ones_like(ratios)
 
 
-def _apart(ratio: float) -> bool:
+def apart(ratio: float) -> bool:
     """Whether a ratio of deviations matters; 0 where a set has no residual at all."""
     return ratio > _APART or ratio * _APART < 1.0
 
@@ -56,7 +56,7 @@ def unlike_noise(equations: Equations, ratios: FloatArray, with_outliers: bool) 
         "touch_distances" if m.kind == "touch-distance" else f"measurements {i + 1}"
         for i, m in enumerate(equations.sets)
     ]
-    wrong = [i for i, ratio in enumerate(ratios.tolist()) if _apart(ratio)]
+    wrong = [i for i, ratio in enumerate(ratios.tolist()) if apart(ratio)]
     if not wrong:
         return []
     parts = " and ".join(f"{names[i]} are {ratios[i]:.2g}" for i in wrong)
