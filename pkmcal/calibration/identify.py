@@ -8,34 +8,21 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from pkmcal.arguments import word, words
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
-from pkmcal.diagnostics.plausibility import (
-    beyond_strokes,
-    contradicted_prior,
-    distant_points,
-    implausible_changes,
-    insufficient_data,
-    likely_unit_errors,
-    shrunk,
-)
 from pkmcal.diagnostics.row_errors import likely_mistakes
 from pkmcal.effects.expansion import Coefficients, expansion_of
 from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.datasets import as_fit_data, as_fitted, by_set, informative
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
-from pkmcal.estimation.estimator import LEAST_FREEDOM, Estimator
+from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.loss import LIMITS, LossName
-from pkmcal.estimation.mode_slips import in_other_modes
 from pkmcal.estimation.parameters import Asked, Bounds, Known, Prior
-from pkmcal.estimation.set_noise import unlike_noise
 from pkmcal.estimation.starts import known_distances
 from pkmcal.estimation.uncertainty import Uncertainty, solved, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
@@ -59,14 +46,11 @@ from pkmcal.fitted.fit_statistics import (
 )
 from pkmcal.fitted.holdout import HeldOut, draw, evaluate
 from pkmcal.fitted.row_names import row_names
-from pkmcal.fitted.slack import SLACK, Cell, Slack, said_slack, slack_cables, taut
+from pkmcal.fitted.slack import SLACK, Cell, Slack, slack_cables, taut
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.calibratable import as_given, as_machine
 from pkmcal.statistics.covariance import RULES, CovarianceRule
-
-_POOR = 0.1  # share of the misfit that a fit worth its name does not leave
-_NOISY = 9.0  # chi²/dof that a slip in sigma does not explain
 
 
 def identify(
@@ -286,83 +270,9 @@ def identify(
         with suppress(ArgumentError):  # a robust fit that does not come to an end says nothing
             _, cells = taut(equations, commanded, start)
     result = replace(result, slack=slack_cables(estimator.equations, estimate, cells))
-    notes = _warnings(result, estimator, estimate, datasets)
-    if slack == "keep" and result.slack:
-        notes.append(said_slack(result.slack))
-    for text in notes:
+    for text in result.warnings:
         warnings.warn(text, CalibrationWarning, stacklevel=2)
-    return replace(result, warnings=tuple(notes))
-
-
-def _warnings(
-    result: Identification, estimator: Estimator, estimate: Estimate, datasets: Sequence[FitData]
-) -> list[str]:
-    """Say what looks wrong with the measurements or the fit."""
-    fit = result.fit
-    equations, size = fit.equations, estimator.start.robot.length
-    notes = implausible_changes(estimator.start, estimate.evaluation, equations.parameters)
-    if notes or result.rms > _POOR * result.rms_before or result.chi2_per_dof > _NOISY:
-        notes = likely_unit_errors(datasets, equations.parameters, fit.start) or notes
-    notes += insufficient_data(
-        estimator.equations, result.rank, result.dof, bool(len(estimate.prior))
-    )
-    scale = float(np.sqrt(result.chi2_per_dof))
-    if estimator.loss != "linear" and equations.sigma_stated:
-        # of pseudo-residuals: rows that are weighed down say nothing about sigma
-        scale = fit.uncertainty.covariance.scale
-    if scale**2 > _NOISY:
-        notes.append(f"residuals are {scale:.3g} times what sigma says: {_remedy(result)}")
-    notes += in_other_modes(equations, fit.end)
-    notes += contradicted_prior(result.prior_test, equations.parameters, bool(result.outliers))
-    notes += distant_points(fit.end, equations.parameters)
-    notes += shrunk(equations, fit.start, fit.end)
-    notes += unlike_noise(equations, fit.uncertainty.slips, bool(result.outliers))
-    notes += beyond_strokes(equations, fit.start, fit.end)
-    unknown = fit.uncertainty.unknown
-    if fit.uncertainty.mixed and unknown.any():
-        names = [f"of measurements {i + 1}" for i in range(len(equations.sets))]
-        names += ["of the load cells"] if equations.closures.cells else []
-        names = [n for n, u in zip([*names, "of the actuators"], unknown, strict=True) if u]
-        cells = equations.closures.cells
-        sigmas = "sigma, actuator_sigma and tension_sigma" if cells else "sigma and actuator_sigma"
-        notes.append(
-            f"too little is left over to estimate the noise {' and '.join(names)}: state {sigmas}"
-        )
-    kept = estimate.state.determined.rank - estimate.state.fitted.rank
-    if kept:
-        which = "combinations of parameters are" if kept > 1 else "combination of parameters is"
-        worst = estimate.state.worst
-        why = "the machine's size" if worst == size else "and the search did not end with them"
-        notes.append(
-            f"{kept} {which} determined to no better than {worst:.3g} mm, {why}, and"
-            " kept as before: state a prior or measure more poses"
-        )
-    if not result.converged:
-        notes.append("the least squares did not converge: the result is not to be trusted")
-    if result.holdout_unreached:
-        notes.append(f"holdout: {result.holdout_unreached}; left out")
-    if result.holdout_spare < LEAST_FREEDOM:
-        notes.append(
-            f"holdout: {len(result.holdout_own)} numbers of its own session take all of its"
-            " readings, nothing is left to compare; hold out more rows of it"
-        )
-    return notes
-
-
-def _remedy(result: Identification) -> str:
-    """Advise on residuals far above sigma; repeats decide between its two causes."""
-    scatter = result.fit.uncertainty.repeats().scatter
-    if scatter**2 > _NOISY:
-        cause = f"repeats of a pose scatter {scatter:.3g} times as much as it"
-        first = ": look at the outliers; without any," if result.outliers else ","
-        return f"{cause}{first} state the true sigma"
-    cure = "free more parameters"
-    if not np.isfinite(scatter):
-        cure += ", or state the true sigma"
-    if result.outliers:
-        robust = "" if result.loss == "cauchy" else " fit with --loss cauchy (loss='cauchy'),"
-        cure = f"look at the outliers,{robust} or {cure}"
-    return cure
+    return result
 
 
 def _result(

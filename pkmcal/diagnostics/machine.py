@@ -176,8 +176,9 @@ CHECKS = (
         at_once=True,
         run=lambda found: at_most_one(far_numbers(found) or None),
         say=lambda found, moved: (
-            f"{listed(list(moved))} moved by up to {max(moved.values()):.3g} mm, further than errors"
-            " of a machine: check that the robot file describes this one, or free fewer parameters"
+            f"{listed(list(moved))} moved by up to {max(moved.values()):.3g} mm, further than"
+            " errors of a machine: check that the robot file describes this one, or free fewer"
+            " parameters"
         ),
         remedies=lambda found, moved: (Remedy("fix", tuple(moved)),),
     ),

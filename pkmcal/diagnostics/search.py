@@ -74,7 +74,7 @@ CHECKS = (
         levels=("grave",),
         at_once=True,
         run=lambda found: () if found.converged else (found.evaluations,),
-        say=lambda found, _: "the least squares did not converge, the result is not to be trusted",
+        say=lambda found, _: "the least squares did not converge",
     ),
     Check(
         name="at-bounds",

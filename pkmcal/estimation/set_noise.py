@@ -48,20 +48,3 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
 def apart(ratio: float) -> bool:
     """Whether a ratio of deviations matters; 0 where a set has no residual at all."""
     return ratio > _APART or ratio * _APART < 1.0
-
-
-def unlike_noise(equations: Equations, ratios: FloatArray, with_outliers: bool) -> list[str]:
-    """Name the sets whose sigma is wrong beside that of the others."""
-    names = [
-        "touch_distances" if m.kind == "touch-distance" else f"measurements {i + 1}"
-        for i, m in enumerate(equations.sets)
-    ]
-    wrong = [i for i, ratio in enumerate(ratios.tolist()) if apart(ratio)]
-    if not wrong:
-        return []
-    parts = " and ".join(f"{names[i]} are {ratios[i]:.2g}" for i in wrong)
-    return [
-        f"the residuals of {parts} times what sigma says: the sets are weighted wrongly beside each"
-        " other; state the true sigma, or none"
-        + (", or look at the outliers first" if with_outliers else "")
-    ]
