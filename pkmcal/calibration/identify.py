@@ -214,7 +214,7 @@ def identify(
             equations, commanded, start = begun(datasets, chosen, unread)
         if slack == "drop":
             equations, cells = taut(equations, commanded, start)
-            commanded = equations.commanded() if cells else commanded
+            commanded = equations.with_exact_actuators() if cells else commanded
         estimator = estimator_at(equations, commanded, start, loss)
         estimate = estimator.solve()
         if datum == "auto":
@@ -225,7 +225,7 @@ def identify(
             if cells:
                 keys = [(cell.pose, cell.closures[0]) for cell in cells]
                 equations = equations.without_closures(keys, estimate.evaluation)
-                commanded = equations.commanded()
+                commanded = equations.with_exact_actuators()
             estimator = estimator_at(equations, commanded, start, loss)
             estimate = estimator.solve()
     except ValueError as error:
@@ -287,7 +287,7 @@ def _result(
     end = estimate.evaluation
     robots = _robots(commanded, end)
     if commanded is not estimator.equations:
-        commanded = commanded.under(end.tension)
+        commanded = commanded.with_tension(end.states.tension)
         end = commanded.at(end.theta, near=end)
     return Identification(
         **vars(parameter_table(estimator, estimate, sure)),
@@ -325,7 +325,8 @@ def _robots(commanded: Equations, end: Evaluation) -> dict[str, Robot | SerialAr
     for session in chosen.sessions or ("",):
         columns = chosen.geometry_of(session)
         robot = as_given(chosen.robot.replace(chosen.values_at(end.theta, columns)))
-        own = (commanded.machine_columns == columns).all(axis=1)[commanded.machine_of_pose]
+        table = commanded.table
+        own = (table.machine_columns == columns).all(axis=1)[table.machine_of_pose]
         if isinstance(robot, Robot):
             robot = robot.closing(commanded.actuators[own], end.pose[own])
         found[session] = robot

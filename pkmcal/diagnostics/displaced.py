@@ -152,6 +152,6 @@ def _columns(fit: Fit, rows: list[BoolArray]) -> FloatArray:
         np.where(mine[:, None, None], seen.by["target"], 0.0)
         if "target" in seen.by
         else np.zeros((*seen.values.shape, 3))
-        for seen, mine in zip(fit.equations.seen(fit.end), rows, strict=True)
+        for seen, mine in zip(fit.equations.prediction.predicted(fit.end), rows, strict=True)
     ]
-    return sure.equations.whitened(parts, sure.factors)
+    return sure.equations.whitening.whitened(parts, sure.factors)

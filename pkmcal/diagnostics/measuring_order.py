@@ -208,7 +208,7 @@ def _by_component(fit: Fit) -> FloatArray:
     for m in equations.sets:
         one = np.eye(len(numbers))[[numbers[n] for n in m.components]]
         parts.append(np.tile(one, (len(m), 1, 1)))
-    return equations.whiten(parts, fit.uncertainty.factors)
+    return equations.whitening.whiten(parts, fit.uncertainty.factors)
 
 
 def _tested(visits: _Visits, series: int) -> tuple[int, int, Course] | None:

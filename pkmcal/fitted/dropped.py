@@ -82,7 +82,7 @@ def outlying(estimator: Estimator, estimate: Estimate) -> BoolArray:
         estimate.weights,
         estimate.prior @ estimate.half[:, :fitted],
     )
-    return np.isin(equations.unit_of_row, odd)
+    return np.isin(equations.blocks.block_of_row, odd)
 
 
 def robust_outliers(

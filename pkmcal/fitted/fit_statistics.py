@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, rms
+from pkmcal.estimation import misfits
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
@@ -307,29 +308,30 @@ def misfit(
     stated = equations.sigma_stated and dof > 0
     split = uncertainty.noises
     shown = np.where(estimator.unstated & ~uncertainty.unknown, state.noise, np.nan)
+    deviations = equations.whitening.deviations
     by_component = tuple(
         tuple((sigma * relative / m.instrument.mm(m, estimator.start.robot.length)).tolist())
-        for m, relative, sigma in zip(equations.sets, equations.deviations, shown, strict=False)
+        for m, relative, sigma in zip(equations.sets, deviations, shown, strict=False)
     )
     named = outlying(estimator, estimate)
-    before, after = (distances(equations.distances(each), named) for each in (start, end))
+    before, after = (distances(misfits.distances(equations, each), named) for each in (start, end))
     return Misfit(
         rms=after.rms,
         rms_before=before.rms,
-        closure_rms=equations.closure_rms(estimate.evaluation),
-        closure_rms_before=equations.closure_rms(estimator.start),
-        closures=equations.worst_closures(estimate.evaluation),
+        closure_rms=misfits.closure_rms(equations, estimate.evaluation),
+        closure_rms_before=misfits.closure_rms(equations, estimator.start),
+        closures=misfits.worst_closures(equations, estimate.evaluation),
         actuator_noise=float(shown[-1]) if equations.closures.unknowns else float("nan"),
         tension_noise=float(shown[-2]) if equations.closures.cells else float("nan"),
-        tension_rms=equations.cell_rms(estimate.evaluation),
+        tension_rms=misfits.cell_rms(equations, estimate.evaluation),
         redundancy=tuple(estimate.freedom.tolist()),
-        idle=equations.idle,
+        idle=equations.blocks.uninformative,
         chi2_per_dof=float((squares + prior @ prior) / dof) if stated else float("nan"),
         dof=dof,
         noise=tuple(rms(np.array(each[:3])) for each in by_component),
         component_noise=by_component,
         components=tuple(m.components for m in equations.sets),
-        told_apart=any((relative != 1.0).any() for relative in equations.deviations),
+        told_apart=any((relative != 1.0).any() for relative in deviations),
         reading_noise=tuple(float(np.sqrt(part.single)) for part in split),
         pose_noise=tuple(float(np.sqrt(part.shared)) for part in split),
         residuals=end.residuals,

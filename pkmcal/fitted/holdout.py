@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
+from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM, Estimator
@@ -150,14 +151,14 @@ def evaluate(
         return HeldOut()
     rows = later(estimator.equations.parameters, held)
     whole = rows.equations(estimator.equations)
-    before = whole.commanded().start(rows.at(estimator.start.theta), rows.own)
+    before = whole.with_exact_actuators().start(rows.at(estimator.start.theta), rows.own)
     equations, after, own = compared(rows, whole, estimate, uncertainty)
     rows = replace(rows, parameters=equations.parameters)  # their own frames have been laid
     named = labels(equations)
     points = _points(rows, equations, after, named, own, uncertainty)
     row = named.row[named.length]
     count = len(equations.rows)
-    off_before, off = equations.distances(before), equations.distances(after)
+    off_before, off = (misfits.distances(equations, each) for each in (before, after))
     good = np.isfinite(off)
     expected = np.bincount(row, points.own + points.by_fit(uncertainty), count)
     spare = float((1.0 - points.taken[good[row]]).sum()) if good.any() else float("nan")
@@ -224,7 +225,7 @@ def _points(
     like = rows.like
     by_actuators = after.machines.actuator_twists(after.states)
     variances, added = [], []
-    seen = equations.seen(after)
+    seen = equations.prediction.predicted(after)
     for i, measured in enumerate(equations.sets):
         count, k = after.residuals[i].shape
         variances.append(np.repeat(_variances(measured, uncertainty, like[i]), k))
@@ -237,20 +238,20 @@ def _points(
     jacobian = np.concatenate([
         arc * part.reshape(-1, part.shape[2])
         for arc, part in zip(equations.arcs, equations.jacobian(after), strict=True)
-    ])[equations.present]  # fmt: skip
+    ])[equations.whitening.present]  # fmt: skip
     back = uncertainty.fit.back
     by_all = (jacobian * equations.parameters.scale)[named.length]
     by_fitted = rows.by_fitted(by_all, len(back))
 
     def lengths(parts: Sequence[FloatArray]) -> FloatArray:
-        return np.concatenate(parts)[equations.present][named.length]
+        return np.concatenate(parts)[equations.whitening.present][named.length]
 
     by_sigma, taken = lengths(added), np.zeros(len(by_all))
     if own is not None:
         by_own = by_all[:, rows.own]
         by_fitted += by_own @ own.follow
         arcs = np.array(equations.arcs)[named.set_of[named.length]]
-        weighted = arcs**2 * equations.variances(own.noise)[named.length]
+        weighted = arcs**2 * equations.whitening.variances(own.noise)[named.length]
         if uncertainty.mixed:
             weighted += by_sigma / uncertainty.excess.total
         taken = np.clip(((by_own @ own.half) ** 2).sum(axis=1) / weighted, 0.0, 1.0)

@@ -146,7 +146,7 @@ class Solution(ParameterTable, Identifiability, Misfit, Repeats, HeldOut):
     @property
     def read(self) -> BoolArray:
         """Of which fitted rows (N,) more is known than where the actuators were."""
-        read: BoolArray = self.fit.equations.count > 0
+        read: BoolArray = self.fit.equations.table.count > 0
         return read
 
     @property

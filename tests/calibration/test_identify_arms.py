@@ -226,7 +226,7 @@ def test_derivatives_of_what_is_read_are_those_of_differences(kind: str, framed:
         attachment=[50.0, 60.0, 70.0] if kind == "distance" else None,
     )  # fmt: skip
     share = FitData(measured, np.arange(7), framed, False)
-    equations = Equations([share], parameters(ArmMachine(erring(ARM)), [share], Asked()))
+    equations = Equations.of([share], parameters(ArmMachine(erring(ARM)), [share], Asked()))
     at = equations.parameters.start.copy()
     if framed:
         at[-6:] = [10.0, -20.0, 30.0, 0.3, -0.2, 0.9]

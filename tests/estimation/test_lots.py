@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.estimation import derivatives, readings, session_machines
+from pkmcal.estimation import prediction, session_machines, whitening
 from pkmcal.statistics import clusters, linear_fit
 
 
@@ -31,8 +31,8 @@ def fitted(robot: pk.Robot, **options: Any) -> pk.Identification:
 def in_small_lots(monkeypatch: pytest.MonkeyPatch) -> None:
     for module, name, together in (
         (session_machines, "_TOGETHER", 7),
-        (readings, "_TOGETHER", 4),
-        (derivatives, "_LOT", 5),
+        (whitening, "_TOGETHER", 4),
+        (prediction, "_BATCH", 5),
         (clusters, "_FEW", 7),
         (linear_fit, "_KEYS", 3),
     ):
