@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from typing import Any
 
 from pkmcal.arguments import word, words
 from pkmcal.arms.arm import SerialArm
@@ -22,6 +21,7 @@ from pkmcal.calibration.steps import (
     without_slack,
 )
 from pkmcal.diagnostics.row_errors import likely_mistakes
+from pkmcal.effects.effect import Effect
 from pkmcal.effects.expansion import Coefficients, expansion_of
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters
@@ -60,7 +60,7 @@ def identify(
     drop: Drop = None,
     expansion: Coefficients = None,
     slack: Slack = "keep",
-    effects: Sequence[Any] = (),
+    effects: Sequence[Effect] = (),
 ) -> Identification:
     """Find the geometry that agrees best with measurements.
 
@@ -174,7 +174,8 @@ def identify(
     anew = words("per_session", per_session)
     asked = Asked(free, prior, bounds, anew, by_set(unknown), words("fix", fix))
     grows = expansion_of(machine, expansion)
-    given = as_fit_data(machine, measurements, unknown, bool(anew), grows, tuple(effects))
+    every = tuple(effects) if grows is None else (grows, *effects)
+    given = as_fit_data(machine, measurements, unknown, bool(anew), every)
     named = named_rows(drop, sum(len(data.rows) for data in given))
     rows = prepare(machine, given, holdout, named, bool(anew))
     chosen = parameters(machine, rows.fitted, asked)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.display import chance_text
-from pkmcal.effects.expansion import temperatures
+from pkmcal.effects.expansion import stated, temperatures
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.fitted.fit import Fit
@@ -229,5 +229,5 @@ def _bursts(pose: IntArray) -> Iterator[range]:
 
 def _unused(sets: Sequence[FitData]) -> tuple[float, float]:
     """Between which temperatures the machine was, where that is not allowed for."""
-    read = None if sets[0].expansion else temperatures(data.measured for data in sets)
+    read = None if stated(sets[0].effects) else temperatures(data.measured for data in sets)
     return read or (float("nan"), float("nan"))

@@ -1,7 +1,8 @@
 """An effect: what moves a machine off the pose that geometry alone gives, in one class.
 
 To first order: it turns and shifts the platform by a twist, which readings then follow. Its
-coefficients are given, or found along with the geometry.
+coefficients are given, or estimated with the geometry. An effect that is not in the package is an
+object with the members of `Effect`; `identify(effects=[...])` takes it.
 """
 
 from __future__ import annotations
@@ -14,30 +15,50 @@ from pkmcal.readings.unknowns import Dependence
 
 
 class Moved(NamedTuple):
-    """Twists (N, 6) of the platform, and their derivatives (N, 6, w) by each argument."""
+    """How an effect moves the platform in some rows.
+
+    Attributes
+    ----------
+    twist : ndarray (N, 6)
+        ω in rad, then the shift of the platform's origin in mm, in base axes.
+    by : mapping of str to ndarray (N, 6, w)
+        Its derivative by each argument of the effect that may be estimated.
+    growth : ndarray (N,) or None
+        Relative growth of places on the platform.
+    """
 
     twist: FloatArray
     by: Mapping[str, FloatArray] = {}
+    growth: FloatArray | None = None
 
 
 class EffectOfRows(Protocol):
     """An effect in the rows of one set of measurements."""
 
     def moved(
-        self, machine: Any, pose: FloatArray, actuators: FloatArray, rows: IntArray,
+        self,
+        machine: Any,
+        pose: FloatArray,
+        actuators: FloatArray,
+        rows: IntArray,
         numbers: Mapping[str, FloatArray],
-    ) -> Moved:  # fmt: skip
-        """How the platform moves at poses (N, 6) of some rows."""
+    ) -> Moved:
+        """How the platform moves in some rows, by their numbers among those of the set.
 
-    def growth_of_targets(self) -> FloatArray | None:
-        """Relative growth of places on the platform (N,)."""
+        `machine` is that of these rows, `pose` (N, 6) and `actuators` (N, n) are where it is.
+        `numbers` are the arguments (M, w) of all rows of the set, by name.
+        """
 
 
 class Effect(Protocol):
     """What moves a machine off the pose that geometry alone gives."""
 
+    @property
+    def name(self) -> str:
+        """As messages say it."""
+
     def of_rows(self, measured: Any) -> EffectOfRows:
         """The effect in these rows; an error where what it needs was not read."""
 
     def dependences(self, measured: Any) -> Iterator[Dependence]:
-        """Its coefficients."""
+        """Its coefficients: arguments whose names no reading and no other effect has."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeGuard
+from typing import Any, ClassVar, TypeGuard
 
 import numpy as np
 
@@ -51,6 +51,7 @@ class Expansion:
     coefficient: FloatArray
     column: IntArray
     platform: float
+    name: ClassVar[str] = "expansion"
 
     def dependences(self, measured: Measurements) -> Iterator[Dependence]:
         """None: its coefficients are exact."""
@@ -90,18 +91,19 @@ class Growth:
     of_platform: FloatArray
 
     def moved(
-        self, machine: Any, pose: FloatArray, actuators: FloatArray, rows: IntArray,
+        self,
+        machine: Any,
+        pose: FloatArray,
+        actuators: FloatArray,
+        rows: IntArray,
         numbers: Mapping[str, FloatArray],
-    ) -> Moved:  # fmt: skip
+    ) -> Moved:
         """How the platform moves at poses (N, 6) of some rows."""
         k = self.by_number.shape[1]
         grown = machine.geometry.values[:k] * self.by_number[rows]
         twists = machine.error_twists(pose, actuators)[..., :k]
-        return Moved(np.einsum("nij,nj->ni", twists, grown))
-
-    def growth_of_targets(self) -> FloatArray:
-        """Relative growth of places on the platform (N,)."""
-        return self.of_platform
+        twist = np.einsum("nij,nj->ni", twists, grown)
+        return Moved(twist, growth=self.of_platform[rows])
 
 
 def expansion_of(robot: Calibratable, given: Coefficients) -> Expansion | None:
@@ -135,6 +137,11 @@ def expansion_of(robot: Calibratable, given: Coefficients) -> Expansion | None:
             coefficient[i] = of.get(f"limb{number.limb + 1}", of.get("limbs", 0.0))
             column[i] = 2 + actuator
     return Expansion(of, coefficient, column, of.get("platform", 0.0))
+
+
+def stated(effects: Sequence[object]) -> dict[str, float]:
+    """The coefficients that were given, 1/K, by part; empty where the machine does not grow."""
+    return {k: v for each in effects if isinstance(each, Expansion) for k, v in each.given.items()}
 
 
 def has_lengths(robot: Calibratable) -> TypeGuard[Robot]:

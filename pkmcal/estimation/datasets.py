@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import PurePath
-from typing import Any
 
 import numpy as np
 
 from pkmcal.arguments import instance, word
-from pkmcal.effects.expansion import Expansion
+from pkmcal.effects.effect import Effect
 from pkmcal.estimation.closures import has_equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import KNOWN, Known
@@ -30,8 +29,7 @@ def as_fit_data(
     measurements: Measurements | Sequence[Measurements],
     said: Said,
     sessions: bool,
-    expansion: Expansion | None = None,
-    others: tuple[Any, ...] = (),
+    effects: tuple[Effect, ...] = (),
 ) -> list[FitData]:
     """The sets of measurements with what is unknown of each.
 
@@ -45,8 +43,8 @@ def as_fit_data(
         What `identify` was told of "frame", "target" and "attachment".
     sessions : bool
         Whether every row is to have a session.
-    expansion : Expansion, optional
-        How the machine grows with its temperature.
+    effects : tuple of Effect
+        What moves the machine off the pose that geometry alone gives.
     """
     sets = list(measurements) if isinstance(measurements, Iterable) else [measurements]
     for measured in sets:
@@ -68,8 +66,7 @@ def as_fit_data(
                 of_target,
                 of_attachment,
                 name,
-                expansion=expansion,
-                others=others,
+                effects=effects,
             )
         )
         first += len(measured)

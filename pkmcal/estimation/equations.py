@@ -104,7 +104,7 @@ class Equations:
         )
         if not closures.unknowns:
             return equations
-        prediction.refuse_free_poses()
+        prediction.refuse_free_poses([e.name for data in datasets for e in data.effects])
         of_cells = [cells is not None and cells.sigma is None] if closures.cells else []
         groups = np.concatenate([unstated, of_cells, [sigma is None]]).astype(bool)
         slack = np.zeros((len(table.actuators), closures.equations), dtype=bool)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from pkmcal.arrays import BoolArray, IntArray
-from pkmcal.effects.expansion import Expansion
+from pkmcal.effects.effect import Effect
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, points_of
@@ -33,8 +32,8 @@ class FitData:
         Of the set, where it has a frame or points of its own.
     starts : mapping of (str, str) to Start
         Of all that is always found along, by role and name.
-    expansion : Expansion or None
-        How the machine grows with its temperature.
+    effects : tuple of Effect
+        What moves the machine off the pose that geometry alone gives.
     """
 
     measured: Measurements
@@ -44,8 +43,7 @@ class FitData:
     unknown_attachment: bool = False
     set_name: str = ""
     starts: Mapping[tuple[str, str], Start] = field(default_factory=dict)
-    expansion: Expansion | None = None
-    others: tuple[Any, ...] = ()
+    effects: tuple[Effect, ...] = ()
 
     def select(self, chosen: IntArray | BoolArray) -> FitData:
         """Some of the rows."""
@@ -69,8 +67,3 @@ class FitData:
         yield from self.measured.instrument.dependences(self)
         for effect in self.effects:
             yield from effect.dependences(self.measured)
-
-    @property
-    def effects(self) -> tuple[Any, ...]:
-        """All that moves the machine off its geometry's pose."""
-        return (() if self.expansion is None else (self.expansion,)) + self.others

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -67,6 +68,9 @@ class Arguments:
     ) -> Arguments:
         """Of the rows of a set, each of which is of a `part` (N,) of the map."""
         depend = list(data.dependences())
+        for name, several in Counter(each.argument for each in depend).items():
+            if several > 1:
+                raise ArgumentError(f"effects: several arguments are called {name!r}")
         numbers = {each.argument: parameters.numbers_of(each) for each in depend if each.sought}
         of_rows = columns.columns[part]
         frames = []
@@ -162,11 +166,15 @@ class Prediction:
                 guess[np.ix_(place[read], ever)] = values
         return RowStates(guess, table.actuators, np.zeros(len(guess), dtype=np.int32))
 
-    def refuse_free_poses(self) -> None:
-        """Refuse effects, and readings of joints and between poses, where poses have unknowns."""
-        if any(arguments.effects for arguments in self.arguments):
+    def refuse_free_poses(self, effects: Collection[str]) -> None:
+        """Refuse what needs exact actuators, where poses have unknowns.
+
+        Those are effects, by name, and readings of joints and between poses.
+        """
+        if effects:
+            names = ", ".join(dict.fromkeys(effects))
             raise ArgumentError(
-                "expansion: needs poses that follow from the actuators: no actuator_sigma, and"
+                f"{names}: needs poses that follow from the actuators: no actuator_sigma, and"
                 " no surplus actuators; found others"
             )
         for m in self.table.sets:
@@ -240,6 +248,7 @@ class Prediction:
         change = np.zeros(predicted.values.shape)
         for effect in effects:
             for machine, rows in self._machines(i, theta):
+                growth = None
                 for place, by_twist in places:
                     at = place[rows]
                     found = effect.moved(machine, pose[at], table.actuators[at], rows, numbers)
@@ -247,10 +256,11 @@ class Prediction:
                     for name, rates in found.by.items():
                         by.setdefault(name, np.zeros((*change.shape, rates.shape[2])))
                         by[name][rows] += by_twist[rows] @ rates
-            grown, target = effect.growth_of_targets(), numbers.get("target")
-            if grown is not None and target is not None and "target" in predicted.by:
-                shift = target * grown[:, None]
-                change += np.einsum("nki,ni->nk", predicted.by["target"], shift)
+                    growth = found.growth
+                if growth is not None and "target" in numbers and "target" in predicted.by:
+                    shift = numbers["target"][rows] * growth[:, None]
+                    by_target = predicted.by["target"][rows]
+                    change[rows] += np.einsum("nki,ni->nk", by_target, shift)
         values = corrected(table.sets[i].kind, predicted.values, change)
         return replace(predicted, values=values, by=by)
 

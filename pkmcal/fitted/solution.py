@@ -8,6 +8,7 @@ from typing import Any
 
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import BoolArray, FloatArray
+from pkmcal.effects.expansion import stated
 from pkmcal.fitted.datum import NO_DATUM, Datum
 from pkmcal.fitted.fit import Fit
 from pkmcal.fitted.fit_statistics import Identifiability, Misfit, ParameterTable, Repeats
@@ -152,8 +153,7 @@ class Solution(ParameterTable, Identifiability, Misfit, Repeats, HeldOut):
     @property
     def expansion(self) -> dict[str, float]:
         """Coefficients of thermal expansion, 1/K, by part; empty where none were stated."""
-        grows = self.fit.equations.datasets[0].expansion
-        return {} if grows is None else dict(grows.given)
+        return stated(self.fit.equations.datasets[0].effects)
 
     @property
     def left_out(self) -> str:
