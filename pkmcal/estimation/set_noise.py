@@ -34,7 +34,7 @@ def slipped(estimator: Estimator, estimate: Estimate) -> FloatArray:
     common = 1.0 if unstated.any() else float(squares.sum() / max(freedom.sum(), 1e-9))
     if not common > 0.0:
         return ratios  # no residual at all
-    rows, set_of = equations.squares(estimate.residual), equations.set_of
+    rows, set_of = equations.blocks.squares(estimate.residual), equations.set_of
     for i in np.flatnonzero(~unstated & (freedom >= FEW)):
         above = chi2_tail(float(squares[i]) / common, float(freedom[i]))
         components = equations.components[set_of == i]
