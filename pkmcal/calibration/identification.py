@@ -28,9 +28,9 @@ from pkmcal.display import Table
 from pkmcal.effects.expansion import in_words
 from pkmcal.estimation.estimator import FEW
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.observation import predict
-from pkmcal.readings.calibratable import as_machine
 from pkmcal.result import Result
 
 if TYPE_CHECKING:

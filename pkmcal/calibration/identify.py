@@ -61,9 +61,9 @@ from pkmcal.estimation.set_noise import unlike_noise
 from pkmcal.estimation.starts import known_distances
 from pkmcal.estimation.uncertainty import Uncertainty, solved, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
+from pkmcal.kinematics.calibratable import as_given, as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import as_given, as_machine
 from pkmcal.statistics.covariance import RULES, CovarianceRule
 
 _POOR = 0.1  # share of the misfit that a fit worth its name does not leave

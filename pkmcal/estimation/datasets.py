@@ -18,9 +18,9 @@ from pkmcal.estimation.sessions import in_sessions, set_names
 from pkmcal.estimation.starts import with_starts
 from pkmcal.estimation.tensioned_poses import unknown_tensions
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
 
 Said = Mapping[str, Known | Sequence[Known]]  # of "frame", "target" and "attachment"
 

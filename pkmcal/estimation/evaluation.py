@@ -8,7 +8,7 @@ from typing import Any
 from pkmcal.arrays import FloatArray, Int32Array
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines
-from pkmcal.readings.calibratable import Calibratable
+from pkmcal.kinematics.calibratable import Calibratable
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,9 +19,9 @@ from pkmcal.estimation.prior_functions import is_function, prior_functions
 from pkmcal.estimation.sessions import Scope, label, matches, scopes
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.geometry.load import is_of_load
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
 
 _LEAST_PRIOR, _MOST_PRIOR = 1e-15, 1e15  # mm or rad, whose squares are numbers
 

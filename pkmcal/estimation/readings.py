@@ -13,13 +13,13 @@ from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.sessions import NONE
 from pkmcal.estimation.tensioned_poses import Cells, cells_of, check_cells
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.fields import filled_tension
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import Predicted, corrected, difference, joined
 from pkmcal.readings import orientation
-from pkmcal.readings.calibratable import Calibratable
 from pkmcal.readings.reading import At
 
 _TOGETHER = 16384  # rows that are whitened at once by matrices

@@ -14,9 +14,9 @@ import numpy as np
 
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
 from pkmcal.readings.unknowns import Found
 
 

@@ -58,6 +58,7 @@ from pkmcal.arrays import FloatArray, TextArray, as_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError, FileError
 from pkmcal.files.column_names import SYNONYMS
 from pkmcal.files.csv_table import Table
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.reading_units import Actuated
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.actuator_columns import (
@@ -98,7 +99,6 @@ from pkmcal.measurements.table_layout import (
 from pkmcal.measurements.target_columns import read_several, read_targets, several_targets
 from pkmcal.measurements.temperature_columns import WHOLE, parts_of, read_temperature
 from pkmcal.measurements.time_stamps import times_of
-from pkmcal.readings.calibratable import as_machine
 
 _AXES = ("x", "y", "z")
 _TRIED = 200  # rows by which an order of angles is told

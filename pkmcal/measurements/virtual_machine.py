@@ -14,13 +14,13 @@ from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.display import first_rows
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.kinematics.calibratable import ArmMachine, Solvable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.components import KINDS, Artefact, Kind, components
 from pkmcal.measurements.fields import numbers
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.observation import corrected
 from pkmcal.measurements.tracker import Tracker
-from pkmcal.readings.calibratable import ArmMachine, Solvable
 from pkmcal.readings.reading import At, Reading
 
 _ARM = 200.0  # mm; an instrument good to 0.02 mm over it is good to 1e-4 rad

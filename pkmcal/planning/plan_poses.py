@@ -16,6 +16,7 @@ from pkmcal.core.library import POSE
 from pkmcal.display import Table, fixed
 from pkmcal.estimation.parameters import Parameters, Prior
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.calibratable import Calibratable, as_machine
 from pkmcal.kinematics.perturbed import ideal
 from pkmcal.kinematics.pulled import pulled
 from pkmcal.kinematics.robot import Robot
@@ -32,7 +33,6 @@ from pkmcal.planning.planned import (
 )
 from pkmcal.planning.tour import short_tour
 from pkmcal.planning.travel_weight import with_travel
-from pkmcal.readings.calibratable import Calibratable, as_machine
 from pkmcal.readings.reading import Reading
 from pkmcal.result import Result
 

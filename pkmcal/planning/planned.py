@@ -19,13 +19,13 @@ from pkmcal.estimation.parameters import Asked, Parameters, Prior
 from pkmcal.estimation.starts import with_starts
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics import pose_steps
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.components import Kind
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker
 from pkmcal.measurements.virtual_machine import VirtualMachine
 from pkmcal.planning.optimal_design import Criterion, Design
-from pkmcal.readings.calibratable import Calibratable
 from pkmcal.readings.reading import Reading
 from pkmcal.statistics.linear_fit import column_basis
 

@@ -18,9 +18,9 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
+from pkmcal.kinematics.calibratable import ArmMachine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.virtual_machine import VirtualMachine
-from pkmcal.readings.calibratable import ArmMachine
 
 ARM = pk.SerialArm.from_dh(  # an industrial arm with a wrist in one point
     a=[312, 1075, 225, 0, 0, 0],

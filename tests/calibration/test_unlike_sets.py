@@ -9,8 +9,8 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import as_machine
 
 from ..simulated import hexapod_poses
 
