@@ -24,13 +24,13 @@ from pkmcal.calibration.parts import Parts
 from pkmcal.calibration.robust_check import robust_check
 from pkmcal.calibration.row_names import row_names
 from pkmcal.calibration.verdict import Verdict, judge
+from pkmcal.core import instruments
 from pkmcal.display import Table
 from pkmcal.effects.expansion import in_words
 from pkmcal.estimation.estimator import FEW
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.observation import predict
 from pkmcal.result import Result
 
 if TYPE_CHECKING:
@@ -195,7 +195,7 @@ class Identification(Parts, Result):
         machine = as_machine(self.robot if session is None else self.robots[session])
         at, actuators, shape = machine.commanded(poses)
         by_numbers = machine.error_twists(at, actuators)[:, :, chosen.places]
-        by_geometry = predict("position", at, place).by_twist @ by_numbers
+        by_geometry = instruments.points(at, place)[1] @ by_numbers
         own = chosen.geometry_of(session)
         deviation = np.sqrt(propagate(by_geometry, self.fit.covariance[np.ix_(own, own)]))
         undetermined = self.fit.undetermined() * chosen.scale[:, None]

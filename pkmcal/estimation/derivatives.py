@@ -11,7 +11,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.readings import Readings
 from pkmcal.estimation.session_machines import SessionClosures
 from pkmcal.estimation.sessions import NONE
-from pkmcal.measurements.observation import Predicted, by_difference
+from pkmcal.readings.reading import Predicted
 
 _LOT = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
 
@@ -85,8 +85,9 @@ class Derivatives(Readings):
                     row, slot = np.nonzero(mine != NONE)
                     part[row, :, mine[row, slot]] += seen.by[name][rows][row, :, slot]
                 wide = self.spread.of_rows(part, i, rows)
-                kind, residual = self.sets[i].kind, evaluation.residuals[i][rows]
-                found.append((i, rows, by_difference(kind, wide, residual)))
+                residual = evaluation.residuals[i][rows]
+                read = self.sets[i].instrument
+                found.append((i, rows, read.by_difference(wide, residual)))
             yield lot, found
 
     def _in_sets(self, lot: slice) -> Iterator[tuple[int, slice]]:

@@ -33,11 +33,6 @@ from pkmcal.estimation.session_machines import (
     commanded_closures,
 )
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.observation import (
-    by_difference,
-    corrected,
-    distance_per_point,
-)
 from pkmcal.readings import joint_angles, orientation
 from pkmcal.result import failed_rows
 
@@ -295,7 +290,7 @@ class Equations(Derivatives):
         predicted = self.predicted(states.pose, theta)
         residuals = self.residuals(predicted)
         by_pose = [
-            by_difference(m.kind, seen.by_twist @ twists[place], residual)
+            m.instrument.by_difference(seen.by_twist @ twists[place], residual)
             for m, seen, place, residual in zip(
                 self.sets, predicted, self.pose_of, residuals, strict=True
             )
@@ -447,7 +442,7 @@ class Equations(Derivatives):
             errors = errors[own:]
         residuals = tuple(self.unwhiten(errors, noise[: len(self.sets)]))
         other.sets = tuple(
-            replace(m, values=corrected(m.kind, values, residual).reshape(m.values.shape))
+            replace(m, values=m.instrument.corrected(values, residual).reshape(m.values.shape))
             for m, values, residual in zip(self.sets, at.predicted, residuals, strict=True)
         )
         other.parameters = replace(self.parameters, start=prior_centre, drawn=drawn)
@@ -539,7 +534,7 @@ class Equations(Derivatives):
     def distances(self, evaluation: Evaluation) -> FloatArray:
         """How far off each measured point is, mm, in the order of the sets."""
         return np.concatenate([
-            distance_per_point(of_read(m, r), m, self.parameters.robot.length)
+            m.instrument.distance_per_point(of_read(m, r), m, self.parameters.robot.length)
             for m, r in zip(self.sets, evaluation.residuals, strict=True)
         ])  # fmt: skip
 

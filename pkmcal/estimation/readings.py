@@ -15,12 +15,10 @@ from pkmcal.estimation.sessions import NONE
 from pkmcal.estimation.tensioned_poses import Cells, cells_of, check_cells
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.drive_state import DriveState
-from pkmcal.measurements.components import KINDS
-from pkmcal.measurements.fields import filled_tension
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import Predicted, corrected, difference, joined
+from pkmcal.measurements.tension import filled_tension
 from pkmcal.readings import orientation
-from pkmcal.readings.reading import At
+from pkmcal.readings.reading import At, Predicted, joined
 
 _TOGETHER = 16384  # rows that are whitened at once by matrices
 ROUNDING = 2e-15  # of the largest value: what is left of a solved pose
@@ -244,7 +242,7 @@ class Readings:
             grown, target = effect.growth_of_targets(), numbers.get("target")
             if grown is not None and target is not None and "target" in seen.by:
                 moved += np.einsum("nki,ni->nk", seen.by["target"], target * grown[:, None])
-        values = corrected(self.sets[i].kind, seen.values, moved)
+        values = self.sets[i].instrument.corrected(seen.values, moved)
         return replace(seen, values=values, by=by)
 
     def _predicted_of(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
@@ -275,7 +273,6 @@ class Readings:
             pose[self.pose_of[i]],
             None if there is None else pose[there],
             along=self._along[i],
-            artefact=measured.artefact,
             machines=lambda: self._machines(i, theta),
             measured=measured,
         )
@@ -296,7 +293,7 @@ class Readings:
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
         """Measured less predicted of each set."""
         return tuple(
-            difference(measured.kind, measured.values, seen.values)
+            measured.instrument.difference(measured.values, seen.values)
             for measured, seen in zip(self.sets, predicted, strict=True)
         )
 
@@ -418,7 +415,7 @@ def _whitening(measured: Measurements, length: float) -> FloatArray:
     sigma = measured.sigma
     if sigma is None:
         return np.tile(measured.instrument.mm(measured, length), (len(measured), 1))
-    first = KINDS[measured.kind].turning
+    first = measured.instrument.turning
     if first is not None and not _same_turnings(sigma, first):
         sigma = orientation.covariance(sigma, np.nan_to_num(measured.values[:, first:]))
     if sigma.ndim == 2:

@@ -13,8 +13,8 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
 from pkmcal.estimation.parameters import Asked
-from pkmcal.measurements.observation import corrected, difference
 from pkmcal.readings import orientation
+from pkmcal.readings.registry import KINDS
 
 from ..workspaces import WORKSPACE, poses
 
@@ -51,7 +51,7 @@ def test_a_difference_is_undone_by_correcting() -> None:
     rng = np.random.default_rng(2)
     values = rng.uniform(-3, 3, (30, 6))
     residual = rng.normal(0, 0.5, (30, 6))
-    again = difference("pose", corrected("pose", values, residual), values)
+    again = KINDS["pose"].difference(KINDS["pose"].corrected(values, residual), values)
     np.testing.assert_allclose(again, residual, atol=1e-9)
 
 
@@ -104,7 +104,7 @@ def test_a_covariance_that_knows_a_turning_exactly_is_refused() -> None:
 def test_derivatives_of_residuals_are_their_differences(name: str, framed: bool) -> None:
     robot, rng = pk.load(name), np.random.default_rng(5)
     at = poses(name, 6, 5)
-    values = corrected("pose", robot.complete(at), rng.normal(0, 0.4, (6, 6)))
+    values = KINDS["pose"].corrected(robot.complete(at), rng.normal(0, 0.4, (6, 6)))
     data = FitData(pk.Measurements(robot.inverse(at), values, "pose"), np.arange(6), framed, False)
     chosen = parameters(robot, [data], Asked("offset*"))
     equations = Equations([data], chosen)
@@ -145,7 +145,7 @@ def test_a_turned_tool_does_not_change_a_calibration(beta: float) -> None:
     q, n = plain.inverse(at), len(plain.model.limbs)
     true = plain.replace({f"offset{i + 1}": 0.3 * rng.normal() for i in range(n)})
     noise = SIGMA * rng.normal(size=(40, 6))
-    seen = corrected("pose", true.forward(q).pose, noise)
+    seen = KINDS["pose"].corrected(true.forward(q).pose, noise)
     tool = of(np.array([0.2, beta, -0.4]))
     values = seen.copy()
     turned_axes = orientation.rotations(seen[:, 3:]) @ tool.as_matrix()
