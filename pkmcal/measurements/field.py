@@ -33,14 +33,11 @@ class Field:
         Whether it is taken from the log of a controller that is joined.
     log_first : bool
         Whether that of a log is taken in the place of the instrument's.
-    listed : bool
-        Whether the printed table has its columns.
     """
 
     name = ""
     logged = False
     log_first = False
-    listed = False
 
     def __set_name__(self, owner: type, name: str) -> None:
         self.name = name
@@ -82,6 +79,10 @@ class Field:
     def framed(self, m: Any) -> Iterator[WrittenColumn]:
         """Its columns in a data frame."""
         return self.columns(m, m.actuator_units or ("mm",) * m.actuators.shape[1])
+
+    def printed(self, m: Any) -> Iterator[WrittenColumn]:
+        """Its columns in the printed table."""
+        return iter(())
 
     def said(self, m: Any) -> str:
         """What the title of the printed table says of it, or nothing."""

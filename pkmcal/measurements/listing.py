@@ -49,9 +49,8 @@ def _columns(m: Any) -> Iterator[tuple[WrittenColumn, float | None]]:
     for i, column in enumerate(m.instrument.value_columns(values)):
         yield column, None if sigmas is None else float(sigmas[:, i].min())
     for field in row_fields(type(m)):
-        if field.listed:
-            for column in field.framed(m):
-                yield column, None
+        for column in field.printed(m):
+            yield column, None
 
 
 def _cells(column: WrittenColumn, sigma: float | None) -> list[str]:

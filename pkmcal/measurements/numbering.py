@@ -15,8 +15,6 @@ from pkmcal.readings.reading import Reading
 class Group(Field):
     """Rows with the same number are repeats of one pose."""
 
-    listed = True
-
     def kept(self, given: Any, m: Any) -> Int64Array:
         """Whole numbers (N,)."""
         return integers(self.name, given, len(m))
@@ -24,6 +22,10 @@ class Group(Field):
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> Int64Array | None:
         """Whole numbers."""
         return table.integers(self.name) if self.name in table.columns else None
+
+    def printed(self, m: Any) -> Iterator[WrittenColumn]:
+        """Its column."""
+        return self.framed(m)
 
 
 class Lines(Field):

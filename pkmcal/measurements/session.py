@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from pkmcal.arguments import shown, words
 from pkmcal.arrays import TextArray
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.csv_table import Table
+from pkmcal.files.csv_writer import WrittenColumn
 from pkmcal.files.reading import LONGEST_NAME
 from pkmcal.measurements.field import Field
 from pkmcal.readings.reading import Reading
@@ -44,6 +45,10 @@ class Session(Field):
     def read(self, table: Table, instrument: Reading, units: Sequence[str]) -> TextArray | None:
         """Names."""
         return np.array(table.texts(self.name)) if self.name in table.columns else None
+
+    def printed(self, m: Any) -> Iterator[WrittenColumn]:
+        """Its column, where there are several sessions."""
+        return self.framed(m) if len(m.sessions) > 1 else iter(())
 
     def said(self, m: Any) -> str:
         """Their names."""

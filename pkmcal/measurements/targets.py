@@ -26,8 +26,6 @@ _OF_A_TARGET = re.compile(r"(?P<target>.+)\.[xyz]")
 class TargetIndex(Field):
     """Which of several targets each row measured, counted from 0; its columns say where it is."""
 
-    listed = True
-
     def kept(self, given: Any, m: Any) -> Int64Array:
         """Whole numbers (N,)."""
         _refuse_without_point(m.instrument)
@@ -52,6 +50,10 @@ class TargetIndex(Field):
         """The target's name."""
         if m.target_index is not None:
             yield WrittenColumn("target", "", np.array(m.target_names)[m.target_index])
+
+    def printed(self, m: Any) -> Iterator[WrittenColumn]:
+        """The target's name."""
+        return self.framed(m)
 
     def said(self, m: Any) -> str:
         """The names, or where the one target is."""
