@@ -14,7 +14,7 @@ import numpy as np
 import pkmcal as pk
 from benchmarks.fits import Draw, Parts, timed
 from benchmarks.timing import Report, medians
-from pkmcal.calibration.robust_check import robust_check
+from pkmcal.diagnostics.robust_check import robust_check
 from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.datasets import as_fit_data, by_set
 from pkmcal.estimation.free_parameters import parameters

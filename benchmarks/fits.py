@@ -112,7 +112,7 @@ def _serve(checkout: Path, data: Path) -> None:
         found = pk.identify(machine, measured, **options)
         identify, verdict, robust = time.thread_time() - start, float("nan"), float("nan")
         if hasattr(type(found), "verdict"):
-            from pkmcal.calibration.robust_check import robust_check
+            from pkmcal.diagnostics.robust_check import robust_check
 
             both = _seconds(lambda found=found: found.verdict)
             robust = _seconds(lambda found=found: robust_check(found.fit))

@@ -22,16 +22,8 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.calibration.anchors import locate_anchors as locate_anchors
     from pkmcal.calibration.bootstrap import Bootstrap as Bootstrap
     from pkmcal.calibration.bootstrap import bootstrap as bootstrap
-    from pkmcal.calibration.datum import Datum as Datum
-    from pkmcal.calibration.distances import Distances as Distances
-    from pkmcal.calibration.drift import Drift as Drift
     from pkmcal.calibration.identification import Identification as Identification
     from pkmcal.calibration.identify import identify as identify
-    from pkmcal.calibration.law_tests import LawTest as LawTest
-    from pkmcal.calibration.measuring_order import MeasuringOrder as MeasuringOrder
-    from pkmcal.calibration.moved import Moved as Moved
-    from pkmcal.calibration.slack import SlackCable as SlackCable
-    from pkmcal.calibration.verdict import Verdict as Verdict
     from pkmcal.checks.check_geometry import GeometryCheck as GeometryCheck
     from pkmcal.checks.check_geometry import check_geometry as check_geometry
     from pkmcal.checks.finding import Finding as Finding
@@ -48,6 +40,11 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.controllers.import_printer import import_printer as import_printer
     from pkmcal.core.swarm import CONSTRICTION as CONSTRICTION
     from pkmcal.core.swarm import SwarmSettings as SwarmSettings
+    from pkmcal.diagnostics.drift import Drift as Drift
+    from pkmcal.diagnostics.law_tests import LawTest as LawTest
+    from pkmcal.diagnostics.measuring_order import MeasuringOrder as MeasuringOrder
+    from pkmcal.diagnostics.moved import Moved as Moved
+    from pkmcal.diagnostics.verdict import Verdict as Verdict
     from pkmcal.error_model.allocation import Allocation as Allocation
     from pkmcal.error_model.allocation import allocate_tolerance as allocate_tolerance
     from pkmcal.error_model.sensitivity import Sensitivity as Sensitivity
@@ -60,6 +57,9 @@ if TYPE_CHECKING:  # the same names for type checkers and editors; a test compar
     from pkmcal.exceptions import CalibrationWarning as CalibrationWarning
     from pkmcal.exceptions import Error as Error
     from pkmcal.exceptions import FileError as FileError
+    from pkmcal.fitted.datum import Datum as Datum
+    from pkmcal.fitted.distances import Distances as Distances
+    from pkmcal.fitted.slack import SlackCable as SlackCable
     from pkmcal.geometry.geometry import Geometry as Geometry
     from pkmcal.kinematics.dexterity import Dexterity as Dexterity
     from pkmcal.kinematics.dexterity import dexterity as dexterity
@@ -98,7 +98,7 @@ _HOMES = {
     "calibration.anchors": ("LocatedAnchors", "locate_anchors"),
     "calibration.bootstrap": ("Bootstrap", "bootstrap"),
     "calibration.datum": ("Datum",),
-    "calibration.distances": ("Distances",),
+    "fitted.distances": ("Distances",),
     "calibration.drift": ("Drift",),
     "calibration.identification": ("Identification",),
     "calibration.identify": ("identify",),

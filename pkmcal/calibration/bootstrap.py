@@ -21,7 +21,6 @@ import numpy as np
 from pkmcal import arguments, display
 from pkmcal.arguments import checked_seed, instance, whole
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.fit import Fit
 from pkmcal.calibration.identification import Identification
 from pkmcal.display import Table
 from pkmcal.estimation.equations import Equations
@@ -29,6 +28,7 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.labels import labels
 from pkmcal.estimation.least_squares import Search
 from pkmcal.exceptions import ArgumentError
+from pkmcal.fitted.fit import Fit
 from pkmcal.result import Result
 
 _TOGETHER = 20  # replicates that one task computes

@@ -15,20 +15,20 @@ from pkmcal import arguments
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray, as_rows, propagate
 from pkmcal.calibration import summary
-from pkmcal.calibration.displaced import displaced_target
-from pkmcal.calibration.drift import Drift, drift
-from pkmcal.calibration.law_tests import LawTest, law_tests
-from pkmcal.calibration.measuring_order import MeasuringOrder, measuring_order
-from pkmcal.calibration.moved import Moved, moved
-from pkmcal.calibration.parts import Parts
-from pkmcal.calibration.robust_check import robust_check
-from pkmcal.calibration.row_names import row_names
-from pkmcal.calibration.verdict import Verdict, judge
 from pkmcal.core import instruments
+from pkmcal.diagnostics.displaced import displaced_target
+from pkmcal.diagnostics.drift import Drift, drift
+from pkmcal.diagnostics.law_tests import LawTest, law_tests
+from pkmcal.diagnostics.measuring_order import MeasuringOrder, measuring_order
+from pkmcal.diagnostics.moved import Moved, moved
+from pkmcal.diagnostics.robust_check import robust_check
+from pkmcal.diagnostics.verdict import Verdict, judge
 from pkmcal.display import Table
 from pkmcal.effects.expansion import in_words
 from pkmcal.estimation.estimator import FEW
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.fitted.row_names import row_names
+from pkmcal.fitted.solution import Solution
 from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.result import Result
@@ -41,10 +41,10 @@ _ALIKE = 9  # decimals to which correlations differ that are not equal
 _UNIDENTIFIABLE = 1e-3  # mm a pose moves per mm along an unidentifiable combination
 
 
-class Identification(Parts, Result):
+class Identification(Solution, Result):
     """What `identify` found. Arrays are in the order of `free`; mm and rad.
 
-    Its parts are those of `Parts`, its numbers the flat names there.
+    Its parts are those of `Solution`, its numbers the flat names there.
     """
 
     @cached_property
@@ -65,17 +65,17 @@ class Identification(Parts, Result):
         Empty where nothing did: where the points held out were drawn from the same measurements,
         and where they do not contradict a fit of several spare equations.
         """
-        later, end = self.holdout.later, self.holdout.end
+        later, end = self.holdout_later, self.holdout_end
         if not self.holdout_contradicts and self.fit.uncertainty.fit.freedom >= FEW:
             return ()
-        if self.holdout.drawn or later is None or end is None or not self.fit.uncertainty.known:
+        if self.holdout_drawn or later is None or end is None or not self.fit.uncertainty.known:
             return ()
         return moved(self.fit, later, end)
 
     @cached_property
     def drift(self) -> Drift | None:
         """Whether repeated poses moved with time; None where too few were repeated to say."""
-        return drift(self.fit, self.holdout, {*self.outliers, *self.holdout.odd})
+        return drift(self.fit, self, {*self.outliers, *self.holdout_outliers})
 
     @cached_property
     def measuring_order(self) -> MeasuringOrder | None:
@@ -91,12 +91,7 @@ class Identification(Parts, Result):
         if isinstance(self.robot, SerialArm):
             return ()
         prior = np.asarray(self.fit.estimate.prior.any(axis=0))
-        return law_tests(self.robot.geometry, self.table, self.fit.uncertainty, prior)
-
-    @property
-    def loss(self) -> str:
-        """The loss that was asked for."""
-        return self.fit.estimate.state.loss.name
+        return law_tests(self.robot.geometry, self, self.fit.uncertainty, prior)
 
     @property
     def parameters(self) -> dict[str, dict[str, float]]:
@@ -108,15 +103,6 @@ class Identification(Parts, Result):
     def params(self) -> dict[str, dict[str, float]]:
         """`parameters`, as lmfit calls them."""
         return self.parameters
-
-    @property
-    def correlation_matrix(self) -> FloatArray:
-        """Correlations (n, n) by the design; NaN beside parameters that are not determined.
-
-        Those of equal independent errors at the poses that were measured: few poses show what
-        each parameter's error is, not how the errors of two go together.
-        """
-        return self.table.correlation
 
     @property
     def correlations(self) -> tuple[tuple[str, str, float], ...]:
@@ -290,14 +276,14 @@ class Identification(Parts, Result):
             yield summary.sessions(self.sessions)
         if heat := in_words(self.fit.equations.sets, self.expansion, self.fit.parameters.robot):
             yield summary.filled("", heat)
-        yield summary.misfit_table(self.misfit, self.holdout)
-        yield summary.quality(self.misfit, self.repeats, self.observability)
+        yield summary.misfit_table(self)
+        yield summary.quality(self)
         datasets, chosen = self.fit.equations.datasets, self.fit.parameters
         framed = len(self.free) > len(chosen.places) or isinstance(self.robot, SerialArm)
         if self.datum.names:
             yield summary.filled("", str(self.datum))
         yield from summary.limits(
-            self.identifiability,
+            self,
             len(self.free),
             self.correlations,
             row_names(datasets, self.outliers),
@@ -308,10 +294,10 @@ class Identification(Parts, Result):
         if self.at_bounds:
             yield summary.bounds(self.at_bounds)
         yield ""
-        yield from summary.parameter_rows(self.table)
-        if self.holdout.own:
+        yield from summary.parameter_rows(self)
+        if self.holdout_own:
             yield ""
-            yield summary.own_numbers(self.holdout)
+            yield summary.own_numbers(self)
 
     def __repr__(self) -> str:
         return (

@@ -12,28 +12,8 @@ import numpy as np
 
 from pkmcal.arguments import word, words
 from pkmcal.arms.arm import SerialArm
-from pkmcal.calibration.datum import DATUMS, NO_DATUM, DatumRule
-from pkmcal.calibration.datum import datum as choose_datum
-from pkmcal.calibration.dropped import (
-    OUTLIERS,
-    Drop,
-    held_without,
-    named_rows,
-    robust_outliers,
-    without,
-)
-from pkmcal.calibration.fit import Fit
-from pkmcal.calibration.fit_statistics import (
-    SearchRecord,
-    identifiability,
-    misfit,
-    parameter_table,
-    repeats,
-    tested_prior,
-)
-from pkmcal.calibration.holdout import HeldOut, draw, evaluate
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.plausibility import (
+from pkmcal.diagnostics.plausibility import (
     beyond_strokes,
     contradicted_prior,
     distant_points,
@@ -42,9 +22,7 @@ from pkmcal.calibration.plausibility import (
     likely_unit_errors,
     shrunk,
 )
-from pkmcal.calibration.row_errors import likely_mistakes
-from pkmcal.calibration.row_names import row_names
-from pkmcal.calibration.slack import SLACK, Cell, Slack, said_slack, slack_cables, taut
+from pkmcal.diagnostics.row_errors import likely_mistakes
 from pkmcal.effects.expansion import Coefficients, expansion_of
 from pkmcal.estimation.begin import begun, estimator_at
 from pkmcal.estimation.datasets import as_fit_data, as_fitted, by_set, informative
@@ -61,6 +39,27 @@ from pkmcal.estimation.set_noise import unlike_noise
 from pkmcal.estimation.starts import known_distances
 from pkmcal.estimation.uncertainty import Uncertainty, solved, uncertainty, unlike_components
 from pkmcal.exceptions import ArgumentError, CalibrationWarning
+from pkmcal.fitted.datum import DATUMS, NO_DATUM, DatumRule
+from pkmcal.fitted.datum import datum as choose_datum
+from pkmcal.fitted.dropped import (
+    OUTLIERS,
+    Drop,
+    held_without,
+    named_rows,
+    robust_outliers,
+    without,
+)
+from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.fit_statistics import (
+    identifiability,
+    misfit,
+    parameter_table,
+    repeats,
+    tested_prior,
+)
+from pkmcal.fitted.holdout import HeldOut, draw, evaluate
+from pkmcal.fitted.row_names import row_names
+from pkmcal.fitted.slack import SLACK, Cell, Slack, said_slack, slack_cables, taut
 from pkmcal.kinematics.calibratable import as_given, as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
@@ -231,7 +230,7 @@ def identify(
             equations, commanded, start = begun(datasets, chosen, unread)
         if slack == "drop":
             equations, cells = taut(equations, commanded, start)
-            commanded = equations.commanded() if cells else commanded
+            commanded = equations.with_exact_actuators() if cells else commanded
         estimator = estimator_at(equations, commanded, start, loss)
         estimate = estimator.solve()
         if datum == "auto":
@@ -242,7 +241,7 @@ def identify(
             if cells:
                 keys = [(cell.pose, cell.closures[0]) for cell in cells]
                 equations = equations.without_closures(keys, estimate.evaluation)
-                commanded = equations.commanded()
+                commanded = equations.with_exact_actuators()
             estimator = estimator_at(equations, commanded, start, loss)
             estimate = estimator.solve()
     except ValueError as error:
@@ -266,14 +265,17 @@ def identify(
     drawn = not isinstance(holdout, Measurements)
     held = held_without(held, dropped) if drawn else held
     outside = evaluate(held, estimator, estimate, sure)
-    if drop == OUTLIERS and outside.odd and not outside.contradicts:
-        odd, names = outside.odd, row_names(outside.data, outside.odd)
+    if drop == OUTLIERS and outside.holdout_outliers and not outside.holdout_contradicts:
+        odd = outside.holdout_outliers
+        names = row_names(outside.holdout_data, odd)
         outside = evaluate(held_without(held, odd), estimator, estimate, sure)
         if drawn:
             dropped = tuple(sorted({*dropped, *odd}))
         else:
-            outside = replace(outside, dropped=odd, dropped_names=names)
-    result = _result(estimator, estimate, commanded, start, replace(outside, drawn=drawn), sure)
+            outside = replace(outside, holdout_dropped=odd, holdout_dropped_names=names)
+    result = _result(
+        estimator, estimate, commanded, start, replace(outside, holdout_drawn=drawn), sure
+    )
     result = replace(
         result,
         datum=held_numbers,
@@ -339,9 +341,9 @@ def _warnings(
         notes.append("the least squares did not converge: the result is not to be trusted")
     if result.holdout_unreached:
         notes.append(f"holdout: {result.holdout_unreached}; left out")
-    if result.holdout.spare < LEAST_FREEDOM:
+    if result.holdout_spare < LEAST_FREEDOM:
         notes.append(
-            f"holdout: {len(result.holdout.own)} numbers of its own session take all of its"
+            f"holdout: {len(result.holdout_own)} numbers of its own session take all of its"
             " readings, nothing is left to compare; hold out more rows of it"
         )
     return notes
@@ -375,18 +377,20 @@ def _result(
     end = estimate.evaluation
     robots = _robots(commanded, end)
     if commanded is not estimator.equations:
-        commanded = commanded.under(end.tension)
+        commanded = commanded.with_tension(end.states.tension)
         end = commanded.at(end.theta, near=end)
     return Identification(
+        **vars(parameter_table(estimator, estimate, sure)),
+        **vars(identifiability(estimator, estimate)),
+        **vars(misfit(estimator, estimate, sure, (start, end))),
+        **vars(repeats(sure)),
+        **vars(held),
+        converged=search.converged,
+        evaluations=search.evaluations,
+        history=tuple(search.history),
         robot=robots[chosen.sessions[-1] if chosen.sessions else ""],
         robots=_of_sessions(robots, held),
         prior_test=tested_prior(estimator, estimate),
-        table=parameter_table(estimator, estimate, sure),
-        identifiability=identifiability(estimator, estimate),
-        misfit=misfit(estimator, estimate, sure, (start, end)),
-        holdout=held,
-        repeats=repeats(sure),
-        search=SearchRecord(search.converged, search.evaluations, tuple(search.history)),
         fit=Fit(commanded, start, end, estimate, sure),
     )
 
@@ -396,11 +400,11 @@ def _of_sessions(
 ) -> dict[str, Robot | SerialArm]:
     """The machines of all sessions by name, those that were held out with them."""
     found = {name: robot for name, robot in robots.items() if name}
-    if found and held.later is not None and held.end is not None:
-        chosen = held.later.parameters
+    if found and held.holdout_later is not None and held.holdout_end is not None:
+        chosen = held.holdout_later.parameters
         for name in chosen.sessions:
             if name not in found:
-                values = chosen.values_at(held.end.theta, chosen.geometry_of(name))
+                values = chosen.values_at(held.holdout_end.theta, chosen.geometry_of(name))
                 found[name] = as_given(chosen.robot.replace(values))
     return found
 
@@ -411,7 +415,8 @@ def _robots(commanded: Equations, end: Evaluation) -> dict[str, Robot | SerialAr
     for session in chosen.sessions or ("",):
         columns = chosen.geometry_of(session)
         robot = as_given(chosen.robot.replace(chosen.values_at(end.theta, columns)))
-        own = (commanded.machine_columns == columns).all(axis=1)[commanded.machine_of_pose]
+        table = commanded.table
+        own = (table.machine_columns == columns).all(axis=1)[table.machine_of_pose]
         if isinstance(robot, Robot):
             robot = robot.closing(commanded.actuators[own], end.pose[own])
         found[session] = robot

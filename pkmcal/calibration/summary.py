@@ -10,10 +10,11 @@ import numpy as np
 
 from pkmcal import display
 from pkmcal.arrays import BoolArray
-from pkmcal.calibration.distances import Distances
-from pkmcal.calibration.fit_statistics import Identifiability, Misfit, ParameterTable, Repeats
-from pkmcal.calibration.holdout import HeldOut
 from pkmcal.display import Table, first_rows
+from pkmcal.fitted.distances import Distances
+from pkmcal.fitted.fit_statistics import Identifiability, Misfit, ParameterTable
+from pkmcal.fitted.holdout import HeldOut
+from pkmcal.fitted.solution import Solution
 from pkmcal.statistics.noise import SIGNIFICANT
 
 _WIDTH = 100  # letters on a line of the terminal
@@ -23,22 +24,27 @@ _SHARED = 0.5  # of a reading's own noise, from which what its pose shares is sa
 _FEW = 10.0  # degrees of freedom below which a standard deviation says too little
 
 
-def misfit_table(misfit: Misfit, holdout: HeldOut) -> Table:
+def misfit_table(found: Solution) -> Table:
     """Misfit before and after, of fitted points and of those held out."""
     rows = []
-    if np.isfinite(misfit.rms):
-        rows.append(["fitted", *_cells(misfit.before, misfit.after, misfit.outliers), ""])
-    if np.isfinite(misfit.closure_rms):
-        pair = _short(misfit.closure_rms_before), _short(misfit.closure_rms)
+    if np.isfinite(found.rms):
+        rows.append(
+            ["fitted", *_cells(found.distances_before, found.distances, found.outliers), ""]
+        )
+    if np.isfinite(found.closure_rms):
+        pair = _short(found.closure_rms_before), _short(found.closure_rms)
         rows.append(["closures", *pair, "", "", "", "of the actuators"])
-    if np.isfinite(holdout.rms):
-        known = np.isfinite(holdout.expected)
-        expected = f"rms {_short(holdout.expected)} expected" if known else ""
-        cells = _cells(holdout.before, holdout.after, holdout.odd)
+    if np.isfinite(found.holdout_rms):
+        known = np.isfinite(found.holdout_expected)
+        expected = f"rms {_short(found.holdout_expected)} expected" if known else ""
+        cells = _cells(
+            found.holdout_distances_before, found.holdout_distances, found.holdout_outliers
+        )
         rows.append(["held out", *cells, expected])
     heads = ["misfit [mm]", "rms before", "rms after", "median", "95 %", "rms without outliers", ""]
+    odd = found.outliers or found.holdout_outliers
     kept = [
-        k for k in range(len(heads)) if k < 5 or (k == 5 and (misfit.outliers or holdout.odd))
+        k for k in range(len(heads)) if k < 5 or (k == 5 and odd)
         or (k == 6 and any(row[6] for row in rows))
     ]  # fmt: skip
     return Table([heads[k] for k in kept], [[row[k] for k in kept] for row in rows], left=1)
@@ -66,24 +72,24 @@ def _cells(before: Distances, after: Distances, outliers: Sequence[int]) -> list
     return cells
 
 
-def quality(misfit: Misfit, repeats: Repeats, observability: dict[str, float]) -> str:
+def quality(found: Solution) -> str:
     """χ² per degree of freedom, noise, lack of fit and observability in one paragraph."""
     facts = []
-    chi2 = misfit.chi2_per_dof
+    chi2 = found.chi2_per_dof
     if np.isfinite(chi2):
         shown = f"{chi2:.2f}" if chi2 < 100 else f"{chi2:.2g}"
-        expected = f"1 ± {np.sqrt(2 / misfit.dof):.2f} expected, dof {_count(misfit.dof)}"
+        expected = f"1 ± {np.sqrt(2 / found.dof):.2f} expected, dof {_count(found.dof)}"
         facts.append(f"chi²/dof {shown} ({expected})")
-    facts += _noise(misfit)
-    misses = repeats.lack_of_fit_chance < SIGNIFICANT
-    if np.isfinite(repeats.repeatability):
-        text = f"repeats scatter by {_short(repeats.repeatability)} mm"
+    facts += _noise(found)
+    misses = found.lack_of_fit_chance < SIGNIFICANT
+    if np.isfinite(found.repeatability):
+        text = f"repeats scatter by {_short(found.repeatability)} mm"
         if misses:
-            text += f", lack of fit beyond that {_short(repeats.lack_of_fit)} mm"
-        elif np.isfinite(repeats.lack_of_fit_chance):
-            text += f", no lack of fit beyond that (p {repeats.lack_of_fit_chance:.2g})"
+            text += f", lack of fit beyond that {_short(found.lack_of_fit)} mm"
+        elif np.isfinite(found.lack_of_fit_chance):
+            text += f", no lack of fit beyond that (p {found.lack_of_fit_chance:.2g})"
         facts.append(text)
-    facts.append(" ".join(f"{key} {value:.2g}" for key, value in observability.items()))
+    facts.append(" ".join(f"{key} {value:.2g}" for key, value in found.observability.items()))
     return filled("", "; ".join(facts))
 
 
@@ -172,11 +178,11 @@ def sessions(names: Sequence[str]) -> str:
     return filled("sessions: ", f"{shown}; numbers without an @ are common, the robot is {last}'s")
 
 
-def own_numbers(holdout: HeldOut) -> Table:
+def own_numbers(found: HeldOut) -> Table:
     """Numbers of sessions that were held out."""
     rows = []
-    for name, (value, sigma) in holdout.own.items():
-        unit = holdout.units[name]
+    for name, (value, sigma) in found.holdout_own.items():
+        unit = found.holdout_units[name]
         number, shown = display.displayed(value, unit)
         deviation, _ = display.displayed(sigma, unit)
         label = f"{name} [{shown}]"
@@ -198,7 +204,7 @@ def parameter_rows(table: ParameterTable) -> Iterator[str | Table]:
     Where few degrees of freedom are left, half widths of 95 % intervals, and a line that says so.
     """
     sure = np.isfinite(table.stderr)
-    least = float(table.dof[sure].min()) if sure.any() else np.inf
+    least = float(table.parameter_dof[sure].min()) if sure.any() else np.inf
     half = (table.interval95[:, 1] - table.interval95[:, 0]) / 2.0
     wide = least < _FEW
     rows = []

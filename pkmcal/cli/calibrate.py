@@ -13,7 +13,6 @@ import typer
 
 import pkmcal as pk
 from pkmcal.arguments import word
-from pkmcal.calibration.datum import DATUMS
 from pkmcal.cli.geometry_options import (
     free_names,
     matching,
@@ -44,6 +43,7 @@ from pkmcal.estimation.parameters import KNOWN, Known
 from pkmcal.exceptions import ArgumentError
 from pkmcal.files.number_text import typed
 from pkmcal.files.reading import Input
+from pkmcal.fitted.datum import DATUMS
 from pkmcal.kinematics.calibratable import Calibratable, as_machine
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.measurements.tracker import Tracker

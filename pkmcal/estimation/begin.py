@@ -18,9 +18,10 @@ def begun(
     datasets: Sequence[FitData], chosen: Parameters, unread: int
 ) -> tuple[Equations, Equations, Evaluation]:
     """The equations, the same with commanded poses, and where these start."""
-    equations = Equations(datasets, chosen, unread)
-    commanded = equations.commanded()
-    return equations, commanded, start_in_modes(commanded)
+    equations = Equations.of(datasets, chosen, unread)
+    start = start_in_modes(equations.with_exact_actuators())
+    equations = equations.with_parameters(start.parameters)
+    return equations, equations.with_exact_actuators(), start
 
 
 def estimator_at(
@@ -35,7 +36,7 @@ def estimator_at(
     """
     if not start.ok and commanded is equations:
         raise ArgumentError(commanded.failures(start))
-    own = equations.begin(commanded, start)
+    equations, own = equations.begin(start)
     if not own.ok:
         raise ArgumentError(equations.failures(own))
     return Estimator(equations, own, loss)

@@ -44,7 +44,7 @@ class Closures(Protocol):
     equations: int
     actuators: tuple[int, ...]
     sigma: FloatArray | None
-    unread: BoolArray | None  # equations (K, equations) of load cells that were not read
+    missing: BoolArray | None  # equations (K, equations) of load cells that were not read
     cells: int  # how many of the equations are of load cells: the last ones
 
     def settled(self, robot: Calibratable, states: RowStates) -> RowStates:
@@ -79,7 +79,7 @@ class Commanded:
 
     unknowns = equations = cells = 0
     actuators: tuple[int, ...] = ()
-    unread: BoolArray | None = None
+    missing: BoolArray | None = None
 
     def __init__(self, read: FloatArray) -> None:
         self.read = read
@@ -133,7 +133,7 @@ class NoisyActuators:
     """
 
     cells = 0
-    unread: BoolArray | None = None
+    missing: BoolArray | None = None
 
     def __init__(self, read: FloatArray, sigma: FloatArray) -> None:
         self.read = read
@@ -203,7 +203,7 @@ class FreePoses:
     """
 
     cells = 0
-    unread: BoolArray | None = None
+    missing: BoolArray | None = None
 
     def __init__(self, robot: Robot, read: FloatArray, sigma: FloatArray) -> None:
         self.read = read

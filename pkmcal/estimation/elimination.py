@@ -49,13 +49,13 @@ class System(NamedTuple):
         Predicted less measured, whitened.
     by_unknown : ndarray (E, u)
         Their derivative by the unknowns.
-    left : ndarray (M,)
-        What is left of them when poses have taken their part.
+    reduced : ndarray (M,)
+        The reduced equations: the poses have taken their part.
     """
 
     off: FloatArray
     by_unknown: FloatArray
-    left: FloatArray
+    reduced: FloatArray
 
 
 class _Alike(NamedTuple):
@@ -87,7 +87,7 @@ class Shares(NamedTuple):
     information: FloatArray
 
 
-class Blocks:
+class Elimination:
     """Which equations belong to which pose.
 
     Parameters
@@ -105,9 +105,9 @@ class Blocks:
     ----------
     components : ndarray of int (U,)
         How many equations are left of each pose that has any left.
-    pose_of_unit : ndarray of int (U,)
+    pose_of_block : ndarray of int (U,)
         Which poses these are.
-    idle : int
+    uninformative : int
         How many poses have none left: whatever was read there, they say nothing.
     """
 
@@ -117,11 +117,11 @@ class Blocks:
         self._order = np.argsort(pose_of, kind="stable")
         self._count = np.bincount(pose_of, minlength=poses)
         self._all = PoseEquations(self._order, self._count, unknowns)
-        self.pose_of_unit: IntArray = np.flatnonzero(self._all.left_of)
-        self.components: IntArray = self._all.left_of[self.pose_of_unit]
-        self.idle = poses - len(self.pose_of_unit)
+        self.pose_of_block: IntArray = np.flatnonzero(self._all.left_of)
+        self.components: IntArray = self._all.left_of[self.pose_of_block]
+        self.uninformative = poses - len(self.pose_of_block)
 
-    def left(self, by_unknown: FloatArray, part: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def reduced(self, by_unknown: FloatArray, part: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What is left (M, n) of columns (E, n) when the poses have taken their part.
 
         And how they take it: steps (K, u, n) of the unknowns by each column. `by_unknown` is
@@ -129,7 +129,7 @@ class Blocks:
         """
         return self._all.left(by_unknown, part)
 
-    def spread(self, by_unknown: FloatArray, left: FloatArray) -> FloatArray:
+    def expanded(self, by_unknown: FloatArray, left: FloatArray) -> FloatArray:
         """Equations (E,) of which so much is left (M,), and nothing for the poses to take."""
         spread = np.empty(len(self.pose_of))
         spread[self._order] = self._all.spread(by_unknown, left[:, None])[:, 0]
@@ -142,7 +142,7 @@ class Blocks:
             units = np.flatnonzero(self.components == left)
             for lot in lots(len(units), _TOGETHER):
                 some = units[lot]
-                mine, count = self.pose_of_unit[some], len(some)
+                mine, count = self.pose_of_block[some], len(some)
                 equations = self._order[first[mine, None] + np.arange(left + u)]
                 poses = PoseEquations(equations.ravel(), np.full(count, left + u), u)
                 behind = np.tile(np.eye(left), (count, 1))
@@ -294,10 +294,10 @@ class Blocks:
         moving: BoolArray,
         pulled: Callable[[FloatArray], FloatArray],
     ) -> Fit:
-        """Newton's steps of poses that move, equations bent as `_bent` finds them by `pulled`."""
+        """Newton's steps of poses that move, equations bent as `_curved` finds them by `pulled`."""
         matrix, pull, cost = self._all.normals(*there)
         rounded = self._rounding * np.sqrt(np.einsum("kii->k", matrix))
-        matrix = _bent(matrix, pull, np.where(moving, cost, 0.0), pulled)
+        matrix = _curved(matrix, pull, np.where(moving, cost, 0.0), pulled)
         size = np.einsum("kii->ki", matrix)
         ridge = _RIDGE * size.sum(axis=1) + np.finfo(np.float64).tiny
         unit = np.eye(self.unknowns)
@@ -317,7 +317,7 @@ def _sums(numbers: FloatArray, group: IntArray, count: int) -> FloatArray:
     return sums
 
 
-def _bent(
+def _curved(
     matrix: FloatArray,
     pull: FloatArray,
     cost: FloatArray,

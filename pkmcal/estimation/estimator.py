@@ -124,7 +124,7 @@ class Estimator:
     # between the least squares ------------------------------------------------------------------
 
     def _loss(self, name: LossName, width: FloatArray) -> Loss:
-        of_units = width[self.equations.family_of_unit]
+        of_units = width[self.equations.blocks.family_of_block]
         return Loss(name, self.equations.components, of_units)
 
     def _first_noise(self) -> FloatArray:
@@ -173,7 +173,7 @@ class Estimator:
     def _medians(self, residual: FloatArray) -> FloatArray:
         """Variance (F,) that whitened residuals (M,) of each family show by their median."""
         squares, components = self.equations.squares(residual), self.equations.components
-        family_of = self.equations.family_of_unit
+        family_of = self.equations.blocks.family_of_block
         return np.array([
             median_ratio(squares[family_of == f], components[family_of == f])
             for f in range(int(family_of.max()) + 1)
@@ -243,7 +243,7 @@ class Estimator:
         factor, of_families = self._spread(estimate)
         noise = self._kept(estimate.state.noise * factor, estimate.state.noise)
         # while the model is still far off, outliers are units further off than most
-        family_of = self.equations.family_of_group
+        family_of = self.equations.blocks.family_of_group
         families = range(len(of_families))
         none_stated = np.array([bool(self.unstated[family_of == f].all()) for f in families])
         width = np.where(none_stated, 1.0, np.maximum(of_families, 1.0))
@@ -268,7 +268,7 @@ class Estimator:
         1 without freedom. `medians` (F,) are the variances of families that medians show, of
         robust losses.
         """
-        family_of = self.equations.family_of_group
+        family_of = self.equations.blocks.family_of_group
         squares, freedom, information = shares
         factor, of_families = np.ones(len(freedom)), np.ones(int(family_of.max()) + 1)
         for f in range(len(of_families)):
@@ -278,7 +278,7 @@ class Estimator:
                 continue
             variance = together = float(squares[mine].sum()) / left
             if medians is not None:
-                of_family = self.equations.family_of_unit == f
+                of_family = self.equations.blocks.family_of_block == f
                 count = float(self.equations.components[of_family].sum())
                 variance = float(medians[f]) * count / left
             of_families[f] = np.sqrt(variance)
@@ -321,10 +321,10 @@ class Estimator:
             return self.search.triangle(evaluation, np.ones(len(self.unstated)))
         arcs = [m.instrument.mm(m, self.start.robot.length) for m in self.equations.sets]
         factor = np.zeros((0, len(self.scale)))
-        for _, parts in self.equations.derivatives(evaluation):
+        for _, parts in self.equations.prediction.derivatives(evaluation, self.equations.closures):
             for i, rows, part in parts:
                 part *= arcs[i][:, None] * self.scale
-                factor = triangle(factor, self.equations.read(part, i, rows))
+                factor = triangle(factor, self.equations.whitening.stacked(part, i, rows))
         return factor
 
     def _estimate(self, u: FloatArray, state: IterationState) -> Estimate:

@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TypedDict
 
 from pkmcal.arrays import FloatArray, Int32Array
+from pkmcal.estimation.elimination import System
+from pkmcal.estimation.parameters import Parameters
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines
 from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.readings.reading import Predicted
+
+
+class Cache(TypedDict, total=False):
+    """What was computed at an evaluation and may be asked for again, after what computed it.
+
+    "system" is of some noise (G,), too; "following" (K, u, n) is how unknowns of the poses follow
+    the parameters.
+    """
+
+    predicted: tuple[object, tuple[Predicted, ...]]
+    system: tuple[object, FloatArray, System]
+    following: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,44 +34,52 @@ class Evaluation:
     ----------
     theta : ndarray (n,)
         The parameters, mm and rad.
+    parameters : Parameters
+        What they mean: `Equations.start` counts those of frames and tools from where these lie.
     machines : Machines
         With their geometry.
-    pose : ndarray (K, 6)
+    states : RowStates
         Where the machine is at each distinct row of actuators; NaN where it cannot be.
-    actuators : ndarray (K, n)
-        Where the actuators are there; what they read unless their noise is stated.
-    status : ndarray of int (K,)
-        Of the forward kinematics.
     predicted : tuple of ndarray (N, k)
         What the instruments show there, of each set of measurements.
     residuals : tuple of ndarray (N, k)
         Measured less predicted of each set, mm and rad.
-    tension : ndarray (K, n) or None
-        Of what the actuators drive, N, where it is unknown and has been found.
     begun : RowStates
         Where the search for the poses began.
-    kept : dict
-        What was computed here and may be asked for again; it goes when this goes.
+    cache : Cache
+        It dies with the evaluation and is not pickled.
     """
 
     theta: FloatArray
+    parameters: Parameters
     machines: Machines
-    pose: FloatArray
-    actuators: FloatArray
-    status: Int32Array
+    states: RowStates
     predicted: tuple[FloatArray, ...]
     residuals: tuple[FloatArray, ...]
-    tension: FloatArray | None = None
-    begun: RowStates | None = None
-    kept: dict[str, Any] = field(default_factory=dict)
+    begun: RowStates
+    cache: Cache = field(default_factory=Cache, repr=False)
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "kept": {}}
+    def __getstate__(self) -> dict[str, object]:
+        return {**self.__dict__, "cache": Cache()}
+
+    @property
+    def pose(self) -> FloatArray:
+        """Where the machine is (K, 6)."""
+        return self.states.pose
+
+    @property
+    def actuators(self) -> FloatArray:
+        """Where the actuators are (K, n); what they read unless their noise is stated."""
+        return self.states.actuators
+
+    @property
+    def status(self) -> Int32Array:
+        """Of the forward kinematics (K,)."""
+        return self.states.status
 
     @property
     def onward(self) -> RowStates:
         """Where a search for the poses begins from here; of a row without one, where this did."""
-        assert self.begun is not None
         return self.states.chosen(self.status == 0, self.begun)
 
     @property
@@ -68,8 +91,3 @@ class Evaluation:
     def robot(self) -> Calibratable:
         """The machine; that of the last session where some of its numbers are of sessions."""
         return self.machines.robots[-1]
-
-    @property
-    def states(self) -> RowStates:
-        """Where the machine is at each distinct row of actuators."""
-        return RowStates(self.pose, self.actuators, self.status, self.tension)

@@ -7,8 +7,6 @@ with their frame where it is not laid yet.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
@@ -17,44 +15,42 @@ from pkmcal.core.poses import compose, invert
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.hand_eye import of_frame_and_tool, of_tool
 from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.prediction import Prediction
 from pkmcal.readings.alignment import PointPairs, of_heights, of_points, of_poses
-
-if TYPE_CHECKING:
-    from pkmcal.estimation.readings import Readings
 
 Rows = dict[int, IntArray]  # of a frame, in each set
 
 
 def aligned(
-    readings: Readings, evaluation: Evaluation, own: BoolArray | None = None
+    prediction: Prediction, evaluation: Evaluation, own: BoolArray | None = None
 ) -> tuple[Parameters, FloatArray]:
     """Parameters whose frames lie nearest to the readings, and their values (n,).
 
     Parameters
     ----------
-    readings : Readings
-        What was read.
+    prediction : Prediction
+        What was read, and should be.
     evaluation : Evaluation
         Where the machine is with the present parameters.
     own : ndarray of bool (n,), optional
         Which parameters may be changed; all by default.
     """
-    parameters, theta = readings.parameters, evaluation.theta.copy()
+    parameters, theta = prediction.parameters, evaluation.theta.copy()
     free = np.ones(len(parameters), dtype=bool) if own is None else own.copy()
-    frames, tools = readings.frames, readings.tools
-    _with_known_frame(readings, evaluation, theta, free)
+    frames, tools = prediction.frames, prediction.tools
+    _with_known_frame(prediction, evaluation, theta, free)
     by_points = [
         first
         for first, rows in frames.items()
-        if any(readings.sets[i].kind == "position" for i in rows)
+        if any(prediction.table.sets[i].kind == "position" for i in rows)
     ]
     for first in dict.fromkeys([*by_points, *tools, *frames]):
         if not free[first]:
             continue
         if first in tools:
-            laid = _with_tool(readings, evaluation, first, parameters, theta, free)
+            laid = _with_tool(prediction, evaluation, first, parameters, theta, free)
         else:
-            laid = {first: _aligned(readings, evaluation, frames[first], parameters, theta, free)}
+            laid = {first: _aligned(prediction, evaluation, frames[first], parameters, theta, free)}
         for each, motion in laid.items():
             parameters, theta = parameters.aligned(theta, each, motion)
             free[each : each + 6] = False
@@ -62,42 +58,44 @@ def aligned(
 
 
 def _with_known_frame(
-    readings: Readings, evaluation: Evaluation, theta: FloatArray, free: BoolArray
+    prediction: Prediction, evaluation: Evaluation, theta: FloatArray, free: BoolArray
 ) -> None:
     """Place targets that are free and were read in a known frame: they are then not free.
 
     At the medians, which a few rows that are solved in another assembly mode do not move.
     """
-    framed = {i for rows in readings.frames.values() for i in rows}
-    seen = [i for i, m in enumerate(readings.sets) if m.kind == "position" and i not in framed]
-    every = {i: np.arange(len(readings.sets[i])) for i in seen}
-    columns = {i: _sought(readings, i, rows, free)[:, 0] for i, rows in every.items()}
+    framed = {i for rows in prediction.frames.values() for i in rows}
+    seen = [
+        i for i, m in enumerate(prediction.table.sets) if m.kind == "position" and i not in framed
+    ]
+    every = {i: np.arange(len(prediction.table.sets[i])) for i in seen}
+    columns = {i: _free_targets(prediction, i, rows, free)[:, 0] for i, rows in every.items()}
     for first in np.unique(np.concatenate([np.empty(0, np.intp), *columns.values()])).tolist():
         if first < 0:
             continue
         shifts = []
         for i, rows in every.items():
             mine = rows[columns[i] == first]
-            places, turn = _points(readings, evaluation, i, mine, theta)
-            off = readings.sets[i].values[mine] - places
+            places, turn = _points(prediction, evaluation, i, mine, theta)
+            off = prediction.table.sets[i].values[mine] - places
             shifts.append((turn.transpose(0, 2, 1) @ off[:, :, None])[:, :, 0])
         read = np.concatenate(shifts)
         read = read[np.isfinite(read).all(axis=1)]
         if len(read):
-            _shift(readings, theta, free, first, np.median(read, axis=0))
+            _shift(prediction, theta, free, first, np.median(read, axis=0))
 
 
 def _shift(
-    readings: Readings, theta: FloatArray, free: BoolArray, first: int, shift: FloatArray
+    prediction: Prediction, theta: FloatArray, free: BoolArray, first: int, shift: FloatArray
 ) -> None:
     """Move a target within its bounds; it is then not free."""
-    mine, (lower, upper) = slice(first, first + 3), readings.parameters.bounds
+    mine, (lower, upper) = slice(first, first + 3), prediction.parameters.bounds
     theta[mine] = np.clip(theta[mine] + shift, lower[mine], upper[mine])
     free[mine] = False
 
 
 def _with_tool(
-    readings: Readings,
+    prediction: Prediction,
     evaluation: Evaluation,
     tool: int,
     parameters: Parameters,
@@ -106,8 +104,8 @@ def _with_tool(
 ) -> dict[int, FloatArray]:
     """A tool (6,) by its first parameter, with the frame it was measured in where that is free."""
     groups: dict[int | None, list[tuple[int, IntArray]]] = {}
-    for i, rows in readings.tools[tool].items():
-        framed = {f: own[i] for f, own in readings.frames.items() if i in own}
+    for i, rows in prediction.tools[tool].items():
+        framed = {f: own[i] for f, own in prediction.frames.items() if i in own}
         if not framed:
             groups.setdefault(None, []).append((i, rows))
         for f, own in framed.items():
@@ -115,8 +113,10 @@ def _with_tool(
                 groups.setdefault(f, []).append((i, some))
     known = [each for each in groups if each is None or not free[each]]
     frame = (known or list(groups))[0]
-    values = np.concatenate([readings.sets[i].values[rows] for i, rows in groups[frame]])
-    pose = np.concatenate([evaluation.pose[readings.pose_of[i][rows]] for i, rows in groups[frame]])
+    values = np.concatenate([prediction.table.sets[i].values[rows] for i, rows in groups[frame]])
+    pose = np.concatenate(
+        [evaluation.pose[prediction.table.pose_of[i][rows]] for i, rows in groups[frame]]
+    )
     if frame is None:
         return {tool: of_tool(values, pose)}
     if free[frame]:
@@ -134,7 +134,7 @@ def _motion(parameters: Parameters, theta: FloatArray, first: int) -> FloatArray
 
 
 def _seen(
-    readings: Readings,
+    prediction: Prediction,
     evaluation: Evaluation,
     i: int,
     rows: IntArray,
@@ -142,10 +142,10 @@ def _seen(
     theta: FloatArray,
 ) -> FloatArray:
     """What rows of set `i` read in the base frame, (N, k), tools where they are laid."""
-    columns = readings.columns_of(i, "tool")
+    columns = prediction.arguments[i].columns.get("tool")
     if columns is None:
         return evaluation.predicted[i][rows]
-    pose = evaluation.pose[readings.pose_of[i][rows]]
+    pose = evaluation.pose[prediction.table.pose_of[i][rows]]
     for first in np.unique(columns[rows, 0]).tolist():
         mine = columns[rows, 0] == first
         pose[mine] = compose(pose[mine], _motion(parameters, theta, first))
@@ -153,7 +153,7 @@ def _seen(
 
 
 def _aligned(
-    readings: Readings,
+    prediction: Prediction,
     evaluation: Evaluation,
     rows: Rows,
     parameters: Parameters,
@@ -164,26 +164,28 @@ def _aligned(
     kinds = {
         kind: sets
         for kind in ("position", "pose", "height", "orientation", "tilt")
-        if (sets := [i for i in rows if readings.sets[i].kind == kind])
+        if (sets := [i for i in rows if prediction.table.sets[i].kind == kind])
     }
     of_points_in = kinds.get("position", [])
     if not of_points_in:
         kind = next(iter(kinds))
-        values = np.concatenate([readings.sets[i].values[rows[i]] for i in kinds[kind]])
+        values = np.concatenate([prediction.table.sets[i].values[rows[i]] for i in kinds[kind]])
         if kind == "tilt":  # as level as the robot file says
             return np.zeros(6)
         if kind != "height":
-            seen = [_seen(readings, evaluation, i, rows[i], parameters, theta) for i in kinds[kind]]
+            seen = [
+                _seen(prediction, evaluation, i, rows[i], parameters, theta) for i in kinds[kind]
+            ]
             whole = np.zeros((2, len(values), 6))
             whole[:, :, 6 - values.shape[1] :] = values, np.concatenate(seen)
             whole[0, :, np.isnan(whole[0]).all(axis=0)] = 0.0  # never read, as across a plane
             read, predicted = whole[:, np.isfinite(whole[0]).all(axis=1)]
             return of_poses(read, predicted) if len(read) else np.zeros(6)
-        parts = [_points(readings, evaluation, i, rows[i], theta) for i in kinds[kind]]
+        parts = [_points(prediction, evaluation, i, rows[i], theta) for i in kinds[kind]]
         return of_heights(values, np.concatenate([places for places, _ in parts]))
-    values = np.concatenate([readings.sets[i].values[rows[i]] for i in of_points_in])
-    columns = np.concatenate([_sought(readings, i, rows[i], free) for i in of_points_in])
-    parts = [_points(readings, evaluation, i, rows[i], theta) for i in of_points_in]
+    values = np.concatenate([prediction.table.sets[i].values[rows[i]] for i in of_points_in])
+    columns = np.concatenate([_free_targets(prediction, i, rows[i], free) for i in of_points_in])
+    parts = [_points(prediction, evaluation, i, rows[i], theta) for i in of_points_in]
     places, turns = (np.concatenate(each) for each in zip(*parts, strict=True))
     # rows of what was read at all: of a machine in a plane, say, not across it
     never = np.isnan(values).all(axis=0)
@@ -201,13 +203,13 @@ def _aligned(
     )
     frame, shifts = of_points(pairs)
     for first, shift in zip(sought[sought >= 0].tolist(), shifts, strict=True):
-        _shift(readings, theta, free, first, shift)
+        _shift(prediction, theta, free, first, shift)
     return frame
 
 
-def _sought(readings: Readings, i: int, rows: IntArray, free: BoolArray) -> IntArray:
+def _free_targets(prediction: Prediction, i: int, rows: IntArray, free: BoolArray) -> IntArray:
     """Parameters (N, 3) of the target of each row of set `i`; -1 where it is not free."""
-    columns = readings.columns_of(i, "target")
+    columns = prediction.arguments[i].columns.get("target")
     if columns is None:
         return np.full((len(rows), 3), -1)
     mine = columns[rows]
@@ -215,10 +217,10 @@ def _sought(readings: Readings, i: int, rows: IntArray, free: BoolArray) -> IntA
 
 
 def _points(
-    readings: Readings, evaluation: Evaluation, i: int, rows: IntArray, theta: FloatArray
+    prediction: Prediction, evaluation: Evaluation, i: int, rows: IntArray, theta: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Where targets of rows of set `i` are in the base frame (N, 3), and how they are turned."""
-    target = readings.arguments_of(i, theta)["target"]
-    pose = evaluation.pose[readings.pose_of[i][rows]]
+    target = prediction.arguments_of(i, theta)["target"]
+    pose = evaluation.pose[prediction.table.pose_of[i][rows]]
     places, _, turn = instruments.points(pose, np.ascontiguousarray(target[rows]))
     return places, turn

@@ -45,7 +45,7 @@ def poses_of_rows(equations: Equations) -> IntArray:
 
     Rows at the same actuators are one pose in all sets.
     """
-    pose = equations.command_of_pose[np.concatenate(equations.pose_of)]
+    pose = equations.table.command_of_pose[np.concatenate(equations.pose_of)]
     for k, measured in enumerate(equations.sets):
         if measured.group is not None:
             pose[equations.set_of == k] = measured.pose_index + pose.max() + 1
@@ -69,7 +69,7 @@ def _of_readings(equations: Equations) -> Labels:
         lengths.append(np.tile(np.array(counted, dtype=bool), len(m)))
         rows.append(np.repeat(np.arange(first, first + len(m)), len(m.components)))
         first += len(m)
-    read = equations.present
+    read = equations.whitening.present
     row = np.concatenate(rows)[read]
     return Labels(
         set_of=equations.set_of[row],
@@ -94,7 +94,7 @@ def _of_mixtures(equations: Equations) -> Labels:
 
 def _poses_of_units(equations: Equations) -> IntArray:
     """Number of the pose of each unit (U,): units whose rows share a pose are of one."""
-    unit, pose = equations.unit_of_row, poses_of_rows(equations)
+    unit, pose = equations.blocks.block_of_row, poses_of_rows(equations)
     used = unit >= 0
     group = joined(unit[used], pose[used])
     return numbered(group[np.unique(unit[used], return_index=True)[1]])

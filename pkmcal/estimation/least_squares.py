@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray
-from pkmcal.estimation.equations import Equations, Lot
+from pkmcal.estimation.equations import Batch, Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.loss import Loss
+from pkmcal.estimation.misfits import progress
 from pkmcal.exceptions import ArgumentError
 from pkmcal.statistics.linear_fit import triangle
 
@@ -114,7 +115,7 @@ class Search:
     def taken(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """The same, which is the caller's: it is not kept."""
         found = np.empty((self._equations, len(self.scale)))
-        for _, some, by_u in self._lots(evaluation, noise):
+        for _, some, by_u in self._batches(evaluation, noise):
             if len(by_u) == len(found):
                 return _finite(by_u)
             found[some] = _finite(by_u)
@@ -123,7 +124,7 @@ class Search:
     def triangle(self, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
         """R of a QR factorisation of it. Of several lots none is kept."""
         factor = np.zeros((0, len(self.scale)))
-        for _, _, by_u in self._lots(evaluation, noise):
+        for _, _, by_u in self._batches(evaluation, noise):
             factor = triangle(factor, _finite(by_u))
             if len(by_u) == self._equations:
                 self._last_jacobian = evaluation, noise, by_u
@@ -132,19 +133,19 @@ class Search:
     def forget(self) -> None:
         """A search has ended: what is kept for its next step takes memory."""
         self._last_jacobian = None
-        self.near.kept.pop("following", None)
+        self.near.cache.pop("following", None)
 
-    def _lots(self, evaluation: Evaluation, noise: FloatArray) -> Iterator[Lot]:
+    def _batches(self, evaluation: Evaluation, noise: FloatArray) -> Iterator[Batch]:
         """`taken` in lots, finite or not."""
         last, self._last_jacobian = self._last_jacobian, None
         if last is not None and last[0] is evaluation and _same(last[1], noise):
-            yield Lot(slice(0, len(self.equations.components)), slice(0, self._equations), last[2])
+            yield slice(0, len(self.equations.components)), slice(0, self._equations), last[2]
             return
         del last
-        for lot in self.equations.lots(evaluation, noise):
-            by_u: FloatArray = lot.by_parameters[:, self._found]
+        for blocks, some, by_parameters in self.equations.batches(evaluation, noise):
+            by_u: FloatArray = by_parameters[:, self._found]
             by_u *= self.scale
-            yield lot._replace(by_parameters=by_u)
+            yield blocks, some, by_u
 
     def best(self, u: FloatArray, noise: FloatArray, loss: Loss, pins: FloatArray) -> FloatArray:
         """Where the cost is least, from `u` (n,).
@@ -205,7 +206,7 @@ class Search:
         def residual(u: FloatArray) -> FloatArray:
             evaluation = self.at(u, noise)
             if not evaluation.ok:
-                missed = (evaluation.status[equations.pose_of_unit] != 0) & ~aside
+                missed = (evaluation.status[equations.blocks.pose_of_block] != 0) & ~aside
                 if missed.any():  # worse than any step that is taken
                     self._refused |= missed
                     return np.full(count, worse + floor)
@@ -221,18 +222,18 @@ class Search:
             nonlocal taken
             if evaluation is not taken:
                 taken = evaluation
-                self.near.kept.pop("following", None)
+                self.near.cache.pop("following", None)
                 self.near = evaluation
-                self.history.append(equations.progress(evaluation))
+                self.history.append(progress(equations, evaluation))
 
         def jacobian(u: FloatArray) -> FloatArray:
             evaluation = self.at(u, noise)
             take(evaluation)
             whitened = data(evaluation)
             left, factor = -loss.residual(whitened), np.zeros((0, 1 + len(u)))
-            for units, some, by_u in self._lots(evaluation, noise):
+            for blocks, some, by_u in self._batches(evaluation, noise):
                 by_u[without[some]] = 0.0
-                by_u = loss.of(units).jacobian(whitened[some], _finite(by_u))
+                by_u = loss.of(blocks).jacobian(whitened[some], _finite(by_u))
                 factor = triangle(factor, [left[some], by_u])
             turned = _turned(factor)
             return np.concatenate([turned, self.prior(evaluation.theta), pins, still])

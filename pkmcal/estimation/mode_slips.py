@@ -14,6 +14,7 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray, largest_first
 from pkmcal.display import first_rows
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.misfits import worst_readings
 from pkmcal.kinematics.robot import Robot
 
 _GROSS = 6.0  # times the median misfit from which a row is tried in other modes
@@ -37,9 +38,9 @@ def in_their_modes(equations: Equations, evaluation: Evaluation) -> Evaluation:
 def start_in_modes(
     equations: Equations, near: FloatArray | None = None, own: BoolArray | None = None
 ) -> Evaluation:
-    """`Equations.start`, once more where rows of other modes had laid unknown frames."""
+    """`Equations.start`, once more where rows in other modes had moved unknown frames."""
     start = equations.start(near, own)
-    better = in_their_modes(equations, start)
+    better = in_their_modes(equations.with_parameters(start.parameters), start)
     return start if better is start else equations.start(near, own, better.begun)
 
 
@@ -63,7 +64,7 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
     none = np.empty(0, dtype=np.intp), np.empty((0, 6))
     if not isinstance(evaluation.robot, Robot):
         return none  # an arm has one pose
-    misfit = equations.misfit(pose, evaluation.theta)
+    misfit = worst_readings(equations, pose, evaluation.theta)
     solved, read = np.isfinite(misfit), ~np.isnan(misfit)
     if not solved.any():
         return none
@@ -82,7 +83,7 @@ def _better(equations: Equations, evaluation: Evaluation) -> tuple[IntArray, Flo
         trial = pose.copy()
         for k, of_row in zip(gross, modes, strict=True):
             trial[k] = of_row[j] if j < len(of_row) else np.nan
-        now = equations.misfit(trial, evaluation.theta)
+        now = worst_readings(equations, trial, evaluation.theta)
         nearer = now < least
         least, best = np.where(nearer, now, least), np.where(nearer[:, None], trial, best)
     fits = (least < _HALF * np.where(solved, misfit, np.inf)) & (least <= _FITTING * limit)

@@ -17,7 +17,7 @@ from pkmcal.arrays import FloatArray, IntArray
 from pkmcal.core.poses import compose, compose_rates
 from pkmcal.estimation.fit_data import Dependence, FitData
 from pkmcal.estimation.prior_functions import PriorFunction
-from pkmcal.estimation.sessions import NONE, Scope, Spread, label
+from pkmcal.estimation.sessions import NONE, ParameterMap, Scope, label
 from pkmcal.estimation.smoothness import smoothness_rows
 from pkmcal.kinematics.calibratable import Calibratable
 
@@ -187,7 +187,7 @@ class Parameters:
         numbers = [n for n in (self.frame, self.found_along.get(("tool", ""))) if n is not None]
         return tuple(np.flatnonzero(np.isin(self.number_of, numbers)).tolist())
 
-    def spread(self, datasets: Sequence[FitData]) -> Spread:
+    def columns_of(self, datasets: Sequence[FitData]) -> ParameterMap:
         """Which parameters hold in the rows of these sets."""
         place: dict[tuple[str, str], int] = {}
         part_of = []
@@ -206,7 +206,7 @@ class Parameters:
             ]
             for part in place
         ])  # fmt: skip
-        return Spread(columns, tuple(part_of), len(self))
+        return ParameterMap(columns, tuple(part_of), len(self))
 
     def geometry_of(self, session: str | None = None) -> IntArray:
         """Parameters (g,) of the geometry in a session; in the last one by default."""

@@ -15,7 +15,7 @@ import numpy as np
 from pkmcal.arrays import BoolArray, FloatArray, Int32Array, IntArray, lots
 from pkmcal.estimation.closures import Closures, Commanded, closures_of
 from pkmcal.estimation.row_states import RowStates
-from pkmcal.estimation.sessions import spread
+from pkmcal.estimation.sessions import by_parameters
 from pkmcal.estimation.tensioned_poses import Cells, tensioned_poses
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics.calibratable import Calibratable
@@ -92,7 +92,7 @@ class SessionClosures:
         Whose reading each equation is of; -1 of none.
     sigma : ndarray (K, equations) or None
         Standard deviations of the equations.
-    unread : ndarray of bool (K, equations) or None
+    missing : ndarray of bool (K, equations) or None
         Those of load cells that were not read.
     cells : int
         How many of the equations are of load cells: the last ones.
@@ -106,8 +106,8 @@ class SessionClosures:
                 "measurements: state actuator_sigma of the same actuators in all sessions"
             )
         self.actuators, self.cells = parts[0].actuators, parts[0].cells
-        unread = [part.unread for part in parts if part.unread is not None]
-        self.unread = _joined(unread, self._rows) if unread else None
+        missing = [part.missing for part in parts if part.missing is not None]
+        self.missing = _joined(missing, self._rows) if missing else None
         stated = [part.sigma for part in parts if part.sigma is not None]
         self.sigma = _joined(stated, self._rows) if stated else None
 
@@ -157,7 +157,7 @@ class SessionClosures:
         ]
         nowhere = [np.zeros(len(rows), dtype=np.intp) for rows in self._rows]
         wide = [
-            spread(part, columns[s : s + 1], rows, size)
+            by_parameters(part, columns[s : s + 1], rows, size)
             for s, (part, rows) in enumerate(zip(found, nowhere, strict=True))
         ]
         return _joined(wide, self._rows)

@@ -2,8 +2,8 @@
 
 What a row depends on are the *numbers of a row*: the free numbers of the geometry, the frame, the
 points. Each is common to all rows, or there is one of it for each session (``offset5@thursday``) or
-for each set of measurements (``frame.x@2``). `Spread` is the map between the numbers of a row and
-the parameters of the search; everything else knows the numbers of a row alone.
+for each set of measurements (``frame.x@2``). `ParameterMap` says which parameter of the search each
+number of a row is; everything else knows the numbers of a row alone.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ NONE = -1  # column of a number that a row does not depend on
 
 
 @dataclass(frozen=True, eq=False)
-class Spread:
+class ParameterMap:
     """Where the numbers of a row are among the parameters.
 
     Rows of one session and one set are of one part.
@@ -53,7 +53,7 @@ class Spread:
 
     def of_rows(self, derivative: FloatArray, i: int, rows: slice) -> FloatArray:
         """Derivative (b, k, n) by the parameters, from one (b, k, m) by the numbers of set `i`."""
-        return spread(derivative, self.columns, self.part_of[i][rows], self.size)
+        return by_parameters(derivative, self.columns, self.part_of[i][rows], self.size)
 
     def machines(self, geometry: int) -> tuple[IntArray, tuple[IntArray, ...]]:
         """Different machines: columns (S, g) of their numbers, and which each row of each set has.
@@ -68,7 +68,9 @@ class Spread:
         return columns, tuple(of_part[part] for part in self.part_of)
 
 
-def spread(derivative: FloatArray, columns: IntArray, part_of: IntArray, size: int) -> FloatArray:
+def by_parameters(
+    derivative: FloatArray, columns: IntArray, part_of: IntArray, size: int
+) -> FloatArray:
     """Derivative (N, k, size) by the parameters, from one (N, k, m) by the numbers of a row.
 
     Parameters

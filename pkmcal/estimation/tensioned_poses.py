@@ -70,8 +70,8 @@ class TensionedPoses(FreePoses):
         super().__init__(robot, read, sigma)
         count = read.shape[1]
         load = robot.model.balanced_load
-        self.unread = np.zeros((len(read), self.equations + count), dtype=bool)
-        self.unread[:, self.equations :] = np.isnan(cells.read)
+        self.missing = np.zeros((len(read), self.equations + count), dtype=bool)
+        self.missing[:, self.equations :] = np.isnan(cells.read)
         self._cells = np.nan_to_num(cells.read)
         self._last: tuple[object, RowStates, tuple[FloatArray, FloatArray]] | None = None
         self._first = filled_tension(cells.read)

@@ -122,10 +122,10 @@ class Uncertainty:
 
     def in_units(self, whitened: FloatArray) -> FloatArray:
         """Whitened values (M,) in mm and rad; where angles alone were read, their arcs in mm."""
-        parts = self.equations.unwhiten(whitened, self.factors)
+        parts = self.equations.whitening.unwhiten(whitened, self.factors)
         arcs = self.equations.arcs
         every = [arc * part.ravel() for arc, part in zip(arcs, parts, strict=True)]
-        return np.concatenate(every)[self.equations.present]
+        return np.concatenate(every)[self.equations.whitening.present]
 
     @cached_property
     def adjusted(self) -> FloatArray:
@@ -306,7 +306,7 @@ def unlike_components(
     if shared_error_score(fit) > SHARED:
         return None
     every = [np.tile(np.arange(len(m.components)), len(m)) for m in equations.sets]
-    place = np.concatenate(every)[equations.present]
+    place = np.concatenate(every)[equations.whitening.present]
     schemes = (np.zeros(6), [0, 0, 0, 1, 1, 1], [0, 0, 1, 2, 2, 2], np.arange(6))
     candidates = [
         numbered(named.set_of, np.asarray(scheme, dtype=np.intp)[place]) for scheme in schemes

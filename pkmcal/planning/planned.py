@@ -106,20 +106,20 @@ def equations_of(
     ]
     datasets = with_starts(robot, datasets)
     chosen = parameters(robot, datasets, Asked(free, prior))
-    return [Equations([data], chosen) for data in datasets]
+    return [Equations.of([data], chosen) for data in datasets]
 
 
 def information(equations: Equations, poses: int) -> FloatArray:
     """What each pose brings (N, k, n): derivatives of its equations, whitened and scaled."""
-    commanded = equations.commanded()
-    at = equations.begin(commanded, commanded.start())
+    equations, at = equations.begin(equations.with_exact_actuators().start())
     rows = equations.by_parameters(at, np.ones(len(equations.unstated)))
     rows *= equations.parameters.scale
-    first = np.arange(0, len(equations.unit_of_row), len(equations.unit_of_row) // poses)
-    if not equations.closures.unknowns:  # rows are units, in their order
+    block_of_row = equations.blocks.block_of_row
+    first = np.arange(0, len(block_of_row), len(block_of_row) // poses)
+    if not equations.closures.unknowns:  # rows are blocks, in their order
         return rows.reshape(poses, -1, rows.shape[1])
     units: FloatArray = rows.reshape(len(equations.components), -1, rows.shape[1])
-    return units[equations.unit_of_row[first]]
+    return units[block_of_row[first]]
 
 
 def together(parts: Sequence[FloatArray]) -> FloatArray:

@@ -174,7 +174,7 @@ class Touch(Reading):
                 f"{', touch:'.join(TOUCHES)}"
             )
         known = distances_read(table, name)
-        return Touch(np.array(table.texts(name)), cast(Artefact, artefact), known)
+        return Touch(np.array(table.texts(name)), artefact, known)
 
     def columns_read(self, table: Table) -> Components:
         """Those of the components that are there: none where the machine touched alone."""

@@ -25,7 +25,7 @@ def axes(found: Identification) -> list[dict[str, Any]]:
     standard deviations, are ISO 9283's of an angle (7.2.1, 7.2.2).
     """
     equations, ends = found.fit.equations, (found.fit.start, found.fit.end)
-    by_twists = [[seen.by_twist for seen in equations.seen(at)] for at in ends]
+    by_twists = [[seen.by_twist for seen in equations.prediction.predicted(at)] for at in ends]
     before, after = list[FloatArray](), list[FloatArray]()
     poses = list[IntArray]()
     for i, measured in enumerate(equations.sets):

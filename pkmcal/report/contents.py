@@ -13,6 +13,7 @@ from pkmcal.arrays import FloatArray, largest_first, propagate, rms
 from pkmcal.calibration.identification import Identification
 from pkmcal.core.library import POSE
 from pkmcal.display import printable
+from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.kinematics.calibratable import as_machine
@@ -106,8 +107,8 @@ def directions(found: Identification) -> list[dict[str, Any]]:
 def points(found: Identification) -> list[dict[str, Any]]:
     """List every fitted row: its number, the pose, the distance before and after, mm."""
     equations = found.fit.equations
-    off_before = equations.distances(found.fit.start)
-    off = equations.distances(found.fit.end)
+    off_before = misfits.distances(equations, found.fit.start)
+    off = misfits.distances(equations, found.fit.end)
     place = np.concatenate(equations.pose_of)
     at = found.fit.end.pose[place]
     return [
@@ -242,8 +243,8 @@ def as_seen(found: Identification, places: FloatArray) -> FloatArray:
     like, first = _first_of_last(found)
     rows = np.full(len(q), first)
     measured = replace(like.measured.select(rows), actuators=q, group=np.arange(len(q)))
-    equations = Equations([replace(like, measured=measured, rows=rows)], known.parameters)
-    equations = equations.commanded()
+    equations = Equations.of([replace(like, measured=measured, rows=rows)], known.parameters)
+    equations = equations.with_exact_actuators()
     point = equations.at(found.fit.end.theta)
     jacobian = equations.jacobian(point)[0][:, :3]
     jacobian *= known.parameters.scale
@@ -271,11 +272,11 @@ def held_out_numbers(found: Identification) -> list[dict[str, Any]]:
     return [
         {
             "name": printable(name),
-            "unit": found.holdout.units[name],
+            "unit": found.holdout_units[name],
             "value": value,
             "stderr": stderr,
         }
-        for name, (value, stderr) in found.holdout.own.items()
+        for name, (value, stderr) in found.holdout_own.items()
     ]
 
 

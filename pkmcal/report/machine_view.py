@@ -12,7 +12,7 @@ import numpy as np
 from pkmcal.arms.arm import SerialArm
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.row_names import row_names
+from pkmcal.fitted.row_names import row_names
 from pkmcal.kinematics.calibratable import as_given
 from pkmcal.kinematics.robot import Robot
 from pkmcal.report.drawing import sample

@@ -11,11 +11,11 @@ import numpy as np
 from pkmcal import display
 from pkmcal.arms.arm import SerialArm
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.row_names import row_names
 from pkmcal.display import printable
 from pkmcal.effects.expansion import in_words
 from pkmcal.files.atomic import write_whole
 from pkmcal.files.provenance import checksums, comment, version
+from pkmcal.fitted.row_names import row_names
 from pkmcal.report import certificate, contents, machine_view, pdf
 from pkmcal.report.as_json import as_json
 from pkmcal.report.axes import axes

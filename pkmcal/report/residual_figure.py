@@ -165,7 +165,7 @@ def _without_direction(found: Identification) -> tuple[FloatArray, str]:
             sizes.append(np.degrees(np.linalg.norm(residual, axis=1)))
             angles = True
         else:
-            sizes.append(found.misfit.closures[place])
+            sizes.append(found.closures[place])
     size = np.concatenate(sizes)
     label = "angle off [deg]" if angles else "closure [mm]"
     return np.column_stack([0.0 * size, 0.0 * size, size]), label

@@ -19,7 +19,7 @@ def residual_vectors(found: Identification, at: Evaluation) -> FloatArray:
     """
     parts = []
     equations = found.fit.equations
-    every = zip(equations.sets, at.residuals, equations.seen(at), strict=True)
+    every = zip(equations.sets, at.residuals, equations.prediction.predicted(at), strict=True)
     for measured, residual, seen in every:
         lengths = [k for k, unit in enumerate(measured.units) if unit == "mm"]
         along, off = seen.by_twist[:, lengths, 3:], residual[:, lengths]
@@ -34,7 +34,7 @@ def measured_places(found: Identification) -> FloatArray:
     equations, end = found.fit.equations, found.fit.end
     parts = []
     for i in range(len(equations.sets)):
-        target = equations.arguments_of(i, end.theta).get("target")
+        target = equations.prediction.arguments_of(i, end.theta).get("target")
         if target is None:
             parts.append(end.pose[equations.pose_of[i], :3])
         else:

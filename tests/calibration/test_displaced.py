@@ -9,7 +9,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.displaced import DisplacedTarget, displaced_target
+from pkmcal.diagnostics.displaced import DisplacedTarget, displaced_target
 
 from ..simulated import hexapod_poses, with_errors
 

@@ -61,11 +61,11 @@ def test_outliers_among_held_out_rows_are_left_out_too() -> None:
     robot, measured = readings()
     found = pk.identify(robot, measured, drop="outliers", holdout=0.4)
     assert found.dropped == GROSS and found.holdout_outliers == ()
-    kept = {*found.holdout.rows.tolist(), *found.rows.tolist()}
+    kept = {*found.holdout_rows.tolist(), *found.rows.tolist()}
     assert kept == set(range(60)) - set(GROSS)
     with pytest.warns(pk.CalibrationWarning):
         plain = pk.identify(robot, measured, holdout=0.4)
-    assert set(plain.holdout.rows.tolist()) & set(GROSS), "one of them was drawn to be held out"
+    assert set(plain.holdout_rows.tolist()) & set(GROSS), "one of them was drawn to be held out"
     assert found.holdout_rms < 1.5 * found.holdout_expected
 
 
@@ -130,7 +130,7 @@ def test_outliers_of_another_file_that_is_held_out_are_left_out_and_named(
     later = gross.select(slice(0, 30))
     found = pk.identify(robot, measured.select(slice(30, 60)), drop="outliers", holdout=later)
     assert found.holdout_dropped == (3, 20) and found.dropped == ()
-    assert found.verdict.state == "calibrated" and len(found.holdout.rows) == 28
+    assert found.verdict.state == "calibrated" and len(found.holdout_rows) == 28
     assert found.left_out == "2 rows were left out, as asked: row 3, row 20"
     measured.select(slice(30, 60)).write(tmp_path / "first.csv")
     later.write(tmp_path / "later.csv")

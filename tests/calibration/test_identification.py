@@ -92,7 +92,7 @@ def test_strong_correlations_are_in_the_order_of_size_then_of_parameters(
     matrix[0, 2] = matrix[2, 0] = -0.97 - more
     matrix[3, 4] = matrix[4, 3] = 0.99
     matrix[3, 5] = matrix[5, 3] = 0.94
-    pairs = replace(found, table=replace(found.table, correlation=matrix)).correlations
+    pairs = replace(found, correlation_matrix=matrix).correlations
     second = "offset3" if first == "offset2" else "offset2"
     assert [(a, b) for a, b, _ in pairs] == [
         ("offset4", "offset5"), ("offset1", first), ("offset1", second)

@@ -227,7 +227,7 @@ def test_derivatives_of_what_is_read_are_those_of_differences(kind: str, framed:
         target=None if kind == "pose" else [300.0, -200.0, 150.0],
     )  # fmt: skip
     share = FitData(measured, np.arange(7), framed, False)
-    equations = Equations([share], parameters(ArmMachine(erring(ARM)), [share], Asked()))
+    equations = Equations.of([share], parameters(ArmMachine(erring(ARM)), [share], Asked()))
     at = equations.parameters.start.copy()
     if framed:
         at[-6:] = [10.0, -20.0, 30.0, 0.3, -0.2, 0.9]

@@ -10,7 +10,7 @@ import pytest
 
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.linearity import Weak, beyond_linear
+from pkmcal.diagnostics.linearity import Weak, beyond_linear
 from pkmcal.kinematics.calibratable import as_machine
 
 ROWS = 12

@@ -11,7 +11,7 @@ import pytest
 import pkmcal as pk
 from pkmcal.arrays import FloatArray
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.measuring_order import MeasuringOrder
+from pkmcal.diagnostics.measuring_order import MeasuringOrder
 from pkmcal.statistics.order_test import Series
 
 from ..simulated import hexapod_poses, tilted_poses, with_errors

@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.calibration.outliers import outliers
+from pkmcal.fitted.outliers import outliers
 
 FALSE_ALARM = 0.01  # chance of naming any row of good ones
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pkmcal.calibration.plausibility import distant_points, implausible_changes, shrunk
+from pkmcal.diagnostics.plausibility import distant_points, implausible_changes, shrunk
 
 
 def evaluated(places: np.ndarray) -> Any:

@@ -81,7 +81,7 @@ def test_of_a_hexapod_with_repeats_and_a_holdout(seed: int, loss: str) -> None:
     """The robust fit's loss has the width that the table was made with: that of this sigma."""
     digits = LINEAR[seed] if loss == "linear" else CAUCHY[seed]
     found = of_hexapod(seed, loss, None if loss == "linear" else digits[8])
-    test = found.holdout.test
+    test = found.holdout_test
     assert test is not None
     numbers = (
         found.values[0], found.stderr[0], found.parameter_dof[0], found.holdout_rms,

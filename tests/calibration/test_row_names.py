@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.calibration.row_names import row_names
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.fitted.row_names import row_names
 
 FILE = {"file": "day.csv", "lines": np.arange(8) // 2 + 3}
 INDEX = {"target": np.zeros((2, 3)), "target_index": np.arange(8) % 2}

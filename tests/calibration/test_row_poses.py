@@ -451,7 +451,7 @@ def test_what_actuators_add_to_points_held_out_is_shared_by_repeats(
     seen = np.repeat(places[:8], repeats, axis=0)
     seen += rng.normal(0, NOISE / 10, seen.shape)
     held = measured(drawn._replace(lengths=lengths, read=seen), sigma=NOISE / 10)
-    test = pk.identify(cables, measured(drawn), holdout=held).holdout.test
+    test = pk.identify(cables, measured(drawn), holdout=held).holdout_test
     assert test is not None
     assert 0.9 * 24 < test.freedom[0] <= 24
 

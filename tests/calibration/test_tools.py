@@ -118,10 +118,10 @@ def test_one_tool_for_two_frames_or_one_a_session(hexapod: Robot) -> None:
 def test_derivatives_by_a_tool_are_those_of_differences(hexapod: Robot, framed: bool) -> None:
     seen = carried(read(hexapod, hexapod, 4, count=6), None, TOOLS["slightly turned"])
     (data,) = with_starts(hexapod, [FitData(seen, np.arange(6), framed, True)])
-    equations = Equations([data], parameters(hexapod, [data], Asked("offset1")))
+    equations = Equations.of([data], parameters(hexapod, [data], Asked("offset1")))
     first = equations.parameters.motions[-1]
     origin = dict(equations.parameters.origin) | {first: np.array(TOOLS["across"])}
-    equations.parameters = dataclasses.replace(equations.parameters, origin=origin)
+    equations = equations.with_parameters(dataclasses.replace(equations.parameters, origin=origin))
     rng = np.random.default_rng(0)
     at = equations.parameters.start + 0.1 * rng.standard_normal(len(equations.parameters))
     (jacobian,) = equations.jacobian(equations.at(at))

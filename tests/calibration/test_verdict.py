@@ -119,8 +119,8 @@ def test_gross_rows_among_few_held_out_points_do_not_contradict_a_sound_fit(
         values[2] += 3.0
         first = session(hexapod, true, 30, seed)
         found = fitted(hexapod, first, free="offset*", holdout=replace(few, values=values))
-        assert found.holdout.test is not None and 2 in found.holdout_outliers
-        high += found.holdout.test.contradicts
+        assert found.holdout_test is not None and 2 in found.holdout_outliers
+        high += found.holdout_test.contradicts
         rest = found.holdout_distances.rms_without_outliers / found.holdout_expected
         assert not found.holdout_contradicts or rest > 1.2
     assert high  # else nothing was tested

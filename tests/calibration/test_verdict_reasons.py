@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.calibration.displaced import DisplacedTarget
-from pkmcal.calibration.distances import Distances
-from pkmcal.calibration.drift import Drift
-from pkmcal.calibration.holdout import HeldOut
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.measuring_order import MeasuringOrder
-from pkmcal.calibration.robust_check import RobustCheck
-from pkmcal.calibration.verdict import judge
+from pkmcal.diagnostics.displaced import DisplacedTarget
+from pkmcal.diagnostics.drift import Drift
+from pkmcal.diagnostics.measuring_order import MeasuringOrder
+from pkmcal.diagnostics.robust_check import RobustCheck
+from pkmcal.diagnostics.verdict import judge
+from pkmcal.fitted.distances import Distances
+from pkmcal.fitted.holdout import HeldOut
 from pkmcal.statistics.holdout_test import HoldoutTest
 
 from ..simulated import hexapod_poses

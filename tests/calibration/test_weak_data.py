@@ -13,7 +13,7 @@ from scipy.stats import f as f_distribution
 
 import pkmcal as pk
 from pkmcal.calibration.identification import Identification
-from pkmcal.calibration.robust_check import robust_check
+from pkmcal.diagnostics.robust_check import robust_check
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.linear_fit import column_basis
 from pkmcal.statistics.robust_scale import ratio_by_chance, robust_ratio
@@ -172,10 +172,10 @@ def test_how_far_off_points_must_be_to_contradict_few_equations(spare: int) -> N
     told = fitted(
         robot, whole.select(rows < 6 + spare), SIX, holdout=whole.select(rows >= 6 + spare)
     )
-    assert told.holdout.test is not None
-    limit = told.holdout.test.least_ratio
+    assert told.holdout_test is not None
+    limit = told.holdout_test.least_ratio
     assert f"contradict the fit only from {limit:.2g} times what is" in str(told.verdict.reasons)
-    first, second = told.holdout.test.freedom
+    first, second = told.holdout_test.freedom
     assert f_distribution.sf(limit**2, first, second) == pytest.approx(0.01, rel=1e-6)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.estimation.elimination import Blocks
+from pkmcal.estimation.elimination import Elimination
 from pkmcal.estimation.row_states import RowStates
 
 ANCHORS = np.array([[0.0, 2000], [3000, 2000], [0, 0], [3000, 0]])
@@ -40,7 +40,7 @@ def test_poses_of_gross_readings_are_at_a_minimum() -> None:
     pose = np.zeros((count, 6))
     pose[:, :2] = at
     start = RowStates(pose, read, np.zeros(count, dtype=np.int32))
-    blocks = Blocks(np.repeat(np.arange(count), 4), count, 2, 3000.0)
+    blocks = Elimination(np.repeat(np.arange(count), 4), count, 2, 3000.0)
     found, _ = blocks.best(Plane(), None, start, system)  # type: ignore[arg-type]
     residual, slopes = (each.reshape(count, 4, -1) for each in system(found))
     pull = np.linalg.norm((slopes * residual).sum(axis=1), axis=1)

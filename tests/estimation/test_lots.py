@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pkmcal as pk
-from pkmcal.estimation import derivatives, readings, session_machines
+from pkmcal.estimation import prediction, session_machines, whitening
 from pkmcal.statistics import clusters, linear_fit
 
 
@@ -31,8 +31,8 @@ def fitted(robot: pk.Robot, **options: Any) -> pk.Identification:
 def in_small_lots(monkeypatch: pytest.MonkeyPatch) -> None:
     for module, name, together in (
         (session_machines, "_TOGETHER", 7),
-        (readings, "_TOGETHER", 4),
-        (derivatives, "_LOT", 5),
+        (whitening, "_TOGETHER", 4),
+        (prediction, "_BATCH", 5),
         (clusters, "_FEW", 7),
         (linear_fit, "_KEYS", 3),
     ):
@@ -48,7 +48,7 @@ def test_a_calibration_in_lots_is_that_made_at_once(
     in_lots = fitted(hexapod, **options)
     np.testing.assert_array_less(abs(in_lots.values - at_once.values), 1e-6 * at_once.stderr)
     np.testing.assert_allclose(in_lots.stderr, at_once.stderr, rtol=1e-6)
-    np.testing.assert_allclose(in_lots.table.dof, at_once.table.dof, rtol=1e-6)
+    np.testing.assert_allclose(in_lots.parameter_dof, at_once.parameter_dof, rtol=1e-6)
     for name, index in at_once.observability.items():
         assert abs(in_lots.observability[name] / index - 1.0) < 1e-9
     first, second = at_once.fit.uncertainty, in_lots.fit.uncertainty

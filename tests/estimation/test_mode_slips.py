@@ -11,6 +11,7 @@ import pkmcal as pk
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.free_parameters import parameters
+from pkmcal.estimation.misfits import worst_readings
 from pkmcal.estimation.mode_slips import in_other_modes, in_their_modes
 from pkmcal.estimation.parameters import Asked
 
@@ -42,7 +43,7 @@ def test_no_row_is_fitted_in_another_mode_than_it_was_measured_in(name: str, sha
     for seed in range(6):
         robot, true, readings = measured(name, share, seed)
         data = FitData(readings, np.arange(len(readings)), False, False)
-        equations = Equations([data], parameters(robot, [data], Asked("offset*")))
+        equations = Equations.of([data], parameters(robot, [data], Asked("offset*")))
         start = equations.start()
         moved += in_their_modes(equations, start) is not start
         found = pk.identify(robot, readings, "offset*")
@@ -62,7 +63,7 @@ def test_wrong_readings_are_not_taken_for_other_modes(name: str, wrong: float) -
     values[[3, 11, 20]] += wrong * np.random.default_rng(2).normal(size=(3, 3)) * flat
     readings = pk.Measurements(readings.actuators, values, target=TARGET, sigma=NOISE)
     data = FitData(readings, np.arange(len(readings)), False, False)
-    equations = Equations([data], parameters(robot, [data], Asked("offset*")))
+    equations = Equations.of([data], parameters(robot, [data], Asked("offset*")))
     start = in_their_modes(equations, equations.start())
     again = in_their_modes(equations, start)
     assert again is start
@@ -72,7 +73,7 @@ def test_wrong_readings_are_not_taken_for_other_modes(name: str, wrong: float) -
 def test_rows_that_stay_in_another_mode_are_named() -> None:
     robot, _, readings = measured("hexapod", 0.5, 3)
     data = FitData(readings, np.arange(len(readings)), False, False)
-    equations = Equations([data], parameters(robot, [data], Asked("offset*")))
+    equations = Equations.of([data], parameters(robot, [data], Asked("offset*")))
     start = equations.start()
     assert in_other_modes(equations, start) == []
     others = robot.forward_all(equations.actuators[5]).poses
@@ -116,6 +117,6 @@ def test_how_far_off_a_pose_is_counts_angles_as_their_arc(hexapod: pk.Robot) -> 
         [0, 2, 0, 0.1, 0, 0], [0, 0, 0, 0, 0, 0],
     ])  # fmt: skip
     pose[order[3]] = np.nan
-    off = fit.equations.misfit(pose, fit.start.theta)[order]
+    off = worst_readings(fit.equations, pose, fit.start.theta)[order]
     arc = 1e-3 * hexapod.length
     np.testing.assert_allclose(off, [arc, 5.0, 7.0, np.inf, 2.0, 0.0], atol=1e-6)

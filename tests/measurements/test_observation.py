@@ -69,7 +69,7 @@ def test_analytic_jacobian_equals_differences(kind: str, unknown: bool) -> None:
     readings = measured(robot, kind, rng)
     (share,) = with_starts(robot, [FitData(readings, np.arange(12), unknown, unknown, unknown)])
     chosen = parameters(robot, [share], Asked(["base*", "offset*", "gain*"]))
-    equations = Equations([share], chosen)
+    equations = Equations.of([share], chosen)
     theta = chosen.start.copy()
     if chosen.frame is not None:
         theta[chosen.frame : chosen.frame + 6] = [400, -200, 90, 0.4, -0.7, 2.0]
@@ -86,7 +86,7 @@ def test_jacobian_passes_through_ties() -> None:
     readings = Measurements(robot.inverse(poses), poses[:, 2], "height")
     share = FitData(readings, np.arange(3), False, False)
     chosen = parameters(robot, [share], Asked())
-    equations = Equations([share], chosen)
+    equations = Equations.of([share], chosen)
     (jacobian,) = equations.jacobian(equations.at(chosen.start))
     expected = differences(equations, chosen.start, chosen.scale)
     np.testing.assert_allclose(jacobian, expected, rtol=1e-5, atol=1e-7)

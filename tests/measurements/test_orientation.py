@@ -96,7 +96,7 @@ def test_a_covariance_that_knows_a_turning_exactly_is_refused() -> None:
     )
     data = FitData(measured, np.arange(1), False, False)
     with pytest.raises(ValueError, match="row 0 says, so near to beta = 90 degrees"):
-        Equations([data], parameters(robot, [data], Asked("offset*")))
+        Equations.of([data], parameters(robot, [data], Asked("offset*")))
 
 
 @pytest.mark.parametrize("framed", [False, True], ids=["frame known", "frame unknown"])
@@ -107,7 +107,7 @@ def test_derivatives_of_residuals_are_their_differences(name: str, framed: bool)
     values = KINDS["pose"].corrected(robot.complete(at), rng.normal(0, 0.4, (6, 6)))
     data = FitData(pk.Measurements(robot.inverse(at), values, "pose"), np.arange(6), framed, False)
     chosen = parameters(robot, [data], Asked("offset*"))
-    equations = Equations([data], chosen)
+    equations = Equations.of([data], chosen)
     theta = chosen.start.copy()
     if framed:
         theta[chosen.frame : chosen.frame + 6] = [40, -20, 9, 0.4, np.pi / 2, 2.0]

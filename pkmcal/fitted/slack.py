@@ -137,7 +137,7 @@ def _without_each(
 def _squares(equations: Equations, evaluation: Evaluation, noise: FloatArray) -> FloatArray:
     """Squared residuals of each pose (K,)."""
     found = np.zeros(len(equations.actuators))
-    found[equations.pose_of_unit] = equations.squares(equations.residual(evaluation, noise))
+    found[equations.blocks.pose_of_block] = equations.squares(equations.residual(evaluation, noise))
     return found
 
 
@@ -167,7 +167,7 @@ def taut(
             break
         cells = found
         equations = equations.without_closures(list(cells), estimate.evaluation)
-        commanded = equations.commanded()
+        commanded = equations.with_exact_actuators()
     return equations, tuple(cells.values())
 
 
@@ -176,7 +176,8 @@ def _longer(equations: Equations, estimate: Estimate) -> tuple[FloatArray, Float
     root = np.sqrt(np.repeat(estimate.weights, equations.components))
     taken = root[:, None] * estimate.change(estimate.half)
     every = np.ones(len(estimate.weights))  # what a robust loss sets aside is looked at as well
-    off, redundancy = equations.closure_residuals(
+    assert equations.system is not None
+    off, redundancy = equations.system.closure_residuals(
         estimate.evaluation, estimate.state.noise, every, taken
     )
     return off * np.sign(_slopes(equations, estimate.evaluation)), redundancy
@@ -192,7 +193,8 @@ def slack_cables(
     keys = [(cell.pose, cell.closures[0]) for cell in cells]
     without = equations.without_closures(keys, evaluation)
     there = without.at(evaluation.theta, estimate.state.noise, evaluation)
-    off = -without.readings_off(there) * _slopes(equations, there)
+    assert without.system is not None
+    off = -without.system.readings_off(there) * _slopes(equations, there)
     pose_of, actuator = np.concatenate(equations.pose_of), equations.closures.actuators
     cables = [
         SlackCable(

@@ -9,7 +9,6 @@ import numpy as np
 
 from pkmcal.arguments import shown
 from pkmcal.arrays import BoolArray
-from pkmcal.calibration.outliers import outliers
 from pkmcal.estimation.begin import estimator_at
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
@@ -17,6 +16,7 @@ from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.exceptions import ArgumentError, ArgumentTypeError
+from pkmcal.fitted.outliers import outliers
 
 Drop = Literal["outliers"] | Sequence[int] | None
 OUTLIERS = "outliers"
@@ -82,7 +82,7 @@ def outlying(estimator: Estimator, estimate: Estimate) -> BoolArray:
         estimate.weights,
         estimate.prior @ estimate.half[:, :fitted],
     )
-    return np.isin(equations.unit_of_row, odd)
+    return np.isin(equations.blocks.block_of_row, odd)
 
 
 def robust_outliers(

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray
-from pkmcal.calibration.fit import Fit
 from pkmcal.display import chance_text, displayed, printable
 from pkmcal.estimation.fit_data import Dependence
 from pkmcal.estimation.uncertainty import Uncertainty
+from pkmcal.fitted.fit import Fit
 from pkmcal.statistics.score_test import Score, score_test
 
 CHANCE = 0.01  # below which a target is said to be displaced
@@ -152,6 +152,6 @@ def _columns(fit: Fit, rows: list[BoolArray]) -> FloatArray:
         np.where(mine[:, None, None], seen.by["target"], 0.0)
         if "target" in seen.by
         else np.zeros((*seen.values.shape, 3))
-        for seen, mine in zip(fit.equations.seen(fit.end), rows, strict=True)
+        for seen, mine in zip(fit.equations.prediction.predicted(fit.end), rows, strict=True)
     ]
-    return sure.equations.whitened(parts, sure.factors)
+    return sure.equations.whitening.whitened(parts, sure.factors)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pkmcal.calibration.plausibility import (
+from pkmcal.diagnostics.plausibility import (
     GROSS,
     MISFIT_RATIO,
     exchanges,
@@ -19,8 +19,8 @@ from pkmcal.display import printable
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.misfits import of_read
 from pkmcal.estimation.parameters import Parameters
-from pkmcal.estimation.readings import of_read
 from pkmcal.measurements.measurements import Measurements
 
 _SHIFTS = (1, -1, 2, -2)  # rows by which readings are tried
@@ -99,7 +99,7 @@ def _off(value: float) -> str:
 def _median(data: FitData, parameters: Parameters) -> float:
     """Median distance of the readings from the nominal machine, mm; inf where most fail."""
     try:
-        start = Equations([data], parameters).commanded().start()
+        start = Equations.of([data], parameters).with_exact_actuators().start()
     except ValueError:
         return float("inf")
     read = np.isfinite(data.measured.values.reshape(start.residuals[0].shape)).any(axis=1)

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray
-from pkmcal.calibration.fit_statistics import ParameterTable
 from pkmcal.display import chance_text
 from pkmcal.estimation.uncertainty import Uncertainty
+from pkmcal.fitted.fit_statistics import ParameterTable
 from pkmcal.geometry.geometry import Geometry
 from pkmcal.statistics.distributions import f_tail
 
@@ -89,8 +89,9 @@ def law_tests(
         if size[0] <= len(columns) * np.finfo(float).eps * size[-1]:
             continue
         squares = float(((axes.T @ (values / scale)) ** 2 / size).sum())
-        count, freedom, spent = float(len(columns)), float(table.dof[columns].min()), 0.0
-        if table.rule == "cluster":
+        freedom = float(table.parameter_dof[columns].min())
+        count, spent = float(len(columns)), 0.0
+        if table.covariance_rule == "cluster":
             freedom = uncertainty.covariance.sandwich.joint_freedom(uncertainty.reported[columns])
             spent = count - 1.0
         rest = freedom - spent

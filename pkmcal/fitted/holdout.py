@@ -11,8 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
-from pkmcal.calibration.distances import Distances, distances
-from pkmcal.calibration.later import Later, OwnNumbers, compared, later
+from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM, Estimator
@@ -20,6 +19,8 @@ from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.labels import Labels, labels
 from pkmcal.estimation.uncertainty import Uncertainty, stated_variances
+from pkmcal.fitted.distances import Distances, distances
+from pkmcal.fitted.later import Later, OwnNumbers, compared, later
 from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.distributions import f_tail
@@ -34,89 +35,91 @@ _FEW_ODD = 0.25  # share of held-out points that may be off without the rest bei
 _ODD = 0.01  # chance of naming any held-out row that is as far off as expected
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class HeldOut:
     """Errors of the points held out, mm; NaN where there are none.
 
     Attributes
     ----------
-    rms_before, rms : float
+    holdout_rms_before, holdout_rms : float
         Root mean square distances with the start's parameters and with the estimate's.
-    expected : float
+    holdout_expected : float
         What `rms` should be if noise and covariance are right; NaN where the noise is not known.
-    failures : str
+    holdout_unreached : str
         Rows that were left out because their forward kinematics failed, in words.
-    off_before, off : ndarray (N,)
+    holdout_off_before, holdout_off : ndarray (N,)
         The distances themselves.
-    rows : ndarray of int (N,)
+    holdout_rows : ndarray of int (N,)
         Their numbers in what was given.
-    odd : tuple of int
+    holdout_outliers : tuple of int
         Rows further off than noise and covariance explain, numbered likewise.
-    before, after : Distances
+    holdout_distances_before, holdout_distances : Distances
         The distances in short.
-    test : HoldoutTest or None
+    holdout_test : HoldoutTest or None
         Whether they contradict the fit; None where that cannot be said.
-    later : Later or None
+    holdout_later : Later or None
         The rows.
-    end : Evaluation or None
+    holdout_end : Evaluation or None
         They at the estimate, their own parameters found.
-    own : mapping of str to (float, float)
+    holdout_own : mapping of str to (float, float)
         These parameters, of sessions that were not fitted: value and standard deviation.
-    spare : float
+    holdout_spare : float
         Lengths that are left to compare when these parameters have taken theirs.
-    dropped : tuple of int
+    holdout_dropped : tuple of int
         Rows of other measurements that were left out as outliers; of those that were drawn, see
         `Identification.dropped`.
-    dropped_names : str
+    holdout_dropped_names : str
         The same by lines of files, poses and targets.
-    drawn : bool
+    holdout_drawn : bool
         Whether they are of the same measurements as the fitted points, drawn at random.
     """
 
-    rms_before: float = float("nan")
-    rms: float = float("nan")
-    expected: float = float("nan")
-    failures: str = ""
-    off_before: FloatArray = field(default_factory=lambda: np.empty(0))
-    off: FloatArray = field(default_factory=lambda: np.empty(0))
-    rows: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.intp))
-    odd: tuple[int, ...] = ()
-    before: Distances = field(default_factory=Distances)
-    after: Distances = field(default_factory=Distances)
-    test: HoldoutTest | None = None
-    later: Later | None = None
-    end: Evaluation | None = None
-    own: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    spare: float = float("nan")
-    dropped: tuple[int, ...] = ()
-    dropped_names: str = ""
-    drawn: bool = False
+    holdout_rms_before: float = float("nan")
+    holdout_rms: float = float("nan")
+    holdout_expected: float = float("nan")
+    holdout_unreached: str = ""
+    holdout_off_before: FloatArray = field(default_factory=lambda: np.empty(0))
+    holdout_off: FloatArray = field(default_factory=lambda: np.empty(0))
+    holdout_rows: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    holdout_outliers: tuple[int, ...] = ()
+    holdout_distances_before: Distances = field(default_factory=Distances)
+    holdout_distances: Distances = field(default_factory=Distances)
+    holdout_test: HoldoutTest | None = None
+    holdout_later: Later | None = None
+    holdout_end: Evaluation | None = None
+    holdout_own: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    holdout_spare: float = float("nan")
+    holdout_dropped: tuple[int, ...] = ()
+    holdout_dropped_names: str = ""
+    holdout_drawn: bool = False
 
     @property
-    def units(self) -> dict[str, str]:
+    def holdout_units(self) -> dict[str, str]:
         """Unit of each parameter of the rows: "mm", "rad" or "1"."""
-        if self.later is None:
+        if self.holdout_later is None:
             return {}
-        chosen = self.later.parameters
+        chosen = self.holdout_later.parameters
         return dict(zip(chosen.names, chosen.units, strict=True))
 
     @property
-    def data(self) -> tuple[FitData, ...]:
+    def holdout_data(self) -> tuple[FitData, ...]:
         """The sets of measurements."""
-        return () if self.later is None else self.later.data
+        return () if self.holdout_later is None else self.holdout_later.data
 
     @property
-    def contradicts(self) -> bool:
+    def holdout_contradicts(self) -> bool:
         """Whether the points contradict the fit, and not only through a few that are far off."""
-        if self.test is None or not self.test.contradicts:
+        if self.holdout_test is None or not self.holdout_test.contradicts:
             return False
-        few = 0 < len(self.odd) <= _FEW_ODD * int(np.isfinite(self.off).sum())
-        return not (few and self.after.rms_without_outliers <= RATIO * self.expected)
+        few = 0 < len(self.holdout_outliers) <= _FEW_ODD * int(np.isfinite(self.holdout_off).sum())
+        return not (
+            few and self.holdout_distances.rms_without_outliers <= RATIO * self.holdout_expected
+        )
 
     @property
-    def chance(self) -> float:
+    def holdout_chance(self) -> float:
         """How likely such a rms would be if fit, noise and covariance were right."""
-        return float("nan") if self.test is None else self.test.chance
+        return float("nan") if self.holdout_test is None else self.holdout_test.chance
 
 
 def draw(data: FitData, holdout: float) -> tuple[FitData, FitData]:
@@ -148,14 +151,14 @@ def evaluate(
         return HeldOut()
     rows = later(estimator.equations.parameters, held)
     whole = rows.equations(estimator.equations)
-    before = whole.commanded().start(rows.at(estimator.start.theta), rows.own)
+    before = whole.with_exact_actuators().start(rows.at(estimator.start.theta), rows.own)
     equations, after, own = compared(rows, whole, estimate, uncertainty)
     rows = replace(rows, parameters=equations.parameters)  # their own frames have been laid
     named = labels(equations)
     points = _points(rows, equations, after, named, own, uncertainty)
     row = named.row[named.length]
     count = len(equations.rows)
-    off_before, off = equations.distances(before), equations.distances(after)
+    off_before, off = (misfits.distances(equations, each) for each in (before, after))
     good = np.isfinite(off)
     expected = np.bincount(row, points.own + points.by_fit(uncertainty), count)
     spare = float((1.0 - points.taken[good[row]]).sum()) if good.any() else float("nan")
@@ -164,21 +167,21 @@ def evaluate(
     odd = good & _odd(points, row, count, uncertainty)
     in_short = [distances(each, odd) for each in (off_before, off)]
     return HeldOut(
-        rms_before=in_short[0].rms,
-        rms=in_short[1].rms,
-        expected=float(np.sqrt(np.mean(expected[good]))) if usable else float("nan"),
-        failures=equations.failures(after),
-        off_before=off_before,
-        off=off,
-        rows=equations.rows,
-        odd=tuple(equations.rows[odd].tolist()),
-        before=in_short[0],
-        after=in_short[1],
-        test=test,
-        later=rows,
-        end=after,
-        own=_of_own(rows, after, own, uncertainty),
-        spare=spare,
+        holdout_rms_before=in_short[0].rms,
+        holdout_rms=in_short[1].rms,
+        holdout_expected=float(np.sqrt(np.mean(expected[good]))) if usable else float("nan"),
+        holdout_unreached=equations.failures(after),
+        holdout_off_before=off_before,
+        holdout_off=off,
+        holdout_rows=equations.rows,
+        holdout_outliers=tuple(equations.rows[odd].tolist()),
+        holdout_distances_before=in_short[0],
+        holdout_distances=in_short[1],
+        holdout_test=test,
+        holdout_later=rows,
+        holdout_end=after,
+        holdout_own=_of_own(rows, after, own, uncertainty),
+        holdout_spare=spare,
     )
 
 
@@ -222,7 +225,7 @@ def _points(
     like = rows.like
     by_actuators = after.machines.actuator_twists(after.states)
     variances, added = [], []
-    seen = equations.seen(after)
+    seen = equations.prediction.predicted(after)
     for i, measured in enumerate(equations.sets):
         count, k = after.residuals[i].shape
         variances.append(np.repeat(_variances(measured, uncertainty, like[i]), k))
@@ -235,20 +238,20 @@ def _points(
     jacobian = np.concatenate([
         arc * part.reshape(-1, part.shape[2])
         for arc, part in zip(equations.arcs, equations.jacobian(after), strict=True)
-    ])[equations.present]  # fmt: skip
+    ])[equations.whitening.present]  # fmt: skip
     back = uncertainty.fit.back
     by_all = (jacobian * equations.parameters.scale)[named.length]
     by_fitted = rows.by_fitted(by_all, len(back))
 
     def lengths(parts: Sequence[FloatArray]) -> FloatArray:
-        return np.concatenate(parts)[equations.present][named.length]
+        return np.concatenate(parts)[equations.whitening.present][named.length]
 
     by_sigma, taken = lengths(added), np.zeros(len(by_all))
     if own is not None:
         by_own = by_all[:, rows.own]
         by_fitted += by_own @ own.follow
         arcs = np.array(equations.arcs)[named.set_of[named.length]]
-        weighted = arcs**2 * equations.variances(own.noise)[named.length]
+        weighted = arcs**2 * equations.whitening.variances(own.noise)[named.length]
         if uncertainty.mixed:
             weighted += by_sigma / uncertainty.excess.total
         taken = np.clip(((by_own @ own.half) ** 2).sum(axis=1) / weighted, 0.0, 1.0)

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.calibration.fit import Fit
-from pkmcal.calibration.holdout import HeldOut
 from pkmcal.display import chance_text
 from pkmcal.effects.expansion import temperatures
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.holdout import HeldOut
 from pkmcal.measurements import repeats
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.drift_test import LEAST, trend
@@ -115,23 +115,25 @@ def drift(fit: Fit, held: HeldOut, odd: Collection[int]) -> Drift | None:
     """
     found = []
     equations = fit.equations
-    apart = held.later is not None and not held.drawn
+    apart = held.holdout_later is not None and not held.holdout_drawn
     for i, data in enumerate(equations.datasets):
         parts = [(data, fit.end.residuals[i])]
-        if held.later is not None and held.end is not None and held.drawn:
-            parts += _alike(held, held.end, i)
+        if held.holdout_later is not None and held.holdout_end is not None and held.holdout_drawn:
+            parts += _alike(held, held.holdout_end, i)
         found.append(_tested(parts, odd))
-    if apart and held.later is not None and held.end is not None:
+    if apart and held.holdout_later is not None and held.holdout_end is not None:
         for i in range(len(fit.equations.datasets)):
-            found += [_tested([part], held.odd) for part in _alike(held, held.end, i)]
+            found += [
+                _tested([part], held.holdout_outliers) for part in _alike(held, held.holdout_end, i)
+            ]
     known = [each for each in found if each is not None]
     return min(known, key=lambda each: each.chance, default=None)
 
 
 def _alike(held: HeldOut, end: Evaluation, i: int) -> list[tuple[FitData, FloatArray]]:
     """The sets held out that are like fitted set `i`, with their residuals."""
-    assert held.later is not None
-    sets = zip(held.later.data, end.residuals, held.later.like, strict=True)
+    assert held.holdout_later is not None
+    sets = zip(held.holdout_later.data, end.residuals, held.holdout_later.like, strict=True)
     return [(data, residual) for data, residual, like in sets if like == i]
 
 

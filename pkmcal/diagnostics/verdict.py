@@ -8,19 +8,19 @@ from typing import Literal
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.displaced import DisplacedTarget
-from pkmcal.calibration.drift import Drift
-from pkmcal.calibration.linearity import Weak, beyond_linear
-from pkmcal.calibration.measuring_order import MeasuringOrder
-from pkmcal.calibration.moved import Moved
-from pkmcal.calibration.parts import Parts
-from pkmcal.calibration.robust_check import RobustCheck
-from pkmcal.calibration.row_errors import likely_row_errors
-from pkmcal.calibration.row_names import row_names
-from pkmcal.calibration.slack import listed_slack
+from pkmcal.diagnostics.displaced import DisplacedTarget
+from pkmcal.diagnostics.drift import Drift
+from pkmcal.diagnostics.linearity import Weak, beyond_linear
+from pkmcal.diagnostics.measuring_order import MeasuringOrder
+from pkmcal.diagnostics.moved import Moved
+from pkmcal.diagnostics.robust_check import RobustCheck
+from pkmcal.diagnostics.row_errors import likely_row_errors
 from pkmcal.display import chance_text, decimals, displayed, fixed, printable
 from pkmcal.estimation.estimator import FEW, LEAST_FREEDOM
 from pkmcal.estimation.identifiability import listed
+from pkmcal.fitted.row_names import row_names
+from pkmcal.fitted.slack import listed_slack
+from pkmcal.fitted.solution import Solution
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.statistics.covariance import spare
 from pkmcal.statistics.distributions import chi2_tail, deviation_interval
@@ -63,7 +63,7 @@ class Verdict:
 
 
 def judge(
-    found: Parts,
+    found: Solution,
     robust: RobustCheck | None,
     moved: tuple[Moved, ...],
     drift: Drift | None = None,
@@ -74,7 +74,7 @@ def judge(
 
     Parameters
     ----------
-    found : Parts
+    found : Solution
         The calibration.
     robust : RobustCheck or None
         A robust fit beside it, where there is one.
@@ -121,7 +121,7 @@ def judge(
     return Verdict("calibrated", (_change(found),), remarks)
 
 
-def _grave(found: Parts, robust: RobustCheck | None) -> list[str]:
+def _grave(found: Solution, robust: RobustCheck | None) -> list[str]:
     """What makes a result no calibration."""
     reasons = []
     if not found.fit.machine_combinations() and len(found.fit.parameters.places):
@@ -143,14 +143,14 @@ def _grave(found: Parts, robust: RobustCheck | None) -> list[str]:
     return reasons
 
 
-def _commanded_spread(found: Parts) -> float:
+def _commanded_spread(found: Solution) -> float:
     """Rms distance of the commanded positions, by the nominal machine, from their mean, mm."""
     start = found.fit.start
     places = start.pose[start.status == 0, :3]
     return float(np.sqrt(((places - places.mean(axis=0)) ** 2).sum(axis=1).mean()))
 
 
-def _contradicted(found: Parts, moved: tuple[Moved, ...]) -> list[str]:
+def _contradicted(found: Solution, moved: tuple[Moved, ...]) -> list[str]:
     """What points that were held out say against the fit."""
     reasons = []
     if found.holdout_contradicts:
@@ -165,16 +165,16 @@ def _contradicted(found: Parts, moved: tuple[Moved, ...]) -> list[str]:
     return reasons
 
 
-def _off(found: Parts) -> float:
+def _off(found: Solution) -> float:
     """Rms of the held-out points without the outliers among them."""
     return found.holdout_distances.rms_without_outliers
 
 
-def _few_off(found: Parts) -> str:
+def _few_off(found: Solution) -> str:
     count = len(found.holdout_outliers)
     them, are = ("them", "s are") if count > 1 else ("it", " is")
     return (
-        f"{count} held-out point{are} off: {row_names(found.holdout.data, found.holdout_outliers)};"
+        f"{count} held-out point{are} off: {row_names(found.holdout_data, found.holdout_outliers)};"
         f" without {them} the rms is {_mm(_off(found))}, {_mm(found.holdout_expected)} is expected"
     )
 
@@ -204,11 +204,11 @@ def _size(shift: float, sigma: float, unit: str) -> str:
     return f"{sign}{fixed(value, places)} ± {fixed(deviation, places)}{behind}"
 
 
-def _spare(found: Parts) -> float:
+def _spare(found: Solution) -> float:
     return found.fit.uncertainty.fit.freedom
 
 
-def _few(found: Parts) -> list[str]:
+def _few(found: Solution) -> list[str]:
     """Whether enough equations are left to show the noise."""
     freedom, sure = _spare(found), found.fit.uncertainty
     if freedom >= FEW or not sure.equations.unstated.any() or (sure.mixed and not sure.known):
@@ -233,9 +233,9 @@ def _few(found: Parts) -> list[str]:
     ]
 
 
-def _blind(found: Parts) -> str:
+def _blind(found: Solution) -> str:
     """From where on points that were held out could contradict a fit of few spare equations."""
-    test = found.holdout.test
+    test = found.holdout_test
     if test is None:
         return ""
     return (
@@ -244,7 +244,7 @@ def _blind(found: Parts) -> str:
     )
 
 
-def _little_gained(found: Parts) -> bool:
+def _little_gained(found: Solution) -> bool:
     sure = found.fit.uncertainty
     if not sure.equations.unstated.any() and sure.covariance.scale <= RATIO:
         return False  # the residuals are what sigma says
@@ -254,7 +254,7 @@ def _little_gained(found: Parts) -> bool:
     return after > _GAIN * before
 
 
-def _other_causes(found: Parts) -> str:
+def _other_causes(found: Solution) -> str:
     """What else the misfit may come of where the calibration hardly lowered it."""
     if not found.fit.uncertainty.equations.unstated.any():
         return "numbers that are not free are wrong, or sigma is too small"
@@ -266,7 +266,7 @@ def _other_causes(found: Parts) -> str:
     )
 
 
-def _misfit(found: Parts) -> tuple[float, float, str]:
+def _misfit(found: Solution) -> tuple[float, float, str]:
     """Rms before and after of the points to judge by, without outliers, and their name."""
     held = int(np.isfinite(found.holdout_off).sum())
     if held:
@@ -282,7 +282,7 @@ def _misfit(found: Parts) -> tuple[float, float, str]:
     return first.rms_without_outliers, last.rms_without_outliers, name
 
 
-def _change(found: Parts) -> str:
+def _change(found: Solution) -> str:
     """Say how the misfit changed."""
     before, after, name = _misfit(found)
     change = f"{name} {_falls(before, after)}"
@@ -303,7 +303,7 @@ def _falls(before: float, after: float) -> str:
     return f"{verb} from {first} to {last} mm rms"
 
 
-def _disagreement(found: Parts, robust: RobustCheck) -> str:
+def _disagreement(found: Solution, robust: RobustCheck) -> str:
     count = len(robust.rows)
     if not count:
         return (
@@ -321,7 +321,7 @@ def _disagreement(found: Parts, robust: RobustCheck) -> str:
 
 
 def _remarks(
-    found: Parts, robust: RobustCheck | None, drift: Drift | None, weak: Weak | None
+    found: Solution, robust: RobustCheck | None, drift: Drift | None, weak: Weak | None
 ) -> tuple[str, ...]:
     remarks = []
     if drift is not None and drift.found and not drift.large:
@@ -359,7 +359,7 @@ def _remarks(
     return tuple(printable(text, _LONGEST) for text in remarks)
 
 
-def _refuted(found: Parts) -> str:
+def _refuted(found: Solution) -> str:
     """What residuals larger than the stated sigma mean, whichever covariance counts them; or ""."""
     scale = found.fit.uncertainty.covariance.scale
     causes = "sigma is too small, or numbers that are not free are wrong"
@@ -374,7 +374,7 @@ def _refuted(found: Parts) -> str:
     return ""
 
 
-def _larger_sigma(found: Parts) -> float:
+def _larger_sigma(found: Solution) -> float:
     """Deviation of the residuals in units of sigma where that is clearly larger, else 1."""
     squares, freedom = spare(found.fit.uncertainty.fit)
     if not chi2_tail(squares, freedom) > 1.0 - CHANCE:
@@ -382,9 +382,9 @@ def _larger_sigma(found: Parts) -> float:
     return float(np.sqrt(squares / freedom))
 
 
-def _fitted_again(found: Parts) -> int:
+def _fitted_again(found: Solution) -> int:
     """How many rows were held out at actuators where others were fitted."""
-    held = [row.tobytes() for data in found.holdout.data for row in _commands(data.measured)]
+    held = [row.tobytes() for data in found.holdout_data for row in _commands(data.measured)]
     sought = set(held)
     fitted = {
         key

@@ -85,7 +85,7 @@ def likely_unit_errors(
 
 
 def _alone(data: FitData, parameters: Parameters) -> FloatArray:
-    (residual,) = Equations([data], parameters).commanded().start().residuals
+    (residual,) = Equations.of([data], parameters).with_exact_actuators().start().residuals
     return residual
 
 

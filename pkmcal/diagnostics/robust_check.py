@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import BoolArray, rms
-from pkmcal.calibration.dropped import outlying
-from pkmcal.calibration.fit import Fit
+from pkmcal.estimation import misfits
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.fitted.dropped import outlying
+from pkmcal.fitted.fit import Fit
 from pkmcal.statistics.robust_scale import median_ratio, ratio_by_chance, robust_ratio
 
 _SUSPECT = 1.25  # ratio of the linear model's noises from which the robust fit is made
@@ -64,12 +65,12 @@ def robust_check(fit: Fit) -> RobustCheck | None:
     if not ratio > _SUSPECT or fit.uncertainty.rounded:
         return None
     drawn = _drawn(fit)
-    few = Equations([data for data, _ in drawn], fit.parameters).reweighted(
-        [equations.deviations[i] for _, i in drawn]
+    few = Equations.of([data for data, _ in drawn], fit.parameters).reweighted(
+        [equations.whitening.deviations[i] for _, i in drawn]
     )
-    commanded = few.commanded()
+    commanded = few.with_exact_actuators()
     try:
-        estimator = Estimator(few, few.begin(commanded, commanded.at(fit.start.theta)), "cauchy")
+        estimator = Estimator(*few.begin(commanded.at(fit.start.theta)), "cauchy")
         robust = estimator.solve()
     except ValueError:
         return None
@@ -100,11 +101,11 @@ def _rms_of_others(
     few: Equations, commanded: Equations, there: Evaluation, named: BoolArray
 ) -> float:
     """How far off the rows are that are not named (N,), mm; closures where nothing was read."""
-    if not few.any_read:
+    if not few.whitening.any_read:
         poses = np.ones(len(there.pose), dtype=bool)
         poses[np.concatenate(few.pose_of)[named]] = False
-        return few.closure_rms(there, poses)
-    off = few.distances(commanded.at(there.theta, near=there))[~named]
+        return misfits.closure_rms(few, there, poses)
+    off = misfits.distances(few, commanded.at(there.theta, near=there))[~named]
     return rms(off[np.isfinite(off)])
 
 

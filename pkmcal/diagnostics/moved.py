@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.calibration.fit import Fit
-from pkmcal.calibration.later import Later, noise_factors
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.identifiability import listed
 from pkmcal.estimation.labels import labels
 from pkmcal.estimation.mode_slips import in_their_modes
+from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.later import Later, noise_factors
 from pkmcal.statistics.shifts import shifted
 
 _MAY_MOVE = re.compile(  # what is found anew in each session has an @ in its name
@@ -82,7 +82,7 @@ def moved(fit: Fit, later: Later, end: Evaluation) -> tuple[Moved, ...]:
         It at the fit, its own numbers found.
     """
     second, evaluation, noise = _later_session(fit, later, end)
-    solved = evaluation.status[second.pose_of_unit] == 0
+    solved = evaluation.status[second.blocks.pose_of_block] == 0
     chosen = fit.parameters
     candidates = _candidates(chosen.names)
     if not solved.any() or not candidates:
@@ -146,13 +146,13 @@ def _later_session(
     """
     sure = fit.uncertainty
     whole = later.equations(sure.equations)
-    commanded = whole.commanded()
+    commanded = whole.with_exact_actuators()
     evaluation = in_their_modes(commanded, commanded.at(end.theta, near=end))
     if not sure.equations.closures.unknowns:
         return commanded, evaluation, noise_factors(later, commanded, sure)
     noise = noise_factors(later, whole, sure)
-    begun = whole.begin(commanded, evaluation)
-    return whole, whole.at(begun.theta, noise, begun), noise
+    whole, start = whole.begin(evaluation)
+    return whole, whole.at(start.theta, noise, start), noise
 
 
 def _first_session(fit: Fit) -> tuple[FloatArray, FloatArray, np.ndarray]:

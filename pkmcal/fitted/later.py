@@ -68,10 +68,10 @@ class Later:
         deviations = [
             np.ones(len(data.measured.components))
             if differs(fitted, data, i)
-            else fitted.deviations[i]
+            else fitted.whitening.deviations[i]
             for data, i in zip(self.data, self.like, strict=True)
         ]
-        return Equations(self.data, self.parameters).reweighted(deviations)
+        return Equations.of(self.data, self.parameters).reweighted(deviations)
 
 
 def later(fitted: Parameters, held: Sequence[tuple[FitData, int]]) -> Later:
@@ -133,11 +133,12 @@ def compared(
     None where they have none. Where poses have unknowns, closures speak of them as well as readings
     (`whole`).
     """
-    commanded, theta = whole.commanded(), rows.at(estimate.evaluation.theta)
+    commanded, theta = whole.with_exact_actuators(), rows.at(estimate.evaluation.theta)
     if not rows.own.any():
         return commanded, in_their_modes(commanded, commanded.at(theta)), None
-    start = start_in_modes(commanded, theta, rows.own)
-    found, own = _own_numbers(rows, whole, whole.begin(commanded, start), estimate, sure)
+    whole, start = whole.begin(start_in_modes(commanded, theta, rows.own))
+    found, own = _own_numbers(rows, whole, start, estimate, sure)
+    commanded = whole.with_exact_actuators()
     return commanded, commanded.at(found.theta, near=found), own
 
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from pkmcal.arrays import FloatArray, IntArray
-from pkmcal.calibration.fit import Fit
-from pkmcal.calibration.row_names import row_names
 from pkmcal.display import chance_text, displayed, printable
 from pkmcal.estimation.fit_data import FitData
+from pkmcal.fitted.fit import Fit
+from pkmcal.fitted.row_names import row_names
 from pkmcal.statistics.linear_fit import means, numbered
 from pkmcal.statistics.order_test import Course, Series
 
@@ -208,7 +208,7 @@ def _by_component(fit: Fit) -> FloatArray:
     for m in equations.sets:
         one = np.eye(len(numbers))[[numbers[n] for n in m.components]]
         parts.append(np.tile(one, (len(m), 1, 1)))
-    return equations.whiten(parts, fit.uncertainty.factors)
+    return equations.whitening.whiten(parts, fit.uncertainty.factors)
 
 
 def _tested(visits: _Visits, series: int) -> tuple[int, int, Course] | None:

@@ -1,0 +1,100 @@
+"""How far off readings and closures are at an evaluation, in mm and N."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pkmcal.arrays import BoolArray, FloatArray, rms
+from pkmcal.estimation.equations import Equations
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.pose_system import PoseSystem
+from pkmcal.measurements.measurements import Measurements
+
+
+def worst_readings(equations: Equations, pose: FloatArray, theta: FloatArray) -> FloatArray:
+    """How far off the worst reading at each pose (K, 6) is, mm (K,); inf without a pose.
+
+    Angles count as their arc. NaN where nothing was read.
+    """
+    worst = np.full(len(pose), np.nan)
+    prediction, length = equations.prediction, equations.parameters.robot.length
+    residuals = prediction.residuals(prediction.at(pose, theta))
+    for m, place, residual in zip(equations.sets, equations.pose_of, residuals, strict=True):
+        read = np.isfinite(m.values.reshape(residual.shape))
+        known = np.where(read, residual, 0.0)
+        off = np.linalg.norm(known * m.instrument.mm(m, length), axis=1)
+        off = np.where(np.isfinite(off), off, np.inf)
+        some = read.any(axis=1)
+        np.fmax.at(worst, place[some], off[some])
+    return worst
+
+
+def distances(equations: Equations, evaluation: Evaluation) -> FloatArray:
+    """How far off each measured point is, mm, in the order of the sets."""
+    return np.concatenate([
+        m.instrument.distance_per_point(of_read(m, r), m, equations.parameters.robot.length)
+        for m, r in zip(equations.sets, evaluation.residuals, strict=True)
+    ])  # fmt: skip
+
+
+def progress(equations: Equations, evaluation: Evaluation) -> float:
+    """Root mean square of the `distances` of the rows that were reached; NaN without any.
+
+    `closure_rms` where nothing but the actuators was read.
+    """
+    if not equations.whitening.any_read:
+        return closure_rms(equations, evaluation)
+    off = distances(equations, evaluation)
+    return rms(off[np.isfinite(off)])
+
+
+def closure_rms(
+    equations: Equations, evaluation: Evaluation, poses: BoolArray | None = None
+) -> float:
+    """How far off the closures are at poses (K,), mm of the actuators; NaN where they hold."""
+    system = equations.system
+    if system is None:
+        return float("nan")
+    off = _closures_off(system, evaluation)
+    if system.blocks.counting is not None or poses is not None or not evaluation.ok:
+        some = evaluation.status == 0 if poses is None else poses & (evaluation.status == 0)
+        off = off[~system.blocks.slack[:, : off.shape[1]] & some[:, None]]
+    return rms(off)
+
+
+def worst_closures(equations: Equations, evaluation: Evaluation) -> FloatArray:
+    """How far off the worst closure at each pose is, mm (K,); NaN where they hold."""
+    system = equations.system
+    if system is None:
+        return np.full(len(equations.actuators), np.nan)
+    off = np.abs(_closures_off(system, evaluation))
+    off[system.blocks.slack[:, : off.shape[1]]] = 0.0
+    worst: FloatArray = off.max(axis=1)
+    return worst
+
+
+def cell_rms(equations: Equations, evaluation: Evaluation) -> float:
+    """How far tensions are off what load cells read, N; NaN where they are no unknowns."""
+    cells, system = equations.closures.cells, equations.system
+    if not cells or system is None:
+        return float("nan")
+    return rms(system.readings_off(evaluation)[:, -cells:][system.blocks.counts[:, -cells:]])
+
+
+def _closures_off(system: PoseSystem, evaluation: Evaluation) -> FloatArray:
+    """`PoseSystem.readings_off` of the actuators, in mm."""
+    closures = system.closures
+    off: FloatArray = system.readings_off(evaluation) * closures.lengths(evaluation.machines)
+    return off[:, : closures.equations - closures.cells]
+
+
+def of_read(measured: Measurements, residual: FloatArray) -> FloatArray:
+    """Residuals (N, k) of what was read, 0 beside it; NaN in rows where nothing was."""
+    read = np.isfinite(measured.values.reshape(residual.shape))
+    if not residual.shape[1]:
+        return np.full((len(residual), 1), np.nan)
+    if read.all():
+        return residual
+    known = np.where(read, residual, 0.0)
+    known[~read.any(axis=1)] = np.nan
+    return known

@@ -1,0 +1,149 @@
+"""The equations of poses with unknowns: closures and readings, and what the poses take of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray
+from pkmcal.estimation.elimination import Shares, System
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.prediction import Prediction
+from pkmcal.estimation.row_blocks import PoseBlocks
+from pkmcal.estimation.row_states import RowStates
+from pkmcal.estimation.session_machines import Machines, SessionClosures
+from pkmcal.estimation.whitening import Whitening
+
+
+@dataclass(frozen=True, eq=False)
+class PoseSystem:
+    """The equations of poses with unknowns; its parts are those of `Equations`.
+
+    The equations (E,) are those of the closures that count, pose by pose, then the readings. Of
+    these M are left when the poses have taken their part: the reduced ones.
+    """
+
+    prediction: Prediction
+    whitening: Whitening
+    closures: SessionClosures
+    blocks: PoseBlocks
+
+    def best(
+        self, machines: Machines, states: RowStates, theta: FloatArray, noise: FloatArray
+    ) -> tuple[RowStates, System]:
+        """The states near those given at which every pose fits best, and the equations there."""
+
+        def whitened(states: RowStates) -> tuple[FloatArray, FloatArray]:
+            return self.whitened(machines, states, theta, noise)
+
+        return self.blocks.elimination.best(self.closures, machines, states, whitened)
+
+    def whitened(
+        self, machines: Machines, states: RowStates, theta: FloatArray, noise: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Predicted less measured (E,), whitened, and its derivative by the unknowns (E, u)."""
+        blocks, table = self.blocks, self.prediction.table
+        off, by_unknown = self.closures.residual(machines, states)
+        factors = noise[blocks.groups]
+        off /= factors
+        by_unknown /= factors[:, None]
+        equation, by_unknown = blocks.counted(off), blocks.counted(by_unknown)
+        if not self.whitening.any_read:
+            return equation, by_unknown
+        twists = self.closures.twists(machines, states)
+        predicted = self.prediction.at(states.pose, theta)
+        residuals = self.prediction.residuals(predicted)
+        by_pose = [
+            m.instrument.by_difference(each.by_twist @ twists[place], residual)
+            for m, each, place, residual in zip(
+                table.sets, predicted, table.pose_of, residuals, strict=True
+            )
+        ]
+        return (
+            np.concatenate([equation, -self.whitening.whitened(residuals, noise)]),
+            np.concatenate([by_unknown, self.whitening.whitened(by_pose, noise)]),
+        )
+
+    def at(self, evaluation: Evaluation, noise: FloatArray) -> System:
+        """The equations at an evaluation; its cache keeps the last ones, asked for three times."""
+        cache = evaluation.cache
+        if "system" in cache:
+            owner, factors, known = cache["system"]
+            if owner is self and (factors is noise or np.array_equal(factors, noise)):
+                return known
+        there = self.whitened(evaluation.machines, evaluation.states, evaluation.theta, noise)
+        found = self.blocks.elimination.at(there)
+        cache["system"] = self, noise, found
+        return found
+
+    def by_parameters(self, evaluation: Evaluation, noise: FloatArray) -> tuple[int, FloatArray]:
+        """How many blocks there are, and the derivative (M, n) of their reduced equations."""
+        p, blocks = self.prediction.parameters, self.blocks
+        columns = self.prediction.table.machine_columns
+        of_closures = self.closures.by_numbers(
+            evaluation.machines, evaluation.states, p.places, columns, len(p)
+        )
+        of_closures /= noise[blocks.groups][:, None]
+        by_all = blocks.counted(of_closures)
+        if self.whitening.any_read:
+            of_readings = self.prediction.jacobian(evaluation, self.closures)
+            by_all = np.concatenate([by_all, self.whitening.whiten(of_readings, noise)])
+        by_unknown = self.at(evaluation, noise).by_unknown
+        found, evaluation.cache["following"] = blocks.elimination.reduced(by_unknown, by_all)
+        return len(blocks.components), found
+
+    def by_groups(
+        self,
+        evaluation: Evaluation,
+        noise: FloatArray,
+        weights: FloatArray,
+        residual: FloatArray,
+        leverage: FloatArray,
+    ) -> Shares:
+        """As `Equations.by_groups`."""
+        by_unknown, group = self.at(evaluation, noise).by_unknown, self.blocks.group_of_equation
+        return self.blocks.elimination.by_groups(by_unknown, group, weights, residual, leverage)
+
+    def closure_residuals(
+        self, evaluation: Evaluation, noise: FloatArray, weights: FloatArray, leverage: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Closures read less needed (K, e), whitened, and their degrees of freedom.
+
+        None of those that do not count. `weights` and `leverage` are those of `by_groups`.
+        """
+        blocks = self.blocks
+        off, by_unknown, _ = self.at(evaluation, noise)
+        own = int(blocks.counts.sum())
+        longer, freedom = np.zeros((2, *blocks.slack.shape))
+        longer[blocks.counts] = -off[:own]
+        redundancy = blocks.elimination.redundancy(by_unknown, weights, leverage)
+        freedom[blocks.counts] = redundancy[:own]
+        if blocks.slack.any():
+            whole, _ = self.closures.residual(evaluation.machines, evaluation.states)
+            longer[blocks.slack] = -whole[blocks.slack] / noise[-1]
+        return longer, freedom
+
+    def readings_off(self, evaluation: Evaluation) -> FloatArray:
+        """What actuators and load cells would read at the poses less what they read (K, e)."""
+        known = evaluation.cache.get("system")
+        if known is not None and known[0] is self and self.blocks.counting is None:
+            _, factors, system = known
+            off = system.off[: self.blocks.slack.size].reshape(self.blocks.slack.shape)
+            off = off * factors[self.blocks.groups]
+        else:
+            off, _ = self.closures.residual(evaluation.machines, evaluation.states)
+        needed: FloatArray = off if self.closures.sigma is None else off * self.closures.sigma
+        return needed
+
+    def redrawn(
+        self, at: Evaluation, noise: FloatArray, reduced: FloatArray
+    ) -> tuple[SessionClosures, FloatArray]:
+        """Closures and whitened residuals of readings whose reduced equations are these (M,)."""
+        blocks = self.blocks
+        off, by_unknown, _ = self.at(at, noise)
+        errors = blocks.elimination.expanded(by_unknown, reduced)
+        change, own = np.zeros(blocks.counts.shape), int(blocks.counts.sum())
+        change[blocks.counts] = -(errors + off)[:own]
+        change *= noise[blocks.groups]
+        return self.closures.shifted(change), errors[own:]

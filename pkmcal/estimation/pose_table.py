@@ -1,0 +1,175 @@
+"""The rows of all sets of measurements, and the distinct poses they were read at."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.sessions import ParameterMap
+from pkmcal.estimation.tensioned_poses import Cells, cells_of, check_cells
+from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.kinematics.drive_state import DriveState
+from pkmcal.measurements.measurements import Measurements
+from pkmcal.measurements.tension import filled_tension
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTable:
+    """The rows of all sets, and the distinct poses that they were read at.
+
+    Rows with the same actuators, and the same noise of these, are at one pose.
+
+    Attributes
+    ----------
+    sets : tuple of Measurements
+        The rows of each set.
+    rows : ndarray of int (N,)
+        Their numbers in what the user gave.
+    set_of : ndarray of int (N,)
+        Which set each row is of.
+    count : ndarray of int (N,)
+        How many numbers were read in each row.
+    pose_of : tuple of ndarray of int
+        Which pose each row of each set is at.
+    other_of : tuple of ndarray of int or None
+        At which other pose it ends, of distances between two.
+    actuators : ndarray (K, n)
+        What the actuators read at each pose.
+    actuator_sigma : ndarray (K, n) or None
+        Its stated deviations.
+    state : DriveState
+        From where the actuators came, and the tension of what they drive, (K, n) each.
+    cells : Cells or None
+        What load cells read, where tensions are unknown.
+    machine_columns : ndarray of int (S, g)
+        The parameters of the geometry of each machine: one, or one a session.
+    machine_of_pose, command_of_pose : ndarray of int (K,)
+        Which of them each pose is of, and which poses are at the same actuators.
+    """
+
+    sets: tuple[Measurements, ...]
+    rows: IntArray
+    set_of: IntArray
+    count: IntArray
+    pose_of: tuple[IntArray, ...]
+    other_of: tuple[IntArray | None, ...]
+    actuators: FloatArray
+    actuator_sigma: FloatArray | None
+    state: DriveState
+    cells: Cells | None
+    machine_columns: IntArray
+    machine_of_pose: IntArray
+    command_of_pose: IntArray
+
+    @property
+    def poses_of_machine(self) -> tuple[IntArray, ...]:
+        """The poses of each machine."""
+        machines = range(len(self.machine_columns))
+        return tuple(np.flatnonzero(self.machine_of_pose == s) for s in machines)
+
+
+def pose_table(
+    datasets: Sequence[FitData], robot: Calibratable, columns: ParameterMap, geometry: int
+) -> PoseTable:
+    """Find the distinct poses of the rows.
+
+    Parameters
+    ----------
+    datasets : sequence of FitData
+        The rows.
+    robot : Calibratable
+        The nominal machine.
+    columns : ParameterMap
+        Which parameters hold in which row: machines of different sessions are not at the same pose
+        at the same actuators.
+    geometry : int
+        How many numbers of the geometry are free.
+    """
+    sets = tuple(data.measured for data in datasets)
+    double = [i for i, m in enumerate(sets) if m.other is not None]
+    rows = np.concatenate([data.rows for data in datasets])
+    sources = [*sets, *(sets[i] for i in double)]
+    cells = cells_of(robot, sources)
+    known = _commands(sets, sources, cells)
+    commands = np.hstack([*known.values()])
+    machine_columns, machine_of = columns.machines(geometry)
+    machine = np.concatenate([*machine_of, *(machine_of[i] for i in double)])
+    several = len(machine_columns) > 1
+    key = np.column_stack([commands, machine]) if several else commands
+    distinct, first, inverse = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    width = commands.shape[1]
+    parts = np.split(distinct[:, :width], len(known), axis=1)
+    of_pose = dict(zip(known, map(np.ascontiguousarray, parts), strict=True))
+    tension, read = of_pose.get("tension"), None
+    if cells is not None:
+        read = Cells(_blank(of_pose["tension"]), of_pose.get("tension sigma"))
+        of_rows = np.concatenate([rows, *(datasets[i].rows for i in double)])
+        check_cells(robot, read, of_rows[first])
+        tension = filled_tension(read.read)
+    command_of_pose: IntArray = np.arange(len(distinct))
+    if several:
+        command_of_pose = np.unique(distinct[:, :width], axis=0, return_inverse=True)[1].reshape(-1)
+    count = [len(m) for m in sets]
+    edges = np.cumsum([0, *count, *(count[i] for i in double)])
+    place = [inverse.reshape(-1)[a:b] for a, b in itertools.pairwise(edges)]
+    there = iter(place[len(count) :])
+    return PoseTable(
+        sets=sets,
+        rows=rows,
+        set_of=np.repeat(np.arange(len(sets)), count),
+        count=np.concatenate([np.isfinite(m.values).reshape(len(m), -1).sum(axis=1) for m in sets]),
+        pose_of=tuple(place[: len(count)]),
+        other_of=tuple(None if m.other is None else next(there) for m in sets),
+        actuators=of_pose["actuators"],
+        actuator_sigma=of_pose.get("sigma"),
+        state=DriveState(of_pose.get("approach"), tension),
+        cells=read,
+        machine_columns=machine_columns,
+        machine_of_pose=machine[first],
+        command_of_pose=command_of_pose,
+    )
+
+
+def _commands(
+    sets: Sequence[Measurements], sources: Sequence[Measurements], cells: Cells | None
+) -> dict[str, FloatArray]:
+    """What distinguishes the poses of rows, (N, n) each; those of second places come last."""
+    noises = [m.actuator_sigma for m in sources if m.actuator_sigma is not None]
+    approach, tension = (
+        _of_all(each, [m.actuators for m in sources])
+        for each in zip(*(m.drive_state for m in sources), strict=True)
+    )
+    given = {
+        "actuators": np.concatenate(
+            [
+                *(m.actuators for m in sets),
+                *(m.other for m in sets if m.other is not None),
+            ]
+        ),
+        "sigma": np.concatenate(noises) if noises else None,
+        "approach": approach,
+        "tension": tension if cells is None else _blank(cells.read),
+        "tension sigma": None if cells is None else cells.sigma,
+    }
+    return {name: part for name, part in given.items() if part is not None}
+
+
+def _blank(tension: FloatArray) -> FloatArray:
+    """Tensions that were not read as infinite in place of NaN, or back: equal to one another."""
+    there = np.isfinite(tension)
+    return np.where(there, tension, np.where(np.isnan(tension), np.inf, np.nan))
+
+
+def _of_all(
+    parts: Sequence[FloatArray | None], actuators: Sequence[FloatArray]
+) -> FloatArray | None:
+    """The rows of all sets; 0 where a set states nothing, None where none states anything."""
+    if all(part is None for part in parts):
+        return None
+    pairs = zip(parts, actuators, strict=True)
+    return np.concatenate([np.zeros(q.shape) if part is None else part for part, q in pairs])

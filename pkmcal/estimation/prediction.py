@@ -1,0 +1,340 @@
+"""What instruments should read at given poses, and how that follows the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from pkmcal.arrays import FloatArray, IntArray, lots
+from pkmcal.effects.effect import EffectOfRows
+from pkmcal.estimation.evaluation import Evaluation
+from pkmcal.estimation.fit_data import FitData
+from pkmcal.estimation.parameters import Parameters
+from pkmcal.estimation.pose_table import PoseTable, pose_table
+from pkmcal.estimation.session_machines import SessionClosures
+from pkmcal.estimation.sessions import NONE, ParameterMap
+from pkmcal.kinematics.calibratable import Calibratable
+from pkmcal.readings.reading import At, Predicted, joined
+
+_BATCH = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
+
+RowsOfSets = dict[int, dict[int, IntArray]]  # by the first parameter and the set
+Part = tuple[int, slice, FloatArray]  # a set, rows of it, and their derivative (b, k, n)
+
+
+@dataclass(frozen=True, eq=False)
+class Arguments:
+    """What the readings of one set depend on beside the pose.
+
+    Attributes
+    ----------
+    given : mapping of str to ndarray (N, w)
+        What is given, by the name that `Reading.predict` has for it.
+    numbers, columns : mapping of str to ndarray of int (N, w)
+        Of what is estimated, which number of a row each is, and which parameter; `NONE` where the
+        number is held.
+    along : ndarray of int (N,) or None
+        `FitData.along`.
+    frames : tuple of (int, ndarray of int)
+        The first parameter of each unknown frame, and the rows that are in it.
+    framed : bool
+        Whether the readings are in an unknown frame.
+    effects : tuple of EffectOfRows
+        What moves the platform in these rows beside the geometry.
+    of_effects : tuple of str
+        The arguments that are those of effects.
+    """
+
+    given: Mapping[str, FloatArray]
+    numbers: Mapping[str, IntArray]
+    columns: Mapping[str, IntArray]
+    along: IntArray | None
+    frames: tuple[tuple[int, IntArray], ...]
+    framed: bool
+    effects: tuple[EffectOfRows, ...]
+    of_effects: tuple[str, ...]
+
+    @classmethod
+    def of(
+        cls, data: FitData, parameters: Parameters, columns: ParameterMap, part: IntArray
+    ) -> Arguments:
+        """Of the rows of a set, each of which is of a `part` (N,) of the map."""
+        depend = list(data.dependences())
+        numbers = {each.argument: parameters.numbers_of(each) for each in depend if each.sought}
+        of_rows = columns.columns[part]
+        frames = []
+        if parameters.frame is not None and data.framed:
+            first = of_rows[:, parameters.frame]
+            frames = [(int(each), np.flatnonzero(first == each)) for each in np.unique(first)]
+        return cls(
+            given={each.argument: each.given for each in depend},
+            numbers=numbers,
+            columns={
+                name: np.where(own == NONE, NONE, np.take_along_axis(of_rows, own, axis=1))
+                for name, own in numbers.items()
+            },
+            along=data.along,
+            frames=tuple(frames),
+            framed=data.framed,
+            effects=tuple(effect.of_rows(data.measured) for effect in data.effects),
+            of_effects=tuple(
+                each.argument
+                for effect in data.effects
+                for each in effect.dependences(data.measured)
+            ),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What the instruments should read at given poses, and its derivatives.
+
+    Attributes
+    ----------
+    table : PoseTable
+        The rows and their poses.
+    parameters : Parameters
+        The parameter vector.
+    columns : ParameterMap
+        Which parameters hold in each row.
+    arguments : tuple of Arguments
+        What the readings of each set depend on.
+    """
+
+    table: PoseTable
+    parameters: Parameters
+    columns: ParameterMap
+    arguments: tuple[Arguments, ...]
+
+    @classmethod
+    def of(cls, datasets: Sequence[FitData], parameters: Parameters) -> Prediction:
+        """Of the rows to be fitted or held out."""
+        columns = parameters.columns_of(datasets)
+        table = pose_table(datasets, parameters.robot, columns, len(parameters.places))
+        arguments = tuple(
+            Arguments.of(data, parameters, columns, part)
+            for data, part in zip(datasets, columns.part_of, strict=True)
+        )
+        return cls(table, parameters, columns, arguments)
+
+    @cached_property
+    def frames(self) -> RowsOfSets:
+        """Rows of each set that are in each frame, by its first parameter."""
+        found: RowsOfSets = {}
+        for i, each in enumerate(self.arguments):
+            for first, rows in each.frames:
+                found.setdefault(first, {})[i] = rows
+        return found
+
+    @cached_property
+    def tools(self) -> RowsOfSets:
+        """Rows of each set that have each tool, by its first parameter."""
+        found: RowsOfSets = {}
+        for i, each in enumerate(self.arguments):
+            if "tool" in each.columns:
+                first = each.columns["tool"][:, 0]
+                for tool in np.unique(first).tolist():
+                    found.setdefault(tool, {})[i] = np.flatnonzero(first == tool)
+        return found
+
+    def arguments_of(self, i: int, theta: FloatArray) -> dict[str, FloatArray]:
+        """What readings of set `i` depend on beside the pose, (N, w) each, for `predict`."""
+        own = self.arguments[i]
+        found = dict(own.given)
+        for name, columns in own.columns.items():
+            found[name] = np.where(columns == NONE, found[name], theta[columns])
+        if "tool" in own.columns:
+            first = own.columns["tool"][:, 0].tolist()
+            found["tool_origin"] = np.array([self.parameters.origin[column] for column in first])
+        return found
+
+    def at(self, pose: FloatArray, theta: FloatArray) -> tuple[Predicted, ...]:
+        """Predict the readings of each set at poses (K, 6), with their derivatives."""
+        return tuple(
+            self._moved(i, self._by_geometry_alone(i, pose, theta), pose, theta)
+            if m.components
+            else Predicted(np.empty((len(m), 0)), np.empty((len(m), 0, 6)))
+            for i, m in enumerate(self.table.sets)
+        )
+
+    def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
+        """Measured less predicted of each set."""
+        return tuple(
+            measured.instrument.difference(measured.values, each.values)
+            for measured, each in zip(self.table.sets, predicted, strict=True)
+        )
+
+    def _by_geometry_alone(self, i: int, pose: FloatArray, theta: FloatArray) -> Predicted:
+        own, reading = self.arguments[i], self.table.sets[i].instrument
+        numbers, at = self.arguments_of(i, theta), self._place(i, pose, theta)
+        for name in own.of_effects:
+            del numbers[name]
+        if not own.frames:
+            return reading.predict(at, **numbers)
+        parts = [
+            reading.predict(
+                replace(
+                    at,
+                    pose=at.pose[rows],
+                    frame=theta[first : first + 6],
+                    origin=self.parameters.origin[first],
+                ),
+                **{name: number[rows] for name, number in numbers.items()},
+            )
+            for first, rows in own.frames
+        ]
+        return joined(parts, [rows for _, rows in own.frames])
+
+    def _moved(
+        self, i: int, predicted: Predicted, pose: FloatArray, theta: FloatArray
+    ) -> Predicted:
+        """What is read of set `i` where effects have moved the platform."""
+        effects = self.arguments[i].effects
+        if not effects:
+            return predicted
+        table = self.table
+        places = [(table.pose_of[i], predicted.by_twist)]
+        if predicted.by_other is not None and (other := table.other_of[i]) is not None:
+            places.append((other, predicted.by_other))
+        numbers, by = self.arguments_of(i, theta), dict(predicted.by)
+        change = np.zeros(predicted.values.shape)
+        for effect in effects:
+            for machine, rows in self._machines(i, theta):
+                for place, by_twist in places:
+                    at = place[rows]
+                    found = effect.moved(machine, pose[at], table.actuators[at], rows, numbers)
+                    change[rows] += np.einsum("nki,ni->nk", by_twist[rows], found.twist)
+                    for name, rates in found.by.items():
+                        by.setdefault(name, np.zeros((*change.shape, rates.shape[2])))
+                        by[name][rows] += by_twist[rows] @ rates
+            grown, target = effect.growth_of_targets(), numbers.get("target")
+            if grown is not None and target is not None and "target" in predicted.by:
+                shift = target * grown[:, None]
+                change += np.einsum("nki,ni->nk", predicted.by["target"], shift)
+        values = table.sets[i].instrument.corrected(predicted.values, change)
+        return replace(predicted, values=values, by=by)
+
+    def _place(self, i: int, pose: FloatArray, theta: FloatArray) -> At:
+        """Where the machine is in the rows of set `i`."""
+        measured, other = self.table.sets[i], self.table.other_of[i]
+        return At(
+            pose[self.table.pose_of[i]],
+            None if other is None else pose[other],
+            along=self.arguments[i].along,
+            machines=lambda: self._machines(i, theta),
+            measured=measured,
+        )
+
+    def _machines(self, i: int, theta: FloatArray) -> Iterator[tuple[Calibratable, IntArray]]:
+        """The machines of set `i`, one or one a session, and the rows of each."""
+        table, p = self.table, self.parameters
+        machine_of_row = table.machine_of_pose[table.pose_of[i]]
+        for machine in np.unique(machine_of_row):
+            values = p.values_at(theta, table.machine_columns[machine])
+            yield p.robot.with_values(values), np.flatnonzero(machine_of_row == machine)
+
+    # derivatives by the parameters ----------------------------------------------------------------
+
+    def predicted(self, evaluation: Evaluation) -> tuple[Predicted, ...]:
+        """Predict the readings at an evaluation, which may know them."""
+        owner, known = evaluation.cache.get("predicted", (None, ()))
+        if owner is self:
+            return known
+        return self.at(evaluation.pose, evaluation.theta)
+
+    def derivatives(
+        self, evaluation: Evaluation, closures: SessionClosures
+    ) -> Iterator[tuple[slice, list[Part]]]:
+        """Derivatives of the predicted values by the parameters, batch by batch.
+
+        A batch is rows through all sets, and for each set that has some of these its rows and their
+        derivative (b, k, n). There is one batch where poses have unknowns.
+        """
+        table, count = self.table, len(self.table.rows)
+        predicted = self.predicted(evaluation)
+        direct = [
+            m.instrument.by_geometry(
+                self._place(i, evaluation.pose, evaluation.theta), self.parameters.places
+            )
+            for i, m in enumerate(table.sets)
+        ]
+        place = np.full(len(evaluation.pose), NONE)
+        for batch in lots(count, count if closures.unknowns else _BATCH):
+            some = list(self._in_sets(batch))
+            numbers = self.columns.columns.shape[1]
+            parts = [np.zeros((*predicted[i].values[rows].shape, numbers)) for i, rows in some]
+            for poses, twists in closures.twists_by_numbers(
+                evaluation.machines, evaluation.states, self.parameters.places, self._poses_of(some)
+            ):
+                place[poses] = np.arange(len(poses))
+                for (i, rows), part in zip(some, parts, strict=True):
+                    seen, other = predicted[i], table.other_of[i]
+                    _add_motion(part, seen.by_twist[rows], twists, place[table.pose_of[i][rows]])
+                    if seen.by_other is not None and other is not None:
+                        _add_motion(part, seen.by_other[rows], twists, place[other[rows]])
+                place[poses] = NONE
+            found = []
+            for (i, rows), part in zip(some, parts, strict=True):
+                self._add_direct(part, i, rows, predicted[i], direct[i])
+                wide = self.columns.of_rows(part, i, rows)
+                read, residual = table.sets[i].instrument, evaluation.residuals[i][rows]
+                found.append((i, rows, read.by_difference(wide, residual)))
+            yield batch, found
+
+    def jacobian(self, evaluation: Evaluation, closures: SessionClosures) -> list[FloatArray]:
+        """Derivative of the predicted values of each set to the parameters, (N, k, n).
+
+        With the opposite sign that of the residuals.
+        """
+        n = len(self.parameters)
+        found = [np.empty((*each.shape, n)) for each in evaluation.residuals]
+        for _, parts in self.derivatives(evaluation, closures):
+            for i, rows, part in parts:
+                found[i][rows] = part
+        return found
+
+    def _add_direct(
+        self, part: FloatArray, i: int, rows: slice, seen: Predicted, direct: FloatArray | None
+    ) -> None:
+        """Add how readings follow numbers beside the pose to their derivatives (b, k, m)."""
+        places, frame = self.parameters.places, self.parameters.frame
+        if direct is not None:
+            part[:, :, : len(places)] += direct[rows]
+        if seen.by_frame is not None and frame is not None:
+            part[:, :, frame : frame + 6] = seen.by_frame[rows]
+        for name, numbers in self.arguments[i].numbers.items():
+            own = numbers[rows]
+            row, slot = np.nonzero(own != NONE)
+            part[row, :, own[row, slot]] += seen.by[name][rows][row, :, slot]
+
+    def _in_sets(self, batch: slice) -> Iterator[tuple[int, slice]]:
+        """Rows of each set that has some of these, which count through all sets."""
+        first = 0
+        for i, measured in enumerate(self.table.sets):
+            last = first + len(measured)
+            if batch.start < last and first < batch.stop:
+                yield i, slice(max(batch.start - first, 0), min(batch.stop, last) - first)
+            first = last
+
+    def _poses_of(self, some: Sequence[tuple[int, slice]]) -> IntArray:
+        """Distinct poses of rows of sets, in order."""
+        table = self.table
+        if sum(rows.stop - rows.start for _, rows in some) == len(table.rows):
+            return np.arange(len(table.actuators))
+        pairs = [((table.pose_of[i], table.other_of[i]), rows) for i, rows in some]
+        ends = [end[rows] for both, rows in pairs for end in both if end is not None]
+        return np.unique(np.concatenate(ends))
+
+
+def _add_motion(
+    part: FloatArray, by_twist: FloatArray, twists: FloatArray, place: IntArray
+) -> None:
+    """Add how readings follow the twists (b, 6, g) to their derivatives (N, k, m), g ≤ m.
+
+    `by_twist` is (N, k, 6), `place` (N,) which of the twists moves each row; `NONE`: none of them.
+    """
+    moved = np.flatnonzero(place != NONE)
+    part[moved, :, : twists.shape[2]] += by_twist[moved] @ twists[place[moved]]
