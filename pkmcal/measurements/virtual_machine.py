@@ -157,7 +157,7 @@ class VirtualMachine:
             return (np.linalg.cholesky(covariance) @ drawn[:, :, None])[:, :, 0], self.noise
         deviations = {"rad": self.angle_noise}  # every other unit: the instrument's noise
         sigma = np.array([deviations.get(unit, self.noise) for unit in blank.units])
-        return sigma * drawn, sigma if (sigma > 0).all() else None
+        return sigma * drawn, sigma if len(sigma) and (sigma > 0).all() else None
 
 
 @dataclass(frozen=True)

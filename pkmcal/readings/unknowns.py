@@ -36,7 +36,7 @@ class Numbers:
     """
 
     names: tuple[str, ...]
-    units: tuple[Unit, ...]
+    units: tuple[str, ...]
     slots: IntArray
     start: FloatArray
     scale: FloatArray | None = None
@@ -92,9 +92,10 @@ Found = dict[tuple[str, str], Start]  # by role and name
 def always(
     argument: str,
     role: str,
-    numbers: Sequence[tuple[str, Unit]],
+    numbers: Sequence[tuple[str, str]],
     names: Sequence[str],
     starts: Mapping[tuple[str, str], Start],
+    scale: Sequence[float] | None = None,
 ) -> Dependence:
     """A dependence on numbers that are never known before.
 
@@ -110,6 +111,8 @@ def always(
         Which run, artefact or sensor each row has; "" where there is but one.
     starts : mapping of (str, str) to Start
         Where the search for each begins, by role and name.
+    scale : sequence of float, optional
+        Of each number, as in `Numbers`; needed where its unit is none of the package's.
     """
     sought = {}
     for name in dict.fromkeys(names):
@@ -121,6 +124,7 @@ def always(
             tuple(unit for _, unit in chosen),
             np.array(start.slots, dtype=np.intp),
             start.values,
+            None if scale is None else np.array([scale[slot] for slot in start.slots]),
         )
     order = {name: i for i, name in enumerate(sought)}
     index = np.array([order[name] for name in names], dtype=np.intp)
