@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from pkmcal.arrays import FloatArray
-from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.estimate import Estimate
 from pkmcal.estimation.estimator import FEW, Estimator
 from pkmcal.statistics.distributions import chi2_tail

@@ -89,7 +89,7 @@ def test_no_check_is_made_twice_and_all_survive_a_pickle(found: Identification) 
     ]
     pk.diagnose(found, checks)
     assert sorted(made) == sorted(set(made))
-    again = pickle.loads(pickle.dumps(found))  # noqa: S301
+    again = pickle.loads(pickle.dumps(found))
     assert again.verdict == found.verdict
 
 
