@@ -35,9 +35,9 @@ from pkmcal.fitted.dropped import (
     named_rows,
 )
 from pkmcal.fitted.slack import SLACK, Slack
+from pkmcal.kinematics.calibratable import as_machine
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import as_machine
 from pkmcal.statistics.covariance import RULES, CovarianceRule
 
 

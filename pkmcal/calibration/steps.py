@@ -44,9 +44,9 @@ from pkmcal.fitted.fit_statistics import (
 from pkmcal.fitted.holdout import HeldOut, draw, evaluate
 from pkmcal.fitted.row_names import row_names
 from pkmcal.fitted.slack import Cell, slack_cables, taut
+from pkmcal.kinematics.calibratable import Calibratable, as_given
 from pkmcal.kinematics.robot import Robot
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable, as_given
 from pkmcal.statistics.covariance import CovarianceRule
 
 

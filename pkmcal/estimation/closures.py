@@ -29,8 +29,8 @@ from pkmcal.arrays import BoolArray, FloatArray, IntArray, mm_per_unit
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.exceptions import ArgumentError
 from pkmcal.kinematics import pose_steps
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
-from pkmcal.readings.calibratable import Calibratable
 
 _HELD = 1e-9  # of the size: a step back onto held rows after which its square is rounding
 _STEPS = 30  # back onto them

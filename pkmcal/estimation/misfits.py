@@ -9,7 +9,6 @@ from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.estimation.pose_system import PoseSystem
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.measurements.observation import distance_per_point
 
 _ROUNDING = 2e-15  # of the largest value: the error of a solved pose
 
@@ -35,7 +34,7 @@ def worst_readings(equations: Equations, pose: FloatArray, theta: FloatArray) ->
 def distances(equations: Equations, evaluation: Evaluation) -> FloatArray:
     """How far off each measured point is, mm, in the order of the sets."""
     return np.concatenate([
-        distance_per_point(of_read(m, r), m, equations.parameters.robot.length)
+        m.instrument.distance_per_point(of_read(m, r), m, equations.parameters.robot.length)
         for m, r in zip(equations.sets, evaluation.residuals, strict=True)
     ])  # fmt: skip
 

@@ -14,7 +14,6 @@ from pkmcal.estimation.row_blocks import PoseBlocks
 from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import Machines, SessionClosures
 from pkmcal.estimation.whitening import Whitening
-from pkmcal.measurements.observation import by_difference
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +55,7 @@ class PoseSystem:
         predicted = self.prediction.at(states.pose, theta)
         residuals = self.prediction.residuals(predicted)
         by_pose = [
-            by_difference(m.kind, each.by_twist @ twists[place], residual)
+            m.instrument.by_difference(each.by_twist @ twists[place], residual)
             for m, each, place, residual in zip(
                 table.sets, predicted, table.pose_of, residuals, strict=True
             )

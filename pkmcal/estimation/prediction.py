@@ -19,10 +19,9 @@ from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.session_machines import SessionClosures
 from pkmcal.estimation.sessions import NONE, ParameterMap
 from pkmcal.exceptions import ArgumentError
-from pkmcal.measurements.observation import by_difference, corrected, difference, joined
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.readings import joint_angles, orientation
-from pkmcal.readings.calibratable import Calibratable
-from pkmcal.readings.reading import At, Predicted
+from pkmcal.readings.reading import At, Predicted, joined
 
 _BATCH = 1024  # rows whose derivatives by the parameters are made at once, as many as caches hold
 
@@ -208,7 +207,7 @@ class Prediction:
     def residuals(self, predicted: Sequence[Predicted]) -> tuple[FloatArray, ...]:
         """Measured less predicted of each set."""
         return tuple(
-            difference(measured.kind, measured.values, each.values)
+            measured.instrument.difference(measured.values, each.values)
             for measured, each in zip(self.table.sets, predicted, strict=True)
         )
 
@@ -261,7 +260,7 @@ class Prediction:
                     shift = numbers["target"][rows] * growth[:, None]
                     by_target = predicted.by["target"][rows]
                     change[rows] += np.einsum("nki,ni->nk", by_target, shift)
-        values = corrected(table.sets[i].kind, predicted.values, change)
+        values = table.sets[i].instrument.corrected(predicted.values, change)
         return replace(predicted, values=values, by=by)
 
     def _place(self, i: int, pose: FloatArray, theta: FloatArray) -> At:
@@ -271,7 +270,6 @@ class Prediction:
             pose[self.table.pose_of[i]],
             None if other is None else pose[other],
             along=self.arguments[i].along,
-            artefact=measured.artefact,
             machines=lambda: self._machines(i, theta),
             measured=measured,
         )
@@ -328,8 +326,8 @@ class Prediction:
             for (i, rows), part in zip(some, parts, strict=True):
                 self._add_direct(part, i, rows, predicted[i], direct[i])
                 wide = self.columns.of_rows(part, i, rows)
-                kind, residual = table.sets[i].kind, evaluation.residuals[i][rows]
-                found.append((i, rows, by_difference(kind, wide, residual)))
+                read, residual = table.sets[i].instrument, evaluation.residuals[i][rows]
+                found.append((i, rows, read.by_difference(wide, residual)))
             yield batch, found
 
     def jacobian(self, evaluation: Evaluation, closures: SessionClosures) -> list[FloatArray]:

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pkmcal.arrays import FloatArray
 from pkmcal.estimation.equations import Equations
 from pkmcal.estimation.evaluation import Evaluation
-from pkmcal.measurements.observation import corrected
 
 
 def redrawn(
@@ -38,7 +37,7 @@ def redrawn(
         closures, errors = equations.system.redrawn(at, noise, reduced)
     residuals = tuple(equations.whitening.unwhiten(errors, noise[: len(equations.sets)]))
     sets = tuple(
-        replace(m, values=corrected(m.kind, values, residual).reshape(m.values.shape))
+        replace(m, values=m.instrument.corrected(values, residual).reshape(m.values.shape))
         for m, values, residual in zip(equations.sets, at.predicted, residuals, strict=True)
     )
     parameters = replace(equations.parameters, start=prior_centre, drawn=drawn)

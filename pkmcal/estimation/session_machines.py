@@ -18,9 +18,9 @@ from pkmcal.estimation.row_states import RowStates
 from pkmcal.estimation.sessions import by_parameters
 from pkmcal.estimation.tensioned_poses import Cells, tensioned_poses
 from pkmcal.exceptions import ArgumentError
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.drive_state import DriveState
 from pkmcal.kinematics.robot import Robot
-from pkmcal.readings.calibratable import Calibratable
 
 AnyArray = TypeVar("AnyArray", FloatArray, Int32Array, BoolArray)
 

@@ -21,11 +21,11 @@ from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
 from pkmcal.geometry.load import CELL, Load
 from pkmcal.kinematics import pose_steps
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.equilibrium import Equilibrium, balance, equilibrium
 from pkmcal.kinematics.robot import Robot
-from pkmcal.measurements.fields import filled_tension
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
+from pkmcal.measurements.tension import filled_tension
 
 _SHARE = 0.1  # of the largest force: a step of a tension that counts as one of 1 mm does
 

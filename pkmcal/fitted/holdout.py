@@ -21,8 +21,8 @@ from pkmcal.estimation.labels import Labels, labels
 from pkmcal.estimation.uncertainty import Uncertainty, stated_variances
 from pkmcal.fitted.distances import Distances, distances
 from pkmcal.fitted.later import Later, OwnNumbers, compared, later
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.measurements.measurements import Measurements
-from pkmcal.readings.calibratable import Calibratable
 from pkmcal.statistics.distributions import f_tail
 from pkmcal.statistics.holdout_test import RATIO, HoldoutTest, Lengths, holdout_test
 from pkmcal.statistics.linear_fit import numbered

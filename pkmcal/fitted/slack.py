@@ -22,8 +22,8 @@ from pkmcal.estimation.estimator import Estimator
 from pkmcal.estimation.evaluation import Evaluation
 from pkmcal.exceptions import ArgumentError
 from pkmcal.geometry.limb_kinds import KINDS
+from pkmcal.kinematics.calibratable import Calibratable
 from pkmcal.kinematics.robot import Robot
-from pkmcal.readings.calibratable import Calibratable
 from pkmcal.statistics.robust_scale import median_ratio
 
 Slack = Literal["keep", "drop"]

@@ -121,9 +121,7 @@ def test_derivatives_by_a_tool_are_those_of_differences(hexapod: Robot, framed: 
     equations = Equations.of([data], parameters(hexapod, [data], Asked("offset1")))
     first = equations.parameters.motions[-1]
     origin = dict(equations.parameters.origin) | {first: np.array(TOOLS["across"])}
-    equations = equations.with_parameters(
-        dataclasses.replace(equations.parameters, origin=origin)
-    )
+    equations = equations.with_parameters(dataclasses.replace(equations.parameters, origin=origin))
     rng = np.random.default_rng(0)
     at = equations.parameters.start + 0.1 * rng.standard_normal(len(equations.parameters))
     (jacobian,) = equations.jacobian(equations.at(at))
