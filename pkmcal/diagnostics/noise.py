@@ -186,7 +186,7 @@ CHECKS = (
     ),
     Check(
         name="sigma-too-small",
-        about="± are wider than sigma alone would make them",
+        about="residuals are larger than sigma says, which ± count",
         levels=("remark",),
         run=_widened,
         say=_widened_text,

@@ -31,8 +31,29 @@ _PARTS = ("base", "platform", "limbs")
 _LIMB = re.compile(r"limb([1-9][0-9]*)")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Expansion:
+    """Thermal expansion, an effect that `identify` takes into account.
+
+    With `Measurements.temperature` the numbers that are identified are those at 20 °C.
+
+    Parameters
+    ----------
+    coefficients : float or mapping of str to float
+        In 1/K, of steel 11.5e-6: one for all, or of "base", "platform" (with the targets on it),
+        "limbs" or single ones, "limb3"; parts that are not named do not grow.
+
+    Examples
+    --------
+    >>> Expansion({"base": 11.5e-6, "limb3": 23e-6})
+    Expansion(coefficients={'base': 1.15e-05, 'limb3': 2.3e-05})
+    """
+
+    coefficients: float | Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class MachineExpansion:
     """How the numbers of a machine grow with temperature.
 
     Attributes
@@ -104,7 +125,7 @@ class Growth:
         return self.of_platform
 
 
-def expansion_of(robot: Calibratable, given: Coefficients) -> Expansion | None:
+def expansion_of(robot: Calibratable, given: Coefficients) -> MachineExpansion | None:
     """The coefficients that `identify` was given, of the numbers of a machine.
 
     Raises
@@ -134,7 +155,7 @@ def expansion_of(robot: Calibratable, given: Coefficients) -> Expansion | None:
         if number.unit == "mm" or scale:
             coefficient[i] = of.get(f"limb{number.limb + 1}", of.get("limbs", 0.0))
             column[i] = 2 + actuator
-    return Expansion(of, coefficient, column, of.get("platform", 0.0))
+    return MachineExpansion(of, coefficient, column, of.get("platform", 0.0))
 
 
 def has_lengths(robot: Calibratable) -> TypeGuard[Robot]:
@@ -179,7 +200,11 @@ def in_words(sets: Sequence[Measurements], given: Mapping[str, float], robot: Ca
     low, high = between
     span = f"{low:.4g} to {high:.4g} °C" if low < high else f"{low:.4g} °C"
     if not given:
-        advice = "; --expansion (expansion=) states how it expands" if has_lengths(robot) else ""
+        advice = (
+            "; --expansion (effects=[pk.Expansion(…)]) states how it expands"
+            if has_lengths(robot)
+            else ""
+        )
         return f"the machine was at {span}, which is not taken into account{advice}"
     return (
         f"numbers are those at {REFERENCE:g} °C; the machine was at {span}, expansion:"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arguments import instance, word
-from pkmcal.effects.expansion import Expansion
+from pkmcal.effects.expansion import MachineExpansion
 from pkmcal.estimation.closures import has_equations
 from pkmcal.estimation.fit_data import FitData
 from pkmcal.estimation.parameters import KNOWN, Known
@@ -30,7 +30,7 @@ def as_fit_data(
     measurements: Measurements | Sequence[Measurements],
     said: Said,
     sessions: bool,
-    expansion: Expansion | None = None,
+    expansion: MachineExpansion | None = None,
     others: tuple[Any, ...] = (),
 ) -> list[FitData]:
     """The sets of measurements with what is unknown of each.
@@ -45,7 +45,7 @@ def as_fit_data(
         What `identify` was told of "frame", "target" and "attachment".
     sessions : bool
         Whether every row is to have a session.
-    expansion : Expansion, optional
+    expansion : MachineExpansion, optional
         How the machine grows with its temperature.
     """
     sets = list(measurements) if isinstance(measurements, Iterable) else [measurements]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pkmcal.arrays import BoolArray, IntArray
-from pkmcal.effects.expansion import Expansion
+from pkmcal.effects.expansion import MachineExpansion
 from pkmcal.measurements.components import KINDS
 from pkmcal.measurements.measurements import Measurements
 from pkmcal.readings.unknowns import PLACE, Dependence, Numbers, Start, points_of
@@ -33,7 +33,7 @@ class FitData:
         Of the set, where it has a frame or points of its own.
     starts : mapping of (str, str) to Start
         Of all that is always found along, by role and name.
-    expansion : Expansion or None
+    expansion : MachineExpansion or None
         How the machine grows with its temperature.
     """
 
@@ -44,7 +44,7 @@ class FitData:
     unknown_attachment: bool = False
     set_name: str = ""
     starts: Mapping[tuple[str, str], Start] = field(default_factory=dict)
-    expansion: Expansion | None = None
+    expansion: MachineExpansion | None = None
     others: tuple[Any, ...] = ()
 
     def select(self, chosen: IntArray | BoolArray) -> FitData:

@@ -117,8 +117,8 @@ class Solution(ParameterTable, Identifiability, Misfit, Repeats, HeldOut):
     dropped_names : str
         These rows by lines of files, poses and targets.
     slack : tuple of SlackCable
-        Readings of cables that the others show to be slack, the longest first: left out, or with
-        ``slack="keep"`` fitted.
+        Readings of cables that the others show to be slack, the longest first: left out, or
+        fitted.
     """
 
     robot: Robot | SerialArm

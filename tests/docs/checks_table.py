@@ -18,7 +18,9 @@ def table() -> str:
         says = " or ".join(_MEANS[level] for level in check.levels)
         beside = [_MEANS.get(other, f"`{other}`") for other in check.unless]
         at_once = "yes" if check.at_once else ""
-        rows.append(f"| `{check.name}` | {check.about} | {says} | {', '.join(beside)} | {at_once} |")
+        rows.append(
+            f"| `{check.name}` | {check.about} | {says} | {', '.join(beside)} | {at_once} |"
+        )
     return "\n".join(rows)
 
 
