@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from pkmcal.arguments import shown, word
+from pkmcal.arguments import did_you_mean, shown
 from pkmcal.arrays import BoolArray
 from pkmcal.estimation.begin import estimator_at
 from pkmcal.estimation.equations import Equations
@@ -21,6 +21,7 @@ from pkmcal.fitted.outliers import outliers
 Found = Literal["outliers", "slack"]
 Drop = Found | Sequence[int | Found] | None
 FOUND: tuple[Found, ...] = ("outliers", "slack")
+_WANTED = "'outliers', 'slack' or numbers of rows"
 
 
 class LeftOut(NamedTuple):
@@ -40,11 +41,14 @@ def left_out(drop: Drop, count: int) -> LeftOut:
         No row of the measurements, no such word.
     """
     if drop is not None and not isinstance(drop, str | Iterable):
-        raise ArgumentTypeError(f"drop: 'outliers' or numbers of rows, found {shown(drop)}")
+        raise ArgumentTypeError(f"drop: {_WANTED}, found {shown(drop)}")
     rows, words = set[int](), set[str]()
     for each in () if drop is None else (drop,) if isinstance(drop, str) else drop:
         if isinstance(each, str):
-            words.add(word("drop", each, FOUND))
+            if each not in FOUND:
+                near = did_you_mean(each, FOUND, listed=0)
+                raise ArgumentTypeError(f"drop: {_WANTED}, found {shown(each)}{near}")
+            words.add(each)
         elif isinstance(each, bool) or not isinstance(each, int | np.integer):
             raise ArgumentTypeError(f"drop: rows are whole numbers, found {shown(each)}")
         elif not 0 <= each < count:
